@@ -72,6 +72,17 @@ WITHIN: Mapping[str, Mapping[str, str]] = {
         "st": "line_tags load recorded scan",
         "": "alarm blocks edges scan",
     },
+    "protocols": {
+        "server": "",
+        "tags": "server",
+        "opcua": "server tags",
+        "modbus": "server tags",
+        "mqtt": "server tags",
+        "web": "server tags",
+        "foxglove": "server tags",
+        "hosting": "foxglove modbus mqtt opcua server tags web",
+        "attach": "hosting server tags",
+    },
 }
 """Import rules inside a package, from the lowest up: what each part may import of the others.
 

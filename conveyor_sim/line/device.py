@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conveyor_sim.engine.arrays.types import F8
-from conveyor_sim.engine.compiler.compile import entry
+from conveyor_sim.engine.compiler.numba_internals.machine_code import entry
 from conveyor_sim.engine.support.footing import find_carriers
 from conveyor_sim.line.alarms.declaration import Declared
 from conveyor_sim.line.process_image import of_roles

@@ -19,7 +19,7 @@ from contextlib import suppress
 from typing import BinaryIO
 
 from conveyor_sim.engine.compiler.compile import ENGINE_HASH, KERNELS
-from conveyor_sim.engine.compiler.kernel_cache import NotCached, cached_only
+from conveyor_sim.engine.compiler.kernel_folder import NotCached, cached_only
 from conveyor_sim.physics.model import Model, build_model
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation

@@ -24,8 +24,8 @@ from conveyor_sim.simulation import Simulation
 from conveyor_sim.testing.conditions import Present
 
 if TYPE_CHECKING:
-    from conveyor_sim.protocols.face import Face
-    from conveyor_sim.protocols.source import TagSource
+    from conveyor_sim.protocols.server.interface import ProtocolServer
+    from conveyor_sim.protocols.tags.tag_provider import TagProvider
     from conveyor_sim.ros.attached import AttachedNode
     from conveyor_sim.testing.plc import AttachedPlc
     from conveyor_sim.testing.plc_server import ServedPlc
@@ -98,7 +98,7 @@ class ScanCycle:
 
     def attach_plc(
         self,
-        make: Callable[[TagSource, Path], Face],
+        make: Callable[[TagProvider, Path], ProtocolServer],
         command: Sequence[str],
         environment: Mapping[str, str],
         patience: float,

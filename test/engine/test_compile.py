@@ -61,7 +61,12 @@ def copied(tmp_path: Path) -> Path:
 def python(folder: Path, code: str, **variables: str) -> list[str]:
     """Output of a new interpreter that imports from a folder, with its cache there unless said otherwise."""
     kept = {key: value for key, value in os.environ.items() if key not in ("XDG_CACHE_HOME", "NUMBA_CACHE_DIR")}
-    environment = {**kept, "PYTHONPATH": str(folder), "NUMBA_CACHE_DIR": str(folder / "cache"), **variables}
+    environment = {
+        **kept,
+        "PYTHONPATH": os.pathsep.join([str(folder), *kept.get("PYTHONPATH", "").split(os.pathsep)]),
+        "NUMBA_CACHE_DIR": str(folder / "cache"),
+        **variables,
+    }
     done = subprocess.run(
         [sys.executable, "-c", code], cwd=folder, env=environment, capture_output=True, text=True, check=True
     )
@@ -121,17 +126,13 @@ def test_a_second_process_compiles_nothing(copied: Path) -> None:
 
 
 def test_without_a_cache_kernels_come_from_a_process_of_their_own(copied: Path) -> None:
-    nowhere = {"NUMBA_CACHE_DIR": "/proc/nowhere", "TMPDIR": str(copied / "open")}
-    (copied / "open").mkdir()
-    (copied / "open").chmod(0o777)
-    hits, misses, sentences = (int(number) for number in python(copied, RUN, **nowhere))
+    hits, misses, sentences = (int(number) for number in python(copied, RUN, NUMBA_CACHE_DIR="/proc/nowhere"))
     assert hits >= 3
     assert (misses, sentences) == (0, 1)
-    assert not list((copied / "open").iterdir())
 
 
 def test_where_the_cache_is(copied: Path) -> None:
-    """NUMBA_CACHE_DIR, else XDG_CACHE_HOME, else the home's cache; a temporary folder if that can't be written."""
+    """NUMBA_CACHE_DIR, else XDG_CACHE_HOME, else the home's cache."""
     code = (
         "from conveyor_sim.engine.compiler.compile import ENGINE_HASH, KERNELS; print(KERNELS.path.parent, ENGINE_HASH)"
     )
@@ -142,10 +143,3 @@ def test_where_the_cache_is(copied: Path) -> None:
     assert xdg == [str(copied / "xdg" / "conveyor_sim"), digest]
     home = python(copied, code, NUMBA_CACHE_DIR="", HOME=str(copied))
     assert home == [str(copied / ".cache" / "conveyor_sim"), digest]
-    file = copied / "file"
-    file.write_text("")
-    temporary = copied / "temporary"
-    temporary.mkdir()
-    fallback = python(copied, code, NUMBA_CACHE_DIR=str(file / "cache"), TMPDIR=str(temporary))
-    assert fallback[0].startswith(str(temporary / "conveyor_sim-"))
-    assert fallback[1] == digest

@@ -8,21 +8,19 @@ from typing import Any, NamedTuple
 import numba
 import numpy as np
 import pytest
+from numba_source import relies_on
 
-from conveyor_sim.engine.compiler.call_by_address import address, call
-from conveyor_sim.engine.compiler.compile import OPTIONS
-from conveyor_sim.engine.compiler.dispatcher import KernelDispatcher
+from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.compiler.groups import fewer, group
-from conveyor_sim.engine.compiler.pipelines import KernelCompiler, PartCompiler
+from conveyor_sim.engine.compiler.kernel_folder import KernelFolder
+from conveyor_sim.engine.compiler.numba_internals.call_by_address import call
+from conveyor_sim.engine.compiler.numba_internals.dispatcher import kernel_dispatcher
+from conveyor_sim.engine.compiler.numba_internals.machine_code import address
 
 
 def kernel(function: Any) -> Any:
-    return KernelDispatcher(function, targetoptions=OPTIONS, pipeline_class=KernelCompiler)
-
-
-def part(function: Any) -> Any:
-    options = {**OPTIONS, "no_cpython_wrapper": True}
-    return KernelDispatcher(function, targetoptions=options, pipeline_class=PartCompiler)
+    """Compile a kernel without a cache."""
+    return kernel_dispatcher(function, KernelFolder(None, ""))
 
 
 @group
@@ -59,6 +57,7 @@ def add_all(outer: Any) -> float:
     return outer.inner.factor
 
 
+@relies_on("core/pythonapi.py: PythonAPI.long_as_voidptr", "core/pythonapi.py: unbox")
 def test_parts_reach_the_arrays_of_a_group() -> None:
     """Groups within groups, through two calls, and again with other arrays."""
     for _ in range(2):
@@ -116,6 +115,7 @@ def test_a_member_that_is_absent_is_pruned() -> None:
     assert outer.sums.tolist() == [1.5, 1.5]
 
 
+@relies_on("core/untyped_passes.py: DeadBranchPrune.run_pass", "core/analysis.py: rewrite_semantic_constants")
 def test_a_member_of_a_member_is_pruned() -> None:
     """The group itself is an argument, its members are not."""
 
@@ -161,6 +161,7 @@ def test_a_group_without_some_members() -> None:
     assert fewer(outer, frozenset({"inner"})).inner is None
 
 
+@relies_on("core/base.py: BaseContext.cast", "core/imputils.py: lower_cast")
 def test_a_part_is_compiled_once_for_all_groups_that_differ_in_what_it_does_not_read() -> None:
     """Through what it calls, and through names of its own; members of other kinds, and members that are not there."""
 
@@ -190,6 +191,12 @@ def test_a_part_is_compiled_once_for_all_groups_that_differ_in_what_it_does_not_
     assert (len(both.signatures), len(size.signatures)) == (2, 2)
 
 
+@relies_on(
+    "core/typeinfer.py: StaticGetItemConstraint",
+    "core/rewrites/static_getitem.py: RewriteConstGetitems",
+    "core/lowering.py: Lower.lower_setitem",
+    "core/typing/templates.py: AbstractTemplate",
+)
 def test_a_column_is_indexed_as_an_array_is() -> None:
     """From the end too, by numbers of any width, with what is stored made the column's kind."""
 
@@ -216,6 +223,7 @@ def test_what_is_only_to_be_read_is_not_written() -> None:
     assert add_all(Outer(Inner(sums, 1.0), np.zeros(3))) == 1.0
 
 
+@relies_on("core/datamodel/packer.py: ArgPacker.from_arguments", "core/codegen.py: CodeLibrary.create_ir_module")
 def test_a_kernel_calls_another_by_its_address() -> None:
     """With what it was given itself, not with the copies that it works on."""
 

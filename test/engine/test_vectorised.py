@@ -14,7 +14,7 @@ import pytest
 from numba import uint64
 
 from conveyor_sim.engine.arrays.contacts import ContactLaw
-from conveyor_sim.engine.compiler.pipelines import KernelCompiler
+from conveyor_sim.engine.compiler.numba_internals.pipelines import KernelCompiler
 from conveyor_sim.engine.contact.contact import contact_force, spring_after
 from conveyor_sim.engine.contact.friction import implicit_regularisation, regularisation
 from conveyor_sim.engine.support.ring import ring_means, ring_share

@@ -59,7 +59,7 @@ class Invariants:
         """The checks; sent: the inputs of this tick, and what was told of them."""
         self._belts.check(sent, outcomes)
         now = self._finite()
-        self._devices.check(self._before, now, sent)
+        self._devices.check(self._before, now, outcomes)
         self.bottle_ticks += len(now.id)
         fresh = self._identities(now)
         self._births(now, fresh)

@@ -89,7 +89,7 @@ def test_the_best_point_is_near_the_bound_and_better_than_the_start(bounded: Opt
     assert {row.seed for row in fresh.rows} == {row.seed for row in start.rows} == set(range(3, 7))
     said = "\n".join(answer(bounded, UNITS))
     assert "speed_is < 0.5 on average, and in 4 of 4 runs" in said
-    assert "is told from none with 4 seeds: best has more than start" in said
+    assert "is significant with 4 seeds: best is higher than start" in said
 
 
 @pytest.mark.parametrize(

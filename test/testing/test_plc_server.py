@@ -26,7 +26,7 @@ from conveyor_sim.protocols.attach.free_running import PlcFace
 from conveyor_sim.protocols.attach.link import LinkError
 from conveyor_sim.protocols.attach.links import all_of, link
 from conveyor_sim.protocols.attach.tag_map import TagMapError, read_tag_map
-from conveyor_sim.protocols.server_thread import ServerThread
+from conveyor_sim.protocols.hosting.server_thread import ServerThread
 from conveyor_sim.testing.scenario import Scenario
 
 SECONDS = 4.0

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager
 from typing import Any
 
-from conveyor_sim.engine.compiler.compile_time import CompileTime
+from conveyor_sim.engine.compiler.numba_internals.compile_time import CompileTime
 
 
 def cpu_time() -> float:

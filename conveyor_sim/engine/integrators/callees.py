@@ -1,8 +1,9 @@
 """Kernels that the integrators call by their addresses: what comes seldom, and is the same for all laws of contacts."""
 
 from conveyor_sim.engine.arrays.world import Worker, World
-from conveyor_sim.engine.compiler.call_by_address import address, call
 from conveyor_sim.engine.compiler.compile import part
+from conveyor_sim.engine.compiler.numba_internals.call_by_address import call
+from conveyor_sim.engine.compiler.numba_internals.machine_code import address
 from conveyor_sim.engine.lists.rebuild import rebuild
 from conveyor_sim.engine.observers.guard_probe import probe_overlaps
 from conveyor_sim.engine.world_views import lists_of

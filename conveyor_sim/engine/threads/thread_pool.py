@@ -7,7 +7,7 @@ from queue import SimpleQueue
 from typing import Any
 
 from conveyor_sim.engine.arrays.world import Worker, World
-from conveyor_sim.engine.compiler.compile import entry
+from conveyor_sim.engine.compiler.numba_internals.machine_code import entry
 from conveyor_sim.engine.integrators import Advance
 from conveyor_sim.engine.integrators.callees import find_callees
 from conveyor_sim.engine.threads.workers import workers

@@ -5,11 +5,7 @@ whole units, and each share is worked on block by block. No block reads what ano
 sum runs over blocks, so the bits do not depend on who did which.
 """
 
-from typing import Any
-
-import numba
 import numpy as np
-from numba.extending import intrinsic
 
 from conveyor_sim.engine.arrays.contacts import Gathered
 from conveyor_sim.engine.arrays.damage import empty_history
@@ -17,6 +13,7 @@ from conveyor_sim.engine.arrays.rails import RailContacts
 from conveyor_sim.engine.arrays.types import F8, U4
 from conveyor_sim.engine.arrays.world import Worker
 from conveyor_sim.engine.compiler.compile import part
+from conveyor_sim.engine.compiler.numba_internals.atomics import add_atomic, load_atomic, sched_yield, store_atomic
 
 UNIT = 64
 """Pairs, or bottles, that are never parted: few enough that shares are even, and no two threads write to one line."""
@@ -88,69 +85,31 @@ def wait_for_all(worker: Worker) -> None:
     """Return when all workers have called it; what they wrote before is then seen by all."""
     if worker.size == 1:
         return
-    turn = _load(worker.sync, TURN)
-    if _add(worker.sync, ARRIVED, 1) == worker.size - 1:
-        _store(worker.sync, ARRIVED, 0)
-        _store(worker.sync, TURN, turn + 1)
+    turn = load_atomic(worker.sync, TURN)
+    if add_atomic(worker.sync, ARRIVED, 1) == worker.size - 1:
+        store_atomic(worker.sync, ARRIVED, 0)
+        store_atomic(worker.sync, TURN, turn + 1)
         return
     spins = 0
-    while _load(worker.sync, TURN) == turn:
+    while load_atomic(worker.sync, TURN) == turn:
         spins += 1
         if spins > SPINS:
-            _sched_yield()
+            sched_yield()
 
 
 @part
 def raise_flag(worker: Worker, flag: int) -> None:
     """Set a flag that all see after the next `wait_for_all`."""
-    _store(worker.sync, flag, 1)
+    store_atomic(worker.sync, flag, 1)
 
 
 @part
 def lower_flag(worker: Worker, flag: int) -> None:
     """Clear a flag; by one worker, between two barriers."""
-    _store(worker.sync, flag, 0)
+    store_atomic(worker.sync, flag, 0)
 
 
 @part
 def flag_raised(worker: Worker, flag: int) -> bool:
     """Whether a flag is set."""
-    return _load(worker.sync, flag) != 0
-
-
-_sched_yield = numba.types.ExternalFunction("sched_yield", numba.types.int32())
-
-
-def _pointer(context: Any, builder: Any, array_type: Any, array: Any, index: Any) -> Any:
-    return builder.gep(builder.extract_value(array, 0), [index])
-
-
-def _load_atomic(typing: Any, array: Any, index: Any) -> Any:
-    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        pointer = _pointer(context, builder, signature.args[0], args[0], args[1])
-        return builder.load_atomic(pointer, "seq_cst", 8)
-
-    return numba.types.int64(array, numba.types.intp), generate
-
-
-def _store_atomic(typing: Any, array: Any, index: Any, value: Any) -> Any:
-    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        pointer = _pointer(context, builder, signature.args[0], args[0], args[1])
-        builder.store_atomic(args[2], pointer, "seq_cst", 8)
-        return context.get_dummy_value()
-
-    return numba.types.void(array, numba.types.intp, numba.types.int64), generate
-
-
-def _add_atomic(typing: Any, array: Any, index: Any, value: Any) -> Any:
-    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        pointer = _pointer(context, builder, signature.args[0], args[0], args[1])
-        return builder.atomic_rmw("add", pointer, args[2], "seq_cst")
-
-    return numba.types.int64(array, numba.types.intp, numba.types.int64), generate
-
-
-# Numba has no atomic access to arrays on a CPU; these three are what a barrier takes.
-_load: Any = intrinsic(_load_atomic)
-_store: Any = intrinsic(_store_atomic)
-_add: Any = intrinsic(_add_atomic)
+    return load_atomic(worker.sync, flag) != 0

@@ -21,8 +21,8 @@ from conveyor_sim.bag.markers import bottles_markers, plant_markers
 from conveyor_sim.bag.messages import Header
 from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.bag.typestore import default_distro
-from conveyor_sim.protocols.face import FaceError, Status
-from conveyor_sim.protocols.view import DRAWN, HEARD, PictureSource
+from conveyor_sim.protocols.server.interface import ServerError, Status
+from conveyor_sim.protocols.tags.line_mirror import DRAWING_TOPICS, STATE_TOPICS, DrawableProvider
 from conveyor_sim.scene import parse_overrides, parse_scene
 from conveyor_sim.scene.geometry import belt_shapes, rail_shapes
 from conveyor_sim.scene.marks import marks_of
@@ -46,7 +46,7 @@ FRAME = "world"
 class FoxgloveServer:
     """Follows a source; what is drawn is asked of it as long as somebody looks at that."""
 
-    def __init__(self, source: PictureSource, host: str, port: int) -> None:
+    def __init__(self, source: DrawableProvider, host: str, port: int) -> None:
         """port: 0 for any that is free."""
         self._source, self._at = source, (host, port)
         self._context = foxglove.Context()  # without it channels are closed
@@ -68,10 +68,10 @@ class FoxgloveServer:
         return f"ws://{host}:{port}"
 
     async def start(self) -> None:
-        """Serve from now on. Raises FaceError if that can't be."""
+        """Serve from now on. Raises ServerError if that can't be."""
         self._loop = asyncio.get_running_loop()
         distro = default_distro()
-        for topic in (*HEARD, *DRAWN, PLANT, MARKERS):
+        for topic in (*STATE_TOPICS, *DRAWING_TOPICS, PLANT, MARKERS):
             known = schema_of(topic, distro)
             schema = foxglove.Schema(name=known.name, encoding=known.encoding, data=known.text)
             self._channels[topic] = foxglove.Channel(
@@ -88,7 +88,7 @@ class FoxgloveServer:
                 message_backlog_size=WAITING,
             )
         except Exception as error:  # the library has no type of its own for it
-            raise FaceError(f"foxglove: {self._at[0]}:{self._at[1]} can't be served ({error})") from error
+            raise ServerError(f"foxglove: {self._at[0]}:{self._at[1]} can't be served ({error})") from error
         self._ends = [self._source.hear(self._heard), self._source.listen(lambda: self._in_loop(self._changed.set))]
         self._task = asyncio.create_task(self._draw_all())
 
@@ -145,7 +145,7 @@ class FoxgloveServer:
 
     def _watch(self) -> None:
         """Have drawn what somebody looks at, and nothing else."""
-        wanted = any(self._looks[topic] for topic in (*DRAWN, MARKERS))
+        wanted = any(self._looks[topic] for topic in (*DRAWING_TOPICS, MARKERS))
         if wanted and self._end_watch is None:
             self._end_watch = self._source.watch()
         elif not wanted and self._end_watch is not None:

@@ -7,8 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from conveyor_sim.line.tag import COMMANDS, SIGNALS, Tag
-from conveyor_sim.protocols.hands import is_mode
-from conveyor_sim.protocols.handshake import TARGET, TICK
+from conveyor_sim.protocols.tags.control_mode import is_mode
+from conveyor_sim.protocols.tags.handshake import TARGET, TICK
 from conveyor_sim.support.files import FileError, write_file
 from conveyor_sim.support.modbus_rows import (
     GONE,

@@ -28,13 +28,13 @@ from conveyor_sim.line.commands.authority import MAY
 from conveyor_sim.line.commands.inputs import MODE, SET, Input, WriterKind
 from conveyor_sim.line.commands.receipt import Cause, Receipt
 from conveyor_sim.line.tag import COMMANDS
-from conveyor_sim.protocols.face import HERE, FaceError, Status, require_free
-from conveyor_sim.protocols.hands import objection, refused_for_good
-from conveyor_sim.protocols.handshake import MAY_GO_ON, TARGET, TICK
-from conveyor_sim.protocols.holding import Holding, HoldingService
 from conveyor_sim.protocols.modbus.address_map import SET_MODE
-from conveyor_sim.protocols.quotas import GUEST, QUOTA, Place, Places, Quota
-from conveyor_sim.protocols.source import MODBUS, TagSource
+from conveyor_sim.protocols.server.interface import HERE, ServerError, Status, require_free
+from conveyor_sim.protocols.server.quotas import GUEST, QUOTA, ConnectionSlot, ConnectionSlots, Quota
+from conveyor_sim.protocols.tags.control_mode import objection, refused_for_good
+from conveyor_sim.protocols.tags.handshake import MAY_GO_ON, TARGET, TICK
+from conveyor_sim.protocols.tags.holding import Holding, HoldingService
+from conveyor_sim.protocols.tags.tag_provider import MODBUS, TagProvider
 from conveyor_sim.support.modbus_rows import Row, Table, decode, encode
 
 MOST_UNREAD = 64 * 1024
@@ -77,7 +77,7 @@ class ModbusServer:
 
     def __init__(
         self,
-        source: TagSource,
+        source: TagProvider,
         rows: Sequence[Row],
         role: WriterKind | None = None,
         host: str = HERE,
@@ -118,18 +118,18 @@ class ModbusServer:
         return Status(len(server.connected), 0, image.writes, image.refused, longest)
 
     async def start(self) -> None:
-        """Listen. Raises FaceError if that is not possible."""
+        """Listen. Raises ServerError if that is not possible."""
         logging.getLogger("pymodbus.logging").setLevel(logging.CRITICAL)  # it logs whatever clients send
         host, port = self._at
         require_free(MODBUS, host, port)
         # The library wants a device of its own; the image takes its place at each request.
         server = _Server(SimDevice(0, simdata=SimData(0, datatype=DataType.REGISTERS)), address=(host, port))
         server.image, server.holding = self._image, self._image.holding
-        server.places = Places(self._quota, keeps_active=True)
+        server.places = ConnectionSlots(self._quota, keeps_active=True)
         try:
             await server.serve_forever(background=True)
         except (OSError, RuntimeError) as error:
-            raise FaceError(f"modbus: {host}:{port} can't be listened on ({error})") from error
+            raise ServerError(f"modbus: {host}:{port} can't be listened on ({error})") from error
         self._server = server
         self._watch = asyncio.create_task(server.watch())
 
@@ -148,7 +148,7 @@ class _Server(ModbusTcpServer):
     image: Any
     """An _Image: to the library, what a request is done to."""
     holding: HoldingService
-    places: Places
+    places: ConnectionSlots
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
@@ -174,7 +174,7 @@ class _Handler(ServerRequestHandler):
     server: _Server
     writer = ""
     """Who its client is on record."""
-    place: Place | None = None
+    place: ConnectionSlot | None = None
     asked = 0.0
     """s of wall time, when it asked for something last."""
     _received = b""
@@ -281,7 +281,7 @@ class _Image:
     """What the library asks for values, in place of a device's memory."""
 
     def __init__(
-        self, source: TagSource, rows: Sequence[Row], role: WriterKind | None, holding: HoldingService
+        self, source: TagProvider, rows: Sequence[Row], role: WriterKind | None, holding: HoldingService
     ) -> None:
         self._source, self._role, self.holding = source, role, holding
         self._receipt = Receipt(source.about.tags, source.about.where)

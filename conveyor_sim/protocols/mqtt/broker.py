@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
-from conveyor_sim.protocols.face import FaceError, Settings
-from conveyor_sim.protocols.source import About
+from conveyor_sim.protocols.server.interface import ServerError
+from conveyor_sim.protocols.tags.tag_provider import LineInfo
 from conveyor_sim.support.files import MB, FileError, read_file
 from conveyor_sim.support.printable import printable
 
@@ -57,53 +57,60 @@ class Broker:
         """Whether what is sent there stays on this machine."""
         return self.host in ("localhost", "::1") or self.host.startswith("127.")
 
-    def named(self, about: About) -> tuple[str, str]:
+    def named(self, about: LineInfo) -> tuple[str, str]:
         """Group and edge node of a line."""
         return self.group or about.where.replace("/", ":") or about.name, self.node or about.name
 
     def context(self) -> ssl.SSLContext:
-        """What TLS goes by. Raises FaceError."""
+        """What TLS goes by. Raises ServerError."""
         try:
             context = ssl.create_default_context(cafile=self.authority)
         except (OSError, ValueError) as error:
-            raise FaceError(f"{self.authority}: {_reason(error)}, expected certificates in PEM") from error
+            raise ServerError(f"{self.authority}: {_reason(error)}, expected certificates in PEM") from error
         context.minimum_version = ssl.TLSVersion.TLSv1_2
         return context
 
     def require_reachable(self) -> None:
-        """Raises FaceError, with the reason, if nothing can be connected to there."""
+        """Raises ServerError, with the reason, if nothing can be connected to there."""
         try:
             socket.create_connection((self.host, self.port), PATIENCE).close()
         except OSError as error:
-            raise FaceError(f"{self.address}: can't be reached ({_reason(error)}), expected an MQTT broker") from error
+            raise ServerError(
+                f"{self.address}: can't be reached ({_reason(error)}), expected an MQTT broker"
+            ) from error
 
 
-def broker_of(url: str, settings: Settings) -> Broker:
-    """The one that a URL and the settings of the face name. Raises FaceError, with what was given and expected."""
+def broker_of(
+    url: str, *, authority: Path | None = None, password_file: Path | None = None, primary_host: str = ""
+) -> Broker:
+    """Return the broker at `url`. The other parameters are the fields of `Broker` and the file of its password.
+
+    Raises ServerError.
+    """
     given = f"mqtt: {printable(url)} given"
     try:
         parts = urlsplit(url)
         port = parts.port
     except ValueError as error:
-        raise FaceError(f"{given} ({error}), {EXPECTED}") from error
+        raise ServerError(f"{given} ({error}), {EXPECTED}") from error
     names = parts.path.strip("/").split("/") if parts.path.strip("/") else []
     if parts.password is not None:
-        raise FaceError(
+        raise ServerError(
             "mqtt: a password given in the URL, where all users of this machine see it; expected it in the environment "
             f"variable {PASSWORD} or by --mqtt-password-file"
         )
     if parts.scheme not in _PORTS or not parts.hostname or parts.query or parts.fragment or len(names) > 2:
-        raise FaceError(f"{given}, {EXPECTED}")
-    for name in (*names, settings.mqtt_primary_host or "none"):
+        raise ServerError(f"{given}, {EXPECTED}")
+    for name in (*names, primary_host or "none"):
         if not _ID.fullmatch(name) or name == "STATE":
-            raise FaceError(f"mqtt: {printable(name)} given as a name, expected letters, digits, or any of _ . : -")
+            raise ServerError(f"mqtt: {printable(name)} given as a name, expected letters, digits, or any of _ . : -")
     secured = parts.scheme == "mqtts"
-    if settings.mqtt_ca is not None and not secured:
-        raise FaceError(f"--mqtt-ca: given with {parts.scheme}://, expected mqtts://")
+    if authority is not None and not secured:
+        raise ServerError(f"--mqtt-ca: given with {parts.scheme}://, expected mqtts://")
     user = unquote(parts.username or "")
-    if settings.mqtt_password_file is not None and not user:
-        raise FaceError("--mqtt-password-file: given without a user, expected mqtt://USER@HOST")
-    password = _password(settings.mqtt_password_file) if user else ""
+    if password_file is not None and not user:
+        raise ServerError("--mqtt-password-file: given without a user, expected mqtt://USER@HOST")
+    password = _password(password_file) if user else ""
     group, node = (*names, "", "")[:2]
     return Broker(
         parts.hostname,
@@ -111,10 +118,10 @@ def broker_of(url: str, settings: Settings) -> Broker:
         secured,
         user,
         password,
-        settings.mqtt_ca,
+        authority,
         group,
         node,
-        settings.mqtt_primary_host,
+        primary_host,
     )
 
 
@@ -124,9 +131,9 @@ def _password(path: Path | None) -> str:
     try:
         return read_file(path, MB).decode().partition("\n")[0].rstrip("\r")
     except FileError as error:
-        raise FaceError(f"{path}: {error}, expected a file with the password of the broker") from error
+        raise ServerError(f"{path}: {error}, expected a file with the password of the broker") from error
     except UnicodeDecodeError as error:
-        raise FaceError(f"{path}: is not UTF-8, expected a file with the password of the broker") from error
+        raise ServerError(f"{path}: is not UTF-8, expected a file with the password of the broker") from error
 
 
 def _reason(error: Exception) -> str:

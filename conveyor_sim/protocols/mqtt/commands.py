@@ -1,4 +1,4 @@
-"""`Commands`: what hosts want of a line by NCMD and DCMD, judged at once, and then given to the source as inputs are.
+"""`HostCommands`: commands of Sparkplug hosts by NCMD and DCMD, checked at once and passed on as inputs.
 
 A command names nobody, and Sparkplug has no answers: whoever the broker lets publish it gives it, in the role that the
 face was given, and hosts find what came of it in metrics of the edge node.
@@ -13,11 +13,11 @@ from typing import Any
 from conveyor_sim.line.commands.inputs import MODE, SET, Input, WriterKind
 from conveyor_sim.line.commands.receipt import Receipt
 from conveyor_sim.line.tag import COMMANDS, Tag
-from conveyor_sim.protocols.hands import TAKES_NO_INPUT, is_mode, objection, refused_for_good
-from conveyor_sim.protocols.holding import Holding, HoldingService
 from conveyor_sim.protocols.mqtt.line_metrics import number_of
 from conveyor_sim.protocols.mqtt.payload import decoded
-from conveyor_sim.protocols.source import MQTT, TagSource
+from conveyor_sim.protocols.tags.control_mode import TAKES_NO_INPUT, is_mode, objection, refused_for_good
+from conveyor_sim.protocols.tags.holding import Holding, HoldingService
+from conveyor_sim.protocols.tags.tag_provider import MQTT, TagProvider
 from conveyor_sim.support.printable import SENTENCE, printable
 
 REBIRTH = "Node Control/Rebirth"
@@ -30,12 +30,12 @@ SILENCE = 30.0
 """s of wall time without a command after which no controller holds the line by this face."""
 
 
-class Commands:
+class HostCommands:
     """Of all hosts of one source, by one broker."""
 
     def __init__(
         self,
-        source: TagSource,
+        source: TagProvider,
         role: WriterKind | None,
         broker: str,
         silence: float = SILENCE,

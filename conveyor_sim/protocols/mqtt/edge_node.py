@@ -17,17 +17,25 @@ from types import MappingProxyType
 
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.commands.inputs import WriterKind
-from conveyor_sim.protocols.clock import Clock
-from conveyor_sim.protocols.face import FaceError, Stamps, Status
-from conveyor_sim.protocols.holding import HoldingService
 from conveyor_sim.protocols.mqtt.birth_numbers import BirthNumbers
 from conveyor_sim.protocols.mqtt.broker import Broker
-from conveyor_sim.protocols.mqtt.commands import SILENCE, Commands
+from conveyor_sim.protocols.mqtt.commands import SILENCE, HostCommands
 from conveyor_sim.protocols.mqtt.hosts import PrimaryHost
 from conveyor_sim.protocols.mqtt.line_metrics import LineMetrics
-from conveyor_sim.protocols.mqtt.link import MOST_BYTES, NEWEST, OLDEST, Link, LinkError, Message, TooNewError
-from conveyor_sim.protocols.mqtt.session import BETWEEN, Names, Session, death
-from conveyor_sim.protocols.source import Shown, TagSource
+from conveyor_sim.protocols.mqtt.link import (
+    MOST_BYTES,
+    NEWEST,
+    OLDEST,
+    BrokerConnection,
+    BrokerConnectionError,
+    MqttMessage,
+    TooNewError,
+)
+from conveyor_sim.protocols.mqtt.session import BETWEEN, SparkplugSession, SparkplugTopics, death
+from conveyor_sim.protocols.server.interface import ServerError, Stamps, Status
+from conveyor_sim.protocols.tags.holding import HoldingService
+from conveyor_sim.protocols.tags.tag_provider import LineSnapshot, TagProvider
+from conveyor_sim.protocols.tags.tick_clock import TickClock
 
 MOST_BEHIND = 200
 """Ticks that wait to be sent; one more, and the last of them gives way to it."""
@@ -46,7 +54,7 @@ class EdgeNode:
 
     def __init__(
         self,
-        source: TagSource,
+        source: TagProvider,
         broker: Broker,
         role: WriterKind | None = None,
         stamps: Stamps = "wall",
@@ -60,16 +68,16 @@ class EdgeNode:
         were refused, before a restart.
         """
         self._source, self._broker = source, broker
-        self._names = Names(*broker.named(source.about))
-        self._commands = Commands(source, role, f"{broker.host}:{broker.port}", silence, holding)
+        self._names = SparkplugTopics(*broker.named(source.about))
+        self._commands = HostCommands(source, role, f"{broker.host}:{broker.port}", silence, holding)
         self._commands.before = before
-        self._line = LineMetrics(source.about, Clock(source.about, stamps), writes=role is not None)
+        self._line = LineMetrics(source.about, TickClock(source.about, stamps), writes=role is not None)
         self._numbers = BirthNumbers(broker.address, self._names.group, self._names.node)
         self._births = 0  # number of the present connection
         self._version = NEWEST
-        self._link: Link | None = None
+        self._link: BrokerConnection | None = None
         self._state = "not connected"
-        self._waiting: deque[tuple[Shown, datetime]] = deque()
+        self._waiting: deque[tuple[LineSnapshot, datetime]] = deque()
         self._left_out = 0
         self._longest = 0.0
         self._told = False
@@ -89,13 +97,13 @@ class EdgeNode:
 
     async def start(self) -> None:
         """Connect to the broker, and send births, as soon as the primary host is there, if one is waited for. Raises
-        FaceError if it can't be connected to.
+        ServerError if it can't be connected to.
         """
         self._loop, self._wake = asyncio.get_running_loop(), asyncio.Event()
         try:
             self._link = await self._connect()
-        except LinkError as error:
-            raise FaceError(f"mqtt: {error}") from error
+        except BrokerConnectionError as error:
+            raise ServerError(f"mqtt: {error}") from error
         self._tasks = [asyncio.create_task(self._run()), asyncio.create_task(self._watch())]
         self._tasks[0].add_done_callback(self._ended)
 
@@ -134,22 +142,22 @@ class EdgeNode:
             self._commands.look()
             self._wake.set()
 
-    async def _connect(self) -> Link:
+    async def _connect(self) -> BrokerConnection:
         """Return a connection with the next number, by the newest version of MQTT that the broker accepts.
 
-        Raises LinkError, FaceError.
+        Raises LinkError, ServerError.
         """
         version = self._version
         while True:
             number = await asyncio.to_thread(self._numbers.take)
             last_words = death(number)
-            will = Message(self._names.of("NDEATH"), last_words, len(last_words), False)
-            link = Link(self._broker, self._name, will, version, self._notice)
+            will = MqttMessage(self._names.of("NDEATH"), last_words, len(last_words), False)
+            link = BrokerConnection(self._broker, self._name, will, version, self._notice)
             opening = asyncio.ensure_future(asyncio.to_thread(link.open))
             try:
                 await asyncio.shield(opening)
             except asyncio.CancelledError:
-                with suppress(LinkError):  # a connection that nobody knows of would look like a line that is there
+                with suppress(BrokerConnectionError):  # an open connection without owner would look like a live line
                     await opening
                     await asyncio.to_thread(link.close)
                 raise
@@ -173,9 +181,9 @@ class EdgeNode:
         """By which the broker knows this client: a newer one of the same name takes its place."""
         return f"conveyor_sim-{self._names.group}-{self._names.node}"
 
-    async def _serve(self, link: Link) -> None:
+    async def _serve(self, link: BrokerConnection) -> None:
         """Send and take commands until the connection is lost, or the primary host."""
-        session = Session(link, self._names, self._births, self._line, self._commands)
+        session = SparkplugSession(link, self._names, self._births, self._line, self._commands)
         host = PrimaryHost(self._broker.primary_host)
         hosts = [host.topic] if host.topic else []
         link.subscribe(self._names.node_commands, self._names.line_commands, *hosts)
@@ -208,7 +216,7 @@ class EdgeNode:
             end()
             self._waiting.clear()
 
-    async def _send(self, session: Session, link: Link, again: int) -> int:
+    async def _send(self, session: SparkplugSession, link: BrokerConnection, again: int) -> int:
         """What there is to send. again: how often births were asked for again; returned is how often they still are."""
         if session.born_at is None or again:
             if session.born_at is not None and time.monotonic() < session.born_at + BIRTHS_EVERY:
@@ -230,7 +238,7 @@ class EdgeNode:
             self._loop.call_later(BETWEEN, self._wake.set)
         return 0
 
-    def _take(self, message: Message) -> int:
+    def _take(self, message: MqttMessage) -> int:
         """A command; 1 if it asks for births again, else 0."""
         if message.retained:
             self._commands.refuse("a command kept by the broker, expected one that is sent without retain")
@@ -242,7 +250,7 @@ class EdgeNode:
             self._commands.take_line(message.data)
         return 0
 
-    def _state_of(self, link: Link, host: PrimaryHost) -> str:
+    def _state_of(self, link: BrokerConnection, host: PrimaryHost) -> str:
         if not host.online:
             return f"waits for host {self._broker.primary_host}"
         return "connected, the broker lets no commands come" if link.denied else "connected"

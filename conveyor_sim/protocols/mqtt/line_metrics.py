@@ -9,9 +9,6 @@ from typing import Any, NamedTuple
 
 from conveyor_sim.line.run_state import ENDED, PAUSED, STOPPED
 from conveyor_sim.line.tag import COMMANDS, SIGNALS, Tag, count, seconds
-from conveyor_sim.protocols.clock import Clock
-from conveyor_sim.protocols.hands import is_mode
-from conveyor_sim.protocols.handshake import TICK
 from conveyor_sim.protocols.mqtt.payload import (
     BOOLEAN,
     DOUBLE,
@@ -26,7 +23,10 @@ from conveyor_sim.protocols.mqtt.payload import (
     add_property,
     whole,
 )
-from conveyor_sim.protocols.source import About, Shown
+from conveyor_sim.protocols.tags.control_mode import is_mode
+from conveyor_sim.protocols.tags.handshake import TICK
+from conveyor_sim.protocols.tags.tag_provider import LineInfo, LineSnapshot
+from conveyor_sim.protocols.tags.tick_clock import TickClock
 from conveyor_sim.support.rounded_limit import at_limit
 
 FORCED = "forced"
@@ -46,7 +46,7 @@ class _Reading(NamedTuple):
     forced: bool
 
 
-def is_there(shown: Shown) -> bool:
+def is_there(shown: LineSnapshot) -> bool:
     """Whether a line is one whose values are those of now, or of a pause: otherwise the device is dead."""
     return not shown.lost and shown.run.state not in (ENDED, STOPPED)
 
@@ -74,7 +74,7 @@ def number_of(tag: Tag, metric: Any) -> float | None:
 class LineMetrics:
     """Of one line, as its hosts know it."""
 
-    def __init__(self, about: About, clock: Clock, writes: bool) -> None:
+    def __init__(self, about: LineInfo, clock: TickClock, writes: bool) -> None:
         """writes: whether hosts may command."""
         self._tick, self._clock, self._writes = about.tick, clock, writes
         shown = [tag for tag in about.tags if tag.role in (*SIGNALS, *COMMANDS)]
@@ -83,7 +83,7 @@ class LineMetrics:
         self._clocks = {TICK, TIME, *(tag.name for tag in shown if tag.role == "counter" and tag.unit == "s")}
         self._sent: dict[str, _Reading] = {}
 
-    def birth(self, shown: Shown, heard: datetime) -> Any:
+    def birth(self, shown: LineSnapshot, heard: datetime) -> Any:
         """All of them, with what stays the same of each, as a payload."""
         payload, stamp = Payload(), milliseconds(self._clock.stamp(shown.tick, heard))
         self._sent.clear()
@@ -93,7 +93,7 @@ class LineMetrics:
             self._sent[tag.name] = reading
         return payload
 
-    def changes(self, shown: Shown, heard: datetime, passing: bool = True) -> Any:
+    def changes(self, shown: LineSnapshot, heard: datetime, passing: bool = True) -> Any:
         """Those that have changed, as a payload.
 
         passing: whether to say so if that is but how time passes, on a clock or in a state; with others it is always
@@ -111,7 +111,7 @@ class LineMetrics:
             self._sent[tag.name] = reading
         return payload
 
-    def _readings(self, shown: Shown) -> Iterator[tuple[Tag, _Reading]]:
+    def _readings(self, shown: LineSnapshot) -> Iterator[tuple[Tag, _Reading]]:
         values = {**shown.values, TICK: float(shown.tick), TIME: shown.tick * self._tick}
         quality = STALE if shown.run.state == PAUSED else GOOD
         for tag in self._tags:

@@ -1,4 +1,4 @@
-"""`Link`: one connection to a broker, by MQTT 5, or 3.1.1 where the broker knows no better. It does not come back.
+"""`BrokerConnection`: one connection to a broker, by MQTT 5, or 3.1.1 for an older broker. It does not reconnect.
 
 The library has a thread for each. What arrives waits in a bounded queue for the loop of the faces; `full` says when
 what is sent does not leave fast enough, for the library would keep any amount of it.
@@ -44,15 +44,15 @@ _TOO_NEW = "Unsupported protocol version"
 _WITH_WILL = "Disconnect with will message"
 
 
-class LinkError(ConveyorError):
+class BrokerConnectionError(ConveyorError):
     """A connection that can't be made, or that is refused: why."""
 
 
-class TooNewError(LinkError):
+class TooNewError(BrokerConnectionError):
     """The broker does not know that version of MQTT: it refuses it, or closes the connection without an answer."""
 
 
-class Message(NamedTuple):
+class MqttMessage(NamedTuple):
     """One that has come."""
 
     topic: str
@@ -78,18 +78,18 @@ class _Client(Client):
             self.end(reason)
 
 
-class Link:
+class BrokerConnection:
     """Used by one thread, but for `wake`."""
 
     def __init__(
-        self, broker: Broker, name: str, will: Message, version: MQTTProtocolVersion, wake: Callable[[], None]
+        self, broker: Broker, name: str, will: MqttMessage, version: MQTTProtocolVersion, wake: Callable[[], None]
     ) -> None:
         """name: by which the broker knows it; of two of one name the newer one stays. will: what the broker sends when
-        it is gone. wake: called by any thread when there is something to look at. Raises FaceError.
+        it is gone. wake: called by any thread when there is something to look at. Raises ServerError.
         """
         self._broker, self._will, self._wake = broker, will, wake
         self._is_new = version == NEWEST
-        self._arrived: deque[Message] = deque()
+        self._arrived: deque[MqttMessage] = deque()
         self._decided, self._lost, self._over = threading.Event(), threading.Event(), threading.Event()
         self._refusal = ""
         self._answered = False  # by any acknowledgement
@@ -125,7 +125,9 @@ class Link:
             self._client.connect(self._broker.host, self._broker.port, KEEP_ALIVE, properties=properties)
         except (OSError, ValueError) as error:
             reason = getattr(error, "strerror", None) or error
-            raise LinkError(f"{where}: can't be connected to ({reason}), expected an MQTT broker") from error
+            raise BrokerConnectionError(
+                f"{where}: can't be connected to ({reason}), expected an MQTT broker"
+            ) from error
         self._client.loop_start()
         decided = self._decided.wait(PATIENCE)
         if decided and not self._refusal and not self.lost:
@@ -135,7 +137,7 @@ class Link:
         reason = self._refusal or lost or f"no answer within {PATIENCE:g} s"
         sentence = f"{where}: refuses the connection ({reason}), expected an MQTT broker that takes {self._whom}"
         closed = self._is_new and not self._answered and bool(lost)
-        raise TooNewError(sentence) if closed or self._refusal == _TOO_NEW else LinkError(sentence)
+        raise TooNewError(sentence) if closed or self._refusal == _TOO_NEW else BrokerConnectionError(sentence)
 
     @property
     def full(self) -> bool:
@@ -151,7 +153,7 @@ class Link:
         self._published += 1
         self._client.publish(topic, data)
 
-    def take(self) -> Iterator[Message]:
+    def take(self) -> Iterator[MqttMessage]:
         """What has come, each once."""
         with suppress(IndexError):
             while True:
@@ -205,7 +207,7 @@ class Link:
         else:
             size = len(message.payload)
             data = bytes(message.payload) if size <= MOST_BYTES else b""
-            self._arrived.append(Message(message.topic, data, size, message.retain))
+            self._arrived.append(MqttMessage(message.topic, data, size, message.retain))
         self._wake()
 
     def _lose(self, reason: str) -> None:

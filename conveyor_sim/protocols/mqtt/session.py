@@ -1,4 +1,4 @@
-"""`Session`: what an edge node sends over one connection: births, what changes, deaths, each with its number."""
+"""`SparkplugSession`: messages of an edge node over one connection: numbered births, data and deaths."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from datetime import datetime, timezone
 from typing import Any
 
 from conveyor_sim.line.run_state import RUN, STATES
-from conveyor_sim.protocols.mqtt.commands import REBIRTH, Commands
+from conveyor_sim.protocols.mqtt.commands import REBIRTH, HostCommands
 from conveyor_sim.protocols.mqtt.line_metrics import LineMetrics, is_there, milliseconds
-from conveyor_sim.protocols.mqtt.link import Link
+from conveyor_sim.protocols.mqtt.link import BrokerConnection
 from conveyor_sim.protocols.mqtt.payload import BOOLEAN, INT32, INT64, STRING, Payload, add_metric, add_property
-from conveyor_sim.protocols.source import Shown
+from conveyor_sim.protocols.tags.tag_provider import LineSnapshot
 
 NAMESPACE = "spBv1.0"
 DEVICE = "line"
@@ -23,7 +23,7 @@ BETWEEN = 0.1
 _NUMBERS = 256
 
 
-class Names:
+class SparkplugTopics:
     """Topics of an edge node and of its device."""
 
     def __init__(self, group: str, node: str) -> None:
@@ -44,23 +44,25 @@ def death(number: int) -> bytes:
     return bytes(payload.SerializeToString())
 
 
-class Session:
+class SparkplugSession:
     """Of one connection."""
 
-    def __init__(self, link: Link, names: Names, number: int, line: LineMetrics, commands: Commands) -> None:
+    def __init__(
+        self, link: BrokerConnection, names: SparkplugTopics, number: int, line: LineMetrics, commands: HostCommands
+    ) -> None:
         """number: of the connection, as its death has it."""
         self._link, self._names, self._number, self._line, self._commands = link, names, number, line, commands
         self._next = 0  # sequence number
-        self._last: Shown | None = None
+        self._last: LineSnapshot | None = None
         self._node: dict[str, tuple[int, float | str]] = {}
         self._node_at = 0.0  # s of wall time
         self._alive = False
         self._line_at = 0.0  # s of wall time, of the last data of the line
-        self._put_off: tuple[Shown, datetime] | None = None
+        self._put_off: tuple[LineSnapshot, datetime] | None = None
         self.born_at: float | None = None
         """s of wall time of the last births; None: there were none yet."""
 
-    def bear(self, shown: Shown, heard: datetime) -> None:
+    def bear(self, shown: LineSnapshot, heard: datetime) -> None:
         """All births, from the first number on."""
         self._next, self.born_at = 0, time.monotonic()
         payload, stamp = Payload(), _now()
@@ -76,7 +78,7 @@ class Session:
         if self._alive:
             self._bear_line(shown, heard)
 
-    def bring(self, shown: Shown, heard: datetime) -> None:
+    def bring(self, shown: LineSnapshot, heard: datetime) -> None:
         """What a line shows: what has changed, or its death, or that it is there again. After `bear`."""
         last, self._last = self._last, shown
         back = last is not None and (shown.tick < last.tick or shown.run_id != last.run_id)
@@ -100,14 +102,14 @@ class Session:
         if self.behind and self._put_off is not None and time.monotonic() >= self._line_at + BETWEEN:
             self._say(*self._put_off, passing=True)
 
-    def _say(self, shown: Shown, heard: datetime, passing: bool) -> None:
+    def _say(self, shown: LineSnapshot, heard: datetime, passing: bool) -> None:
         changed = self._line.changes(shown, heard, passing)
         self._put_off = None if changed.metrics or passing else (shown, heard)
         if changed.metrics:
             self._line_at = time.monotonic()
             self._send("DDATA", changed)
 
-    def tell(self, shown: Shown) -> None:
+    def tell(self, shown: LineSnapshot) -> None:
         """What has changed of the edge node itself, unless it was told just now. After `bear`."""
         now, metrics = time.monotonic(), self._of_node(shown)
         if metrics == self._node or now < self._node_at + BETWEEN:
@@ -119,11 +121,11 @@ class Session:
         self._node, self._node_at = metrics, now
         self._send("NDATA", payload)
 
-    def _bear_line(self, shown: Shown, heard: datetime) -> None:
+    def _bear_line(self, shown: LineSnapshot, heard: datetime) -> None:
         self._put_off, self._line_at = None, time.monotonic()
         self._send("DBIRTH", self._line.birth(shown, heard))
 
-    def _of_node(self, shown: Shown) -> dict[str, tuple[int, float | str]]:
+    def _of_node(self, shown: LineSnapshot) -> dict[str, tuple[int, float | str]]:
         """Always good: it says what has become of the rest."""
         commands = self._commands
         written, refused = commands.before

@@ -13,12 +13,12 @@ from asyncua.common.events import get_event_obj_from_type_node
 
 from conveyor_sim.columns.alarms import AlarmColumns
 from conveyor_sim.line.alarms.alarm import NEVER, WAITING, AlarmState
-from conveyor_sim.protocols.clock import Clock
 from conveyor_sim.protocols.opcua.emitter import Emitter
 from conveyor_sim.protocols.opcua.methods import ALARM_METHODS, ALARM_STATES, add_alarm_methods
 from conveyor_sim.protocols.opcua.nodes import LINE, Nodes, node_id, nothing
 from conveyor_sim.protocols.opcua.values import status_of
-from conveyor_sim.protocols.source import Shown
+from conveyor_sim.protocols.tags.tag_provider import LineSnapshot
+from conveyor_sim.protocols.tags.tick_clock import TickClock
 
 MOST_OBJECTS = 4000
 """One for each alarm that there ever was; those that come after so many have events, and no object."""
@@ -70,7 +70,7 @@ _VARIABLES: Mapping[str, _Variable] = {
 class AlarmStates:
     """Of one line."""
 
-    def __init__(self, nodes: Nodes, emitter: Emitter, clock: Clock) -> None:
+    def __init__(self, nodes: Nodes, emitter: Emitter, clock: TickClock) -> None:
         self._nodes, self._emitter, self._clock = nodes, emitter, clock
         nodes.object(ALARM_STATES, ALARM_STATES, node_id(LINE), "All alarms, each with its state.")
         add_alarm_methods(nodes)
@@ -85,7 +85,7 @@ class AlarmStates:
         """Whether that is the id of the last event of an alarm."""
         return self._event_ids.get(alarm) == event_id
 
-    async def follow(self, shown: Shown, heard: datetime, back: bool) -> None:
+    async def follow(self, shown: LineSnapshot, heard: datetime, back: bool) -> None:
         """Bring in what has changed."""
         status = status_of(shown)
         every = back or status != self._status

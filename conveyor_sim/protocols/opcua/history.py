@@ -1,4 +1,4 @@
-"""`History`: the last values of chosen tags, for clients that draw a trend as soon as they come (OPC 10000-11)."""
+"""`OpcUaHistory`: the last values of chosen tags, for clients that draw a trend as soon as they come (OPC 10000-11)."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from asyncua.server.history import HistoryStorageInterface
 
 from conveyor_sim.errors import BagError
 from conveyor_sim.line.tag import Tag
-from conveyor_sim.protocols.clock import Clock
-from conveyor_sim.protocols.face import FaceError
 from conveyor_sim.protocols.opcua.nodes import NEVER, name_of
 from conveyor_sim.protocols.opcua.tree import is_shown
 from conveyor_sim.protocols.opcua.values import as_variant
-from conveyor_sim.protocols.past import Past
-from conveyor_sim.protocols.source import TagSource
+from conveyor_sim.protocols.server.interface import ServerError
+from conveyor_sim.protocols.tags.tag_history import TagHistory
+from conveyor_sim.protocols.tags.tag_provider import TagProvider
+from conveyor_sim.protocols.tags.tick_clock import TickClock
 from conveyor_sim.support.printable import printable
 
 MOST_VALUES = 10_000
@@ -29,20 +29,20 @@ MOST_VALUES = 10_000
 
 
 def require_tags(patterns: Sequence[str], tags: Iterable[Tag]) -> None:
-    """Raises FaceError for a pattern that no tag with a variable fits."""
+    """Raises ServerError for a pattern that no tag with a variable fits."""
     names = [tag.name for tag in tags if is_shown(tag)]
     for pattern in patterns:
         if not any(fnmatchcase(name, pattern) for name in names):
-            raise FaceError(
+            raise ServerError(
                 f"opcua: history of {printable(pattern)}: fits no tag, expected a pattern such as 'belts/*/speed'; "
                 "`conveyor-sim tags` lists what there is"
             )
 
 
-class History(HistoryStorageInterface):
+class OpcUaHistory(HistoryStorageInterface):
     """Of one server, from its start on; of a recording with its own times what that holds, up to its present place."""
 
-    def __init__(self, patterns: Sequence[str], source: TagSource, clock: Clock) -> None:
+    def __init__(self, patterns: Sequence[str], source: TagProvider, clock: TickClock) -> None:
         """patterns: of names of tags, such as `belts/*/speed`."""
         super().__init__(MOST_VALUES)
         self._source, self._clock = source, clock
@@ -92,7 +92,7 @@ class History(HistoryStorageInterface):
         return found[:most], found[most].SourceTimestamp if len(found) > most else None
 
     async def _read_past(
-        self, past: Past, tag: Tag, low: datetime | None, high: datetime | None, most: int, back: bool
+        self, past: TagHistory, tag: Tag, low: datetime | None, high: datetime | None, most: int, back: bool
     ) -> tuple[list[ua.DataValue], datetime | None]:
         """From the files, by a thread, for that may take a while."""
         present = self._source.shown.tick

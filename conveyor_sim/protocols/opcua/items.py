@@ -12,7 +12,7 @@ from asyncua.server.monitored_item_service import MonitoredItemService, WhereCla
 
 from conveyor_sim.protocols.opcua.filter_codes import filter_code
 from conveyor_sim.protocols.opcua.filters import filter_units
-from conveyor_sim.protocols.opcua.limits import Limits
+from conveyor_sim.protocols.opcua.limits import OpcUaLimits
 
 CHANGE_UNITS, FIELD_UNITS = 4, 2
 """Work units of a change of a value, and of each field or operand of an event."""
@@ -26,7 +26,7 @@ class Items(MonitoredItemService):
     hides a ramp for ever, and a change of status too. And of what is no number it takes the difference all the same.
     """
 
-    def __init__(self, subscription: Any, aspace: Any, limits: Limits) -> None:
+    def __init__(self, subscription: Any, aspace: Any, limits: OpcUaLimits) -> None:
         """Start without items."""
         super().__init__(subscription, aspace)
         self._limits = limits

@@ -11,10 +11,10 @@ from asyncua import Node, ua
 from asyncua.common.events import get_event_obj_from_type_node
 
 from conveyor_sim.columns.events import Event
-from conveyor_sim.protocols.clock import Clock
 from conveyor_sim.protocols.opcua.emitter import Emitter
 from conveyor_sim.protocols.opcua.nodes import LINE, Nodes, node_id
-from conveyor_sim.protocols.source import Shown, TagSource
+from conveyor_sim.protocols.tags.tag_provider import LineSnapshot, TagProvider
+from conveyor_sim.protocols.tags.tick_clock import TickClock
 
 TYPE = "LineEventType"
 
@@ -45,14 +45,14 @@ SEVERITIES = {
 class LineEvents:
     """Of one source."""
 
-    def __init__(self, source: TagSource, nodes: Nodes, emitter: Emitter, clock: Clock) -> None:
+    def __init__(self, source: TagProvider, nodes: Nodes, emitter: Emitter, clock: TickClock) -> None:
         """Those from now on."""
         self._source, self._nodes, self._emitter, self._clock = source, nodes, emitter, clock
         self._type = nodes.event_type(TYPE, TYPE, ua.ObjectIds.BaseEventType, FIELDS)
         self._template: Any = None
         self._seen, _ = source.events(0)
 
-    async def follow(self, shown: Shown, heard: datetime, back: bool) -> None:
+    async def follow(self, shown: LineSnapshot, heard: datetime, back: bool) -> None:
         """Send what has happened."""
         total, new = self._source.events(self._seen)
         self._seen = total

@@ -16,7 +16,7 @@ from conveyor_sim.line.run_state import RUN
 from conveyor_sim.line.tag import COMMANDS, SIGNALS
 from conveyor_sim.protocols.opcua.nodes import LINE, Nodes, name_of, node_id
 from conveyor_sim.protocols.opcua.requests import Codes, Requests
-from conveyor_sim.protocols.source import Control, TagSource
+from conveyor_sim.protocols.tags.tag_provider import Control, TagProvider
 
 ALARM_STATES = "alarm_states"
 """Id of the object that holds an object for each alarm."""
@@ -35,7 +35,7 @@ _NAME_AND_VALUE: Mapping[int, int] = {Codes.BadNodeIdUnknown: 0, Codes.BadOutOfR
 """Place of the argument that caused a refusal, by status code: the name is first, the value second."""
 
 
-class Parameter(NamedTuple):
+class MethodParameter(NamedTuple):
     """What a method is given."""
 
     name: str
@@ -53,87 +53,89 @@ class Parameter(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Method:
+class OpcUaMethod:
     """One of them."""
 
     description: str
-    parameters: tuple[Parameter, ...]
+    parameters: tuple[MethodParameter, ...]
     operation: str = ""
     """What it has the line do; empty: it asks something of the run."""
     control: Control | None = None
 
 
-_ALARM = Parameter("alarm", _TEXT, "Id of the alarm.")
-_ALARM_OR_ALL = Parameter("alarm", _TEXT, "Id of the alarm; empty: all that this can be done to.", optional=True)
-_SIGNAL = Parameter("signal", _TEXT, "Name of the signal.")
-_SECONDS = Parameter("seconds", _NUMBER, "For how long, simulated time; 0: until its condition ends next.")
+_ALARM = MethodParameter("alarm", _TEXT, "Id of the alarm.")
+_ALARM_OR_ALL = MethodParameter("alarm", _TEXT, "Id of the alarm; empty: all that this can be done to.", optional=True)
+_SIGNAL = MethodParameter("signal", _TEXT, "Name of the signal.")
+_SECONDS = MethodParameter("seconds", _NUMBER, "For how long, simulated time; 0: until its condition ends next.")
 
-LINE_METHODS: dict[str, Method] = {
-    "acknowledge": Method("Acknowledges an alarm, or all.", (_ALARM_OR_ALL,), "acknowledge"),
-    "reset_alarm": Method("Clears a latched alarm, or all.", (_ALARM_OR_ALL,), "reset"),
-    "shelve": Method("Shelves an alarm.", (_ALARM, _SECONDS), "shelve"),
-    "unshelve": Method("Ends that, for one alarm or all.", (_ALARM_OR_ALL,), "unshelve"),
-    "remove_from_service": Method("Takes an alarm out of service.", (_ALARM,), "remove_from_service"),
-    "return_to_service": Method("Ends that.", (_ALARM,), "return_to_service"),
-    "set_mode": Method(
+LINE_METHODS: dict[str, OpcUaMethod] = {
+    "acknowledge": OpcUaMethod("Acknowledges an alarm, or all.", (_ALARM_OR_ALL,), "acknowledge"),
+    "reset_alarm": OpcUaMethod("Clears a latched alarm, or all.", (_ALARM_OR_ALL,), "reset"),
+    "shelve": OpcUaMethod("Shelves an alarm.", (_ALARM, _SECONDS), "shelve"),
+    "unshelve": OpcUaMethod("Ends that, for one alarm or all.", (_ALARM_OR_ALL,), "unshelve"),
+    "remove_from_service": OpcUaMethod("Takes an alarm out of service.", (_ALARM,), "remove_from_service"),
+    "return_to_service": OpcUaMethod("Ends that.", (_ALARM,), "return_to_service"),
+    "set_mode": OpcUaMethod(
         "Puts a device into a mode: 1 Automatic, 2 Maintenance, 3 Manual.",
-        (Parameter("device", _TEXT, "Name of the device."), Parameter("mode", _WHOLE, "1, 2 or 3.")),
+        (MethodParameter("device", _TEXT, "Name of the device."), MethodParameter("mode", _WHOLE, "1, 2 or 3.")),
         MODE,
     ),
-    "force": Method(
+    "force": OpcUaMethod(
         "Has controllers read another value of a signal.",
-        (_SIGNAL, Parameter("value", _NUMBER, "What they read.")),
+        (_SIGNAL, MethodParameter("value", _NUMBER, "What they read.")),
         FORCE,
     ),
-    "unforce": Method(
-        "Ends that.", (Parameter("signal", _TEXT, "Name of the signal; empty: all.", optional=True),), UNFORCE
+    "unforce": OpcUaMethod(
+        "Ends that.", (MethodParameter("signal", _TEXT, "Name of the signal; empty: all.", optional=True),), UNFORCE
     ),
-    "inject": Method(
+    "inject": OpcUaMethod(
         "Has a fault begin, or end.",
-        (Parameter("fault", _TEXT, "Name of the fault."), Parameter("value", _NUMBER, "0: it ends.")),
+        (MethodParameter("fault", _TEXT, "Name of the fault."), MethodParameter("value", _NUMBER, "0: it ends.")),
         INJECT,
     ),
-    "reset_counters": Method(
+    "reset_counters": OpcUaMethod(
         "Counters and times of a device, or of all, begin anew.",
-        (Parameter("device", _TEXT, "Name of the device; empty: all.", optional=True),),
+        (MethodParameter("device", _TEXT, "Name of the device; empty: all.", optional=True),),
         "reset_counters",
     ),
-    "write": Method(
+    "write": OpcUaMethod(
         "Sets commands together: all at one tick, or none.",
         (
-            Parameter("commands", _TEXT, "Names.", array=True),
-            Parameter("values", _NUMBER, "One for each.", array=True),
+            MethodParameter("commands", _TEXT, "Names.", array=True),
+            MethodParameter("values", _NUMBER, "One for each.", array=True),
         ),
         SET,
     ),
-    "own": Method(
+    "own": OpcUaMethod(
         "Takes the line for this controller.",
-        (Parameter("released", _TEXT, "Patterns of devices that it leaves to others.", array=True),),
+        (MethodParameter("released", _TEXT, "Patterns of devices that it leaves to others.", array=True),),
         OWN,
     ),
-    "disown": Method("Gives it up.", (), DISOWN),
+    "disown": OpcUaMethod("Gives it up.", (), DISOWN),
 }
 
-ALARM_METHODS: dict[str, Method] = {
-    "acknowledge": Method("Acknowledges this alarm; of the object of all alarms: all.", (), "acknowledge"),
-    "reset": Method("Clears it, if it has latched.", (), "reset"),
-    "unshelve": Method("Shelves it no more.", (), "unshelve"),
+ALARM_METHODS: dict[str, OpcUaMethod] = {
+    "acknowledge": OpcUaMethod("Acknowledges this alarm; of the object of all alarms: all.", (), "acknowledge"),
+    "reset": OpcUaMethod("Clears it, if it has latched.", (), "reset"),
+    "unshelve": OpcUaMethod("Shelves it no more.", (), "unshelve"),
 }
 """Of the object of an alarm, for panels whose buttons give no arguments."""
 
-RUN_METHODS: dict[str, Method] = {
-    "pause": Method("Time stands.", (), control="pause"),
-    "resume": Method("Time goes on.", (), control="resume"),
-    "step": Method("Lets ticks pass.", (Parameter("ticks", _WHOLE, "How many."),), control="step"),
-    "reset": Method("Begins anew.", (), control="reset"),
-    "seek": Method("Goes to a time.", (Parameter("time", _NUMBER, "Simulated time, s."),), control="seek"),
-    "speed": Method("How fast time passes.", (Parameter("factor", _NUMBER, "Times real time."),), control="speed"),
-    "loop": Method("Begins anew at the end, or not.", (Parameter("on", _WHOLE, "1 or 0."),), control="loop"),
+RUN_METHODS: dict[str, OpcUaMethod] = {
+    "pause": OpcUaMethod("Time stands.", (), control="pause"),
+    "resume": OpcUaMethod("Time goes on.", (), control="resume"),
+    "step": OpcUaMethod("Lets ticks pass.", (MethodParameter("ticks", _WHOLE, "How many."),), control="step"),
+    "reset": OpcUaMethod("Begins anew.", (), control="reset"),
+    "seek": OpcUaMethod("Goes to a time.", (MethodParameter("time", _NUMBER, "Simulated time, s."),), control="seek"),
+    "speed": OpcUaMethod(
+        "How fast time passes.", (MethodParameter("factor", _NUMBER, "Times real time."),), control="speed"
+    ),
+    "loop": OpcUaMethod("Begins anew at the end, or not.", (MethodParameter("on", _WHOLE, "1 or 0."),), control="loop"),
 }
 """Those that the source can do are there."""
 
 
-def add_methods(nodes: Nodes, source: TagSource) -> None:
+def add_methods(nodes: Nodes, source: TagProvider) -> None:
     """Add those of the line and of its run."""
     for name, method in LINE_METHODS.items():
         _add(nodes, LINE, name, method)
@@ -148,7 +150,7 @@ def add_alarm_methods(nodes: Nodes) -> None:
         _add(nodes, ALARM_STATES, name, method)
 
 
-def _add(nodes: Nodes, owner: str, name: str, method: Method) -> None:
+def _add(nodes: Nodes, owner: str, name: str, method: OpcUaMethod) -> None:
     arguments = [parameter.as_argument for parameter in method.parameters]
     nodes.method(f"{owner}/{name}", node_id(owner), method.description, arguments)
 
@@ -156,7 +158,7 @@ def _add(nodes: Nodes, owner: str, name: str, method: Method) -> None:
 class Methods:
     """Calls of them, by clients."""
 
-    def __init__(self, source: TagSource, requests: Requests, is_last_event: Callable[[str, bytes], bool]) -> None:
+    def __init__(self, source: TagProvider, requests: Requests, is_last_event: Callable[[str, bytes], bool]) -> None:
         """is_last_event: whether an alarm's last event had that id."""
         self._source, self._requests, self._is_last_event = source, requests, is_last_event
         tags = source.about.tags
@@ -225,7 +227,7 @@ class Methods:
             return _result(Codes.BadConditionBranchAlreadyAcked)
         return _result(self._requests.operate(client, "acknowledge", (alarm,)))
 
-    def _operate(self, client: User, method: Method, arguments: Sequence[Any]) -> ua.CallMethodResult:
+    def _operate(self, client: User, method: OpcUaMethod, arguments: Sequence[Any]) -> ua.CallMethodResult:
         if method.operation == SET:
             names, values = arguments
             if not names or len(names) != len(values) or len(set(names)) != len(names):
@@ -239,7 +241,7 @@ class Methods:
         code = self._requests.operate(client, method.operation, names, values)
         return _of_arguments(code, _NAME_AND_VALUE, arguments)
 
-    def _judge(self, parameter: Parameter, given: ua.Variant) -> int:
+    def _judge(self, parameter: MethodParameter, given: ua.Variant) -> int:
         values = given.Value if parameter.array else [given.Value]
         if given.VariantType is not parameter.kind or isinstance(given.Value, list) != parameter.array:
             # An array without elements may come as a null.

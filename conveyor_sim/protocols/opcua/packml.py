@@ -18,13 +18,13 @@ from asyncua.crypto.permission_rules import User
 from conveyor_sim.line.commands.inputs import MODE, SET
 from conveyor_sim.line.machines.packml import Command, State, objection
 from conveyor_sim.line.tag import Tag
-from conveyor_sim.protocols.clock import Clock
 from conveyor_sim.protocols.opcua.nodes import INDEX, Nodes, name_of, node_id
 from conveyor_sim.protocols.opcua.packml_admin import A_MINUTE, Admin
 from conveyor_sim.protocols.opcua.packml_admin import NAME as ADMIN
 from conveyor_sim.protocols.opcua.requests import Codes, Requests
 from conveyor_sim.protocols.opcua.values import status_of
-from conveyor_sim.protocols.source import Shown, TagSource
+from conveyor_sim.protocols.tags.tag_provider import LineSnapshot, TagProvider
+from conveyor_sim.protocols.tags.tick_clock import TickClock
 from conveyor_sim.support.rounded_limit import at_limit, single
 
 NODESET = Path(__file__).parent / "nodesets" / "Opc.Ua.PackML.NodeSet2.xml"
@@ -105,7 +105,7 @@ _NONE = (ua.LocalizedText(None), ua.NodeId())
 class PackMl:
     """Of one source."""
 
-    def __init__(self, source: TagSource, requests: Requests, clock: Clock) -> None:
+    def __init__(self, source: TagProvider, requests: Requests, clock: TickClock) -> None:
         self._source, self._requests, self._clock = source, requests, clock
         self._tags: Mapping[str, Tag] = {tag.name: tag for tag in source.about.tags}
         self._machines = [tag.device for tag in source.about.tags if tag.name == f"{tag.device}/cntrl_cmd"]
@@ -156,7 +156,7 @@ class PackMl:
                 found[f"{state_machine}.{name}"] = ua.Variant(ids, ua.VariantType.NodeId, is_array=True)
         return found
 
-    async def follow(self, shown: Shown, heard: datetime, back: bool) -> None:
+    async def follow(self, shown: LineSnapshot, heard: datetime, back: bool) -> None:
         """Bring in what has changed."""
         if self._nodes is None:
             return

@@ -14,10 +14,10 @@ from asyncua.common.copy_node_util import _copy_node
 from conveyor_sim.columns.alarms import AlarmColumns
 from conveyor_sim.line.alarms.alarm import WAITING, AlarmState
 from conveyor_sim.line.tag import Tag
-from conveyor_sim.protocols.clock import Clock
 from conveyor_sim.protocols.opcua.nodes import NEVER, node_id
 from conveyor_sim.protocols.opcua.values import unit_of
-from conveyor_sim.protocols.source import Shown
+from conveyor_sim.protocols.tags.tag_provider import LineSnapshot
+from conveyor_sim.protocols.tags.tick_clock import TickClock
 
 NAME = "Admin"
 
@@ -64,7 +64,7 @@ class PackMLAlarmDataType:
 class Admin:
     """Of one machine."""
 
-    def __init__(self, machine: str, tags: Mapping[str, Tag], clock: Clock) -> None:
+    def __init__(self, machine: str, tags: Mapping[str, Tag], clock: TickClock) -> None:
         """tags: of the line, by name."""
         self._machine, self._clock = machine, clock
         self._own = {name for name, tag in tags.items() if tag.device == machine}
@@ -93,7 +93,7 @@ class Admin:
                 # Unlike the public one it keeps the kind of reference, HasAlarm and others.
                 await _copy_node(session, parent, each, node_id(f"{root}.{NAME}.{each.BrowseName.Name}"), False)
 
-    def values(self, shown: Shown) -> dict[str, ua.Variant]:
+    def values(self, shown: LineSnapshot) -> dict[str, ua.Variant]:
         """Of its variables, by name."""
         found = {name: self._count(tag, shown.values) for name, tag in self._counts.items()}
         if self._design is not None:
@@ -107,7 +107,7 @@ class Admin:
         count = min(_MOST, int(values.get(tag.name, 0.0)))
         return _array([PackMLCountDataType(0, "bottles", unit_of(tag), count, count)])
 
-    def _stop_reason(self, shown: Shown) -> ua.Variant:
+    def _stop_reason(self, shown: LineSnapshot) -> ua.Variant:
         reason = int(shown.values[f"{self._machine}/stop_reason"])
         if reason != self._reason:
             self._reason, self._since = reason, self._clock.simulated(shown.tick) if reason else NEVER

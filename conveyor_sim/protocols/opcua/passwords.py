@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from asyncua import ua
 from asyncua.ua.ua_binary import struct_from_binary
 
-from conveyor_sim.protocols.users import LoginService, User
+from conveyor_sim.protocols.server.users import LoginService, User
 
 
 class Checked(NamedTuple):

@@ -13,7 +13,7 @@ from asyncua.ua.ua_binary import struct_to_binary
 
 from conveyor_sim.protocols.opcua.decoding import Allowance, BoundedBuffer
 from conveyor_sim.protocols.opcua.dispatch import Dispatcher
-from conveyor_sim.protocols.opcua.limits import Limits
+from conveyor_sim.protocols.opcua.limits import OpcUaLimits
 from conveyor_sim.protocols.opcua.operations import require_operations
 
 Codes = ua.StatusCodes
@@ -42,7 +42,7 @@ class ConnectionLimits(TransportLimits):
     """Bytes of one message."""
 
     @classmethod
-    def of(cls, limits: Limits) -> ConnectionLimits:
+    def of(cls, limits: OpcUaLimits) -> ConnectionLimits:
         """Return the limits of a new connection."""
         size = limits.message_bytes
         return cls(CHUNK, CHUNK, -(-size // SMALLEST_CHUNK) + 1, size, before_login=limits.message_bytes_before_login)
@@ -74,7 +74,7 @@ class Processor(Dispatcher):
     name: Any
     session: Any
 
-    def __init__(self, server: Any, transport: Any, limits: Limits) -> None:
+    def __init__(self, server: Any, transport: Any, limits: OpcUaLimits) -> None:
         """Start without a session."""
         super().__init__(server, transport, ConnectionLimits.of(limits))
         self._bounds = limits

@@ -16,7 +16,9 @@ from conveyor_sim.line.commands.authority import MAY
 from conveyor_sim.line.commands.inputs import MODE, SET, Input, WriterKind
 from conveyor_sim.line.commands.receipt import Cause, Receipt
 from conveyor_sim.line.tag import COMMANDS, Tag
-from conveyor_sim.protocols.hands import (
+from conveyor_sim.protocols.opcua.nodes import name_of
+from conveyor_sim.protocols.opcua.values import type_of
+from conveyor_sim.protocols.tags.control_mode import (
     CONTROL_RANGES,
     MAY_CONTROL,
     TAKES_NO_INPUT,
@@ -24,10 +26,8 @@ from conveyor_sim.protocols.hands import (
     objection,
     refused_for_good,
 )
-from conveyor_sim.protocols.handshake import MAY_GO_ON, TARGET
-from conveyor_sim.protocols.opcua.nodes import name_of
-from conveyor_sim.protocols.opcua.values import type_of
-from conveyor_sim.protocols.source import OPCUA, Control, TagSource
+from conveyor_sim.protocols.tags.handshake import MAY_GO_ON, TARGET
+from conveyor_sim.protocols.tags.tag_provider import OPCUA, Control, TagProvider
 
 Codes = ua.StatusCodes
 
@@ -62,7 +62,7 @@ def reader(name: str = "") -> Client:
 class Requests:
     """Of all clients of one source."""
 
-    def __init__(self, source: TagSource) -> None:
+    def __init__(self, source: TagProvider) -> None:
         self._source = source
         self._receipt = Receipt(source.about.tags, source.about.where)
         self._commands: Mapping[str, Tag] = {tag.name: tag for tag in source.about.tags if tag.role in COMMANDS}

@@ -13,13 +13,10 @@ from typing import Any
 from asyncua import ua
 from asyncua.crypto.permission_rules import SimpleRoleRuleset, UserRole
 
-from conveyor_sim.protocols.clock import Clock
-from conveyor_sim.protocols.face import HERE, FaceError, Stamps, Status, require_free
-from conveyor_sim.protocols.opcua.certificates import default_folder, identity
 from conveyor_sim.protocols.opcua.conditions import AlarmStates
 from conveyor_sim.protocols.opcua.emitter import Emitter
-from conveyor_sim.protocols.opcua.history import History, require_tags
-from conveyor_sim.protocols.opcua.limits import LIMITS, Limits
+from conveyor_sim.protocols.opcua.history import OpcUaHistory, require_tags
+from conveyor_sim.protocols.opcua.limits import LIMITS, OpcUaLimits
 from conveyor_sim.protocols.opcua.line_events import LineEvents
 from conveyor_sim.protocols.opcua.methods import Methods, add_methods
 from conveyor_sim.protocols.opcua.nodes import INDEX, NAMESPACE, Nodes
@@ -32,9 +29,12 @@ from conveyor_sim.protocols.opcua.transport import BoundedServer
 from conveyor_sim.protocols.opcua.tree import add_line
 from conveyor_sim.protocols.opcua.updates import Updates
 from conveyor_sim.protocols.opcua.weihenstephan import Weihenstephan
-from conveyor_sim.protocols.quotas import QUOTA, Places, Quota
-from conveyor_sim.protocols.source import OPCUA, TagSource
-from conveyor_sim.protocols.users import Logins, LoginService, User
+from conveyor_sim.protocols.server.certificates import default_folder, identity
+from conveyor_sim.protocols.server.interface import HERE, ServerError, Stamps, Status, require_free
+from conveyor_sim.protocols.server.quotas import QUOTA, ConnectionSlots, Quota
+from conveyor_sim.protocols.server.users import Logins, LoginService, User
+from conveyor_sim.protocols.tags.tag_provider import OPCUA, TagProvider
+from conveyor_sim.protocols.tags.tick_clock import TickClock
 
 POLICIES = [
     ua.SecurityPolicyType.NoSecurity,
@@ -50,7 +50,7 @@ class OpcUaServer:
 
     def __init__(
         self,
-        source: TagSource,
+        source: TagProvider,
         users: Mapping[str, User] | None = None,
         *,
         anonymous: bool = True,
@@ -59,7 +59,7 @@ class OpcUaServer:
         history: Sequence[str] = (),
         host: str = HERE,
         port: int = 0,
-        limits: Limits = LIMITS,
+        limits: OpcUaLimits = LIMITS,
         quota: Quota = QUOTA,
         logins: LoginService | None = None,
     ) -> None:
@@ -68,7 +68,7 @@ class OpcUaServer:
         history: patterns of the tags whose last values are kept. port: 0 for any that is free.
         limits: of each client. quota: places of the connections. logins: checks passwords, in place of `users`.
 
-        Raises FaceError for a pattern that no tag fits.
+        Raises ServerError for a pattern that no tag fits.
         """
         require_tags(history, source.about.tags)
         self._source, self._anonymous, self._stamps = source, anonymous, stamps
@@ -115,7 +115,7 @@ class OpcUaServer:
         return Status(len(server.bserver.clients), items, requests.writes, refused, longest, left_out)
 
     async def start(self) -> None:
-        """Listen; that takes a second or two. Raises FaceError if it is not possible, CertificateError."""
+        """Listen; that takes a second or two. Raises ServerError if it is not possible, CertificateError."""
         for name in ("asyncua.server", "asyncua.common", "asyncua.uaprotocol", "asyncua.crypto"):
             logging.getLogger(name).setLevel(logging.CRITICAL)  # it logs whatever clients send
         host, port = self._at
@@ -127,7 +127,7 @@ class OpcUaServer:
         try:
             await server.listen(host, port)
         except OSError as error:  # it has been taken since
-            raise FaceError(f"opcua: {host}:{port} can't be listened on ({error}), expected a free port") from error
+            raise ServerError(f"opcua: {host}:{port} can't be listened on ({error}), expected a free port") from error
         self._server, self._updates = server, updates
         self._following = asyncio.create_task(updates.run())
         self._following.add_done_callback(self._ended)
@@ -138,7 +138,7 @@ class OpcUaServer:
         own = identity(self._certificates or default_folder())
         internal = SafeServer(self, own.trusted, self._limits, self._logins)
         internal.bind_condition_methods = 1
-        server = BoundedServer(internal, self._limits, Places(self._quota))
+        server = BoundedServer(internal, self._limits, ConnectionSlots(self._quota))
         server.product_uri, server.name, server.manufacturer_name = NAMESPACE, "conveyor_sim", "conveyor_sim"
         server.application_type, server._application_uri = ua.ApplicationType.Server, own.application_uri
         await server.init()
@@ -155,9 +155,9 @@ class OpcUaServer:
         internal, source, requests = server.iserver, self._source, self._requests
         await publish(internal, self._limits, self._quota)
         if await server.register_namespace(NAMESPACE) != INDEX:
-            raise FaceError(f"opcua: namespace {NAMESPACE} has another index than {INDEX}")
-        clock = Clock(source.about, self._stamps)
-        history = History(self._history, source, clock)
+            raise ServerError(f"opcua: namespace {NAMESPACE} has another index than {INDEX}")
+        clock = TickClock(source.about, self._stamps)
+        history = OpcUaHistory(self._history, source, clock)
         internal.history_manager.set_storage(history)
         nodes, emitter = Nodes(internal, history), Emitter(internal)
         add_line(nodes, source.about)

@@ -23,7 +23,7 @@ from asyncua.server.internal_session import InternalSession
 
 from conveyor_sim.line.commands.inputs import SET
 from conveyor_sim.protocols.opcua.bounds import Bounds
-from conveyor_sim.protocols.opcua.limits import Limits
+from conveyor_sim.protocols.opcua.limits import OpcUaLimits
 from conveyor_sim.protocols.opcua.nodes import WRITE, name_of
 from conveyor_sim.protocols.opcua.ownership import REFRESH, OwnedSession, Owners
 from conveyor_sim.protocols.opcua.passwords import Passwords
@@ -32,7 +32,7 @@ from conveyor_sim.protocols.opcua.requests import Codes, Requests
 from conveyor_sim.protocols.opcua.subscriptions import Subscriptions
 from conveyor_sim.protocols.opcua.transport import Connection, channel
 from conveyor_sim.protocols.opcua.well_formed import WellFormedSession, require_url
-from conveyor_sim.protocols.users import LoginService
+from conveyor_sim.protocols.server.users import LoginService
 
 SHORTEST_INTERVAL, LONGEST_INTERVAL = 10.0, 60_000.0
 """ms, at which clients are sent what has changed."""
@@ -57,7 +57,9 @@ class SafeServer(InternalServer):
 
     subscription_service: Subscriptions
 
-    def __init__(self, user_manager: Any, trusted: Collection[bytes], limits: Limits, logins: LoginService) -> None:
+    def __init__(
+        self, user_manager: Any, trusted: Collection[bytes], limits: OpcUaLimits, logins: LoginService
+    ) -> None:
         """trusted: certificates of clients that are let in; empty: all are. limits: of each client.
         logins: checks passwords.
         """
@@ -87,7 +89,7 @@ class SafeServer(InternalServer):
     def lookup_external_session(self, auth_token: ua.NodeId) -> InternalSession | None:
         """For a client that comes back by another connection: who had another certificate is another client."""
         found, connection = super().lookup_external_session(auth_token), channel.get()
-        if not isinstance(found, Session) or connection is None or found.peer != connection.peer:
+        if not isinstance(found, OpcUaSession) or connection is None or found.peer != connection.peer:
             return None
         return found
 
@@ -138,7 +140,7 @@ class SafeServer(InternalServer):
         return name, content[: -len(nonce)].decode()
 
 
-class Session(InternalSession):
+class OpcUaSession(InternalSession):
     """Of one client."""
 
     iserver: SafeServer
@@ -305,7 +307,7 @@ class Session(InternalSession):
         raise ServiceError(Codes.BadUserAccessDenied)
 
 
-class ClientSession(WellFormedSession, OwnedSession, Session):
+class ClientSession(WellFormedSession, OwnedSession, OpcUaSession):
     """Session of one client: its requests are checked for their form, then for ownership, then for limits."""
 
     def republish(self, params: ua.RepublishParameters) -> ua.NotificationMessage:

@@ -19,9 +19,9 @@ from asyncua.server.internal_subscription import InternalSubscription
 from asyncua.server.subscription_service import SubscriptionService
 
 from conveyor_sim.protocols.opcua.items import Items, size_of
-from conveyor_sim.protocols.opcua.limits import Limits
-from conveyor_sim.protocols.quotas import share_of_guests
-from conveyor_sim.protocols.work import Budget
+from conveyor_sim.protocols.opcua.limits import OpcUaLimits
+from conveyor_sim.protocols.server.budget import Budget
+from conveyor_sim.protocols.server.quotas import share_of_guests
 
 Codes = ua.StatusCodes
 
@@ -44,7 +44,7 @@ _LEFT = 0.1
 class Subscription(InternalSubscription):
     """One subscription of a client."""
 
-    limits: Limits
+    limits: OpcUaLimits
     most = 0
     """MaxNotificationsPerPublish of the client; 0: not stated."""
     is_guest = True
@@ -172,7 +172,7 @@ class Subscriptions(SubscriptionService):
 
     subscriptions: dict[int, Any]
 
-    def __init__(self, aspace: Any, iserver: Any, limits: Limits) -> None:
+    def __init__(self, aspace: Any, iserver: Any, limits: OpcUaLimits) -> None:
         """Start without subscriptions."""
         super().__init__(aspace, iserver)
         self._limits = limits

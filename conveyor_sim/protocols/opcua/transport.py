@@ -14,10 +14,10 @@ from asyncua.server.binary_server_asyncio import BinaryServer, OPCUAProtocol
 from asyncua.ua.ua_binary import header_from_binary, uatcp_to_binary
 
 from conveyor_sim.protocols.opcua.client_certificates import without_issuers
-from conveyor_sim.protocols.opcua.limits import Limits
+from conveyor_sim.protocols.opcua.limits import OpcUaLimits
 from conveyor_sim.protocols.opcua.processor import CHUNK, ConnectionLimits, Processor
-from conveyor_sim.protocols.quotas import GREETED, OPENED, Place, Places
-from conveyor_sim.protocols.work import Budget
+from conveyor_sim.protocols.server.budget import Budget
+from conveyor_sim.protocols.server.quotas import GREETED, OPENED, ConnectionSlot, ConnectionSlots
 
 ACTIVATION = 30.0
 """s that a connection has for beginning a session, and may stay without one."""
@@ -34,13 +34,13 @@ class Connection(OPCUAProtocol):
 
     longest: list[float]
     """One element, for all connections: s of wall time from a message to its being done with, the longest."""
-    bounds: Limits
-    places: Places
+    bounds: OpcUaLimits
+    places: ConnectionSlots
     guests: Budget
     """Work of all sessions without a user."""
     turn: asyncio.Lock
     """Held by the session without a user whose request is next, until it is answered."""
-    place: Place | None = None
+    place: ConnectionSlot | None = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         peer = transport.get_extra_info("peername")
@@ -229,8 +229,8 @@ channel: ContextVar[Connection | None] = ContextVar("channel", default=None)
 
 class _Port(BinaryServer):
     longest: list[float]
-    bounds: Limits
-    places: Places
+    bounds: OpcUaLimits
+    places: ConnectionSlots
     guests: Budget
     turn: asyncio.Lock
 
@@ -244,7 +244,7 @@ class _Port(BinaryServer):
 class BoundedServer(Server):
     """The library's server, listening by connections of this kind."""
 
-    def __init__(self, internal: Any, bounds: Limits, places: Places) -> None:
+    def __init__(self, internal: Any, bounds: OpcUaLimits, places: ConnectionSlots) -> None:
         """bounds: of each client. places: of the connections."""
         super().__init__(iserver=internal)
         self.longest = [0.0]

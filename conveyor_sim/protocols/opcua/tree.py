@@ -6,11 +6,11 @@ from asyncua import ua
 
 from conveyor_sim.line.run_state import RUN
 from conveyor_sim.line.tag import COMMANDS, SIGNALS, Tag
-from conveyor_sim.protocols.hands import is_mode
-from conveyor_sim.protocols.handshake import TARGET
 from conveyor_sim.protocols.opcua.nodes import INDEX, LINE, READ, READ_AND_WRITE, Nodes, node_id, nothing
 from conveyor_sim.protocols.opcua.values import as_variant, range_of, unit_of
-from conveyor_sim.protocols.source import About
+from conveyor_sim.protocols.tags.control_mode import is_mode
+from conveyor_sim.protocols.tags.handshake import TARGET
+from conveyor_sim.protocols.tags.tag_provider import LineInfo
 
 WRITTEN_BY, WRITTEN_AT = "written_by", "written_at"
 """Below a command: who gave the value that is in force, and since when it has it from them."""
@@ -28,7 +28,7 @@ RUN_VARIABLES: dict[str, tuple[ua.VariantType, str]] = {
 """About the run, beside its state."""
 
 
-def add_line(nodes: Nodes, about: About) -> None:
+def add_line(nodes: Nodes, about: LineInfo) -> None:
     """Add all variables of a line, with the objects that hold them."""
     parent = ua.NodeId(ua.ObjectIds.ObjectsFolder)
     parts = [part for part in about.where.split("/") if part]

@@ -13,34 +13,34 @@ from asyncua import ua
 from conveyor_sim.columns.read_back import ReadBackColumns
 from conveyor_sim.line.run_state import RUN
 from conveyor_sim.line.tag import COMMANDS, Tag
-from conveyor_sim.protocols.clock import Clock
-from conveyor_sim.protocols.handshake import TARGET, TICK
 from conveyor_sim.protocols.opcua.nodes import Nodes
 from conveyor_sim.protocols.opcua.tree import VALUE_AS_TEXT, WRITTEN_AT, WRITTEN_BY, has_text, is_shown
 from conveyor_sim.protocols.opcua.values import as_variant, status_of
-from conveyor_sim.protocols.source import Shown, TagSource
+from conveyor_sim.protocols.tags.handshake import TARGET, TICK
+from conveyor_sim.protocols.tags.tag_provider import LineSnapshot, TagProvider
+from conveyor_sim.protocols.tags.tick_clock import TickClock
 
 MOST_BEHIND = 200
 """Ticks that wait to be brought in; one more, and the last of them gives way to it."""
 
-Follower = Callable[[Shown, datetime, bool], Awaitable[None]]
+Follower = Callable[[LineSnapshot, datetime, bool], Awaitable[None]]
 """Called after each tick that was brought in, with when that was heard, and whether it is a step back."""
 
 
 class Updates:
     """Of one source, in one asyncio loop."""
 
-    def __init__(self, source: TagSource, nodes: Nodes, clock: Clock, *others: Follower) -> None:
+    def __init__(self, source: TagProvider, nodes: Nodes, clock: TickClock, *others: Follower) -> None:
         """others: what follows the source besides."""
         self._source, self._nodes, self._clock, self._others = source, nodes, clock, others
         self._variables = [_Variable(tag) for tag in source.about.tags if is_shown(tag) and tag.role != "run"]
         self._run_tag = next((tag for tag in source.about.tags if tag.name == f"{RUN}/state"), None)
         self._commands = [tag.name for tag in source.about.tags if tag.role in COMMANDS]
-        self._waiting: deque[tuple[Shown, datetime]] = deque()
+        self._waiting: deque[tuple[LineSnapshot, datetime]] = deque()
         self._told = False
         self._wake = asyncio.Event()
         self._loop = asyncio.get_running_loop()
-        self._last: Shown | None = None
+        self._last: LineSnapshot | None = None
         self._read_back: ReadBackColumns | None = None
         self.longest = 0.0
         """s of wall time from a change of the source to its being in the nodes, the longest since this was set to 0."""
@@ -81,7 +81,7 @@ class Updates:
             with suppress(RuntimeError):  # the loop is closed
                 self._loop.call_soon_threadsafe(self._wake.set)
 
-    async def _bring(self, shown: Shown, heard: datetime) -> None:
+    async def _bring(self, shown: LineSnapshot, heard: datetime) -> None:
         last, self._last = self._last, shown
         status = status_of(shown)
         back = last is not None and shown.tick < last.tick
@@ -110,7 +110,7 @@ class Updates:
             await follow(shown, heard, back)
         await self._bring_run(shown, last, stamp, every)  # at last: who sees the tick finds all else of it
 
-    async def _bring_run(self, shown: Shown, last: Shown | None, stamp: datetime, every: bool) -> None:
+    async def _bring_run(self, shown: LineSnapshot, last: LineSnapshot | None, stamp: datetime, every: bool) -> None:
         """Good even where the rest is not, as it says what has become of that; but for what nobody knows of."""
         tick = shown.tick
         code = ua.StatusCodes.BadNoCommunication if shown.lost else ua.StatusCodes.Good

@@ -8,7 +8,7 @@ from asyncua import ua
 
 from conveyor_sim.line.run_state import ENDED, PAUSED, STOPPED
 from conveyor_sim.line.tag import Tag
-from conveyor_sim.protocols.source import Shown
+from conveyor_sim.protocols.tags.tag_provider import LineSnapshot
 
 _WHOLE = {ua.VariantType.UInt32: (0, 2**32 - 1), ua.VariantType.Int32: (-(2**31), 2**31 - 1)}
 
@@ -49,7 +49,7 @@ def unit_of(tag: Tag) -> ua.EUInformation:
     return ua.EUInformation(_UNITS_URI, number, ua.LocalizedText(shown), ua.LocalizedText(tag.unece.name))
 
 
-def status_of(shown: Shown) -> int:
+def status_of(shown: LineSnapshot) -> int:
     """Of all values of a line; those of signals that are forced are `GoodLocalOverride` where this is Good."""
     if shown.lost:
         return ua.StatusCodes.BadNoCommunication

@@ -12,10 +12,10 @@ from asyncua import ua
 
 from conveyor_sim.line.machines.weihenstephan import DATA_POINTS, data_points, names_of
 from conveyor_sim.line.tag import Tag
-from conveyor_sim.protocols.clock import Clock
 from conveyor_sim.protocols.opcua.nodes import Nodes, node_id
 from conveyor_sim.protocols.opcua.values import status_of
-from conveyor_sim.protocols.source import Shown, TagSource
+from conveyor_sim.protocols.tags.tag_provider import LineSnapshot, TagProvider
+from conveyor_sim.protocols.tags.tick_clock import TickClock
 
 NAME = "Weihenstephan"
 """Of the object below a machine."""
@@ -24,7 +24,7 @@ NAME = "Weihenstephan"
 class Weihenstephan:
     """Of one source."""
 
-    def __init__(self, source: TagSource, nodes: Nodes, clock: Clock) -> None:
+    def __init__(self, source: TagProvider, nodes: Nodes, clock: TickClock) -> None:
         """Adds an object for each machine that has such data points."""
         self._nodes, self._clock = nodes, clock
         self._tags: Mapping[str, Tag] = {tag.name: tag for tag in source.about.tags}
@@ -40,7 +40,7 @@ class Weihenstephan:
                 what = f"{point.what} Data point {point.number}."
                 nodes.variable(f"{root}/{name}", name, node_id(root), _variant(name, value), what)
 
-    async def follow(self, shown: Shown, heard: datetime, back: bool) -> None:
+    async def follow(self, shown: LineSnapshot, heard: datetime, back: bool) -> None:
         """Bring in what has changed."""
         status, stamp = status_of(shown), self._clock.stamp(shown.tick, heard)
         if status != self._status or back:

@@ -1,4 +1,4 @@
-"""`Commands`: what pages want of a line, judged at once as far as that is possible, and handed to its source.
+"""`PageCommands`: what pages want of a line, judged at once as far as that is possible, and handed to its source.
 
 Nothing here waits for a tick. What the line refuses then is among its events, which the page is told of, too.
 """
@@ -13,10 +13,10 @@ from conveyor_sim.line.commands.authority import MAY, unauthorized
 from conveyor_sim.line.commands.inputs import DECLARE, SET, Input, WriterKind
 from conveyor_sim.line.commands.receipt import Receipt
 from conveyor_sim.line.tag import COMMANDS, Tag
-from conveyor_sim.protocols.hands import MAY_CONTROL, TAKES_NO_INPUT, objection, refused_for_good
-from conveyor_sim.protocols.source import WEB
-from conveyor_sim.protocols.users import Role
-from conveyor_sim.protocols.view import PictureSource
+from conveyor_sim.protocols.server.users import Role
+from conveyor_sim.protocols.tags.control_mode import MAY_CONTROL, TAKES_NO_INPUT, objection, refused_for_good
+from conveyor_sim.protocols.tags.line_mirror import DrawableProvider
+from conveyor_sim.protocols.tags.tag_provider import WEB
 
 OPERATIONS = tuple(operation for operation in MAY if operation != DECLARE)
 
@@ -27,7 +27,7 @@ LARGEST = sys.float_info.max
 """Of values."""
 
 
-class Person(NamedTuple):
+class PageUser(NamedTuple):
     """Who sits before a page."""
 
     name: str = ""
@@ -42,13 +42,13 @@ class Person(NamedTuple):
         return f"{WEB} {self.name}"
 
 
-NOBODY = Person()
+NOBODY = PageUser()
 
 
-class Commands:
+class PageCommands:
     """Of all pages of one source."""
 
-    def __init__(self, source: PictureSource) -> None:
+    def __init__(self, source: DrawableProvider) -> None:
         self._source = source
         tags = source.about.tags
         self._commands: Mapping[str, Tag] = {tag.name: tag for tag in tags if tag.role in COMMANDS}
@@ -58,13 +58,13 @@ class Commands:
         self.writes = self.refused = 0
         """Requests that were passed on to the line, and those that were not."""
 
-    def do(self, person: Person, request: Mapping[str, Any]) -> str:
+    def do(self, person: PageUser, request: Mapping[str, Any]) -> str:
         """What a page asks for; why that can't be, "" if it will be done. It may be anything."""
         reason = self._do(person, request)
         self.writes, self.refused = self.writes + (not reason), self.refused + bool(reason)
         return reason
 
-    def _do(self, person: Person, request: Mapping[str, Any]) -> str:
+    def _do(self, person: PageUser, request: Mapping[str, Any]) -> str:
         if person.kind is None:
             who = f"{person.name} is a viewer, who only reads" if person.name else "nobody has signed in"
             return f"{who}; expected an operator, engineer, controller or test"
@@ -79,7 +79,7 @@ class Commands:
             return f"expected one of {', '.join(OPERATIONS)}"
         return self._give(Input(WEB, person.writer, person.kind, what, tuple(names), tuple(map(float, values))))
 
-    def _control(self, person: Person, kind: WriterKind, names: list[str], values: list[float]) -> str:
+    def _control(self, person: PageUser, kind: WriterKind, names: list[str], values: list[float]) -> str:
         if kind not in MAY_CONTROL:
             return f"{person.name} is a {kind}, expected one of the kind {' or '.join(MAY_CONTROL)}"
         (what,) = names[:1] or ("",)

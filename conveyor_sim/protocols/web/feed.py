@@ -17,7 +17,7 @@ from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.page.block import Content, block_ticks, pack
 from conveyor_sim.page.head import head
 from conveyor_sim.page.recording import text
-from conveyor_sim.protocols.view import Picture, PictureSource
+from conveyor_sim.protocols.tags.line_mirror import DrawableFrame, DrawableProvider
 from conveyor_sim.protocols.web.line_story import LineStory
 from conveyor_sim.protocols.web.viewer import Viewer
 from conveyor_sim.scene import parse_overrides, parse_scene
@@ -41,7 +41,7 @@ MOST_TOLD = 2000
 class Feed:
     """Follows a source as long as somebody looks."""
 
-    def __init__(self, source: PictureSource, **about: Any) -> None:
+    def __init__(self, source: DrawableProvider, **about: Any) -> None:
         """about: what pages are told besides, when they begin."""
         self._source, self._about = source, about
         self._viewers: set[Viewer] = set()
@@ -202,7 +202,7 @@ class Feed:
         return self._frame[1]
 
 
-def _packed(picture: Picture) -> bytes:
+def _packed(picture: DrawableFrame) -> bytes:
     content = Content(signals=[(picture.tick, picture.signals)])
     drawn = {topic: decode() for topic, decode in picture.drawn.items() if topic in ("bottles", "contacts", "belts")}
     if (message := drawn.get("bottles")) is not None:

@@ -7,8 +7,8 @@ from typing import Any
 
 from conveyor_sim.columns.events import Event, event_columns
 from conveyor_sim.page.story import Story
-from conveyor_sim.protocols.source import Shown
-from conveyor_sim.protocols.view import Picture
+from conveyor_sim.protocols.tags.line_mirror import DrawableFrame
+from conveyor_sim.protocols.tags.tag_provider import LineSnapshot
 
 COUNTERS = 0.5
 """s of simulated time from one entry of the counters to the next, at least."""
@@ -21,7 +21,7 @@ class LineStory(Story):
         super().__init__(lambda tick: tick * tick_ns * 1e-9, COUNTERS)
         self._seen: dict[str, Any] = {}
 
-    def look(self, shown: Shown, picture: Picture, events: Sequence[Event]) -> None:
+    def look(self, shown: LineSnapshot, picture: DrawableFrame, events: Sequence[Event]) -> None:
         """Add events, and what has changed since the last call."""
         found: dict[str, Any] = {"alarm_states": shown.alarms, "readback": shown.read_back}
         found |= {topic: picture.drawn.get(topic) for topic in ("counters", "rail_wear")}

@@ -15,15 +15,15 @@ from aiohttp import WSCloseCode, WSMsgType, web
 
 from conveyor_sim.page.bundle import HEADERS, PAGE, page_files
 from conveyor_sim.page.own_host import is_own, is_same_origin
-from conveyor_sim.protocols.face import HERE, FaceError, Status, require_free
-from conveyor_sim.protocols.quotas import GUEST, QUOTA, Place, Places, Quota
-from conveyor_sim.protocols.source import WEB
-from conveyor_sim.protocols.users import Logins, LoginService, User
-from conveyor_sim.protocols.view import PictureSource
-from conveyor_sim.protocols.web.commands import NOBODY, Commands, Person
+from conveyor_sim.protocols.server.budget import Budget
+from conveyor_sim.protocols.server.interface import HERE, ServerError, Status, require_free
+from conveyor_sim.protocols.server.quotas import GUEST, QUOTA, ConnectionSlot, ConnectionSlots, Quota
+from conveyor_sim.protocols.server.users import Logins, LoginService, User
+from conveyor_sim.protocols.tags.line_mirror import DrawableProvider
+from conveyor_sim.protocols.tags.tag_provider import WEB
+from conveyor_sim.protocols.web.commands import NOBODY, PageCommands, PageUser
 from conveyor_sim.protocols.web.feed import Feed, text_message
 from conveyor_sim.protocols.web.viewer import Viewer
-from conveyor_sim.protocols.work import Budget
 
 MOST_CONNECTIONS = 256
 """At once, of pages and whatever else: for one more the oldest makes room that is no page."""
@@ -62,7 +62,7 @@ class WebServer:
 
     def __init__(
         self,
-        source: PictureSource,
+        source: DrawableProvider,
         users: Mapping[str, User] | None = None,
         *,
         anonymous: bool = True,
@@ -76,10 +76,10 @@ class WebServer:
         TLS; None: plain, which is for this machine only. port: 0 for any that is free. quota: places of the pages.
         logins: checks passwords, in place of `users`.
         """
-        self._places = Places(quota)
+        self._places = ConnectionSlots(quota)
         self._logins, self._anonymous, self._secured = logins or Logins(dict(users or {})), anonymous, secured
         self._at = host, port
-        self._commands = Commands(source)
+        self._commands = PageCommands(source)
         self._feed = Feed(
             source, users=self._logins.has_users, takes=source.takes_inputs, controls=sorted(self._commands.controls)
         )
@@ -115,7 +115,7 @@ class WebServer:
         return Status(len(self._sockets), 0, self._commands.writes, self._commands.refused, longest)
 
     async def start(self) -> None:
-        """Listen. Raises FaceError if that is not possible."""
+        """Listen. Raises ServerError if that is not possible."""
         for name in ("aiohttp.server", "aiohttp.web", "aiohttp.access"):
             logging.getLogger(name).setLevel(logging.CRITICAL)  # it logs whatever clients send
         host, port = self._at
@@ -134,7 +134,7 @@ class WebServer:
             )
         except OSError as error:
             await runner.cleanup()
-            raise FaceError(
+            raise ServerError(
                 f"web: {host}:{port} can't be listened on ({error.strerror}), expected a free port"
             ) from error
         self._runner = runner
@@ -220,18 +220,18 @@ class WebServer:
         self._closing.add(closing)
         closing.add_done_callback(self._closing.discard)
 
-    def _expire(self, socket: web.WebSocketResponse, place: Place) -> None:
+    def _expire(self, socket: web.WebSocketResponse, place: ConnectionSlot) -> None:
         """Close a page that got no place as a guest, and whose user has not signed in."""
         if place.stage < GUEST and not self._places.admit_guest(place):
             self._end(socket)
 
-    def _sign_out(self, socket: web.WebSocketResponse, place: Place) -> None:
+    def _sign_out(self, socket: web.WebSocketResponse, place: ConnectionSlot) -> None:
         """Make a page a guest, if it had a user."""
         if place.user:
             self._places.leave_user(place)
             self._expire(socket, place)
 
-    async def _answer_all(self, socket: web.WebSocketResponse, viewer: Viewer, place: Place) -> None:
+    async def _answer_all(self, socket: web.WebSocketResponse, viewer: Viewer, place: ConnectionSlot) -> None:
         """Answer a page until its connection ends. place: of the page."""
         expiry = None
         if not self._places.admit_guest(place):
@@ -242,7 +242,7 @@ class WebServer:
             if expiry is not None:
                 expiry.cancel()
 
-    async def _answer_requests(self, socket: web.WebSocketResponse, viewer: Viewer, place: Place) -> None:
+    async def _answer_requests(self, socket: web.WebSocketResponse, viewer: Viewer, place: ConnectionSlot) -> None:
         person, origin = NOBODY, place.address
         if self._anonymous:
             self._feed.join(viewer)
@@ -290,7 +290,7 @@ class WebServer:
                 case _:
                     viewer.tell(_reply(request, self._commands.do(person, request), person))
 
-    async def _sign_in(self, request: Mapping[str, Any], origin: str) -> Person:
+    async def _sign_in(self, request: Mapping[str, Any], origin: str) -> PageUser:
         name, password = request.get("name"), request.get("password")
         user = None
         if isinstance(name, str) and isinstance(password, str):
@@ -299,7 +299,7 @@ class WebServer:
         if user is None or not isinstance(name, str):
             await asyncio.sleep(WRONG_PASSWORD)
             return NOBODY
-        return Person(name, user.role, user.kind)
+        return PageUser(name, user.role, user.kind)
 
 
 def _request(data: str) -> dict[str, Any] | None:
@@ -311,7 +311,7 @@ def _request(data: str) -> dict[str, Any] | None:
     return request if isinstance(request, dict) else None
 
 
-def _reply(request: Mapping[str, Any], refused: str, person: Person) -> bytes:
+def _reply(request: Mapping[str, Any], refused: str, person: PageUser) -> bytes:
     number = request.get("id")
     who = {"name": person.name, "role": person.role}
     return text_message("reply", id=number if isinstance(number, int) else None, refused=refused, person=who)

@@ -7,8 +7,8 @@ import ssl
 from pathlib import Path
 from tempfile import NamedTemporaryFile
 
-from conveyor_sim.protocols.face import FaceError
-from conveyor_sim.protocols.opcua.certificates import KEY, default_folder, identity
+from conveyor_sim.protocols.server.certificates import KEY, default_folder, identity
+from conveyor_sim.protocols.server.interface import ServerError
 
 CHAIN = "certificate.pem"
 """In a folder, beside KEY: what an authority has signed, and the certificates that lead there."""
@@ -17,7 +17,7 @@ CHAIN = "certificate.pem"
 def server_context(folder: Path | None, of_opcua: Path | None) -> ssl.SSLContext:
     """folder: of CHAIN and KEY; None: the certificate that the OPC UA face makes, in of_opcua if that is given.
 
-    Raises FaceError if it can't be read, CertificateError.
+    Raises ServerError if it can't be read, CertificateError.
     """
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     context.minimum_version = ssl.TLSVersion.TLSv1_2
@@ -37,8 +37,8 @@ def server_context(folder: Path | None, of_opcua: Path | None) -> ssl.SSLContext
 def _load(context: ssl.SSLContext, chain: Path, key: Path) -> None:
     for path in (chain, key):
         if not os.access(path, os.R_OK) or not path.is_file():
-            raise FaceError(f"{path}: can't be read, expected a certificate and its key: {CHAIN} and {KEY}")
+            raise ServerError(f"{path}: can't be read, expected a certificate and its key: {CHAIN} and {KEY}")
     try:
         context.load_cert_chain(chain, key, password=lambda: "")  # rather than to ask at the terminal
     except (OSError, ValueError) as error:
-        raise FaceError(f"{chain}: {error}, expected a certificate in PEM, and its key in {key.name}") from error
+        raise ServerError(f"{chain}: {error}, expected a certificate in PEM, and its key in {key.name}") from error

@@ -63,8 +63,12 @@ def attack(seed: int, folder: Path) -> str:
 
 
 def finish() -> None:
-    """End the node as Ctrl-C does, and see that it ends well. Raises Violation."""
-    _station().renew()
+    """End the node as Ctrl-C does, and have the next one account for a flood at its start. Raises Violation."""
+    station = _station()
+    station.renew()
+    for _ in range(3000):
+        station.publish("commands", Commands(names=["nowhere"], values=[0.0]))
+    station.require_account()
 
 
 class Station:
@@ -111,14 +115,14 @@ class Station:
             self._wait(future.done, "an answer to every request after a reset")
         self.futures.clear()
         if self._cases % ACCOUNT == 0:
-            self._require_account()
+            self.require_account()
         self._replay()
         return happened
 
     def renew(self) -> None:
         """End the node, look at how it ended, and start another one."""
         if self._node is not None:
-            self._require_account()
+            self.require_account()
             os.kill(self._node.pid, signal.SIGINT)
             self._wait(lambda: self._node is not None and self._node.exit_code is not None, "the end on Ctrl-C")
             log = self._node.log.read_text(errors="replace")
@@ -126,6 +130,9 @@ class Station:
                 raise Violation("bad end", f"status {self._node.exit_code}: {log[-2000:]}")
             self._wait(lambda: not self.line.node.count_services("lockstep"), "the end of its services")
             self._node = None
+        # Before the next node starts: it would count them as publishers that have not sent anything yet.
+        for publisher in self._publishers.values():
+            self.line.node.destroy_publisher(publisher)
         self._nodes += 1
         self._cases = self._sent = self.others = 0
         place = self._folder / str(self._nodes)
@@ -141,8 +148,6 @@ class Station:
         restore_for_children()
         self._node = Child("sim_node", given | {"record": self._bag, "threads": 1}, self._environment, place)
         self.present()
-        for publisher in self._publishers.values():
-            self.line.node.destroy_publisher(publisher)
         self._publishers = {
             name: self.line.publisher(kind, name, qos)
             for name, kind, qos in (
@@ -151,7 +156,19 @@ class Station:
                 (TABLE, Float64, "cmd_speed"),
             )
         }
+        self._introduce()
         self._memory = self._resident()
+
+    def _introduce(self) -> None:
+        """Send a first message of each publisher, which is refused, and wait for it.
+
+        The node counts lost commands from the first one that it receives of a publisher. A flood that begins before it
+        knows the publisher would not be counted as a whole.
+        """
+        self.publish("commands", Commands())
+        for name in SPEEDS:
+            self.publish(name, Float64(data=math.nan))
+        self._wait(lambda: self._told()["received commands"] == self._sent, "the first commands")
 
     # What actions use
 
@@ -205,13 +222,12 @@ class Station:
         if self.present().tick:
             raise Violation("no reset", "the tick is not 0")
 
-    def _require_account(self) -> None:
+    def require_account(self) -> None:
         """Of every command that was sent: it was lost, or it came and was applied, was refused, or waits."""
         told: dict[str, int] = {}
 
         def complete() -> bool:
-            _, values = self.line.diagnostics()
-            told.update({name: int(value) for name, value in values.items() if name.endswith(" commands")})
+            told.update(self._told())
             came, sent = told["received commands"], self._sent
             known = sum(told[f"{name} commands"] for name in ("applied", "refused", "waiting"))
             return came == known and sent <= came + told["lost commands"] <= sent + self.others
@@ -220,6 +236,11 @@ class Station:
             self._wait(complete, "an account of all commands")
         except Violation as error:
             raise Violation("no account", f"{self._sent} sent, {self.others} others, {told}: {error}") from error
+
+    def _told(self) -> dict[str, int]:
+        """Return the numbers of commands in the next diagnostics."""
+        _, values = self.line.diagnostics()
+        return {name: int(value) for name, value in values.items() if name.endswith(" commands")}
 
     def _replay(self) -> None:
         """Every recording that is closed, which is all but the last, and remove it."""

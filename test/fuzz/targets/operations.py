@@ -276,9 +276,8 @@ class Watch:
 
     def after_tick(self, given: list[Input], outcomes: list[CommandOutcome], expected: str | None) -> None:
         """expected: why the first input was to be refused, as it was told before it was given."""
-        sent = [(one.names, one.values, one.operation == "inject") for one in given]
         now = self._sim.bottles()
-        self._devices.check(self._bottles, now, sent)
+        self._devices.check(self._bottles, now, outcomes)
         self._bottles = now
         self._answers(given, outcomes, expected)
         self._hands(given, outcomes)

@@ -11,7 +11,7 @@ import pytest
 from conveyor_sim.line.commands.inputs import DISOWN, OWN
 from conveyor_sim.protocols.mqtt import link
 from conveyor_sim.protocols.mqtt.line_metrics import number_of
-from conveyor_sim.protocols.source import MOST_WAITING
+from conveyor_sim.protocols.tags.tag_provider import MOST_WAITING
 from test.protocols.mqtt.kit import BOOLEAN, DOUBLE, LONG, SETPOINT, SPEED, Host, Payload, add_metric, properties_of
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ from protocols.waiting import PATIENCE, until
 
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.replay import replay
-from conveyor_sim.protocols.server_messages import BEAT
+from conveyor_sim.protocols.hosting.server_messages import BEAT
 from test.protocols.mqtt.kit import SETPOINT, SPEED, Host
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 from asyncua import ua
 
-from conveyor_sim.protocols.source import MOST_WAITING
+from conveyor_sim.protocols.tags.tag_provider import MOST_WAITING
 from test.protocols.opcua.conftest import ROLES, refused
 
 if TYPE_CHECKING:

@@ -19,8 +19,8 @@ from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption,
 from protocols.waiting import alone
 from warm import run
 
-from conveyor_sim.protocols.opcua.certificates import CERTIFICATE, KEY, TRUSTED, CertificateError, identity
-from conveyor_sim.protocols.users import (
+from conveyor_sim.protocols.server.certificates import CERTIFICATE, KEY, TRUSTED, CertificateError, identity
+from conveyor_sim.protocols.server.users import (
     MOST_WRONG,
     PERIOD,
     Logins,
@@ -208,7 +208,7 @@ def test_a_full_disk_leaves_no_part_of_a_certificate(tmp_path: Path) -> None:
     """By a limit of the size of files, which the system keeps as it does that of the disk."""
     code = (
         "import resource, signal, sys; from pathlib import Path; "
-        "from conveyor_sim.protocols.opcua.certificates import identity; "
+        "from conveyor_sim.protocols.server.certificates import identity; "
         "signal.signal(signal.SIGXFSZ, signal.SIG_IGN); resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0)); "
         "identity(Path(sys.argv[1]))"
     )

@@ -1,0 +1,1 @@
+"""All contact with internals of numba and llvmlite; the README of the engine says what they are."""
