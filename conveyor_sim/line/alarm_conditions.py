@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple, Protocol
 
 from conveyor_sim.columns.damage import DamageEvent
-from conveyor_sim.line.alarms.alarm import Alarm
+from conveyor_sim.line.alarms.alarm import LineAlarm
 from conveyor_sim.line.alarms.alarms import Alarms
 from conveyor_sim.line.alarms.declaration import LINE_GROUP, Declared, error
 from conveyor_sim.line.device import ScanContext
@@ -25,17 +25,17 @@ class Signals(Protocol):
 
 
 class _Watched(NamedTuple):
-    alarm: Alarm
+    alarm: LineAlarm
     column: int
     """Of its signal among those beside it."""
 
 
-class Measured:
+class MeasuredConditions:
     """Looks at the devices whose signals have alarms, each once a tick, and at no others."""
 
     def __init__(self, alarms: Alarms, sources: Sequence[Signals]) -> None:
         self._alarms, self._sources = alarms, sources
-        self._of: tuple[Alarm, ...] = ()
+        self._of: tuple[LineAlarm, ...] = ()
         self._watched: list[tuple[Signals, list[_Watched]]] = []
 
     def changes(self, now: ScanContext, forced: Mapping[str, float]) -> dict[str, bool]:
@@ -63,7 +63,7 @@ class Measured:
                 self._watched.append((source, here))
 
 
-def beyond(alarm: Alarm, value: float) -> bool:
+def beyond(alarm: LineAlarm, value: float) -> bool:
     """Whether its condition holds at a value; where that is no number, it stays as it is."""
     fields = alarm.fields
     band = fields.deadband if alarm.condition else 0.0

@@ -6,7 +6,7 @@ from typing import Any
 
 from conveyor_sim.columns.damage import DamageEvent
 from conveyor_sim.errors import SceneError
-from conveyor_sim.line.alarm_conditions import LimitConditions, Measured, Signals, limit_alarms, scene_alarms
+from conveyor_sim.line.alarm_conditions import LimitConditions, MeasuredConditions, Signals, limit_alarms, scene_alarms
 from conveyor_sim.line.alarms import memory, operations
 from conveyor_sim.line.alarms.alarms import Alarms, Note
 from conveyor_sim.line.alarms.declaration import MOST_ALARMS, parse
@@ -36,7 +36,7 @@ class AlarmSystem:
         self.alarms.declare(0, given, "scene", own=True)
         self.device = AlarmsDevice(self.alarms)
         """What controllers read of them."""
-        self._measured = Measured(self.alarms, sources)
+        self._measured = MeasuredConditions(self.alarms, sources)
         self._limits = LimitConditions(self.alarms)
 
     def operations(self) -> dict[str, Operation]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple
 
 
-class Unit(NamedTuple):
+class UnitOfMeasure(NamedTuple):
     """A unit."""
 
     code: str
@@ -17,19 +17,19 @@ class Unit(NamedTuple):
     """As it is called there."""
 
 
-UNITS: Mapping[str, Unit] = {
-    "1": Unit("C62", "one"),
-    "m": Unit("MTR", "metre"),
-    "m/s": Unit("MTS", "metre per second"),
-    "s": Unit("SEC", "second"),
-    "Hz": Unit("HTZ", "hertz"),
-    "1/s": Unit("C97", "reciprocal second"),
-    "1/min": Unit("C94", "reciprocal minute"),
-    "1/h": Unit("H10", "reciprocal hour"),
-    "1/m^2": Unit("C93", "reciprocal square metre"),
-    "N": Unit("NEW", "newton"),
-    "J": Unit("JOU", "joule"),
-    "%": Unit("P1", "percent"),
+UNITS: Mapping[str, UnitOfMeasure] = {
+    "1": UnitOfMeasure("C62", "one"),
+    "m": UnitOfMeasure("MTR", "metre"),
+    "m/s": UnitOfMeasure("MTS", "metre per second"),
+    "s": UnitOfMeasure("SEC", "second"),
+    "Hz": UnitOfMeasure("HTZ", "hertz"),
+    "1/s": UnitOfMeasure("C97", "reciprocal second"),
+    "1/min": UnitOfMeasure("C94", "reciprocal minute"),
+    "1/h": UnitOfMeasure("H10", "reciprocal hour"),
+    "1/m^2": UnitOfMeasure("C93", "reciprocal square metre"),
+    "N": UnitOfMeasure("NEW", "newton"),
+    "J": UnitOfMeasure("JOU", "joule"),
+    "%": UnitOfMeasure("P1", "percent"),
 }
 """By how a tag writes them."""
 
@@ -97,7 +97,7 @@ class Tag:
         return replace(self, low=-math.inf, high=math.inf) if self.kind in ("number", "count") else self
 
     @property
-    def unece(self) -> Unit:
+    def unece(self) -> UnitOfMeasure:
         """Its unit in UNECE Recommendation 20."""
         return UNITS[self.unit]
 

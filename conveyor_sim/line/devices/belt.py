@@ -8,7 +8,7 @@ from conveyor_sim.line.alarms.declaration import Declared, error
 from conveyor_sim.line.commands.authority import AUTOMATIC
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.devices.region import most_inside
-from conveyor_sim.line.devices.setup import Setup
+from conveyor_sim.line.devices.setup import DeviceSetup
 from conveyor_sim.line.process_image import speed_command
 from conveyor_sim.line.tag import Tag, count, number
 from conveyor_sim.scene.belts import CurvedBelt, StraightBelt
@@ -51,7 +51,7 @@ class BeltDevice(Device):
         self,
         name: str,
         belt: StraightBelt | CurvedBelt,
-        setup: Setup,
+        setup: DeviceSetup,
         more: Sequence[Tag] = (),
         backward: bool = False,
     ) -> None:

@@ -8,7 +8,7 @@ from conveyor_sim.line.alarms.declaration import Declared, error
 from conveyor_sim.line.device import ScanContext
 from conveyor_sim.line.devices.belt import BeltDevice
 from conveyor_sim.line.devices.edge import RisingEdge
-from conveyor_sim.line.devices.setup import Setup
+from conveyor_sim.line.devices.setup import DeviceSetup
 from conveyor_sim.line.tag import MOST_COUNT, count, switch
 from conveyor_sim.scene.belts import CurvedBelt, StraightBelt
 from conveyor_sim.scene.drives import Drive
@@ -54,7 +54,7 @@ class DriveDevice(BeltDevice):
     A trip stops it, at its ramp, until the fault is gone and `reset` has risen since.
     """
 
-    def __init__(self, name: str, belt: StraightBelt | CurvedBelt, drive: Drive, setup: Setup) -> None:
+    def __init__(self, name: str, belt: StraightBelt | CurvedBelt, drive: Drive, setup: DeviceSetup) -> None:
         tags = [
             switch(f"{name}/running", "status", "Commanded to run, and not tripped.", 1.0, "state"),
             switch(f"{name}/at_speed", "status", "At the end of its ramp, also of one to standstill.", 1.0),
@@ -135,6 +135,6 @@ class DriveDevice(BeltDevice):
         return -setpoint if self.reverse else setpoint
 
 
-def belt_device(name: str, belt: StraightBelt | CurvedBelt, setup: Setup) -> BeltDevice:
+def belt_device(name: str, belt: StraightBelt | CurvedBelt, setup: DeviceSetup) -> BeltDevice:
     """A belt, with a drive if it has one."""
     return BeltDevice(name, belt, setup) if belt.drive is None else DriveDevice(name, belt, belt.drive, setup)

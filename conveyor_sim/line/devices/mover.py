@@ -9,7 +9,7 @@ from conveyor_sim.engine.arrays.moving import HELD, OFF_PROFILE, ON_PROFILE, PHA
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.engine.rails.motion_profile import plan_profile
 from conveyor_sim.line.device import Device, ScanContext
-from conveyor_sim.line.devices.setup import Setup
+from conveyor_sim.line.devices.setup import DeviceSetup
 from conveyor_sim.line.tag import number, switch
 from conveyor_sim.scene.parts.movers import Mover as MoverPart
 
@@ -31,7 +31,7 @@ class Mover(Device):
     drive, it is held up or goes back, and goes on from where it is.
     """
 
-    def __init__(self, name: str, part: MoverPart, setup: Setup) -> None:
+    def __init__(self, name: str, part: MoverPart, setup: DeviceSetup) -> None:
         shapes = setup.model.moving_shapes
         index = [shape.name for shape in shapes].index(name)
         shape = shapes[index]

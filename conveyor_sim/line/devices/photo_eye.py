@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from conveyor_sim.engine.sensors.beams import ROUNDING
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.devices.beam import Beams, Span
-from conveyor_sim.line.devices.setup import CHATTER, Setup
+from conveyor_sim.line.devices.setup import CHATTER, DeviceSetup
 from conveyor_sim.line.tag import count, number, seconds, switch
 from conveyor_sim.scene.parts.photo_eye import PhotoEye
 
@@ -61,7 +61,7 @@ class PhotoEyeDevice(Device):
     late: tuple[Edge, ...]
     """Edges that have not come through yet."""
 
-    def __init__(self, name: str, eye: PhotoEye, setup: Setup) -> None:
+    def __init__(self, name: str, eye: PhotoEye, setup: DeviceSetup) -> None:
         eyes = setup.scene.photo_eyes
         beams = setup.shared(Beams, lambda: Beams([(each.from_, each.to) for each in eyes.values()]))
         index = setup.index("photo_eyes", name.rpartition("/")[2])

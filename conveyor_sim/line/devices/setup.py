@@ -1,4 +1,4 @@
-"""`Setup`: what a device is made from, beside its part of the scene."""
+"""`DeviceSetup`: what a device is made from, beside its part of the scene."""
 
 from collections.abc import Callable
 from hashlib import blake2b
@@ -7,7 +7,7 @@ from typing import TypeVar
 import numpy as np
 
 from conveyor_sim.line.device import Device
-from conveyor_sim.line.devices.entry import Entry
+from conveyor_sim.line.devices.entry import BottleEntry
 from conveyor_sim.physics.model import Model
 from conveyor_sim.scene.schema import Scene
 
@@ -20,7 +20,7 @@ BRANCHES = {(JITTER, "infeeds"): (), (BAD, "infeeds"): (1,), (BAD, "machines"): 
 D = TypeVar("D", bound=Device)
 
 
-class Setup:
+class DeviceSetup:
     """A scene, its model, and the devices made so far."""
 
     def __init__(self, scene: Scene, model: Model) -> None:
@@ -47,10 +47,10 @@ class Setup:
         """The place of a part in its field of the scene, from 0."""
         return list(getattr(self.scene, field)).index(name)
 
-    def entry(self, bottle: str, direction: float, speed: float) -> Entry:
+    def entry(self, bottle: str, direction: float, speed: float) -> BottleEntry:
         """Where bottles of a type enter in a direction (rad) at a speed (m/s)."""
         kind = self.model.bottle_types.index(bottle)
-        return Entry(kind, float(self.model.type_radius[kind]), direction, speed)
+        return BottleEntry(kind, float(self.model.type_radius[kind]), direction, speed)
 
     def fastest_flow(self, belt: str) -> float:
         """Bottles a second that a belt can bring at most: the smallest ones, touching in as many lanes as there are."""
