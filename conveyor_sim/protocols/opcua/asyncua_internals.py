@@ -204,7 +204,7 @@ class OpenSubscriptions(SubscriptionService):
 
     @property
     def conditions(self) -> dict[ua.NodeId, Any]:
-        """Latest event of each retained condition, for a refresh. The library fills it only for events that it emits."""
+        """Latest event of each retained condition, for a refresh; the library fills it only for events that it emits."""
         return self._conditions
 
     def lifetime(self, count: int) -> int:

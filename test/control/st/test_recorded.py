@@ -14,7 +14,7 @@ from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.replay import replay
 from conveyor_sim.bag.rerun import rerun
 from conveyor_sim.cli import main
-from conveyor_sim.control.recorded import Recorded
+from conveyor_sim.control.recorded import RecordedVariables
 from conveyor_sim.control.scan import ControlError, together
 from conveyor_sim.control.st import StructuredText
 from conveyor_sim.page.content import Collector
@@ -95,7 +95,10 @@ def test_patterns_choose_variables(tmp_path: Path) -> None:
     )
 
     def chosen(*record: str) -> list[str]:
-        return [name.removeprefix("plc/") for name in Recorded(StructuredText(tmp_path / "p.st", record=record)).names]
+        return [
+            name.removeprefix("plc/")
+            for name in RecordedVariables(StructuredText(tmp_path / "p.st", record=record)).names
+        ]
 
     assert chosen() == []
     assert chosen("p/b", "g") == ["g", "p/b"]
@@ -103,7 +106,7 @@ def test_patterns_choose_variables(tmp_path: Path) -> None:
     assert chosen("p/v[1?]") == ["p/v[10]", "p/v[11]", "p/v[12]"]
     assert len(chosen("*")) == 15
     two = together(StructuredText(tmp_path / "p.st", record="p/a"), StructuredText(PROGRAMS / "table.st", record="*"))
-    assert "plc/p/a" in Recorded(two).names and "plc/table/held" in Recorded(two).names
+    assert "plc/p/a" in RecordedVariables(two).names and "plc/table/held" in RecordedVariables(two).names
     with pytest.raises(ControlError, match=stating("'p/w'", "no variable", "pattern", "plc/g", "plc/p/a")):
         chosen("p/w")
     (tmp_path / "p.st").write_text("PROGRAM p VAR v : ARRAY [1..1001] OF INT; END_VAR ; END_PROGRAM")
