@@ -17,7 +17,17 @@ from conveyor_sim.columns.events import Event, GuardEvent
 from conveyor_sim.columns.ledger import Ledger
 from conveyor_sim.engine.arrays.bodies import Bottles
 from conveyor_sim.engine.observers.contact_list import closed_contacts
-from conveyor_sim.line.inputs import ARRIVAL, FAULT, INJECT, OPERATE, SET, WATCHDOG, CommandOutcome, Input, WriterKind
+from conveyor_sim.line.commands.inputs import (
+    ARRIVAL,
+    FAULT,
+    INJECT,
+    OPERATE,
+    SET,
+    WATCHDOG,
+    CommandOutcome,
+    Input,
+    WriterKind,
+)
 from conveyor_sim.line.line import Line
 from conveyor_sim.line.process_image import ProcessImage
 from conveyor_sim.physics.accounts.clogging import clogging_of

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from conveyor_sim.line.inputs import DISOWN, OWN, Input
+from conveyor_sim.line.commands.inputs import DISOWN, OWN, Input
 from conveyor_sim.run.lockstep import LOCKSTEP, LockstepRequest, Refused
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.printable import SENTENCE, printable

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.line.inputs import SET, CommandOutcome, Input
+from conveyor_sim.line.commands.inputs import SET, CommandOutcome, Input
 from conveyor_sim.run import ownership
 from conveyor_sim.run.advance import Advance, refuse
 from conveyor_sim.run.calls import Calls

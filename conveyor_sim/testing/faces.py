@@ -8,16 +8,16 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
-from conveyor_sim.line.inputs import WriterKind
-from conveyor_sim.protocols.face import Face, Stamps
+from conveyor_sim.line.commands.inputs import WriterKind
+from conveyor_sim.protocols.hosting.server_thread import ServerThread
 from conveyor_sim.protocols.modbus.address_map import modbus_map
-from conveyor_sim.protocols.server_thread import ServerThread
+from conveyor_sim.protocols.server.interface import ProtocolServer, Stamps
 from conveyor_sim.support.modbus_rows import Row
 
 if TYPE_CHECKING:
     from conveyor_sim.protocols.modbus.server import ModbusServer
     from conveyor_sim.protocols.opcua.server import OpcUaServer
-    from conveyor_sim.protocols.users import Role
+    from conveyor_sim.protocols.server.users import Role
     from conveyor_sim.testing.scenario import Scenario
 
 MODBUS_MISSING = "pymodbus is not installed: pip install 'conveyor_sim[scada]'"
@@ -29,9 +29,9 @@ class _Faces:
 
     def __init__(self) -> None:
         self._thread: ServerThread | None = None
-        self._servers: list[Face] = []
+        self._servers: list[ProtocolServer] = []
 
-    def _start(self, server: Face) -> None:
+    def _start(self, server: ProtocolServer) -> None:
         self._thread = self._thread or ServerThread()
         self._thread.run(server.start())
         self._servers.append(server)
@@ -55,7 +55,7 @@ class ModbusFaces(_Faces, AbstractContextManager["ModbusFaces"]):
 
         role: what clients that write are, "controller" or "operator"; None: they can't. rows: the map of addresses;
         None: that of `conveyor-sim tags --modbus`. What clients write acts at the next tick that the test lets pass.
-        Raises FaceError if there is no port, ImportError without pymodbus.
+        Raises ServerError if there is no port, ImportError without pymodbus.
         """
         from conveyor_sim.protocols.modbus.server import ModbusServer
 
@@ -82,10 +82,10 @@ class OpcUaFaces(_Faces, AbstractContextManager["OpcUaFaces"]):
 
         users: who may do more than read, by name, each with role and password. stamps: what the times of values are.
         What clients write acts at the next tick that the test lets pass. The certificate is one for the test. Raises
-        FaceError if there is no port, ImportError without asyncua.
+        ServerError if there is no port, ImportError without asyncua.
         """
         from conveyor_sim.protocols.opcua.server import OpcUaServer
-        from conveyor_sim.protocols.users import new_user
+        from conveyor_sim.protocols.server.users import new_user
 
         known = {name: new_user(role, password) for name, (role, password) in (users or {}).items()}
         server = OpcUaServer(line.source(), known, stamps=stamps, certificates=Path(self._folder.name) / "own")

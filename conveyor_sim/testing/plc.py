@@ -1,6 +1,6 @@
 """`AttachedPlc`: a soft PLC as the controller of a line under test, as a client of a server that the test runs.
 
-It goes in lockstep by two tags (protocols/handshake.py), so the test has the same bits however fast the PLC is.
+It goes in lockstep by two tags (protocols/tags/handshake.py), so the test has the same bits however fast the PLC is.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ from contextlib import AbstractContextManager, ExitStack
 from pathlib import Path
 
 from conveyor_sim.control.scan import ControlError, Inputs
-from conveyor_sim.line.inputs import SET
-from conveyor_sim.protocols.face import Face
-from conveyor_sim.protocols.handshake import TARGET, HandshakeSource
+from conveyor_sim.line.commands.inputs import SET
+from conveyor_sim.protocols.hosting.server_thread import ServerThread
 from conveyor_sim.protocols.modbus.address_map import modbus_map
-from conveyor_sim.protocols.server_thread import ServerThread
-from conveyor_sim.protocols.source import TagSource
+from conveyor_sim.protocols.server.interface import ProtocolServer
+from conveyor_sim.protocols.tags.handshake import TARGET, HandshakeTagProvider
+from conveyor_sim.protocols.tags.tag_provider import TagProvider
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.child_process import Process
 from conveyor_sim.support.modbus_rows import Row
@@ -40,7 +40,7 @@ class AttachedPlc(AbstractContextManager["AttachedPlc"]):
     def __init__(
         self,
         simulation: Simulation,
-        make: Callable[[TagSource, Path], Face],
+        make: Callable[[TagProvider, Path], ProtocolServer],
         command: Sequence[str],
         environment: Mapping[str, str],
         patience: float,
@@ -48,7 +48,7 @@ class AttachedPlc(AbstractContextManager["AttachedPlc"]):
         """make: the server, not started, which may keep files in a folder. command: starts the PLC; empty: others do.
         environment: of it, besides. patience: s of wall time that it has for each scan.
 
-        Raises FaceError if the server can't be, OSError if the command can't be run.
+        Raises ServerError if the server can't be, OSError if the command can't be run.
         """
         self.writer = "plc"
         """Who its commands are recorded under: the client that wrote last."""
@@ -56,7 +56,7 @@ class AttachedPlc(AbstractContextManager["AttachedPlc"]):
         """By which way they came."""
         self._simulation = simulation
         self._patience = patience
-        self._tags = HandshakeSource(simulation)
+        self._tags = HandshakeTagProvider(simulation)
         self._process: Process | None = None
         self._shown = simulation.tick
         with ExitStack() as stack:
@@ -113,7 +113,7 @@ class AttachedPlc(AbstractContextManager["AttachedPlc"]):
             raise ControlError(text)
 
 
-def modbus(rows: Sequence[Row] | None, port: int) -> Callable[[TagSource, Path], Face]:
+def modbus(rows: Sequence[Row] | None, port: int) -> Callable[[TagProvider, Path], ProtocolServer]:
     """What makes the server of a Modbus client. Raises ImportError without pymodbus."""
     from conveyor_sim.protocols.modbus.server import ModbusServer
 
@@ -122,10 +122,10 @@ def modbus(rows: Sequence[Row] | None, port: int) -> Callable[[TagSource, Path],
     )
 
 
-def opcua(password: str, port: int) -> Callable[[TagSource, Path], Face]:
+def opcua(password: str, port: int) -> Callable[[TagProvider, Path], ProtocolServer]:
     """What makes the server of an OPC UA client. Raises ImportError without asyncua."""
     from conveyor_sim.protocols.opcua.server import OpcUaServer
-    from conveyor_sim.protocols.users import new_user
+    from conveyor_sim.protocols.server.users import new_user
 
     users = {USER: new_user("controller", password)}
     return lambda source, folder: OpcUaServer(source, users, port=port, certificates=folder / "certificates")

@@ -16,9 +16,9 @@ from conveyor_sim.bag.outputs import Outputs, forget_past
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.control.scan import Controller
 from conveyor_sim.errors import CommandError, SimulationError
-from conveyor_sim.line.inputs import DISOWN, FAULT, INJECT, SET, Input
+from conveyor_sim.line.commands.inputs import DISOWN, FAULT, INJECT, SET, Input
 from conveyor_sim.line.run_state import ENDED, RUNNING, STOPPED, RunState
-from conveyor_sim.protocols.source import FACES, TickSource
+from conveyor_sim.protocols.tags.tag_provider import SCADA_SOURCES, SteppedTagProvider
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.modbus_rows import Row
@@ -89,7 +89,7 @@ class Scenario(AbstractContextManager["Scenario"]):
         self._cycle = ScanCycle(self.simulation, self._give)
         self._alarms: dict[str, float] = {}
         self._standing: list[Assertion] = []
-        self._sources: list[TickSource] = []
+        self._sources: list[SteppedTagProvider] = []
         self._signals: dict[str, float] = {}
         self._stopped = False  # by the guard
         self._look()
@@ -190,7 +190,7 @@ class Scenario(AbstractContextManager["Scenario"]):
         that is free. rows: the map of addresses; None: that of `conveyor-sim tags --modbus`. patience: s of wall time
         that it has for each scan.
 
-        Raises ControlError if it does not let the line go on, as every later tick does; FaceError, OSError as
+        Raises ControlError if it does not let the line go on, as every later tick does; ServerError, OSError as
         `AttachedPlc`; ImportError without pymodbus.
         """
         self._cycle.attach_plc(plc.modbus(rows, port), command, {}, patience)
@@ -229,12 +229,12 @@ class Scenario(AbstractContextManager["Scenario"]):
         self._cycle.attach_served_plc(url, Path(tags), user, password, patience)
         self._scan()
 
-    def source(self) -> TickSource:
+    def source(self) -> SteppedTagProvider:
         """The line as a SCADA face sees it, from now on. What clients of that give is applied at the next tick.
 
         One that is refused is an outcome and an event, and fails no test.
         """
-        self._sources.append(TickSource(self.simulation))
+        self._sources.append(SteppedTagProvider(self.simulation))
         return self._sources[-1]
 
     def command(self, name: str, value: float) -> None:
@@ -349,7 +349,9 @@ class Scenario(AbstractContextManager["Scenario"]):
         for outcome in outcomes:
             if outcome.accepted:
                 self.history.take(outcome, outcome.source == TEST)
-            elif (outcome.source not in FACES or self._cycle.answers_for(outcome)) and not by_other_hands(outcome):
+            elif by_other_hands(outcome):
+                continue
+            elif outcome.source not in SCADA_SOURCES or self._cycle.answers_for(outcome):
                 refused.append(outcome.reason)
         self._look()
         for source in self._sources:

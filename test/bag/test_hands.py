@@ -12,7 +12,7 @@ from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.bag.replay import replay
 from conveyor_sim.columns.image import Image
-from conveyor_sim.line.inputs import DISOWN, FORCE, MODE, OWN, SET, UNFORCE, Input
+from conveyor_sim.line.commands.inputs import DISOWN, FORCE, MODE, OWN, SET, UNFORCE, Input
 from conveyor_sim.report.summarize import summarize
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation

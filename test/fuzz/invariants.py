@@ -14,7 +14,7 @@ from fuzz.violation import Violation
 from numpy.typing import NDArray
 
 from conveyor_sim.columns.bottles import BottleColumns
-from conveyor_sim.line.inputs import CommandOutcome
+from conveyor_sim.line.commands.inputs import CommandOutcome
 from conveyor_sim.scene.contacts import Contact
 from conveyor_sim.simulation import Simulation
 
@@ -62,7 +62,7 @@ class Invariants:
         """The checks; sent: the inputs of this tick, and what was told of them."""
         self._belts.check(sent, outcomes)
         now = self._finite()
-        self._devices.check(self._before, now, sent)
+        self._devices.check(self._before, now, outcomes)
         self.bottle_ticks += len(now.id)
         fresh = self._identities(now)
         self._births(now, fresh)

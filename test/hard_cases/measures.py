@@ -19,7 +19,7 @@ from conveyor_sim.accuracy.measure.chatter import STEPS
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.accuracy.trajectory import variant
 from conveyor_sim.columns.bottles import BottleColumns
-from conveyor_sim.engine.lists.riding import left_out
+from conveyor_sim.engine.lists.riding import skipped_slots
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.physics.stepping.guard.chatter import ChatterMeter
 from conveyor_sim.scene import Scene, parse_overrides, parse_scene
@@ -149,7 +149,7 @@ def riders(simulation: Simulation) -> int:
     """Bottles that the last step of the last tick left out, on one thread; 0 where nobody can ride."""
     world = simulation._state.world
     ids = world.bottles.id
-    return int((left_out(world.riding, ids.size) & (ids >= 0)).sum())
+    return int((skipped_slots(world.riding, ids.size) & (ids >= 0)).sum())
 
 
 def _acts(case: Case, scene: Scene) -> list[int]:

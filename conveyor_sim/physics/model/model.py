@@ -14,7 +14,7 @@ from conveyor_sim.engine.arrays.contacts import ContactLaw, Curves
 from conveyor_sim.engine.arrays.lists import StaticGrid
 from conveyor_sim.engine.arrays.rails import Arcs, Segments
 from conveyor_sim.engine.arrays.types import F8
-from conveyor_sim.engine.arrays.world import Settings
+from conveyor_sim.engine.arrays.world import EngineSettings
 from conveyor_sim.engine.compiler.compile import ENGINE_HASH
 from conveyor_sim.engine.integrators import AHEAD, LAG
 from conveyor_sim.errors import SceneError
@@ -73,7 +73,7 @@ class Model:
     type_heights: F8
     """(T, 2), m, of the contact band and of the centre of gravity; NaN where they are not given."""
     plant: Plant
-    settings: Settings
+    settings: EngineSettings
     pair_law: ContactLaw | None
     """(T * T,), bottle and bottle; None where bottles do not touch bottles."""
     rail_law: ContactLaw | None
@@ -138,7 +138,7 @@ def build_model(scene: Scene) -> Model:
         type_base_radius=laws.base_radius,
         type_heights=np.array([_heights(kind) for kind in types]),
         plant=plant,
-        settings=Settings(
+        settings=EngineSettings(
             slip_limit=scene.slip_limit,
             lever=1.0 if scene.lever_arm == "overlap" else 0.0,
             skin=skin,

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.engine.arrays.lists import Listed, StaticGrid
+from conveyor_sim.engine.arrays.lists import BottleList, StaticGrid
 from conveyor_sim.engine.arrays.rails import Arcs, Ends, Segments
 from conveyor_sim.engine.arrays.support import Belts, Sectors
 from conveyor_sim.engine.arrays.types import F8
@@ -97,9 +97,9 @@ def belt_arrays(shapes: Sequence[BeltShape], slots: int, candidates: int) -> Bel
     )
 
 
-def listed(slots: int) -> Listed:
+def listed(slots: int) -> BottleList:
     """Room for a list of bottles by unit, empty."""
-    return Listed(np.zeros(slots, np.uint32), np.zeros(slots // UNIT + 2, np.uint32))
+    return BottleList(np.zeros(slots, np.uint32), np.zeros(slots // UNIT + 2, np.uint32))
 
 
 def plant_grid(

@@ -4,12 +4,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from conveyor_sim.engine.arrays.bodies import Bottles, Load, Peaks, Spin
+from conveyor_sim.engine.arrays.bodies import Bottles, ForceSums, Peaks, Spin
 from conveyor_sim.engine.arrays.contacts import ContactLaw, Implicit, PairParts, Pairs, PairSprings, Slots
 from conveyor_sim.engine.arrays.integrators import Blocks, Linear, PairTangent, Slopes, Stage, Triple
 from conveyor_sim.engine.arrays.lists import Near, NearSprings, Neighbourhood
 from conveyor_sim.engine.arrays.moving import MovingRails, MovingSprings
-from conveyor_sim.engine.arrays.observers import GuardProbe, Ledger
+from conveyor_sim.engine.arrays.observers import GuardProbe, LedgerArrays
 from conveyor_sim.engine.arrays.riding import Riding
 from conveyor_sim.engine.arrays.support import Footing, Ring, StaticFriction, Surface
 from conveyor_sim.engine.arrays.types import F8
@@ -84,7 +84,7 @@ def empty_world(model: Model, slots: int) -> World:
             packed=np.zeros(4 * slots),
         ),
         spin=Spin(reals(), reals(), reals(), reals()) if model.has("rotation") else None,
-        load=Load(reals(), reals(), reals() if peaks else None, reals() if peaks else None),
+        load=ForceSums(reals(), reals(), reals() if peaks else None, reals() if peaks else None),
         peaks=Peaks(reals(), reals()) if peaks else None,
         stage=Stage(reals(), reals(), reals()) if model.integrator in STAGED else None,
         path=_triple(slots) if model.integrator in ON_PATHS and _has_springs(model) else None,
@@ -231,9 +231,9 @@ def _riding(model: Model, slots: int) -> Riding:
     )
 
 
-def _ledger(slots: int, model: Model) -> Ledger:
+def _ledger(slots: int, model: Model) -> LedgerArrays:
     units, surfaces, rails = slots // UNIT + 1, len(model.belts) + 1, len(model.plant.moving)
-    return Ledger(
+    return LedgerArrays(
         damping=_triple(slots),
         friction=_triple(slots),
         base=_triple(slots),

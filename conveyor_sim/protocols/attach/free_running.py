@@ -15,15 +15,15 @@ from pathlib import Path
 
 from conveyor_sim.control.scan import ALARMS, AlarmChanges
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.line.commands import refusal
-from conveyor_sim.line.inputs import SET, Input
+from conveyor_sim.line.commands.inputs import SET, Input
+from conveyor_sim.line.commands.refusal import refusal
 from conveyor_sim.line.tag import COMMANDS
 from conveyor_sim.protocols.attach.link import Link, LinkError
 from conveyor_sim.protocols.attach.links import all_of, link
 from conveyor_sim.protocols.attach.tag_map import TagMap, read_tag_map
-from conveyor_sim.protocols.face import Face, Status
-from conveyor_sim.protocols.faces import Kind
-from conveyor_sim.protocols.source import PLC, Shown, TagSource
+from conveyor_sim.protocols.hosting.server_kinds import ServerKind
+from conveyor_sim.protocols.server.interface import ProtocolServer, Status
+from conveyor_sim.protocols.tags.tag_provider import PLC, LineSnapshot, TagProvider
 from conveyor_sim.support.printable import SENTENCE, printable
 
 AGAIN = 1.0
@@ -35,7 +35,7 @@ class PlcFace:
 
     def __init__(
         self,
-        source: TagSource,
+        source: TagProvider,
         url: str,
         tags: TagMap,
         make: Callable[[], Link],
@@ -54,7 +54,7 @@ class PlcFace:
         self._alarms = AlarmChanges()
         self._commands = {tag.name: tag for tag in source.about.tags if tag.role in COMMANDS}
         self._bad: set[str] = set()  # commands that are out of range
-        self._written: Shown | None = None
+        self._written: LineSnapshot | None = None
         self._given = self._refused = 0
         self._lag = 0.0
 
@@ -167,15 +167,15 @@ def of_plc(
     period: float,
     say: Callable[[str], object],
     observe: Callable[[Mapping[str, float]], object],
-) -> Kind:
+) -> ServerKind:
     """What serves a source to a PLC, as one of the faces. url, user, password: as `link`. tags: the map. The others: as
     `PlcFace`.
     """
 
-    def make(source: TagSource, *_: object) -> Face:
+    def make(source: TagProvider, *_: object) -> ProtocolServer:
         mapped = read_tag_map(tags, source.about.tags)
         return PlcFace(source, url, mapped, lambda: link(url, all_of(mapped), user, password), period, say, observe)
 
     library = "pymodbus" if url.startswith("modbus") else "asyncua"
     # It is alone, and made of functions of this process.
-    return Kind(PLC, 0, (library,), __name__, make, lambda _: "command it", isolated=False)
+    return ServerKind(PLC, 0, (library,), __name__, make, lambda _: "command it", isolated=False)

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Protocol
 
-from conveyor_sim.protocols.face import FaceError
+from conveyor_sim.protocols.server.interface import ServerError
 
 PATIENCE = 5.0
 """s of wall time that a PLC has for each request."""
 
 
-class LinkError(FaceError):
+class LinkError(ServerError):
     """A PLC that can't be reached, or does not answer as it should."""
 
 

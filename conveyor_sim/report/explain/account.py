@@ -1,4 +1,4 @@
-"""What a scene comes to, in a table: its contents, and what is chosen for it."""
+"""Table of a scene: contents, effects, time step and expected errors."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from conveyor_sim.support.printable import printable_lines
 
 
 def account(scene: Scene, model: Model) -> Table:
-    """What a scene comes to: contents, effects and why, time step and why, errors to expect."""
+    """Return a table with contents, effects and time step, each with its reason, and expected errors."""
     table = Table.grid(padding=(0, 2))
     fed = ["without end" if entry.most is None else str(entry.most) for _, entry in scene.entries()]
     table.add_row("scene", ": ".join(filter(None, (model.name, printable_lines(scene.description)))))

@@ -25,11 +25,11 @@ from conveyor_sim.bag.replay import replay
 from conveyor_sim.columns.counters import CounterColumns
 from conveyor_sim.columns.read_back import ReadBackColumns
 from conveyor_sim.engine.arrays.types import F8
-from conveyor_sim.line.authority import MAY, PEOPLE
-from conveyor_sim.line.inputs import WRITER_KINDS, CommandOutcome, Input
-from conveyor_sim.line.packml import COMMAND_TEXTS, MODE_STATES, Command, State
-from conveyor_sim.line.stop_reason import BY_HAND, COMMANDED, WORKING
-from conveyor_sim.line.time_account import CATEGORIES
+from conveyor_sim.line.commands.authority import MAY, PEOPLE
+from conveyor_sim.line.commands.inputs import WRITER_KINDS, CommandOutcome, Input
+from conveyor_sim.line.machines.packml import COMMAND_TEXTS, MODE_STATES, Command, PackMLState
+from conveyor_sim.line.machines.stop_reason import BY_HAND, COMMANDED, WORKING
+from conveyor_sim.line.machines.time_account import CATEGORIES
 from conveyor_sim.scene import Scene, parse_scene
 from conveyor_sim.scene.yaml_lines import Document
 from conveyor_sim.simulation import Simulation
@@ -42,8 +42,14 @@ VALUES = (0.0, 1.0, 1.0, 2.0, 3.0, 8.0, 0.5, -1.0, 1e-9, 1e300, math.nan, math.i
 VALUED = ("set", "inject", "mode", "force")
 STOPS = (Command.STOP, Command.ABORT)
 STOPPED = {
-    Command.STOP: {State.STOPPING, State.STOPPED, State.ABORTING, State.ABORTED, State.CLEARING},
-    Command.ABORT: {State.ABORTING, State.ABORTED},
+    Command.STOP: {
+        PackMLState.STOPPING,
+        PackMLState.STOPPED,
+        PackMLState.ABORTING,
+        PackMLState.ABORTED,
+        PackMLState.CLEARING,
+    },
+    Command.ABORT: {PackMLState.ABORTING, PackMLState.ABORTED},
 }
 """Where a machine is after what a person has stopped it with."""
 
@@ -276,9 +282,8 @@ class Watch:
 
     def after_tick(self, given: list[Input], outcomes: list[CommandOutcome], expected: str | None) -> None:
         """expected: why the first input was to be refused, as it was told before it was given."""
-        sent = [(one.names, one.values, one.operation == "inject") for one in given]
         now = self._sim.bottles()
-        self._devices.check(self._bottles, now, sent)
+        self._devices.check(self._bottles, now, outcomes)
         self._bottles = now
         self._answers(given, outcomes, expected)
         self._hands(given, outcomes)
@@ -310,7 +315,7 @@ class Watch:
         for name, value in zip(one.names, one.values, strict=False):
             machine = name.removesuffix("/cntrl_cmd")
             changed = one.operation == "mode" and modes[name] != self._modes[name]
-            if changed and self._states.get(name, State.STOPPED) not in MODE_STATES:
+            if changed and self._states.get(name, PackMLState.STOPPED) not in MODE_STATES:
                 raise Violation("mode", f"{name}: changed in state {self._states[name]}")
             stopped = one.operation == "set" and machine != name and value in STOPS and one.writer_kind in PEOPLE
             if stopped and now[machine] not in STOPPED[Command(int(value))]:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from line.test_station import LOADED, stationed
+from line.machines.test_station import LOADED, stationed
 from physics.state.test_checkpoint import INTEGRATORS, queue, run
 from scenes import SPRINGS_AND_RINGS, line, scene
 
@@ -149,7 +149,7 @@ def test_states_that_look_equal_and_have_other_futures_differ(station: Path) -> 
     stream = next(
         place for place, value in leaves(json.loads(json.dumps(sim._snapshot()))) if place[-1] == "inc" and value
     )
-    device: Any = other._line._by_name()[stream[2]]
+    device: Any = next(device for device in other._line._devices if device.name == stream[2])
     for step in stream[3:-2]:
         device = device[step] if isinstance(device, dict) else getattr(device, step)
     device.random()

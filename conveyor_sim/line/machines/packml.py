@@ -1,0 +1,191 @@
+"""The PackML state model: 17 states, ten commands, and which leads from which to which.
+
+Numbers are those of StateCurrent and CntrlCmd in PackML (OPC 30050, Beckhoff Tc3_PackML_V3). As in OPC 30050, Hold is
+taken not in Execute alone but on the way to and from it and while Suspended too: a machine can break down there.
+"""
+
+from collections.abc import Collection, Mapping
+from enum import IntEnum
+from typing import Literal
+
+
+class PackMLState(IntEnum):
+    """States of a machine, as StateCurrent has them; 0, Undefined, is none."""
+
+    CLEARING = 1
+    STOPPED = 2
+    STARTING = 3
+    IDLE = 4
+    SUSPENDED = 5
+    EXECUTE = 6
+    STOPPING = 7
+    ABORTING = 8
+    ABORTED = 9
+    HOLDING = 10
+    HELD = 11
+    UNHOLDING = 12
+    SUSPENDING = 13
+    UNSUSPENDING = 14
+    RESETTING = 15
+    COMPLETING = 16
+    COMPLETE = 17
+
+
+class Command(IntEnum):
+    """Commands to a machine, as CntrlCmd has them; 0 is none."""
+
+    RESET = 1
+    START = 2
+    STOP = 3
+    HOLD = 4
+    UNHOLD = 5
+    SUSPEND = 6
+    UNSUSPEND = 7
+    ABORT = 8
+    CLEAR = 9
+    COMPLETE = 10
+
+
+StateNumber = Literal[1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17]
+"""A State as a plain number, as checkpoints keep it."""
+
+CNTRL_CMD = "/cntrl_cmd"
+"""Ending of the names of commands that take PackML commands."""
+
+FROM: Mapping[Command, frozenset[PackMLState]] = {
+    Command.RESET: frozenset({PackMLState.STOPPED, PackMLState.COMPLETE}),
+    Command.START: frozenset({PackMLState.IDLE}),
+    Command.STOP: frozenset(PackMLState)
+    - {PackMLState.CLEARING, PackMLState.STOPPED, PackMLState.STOPPING, PackMLState.ABORTING, PackMLState.ABORTED},
+    Command.HOLD: frozenset(
+        {
+            PackMLState.EXECUTE,
+            PackMLState.STARTING,
+            PackMLState.SUSPENDED,
+            PackMLState.UNHOLDING,
+            PackMLState.SUSPENDING,
+            PackMLState.UNSUSPENDING,
+        }
+    ),
+    Command.UNHOLD: frozenset({PackMLState.HELD}),
+    Command.SUSPEND: frozenset({PackMLState.EXECUTE}),
+    Command.UNSUSPEND: frozenset({PackMLState.SUSPENDED}),
+    Command.ABORT: frozenset(PackMLState) - {PackMLState.ABORTING, PackMLState.ABORTED},
+    Command.CLEAR: frozenset({PackMLState.ABORTED}),
+    Command.COMPLETE: frozenset({PackMLState.EXECUTE}),
+}
+"""The states in which a command is taken."""
+
+TO: Mapping[Command, PackMLState] = {
+    Command.RESET: PackMLState.RESETTING,
+    Command.START: PackMLState.STARTING,
+    Command.STOP: PackMLState.STOPPING,
+    Command.HOLD: PackMLState.HOLDING,
+    Command.UNHOLD: PackMLState.UNHOLDING,
+    Command.SUSPEND: PackMLState.SUSPENDING,
+    Command.UNSUSPEND: PackMLState.UNSUSPENDING,
+    Command.ABORT: PackMLState.ABORTING,
+    Command.CLEAR: PackMLState.CLEARING,
+    Command.COMPLETE: PackMLState.COMPLETING,
+}
+"""The acting state that a command leads to."""
+
+COMPLETES: Mapping[PackMLState, PackMLState] = {
+    PackMLState.CLEARING: PackMLState.STOPPED,
+    PackMLState.STARTING: PackMLState.EXECUTE,
+    PackMLState.STOPPING: PackMLState.STOPPED,
+    PackMLState.ABORTING: PackMLState.ABORTED,
+    PackMLState.HOLDING: PackMLState.HELD,
+    PackMLState.UNHOLDING: PackMLState.EXECUTE,
+    PackMLState.SUSPENDING: PackMLState.SUSPENDED,
+    PackMLState.UNSUSPENDING: PackMLState.EXECUTE,
+    PackMLState.RESETTING: PackMLState.IDLE,
+    PackMLState.COMPLETING: PackMLState.COMPLETE,
+}
+"""The acting states, each with the state that it leads to once it is complete."""
+
+MODE_STATES = (PackMLState.STOPPED, PackMLState.IDLE, PackMLState.ABORTED, PackMLState.COMPLETE)
+"""In which a machine's unit mode may change: it works on nothing, and does not go on by itself. PackML leaves it to the
+machine which these are (PML_UnitModeConfig of Beckhoff Tc3_PackML_V3).
+"""
+
+STATE_TEXTS: Mapping[int, str] = {0: "Undefined", **{state: state.name.capitalize() for state in PackMLState}}
+COMMAND_TEXTS: Mapping[int, str] = {0: "none", **{command: command.name.capitalize() for command in Command}}
+
+
+def objection(command: int, state: int) -> str:
+    """Why a command is not taken in a state, "" if it is."""
+    given, now = Command(command), PackMLState(state)
+    if now in FROM[given]:
+        return ""
+    allowed, refused = ([s for s in PackMLState if (s in FROM[given]) is taken] for taken in (True, False))
+    expected = f"in {_listed(allowed)}" if len(allowed) <= len(refused) else f"outside {_listed(refused)}"
+    return f"{COMMAND_TEXTS[given]} given in {STATE_TEXTS[now]}, expected {expected}"
+
+
+def stops(name: str, value: float) -> bool:
+    """Return True if a command is Stop or Abort of a machine. People may send it in every mode."""
+    return name.endswith(CNTRL_CMD) and value in (Command.STOP, Command.ABORT)
+
+
+def mode_objection(state: int) -> str:
+    """Why a unit mode can't change in a state, "" if it can."""
+    if state in MODE_STATES:
+        return ""
+    return f"is in {STATE_TEXTS[state]}, expected {_listed(MODE_STATES)} for a change of mode"
+
+
+def _listed(states: Collection[PackMLState]) -> str:
+    *most, last = (STATE_TEXTS[state] for state in states)
+    return f"{', '.join(most)} or {last}" if most else last
+
+
+class StateMachine:
+    """The state of one machine. An acting state lasts for its ticks; one of none is left as soon as it is entered."""
+
+    state: StateNumber
+
+    def __init__(
+        self, state: PackMLState, ticks: Mapping[PackMLState, int], conditional: Collection[PackMLState] = ()
+    ) -> None:
+        """ticks: that acting states last at least, 0 for those left out. conditional: acting states that are left only
+        when `advance` says that they may be, however long they have lasted.
+        """
+        self._ticks = {acting: ticks.get(acting, 0) for acting in COMPLETES}
+        self._conditional = frozenset(conditional)
+        self.spent = 0
+        """Ticks in the present state, if it is an acting one."""
+        self._enter(state)
+
+    def take(self, command: int) -> None:
+        """Take a command. Raises ValueError, in words, where the state does not allow it."""
+        if wrong := objection(command, self.state):
+            raise ValueError(wrong)
+        self._enter(TO[Command(command)])
+
+    def takes(self, command: int) -> bool:
+        """Whether the state allows a command."""
+        return self.state in FROM[Command(command)]
+
+    @property
+    def acts(self) -> bool:
+        """Whether it is in an acting state."""
+        return self.state in COMPLETES
+
+    def advance(self, may_complete: bool = True) -> None:
+        """A tick has passed. may_complete: whether what a conditional state waits for is there."""
+        after = COMPLETES.get(PackMLState(self.state))
+        if after is None:
+            return
+        self.spent += 1
+        if self.spent >= self._ticks[PackMLState(self.state)] and (may_complete or self.state not in self._conditional):
+            self._enter(after)
+
+    def _enter(self, state: PackMLState) -> None:
+        while state in COMPLETES and not self._ticks[state] and state not in self._conditional:
+            state = COMPLETES[state]
+        self.state, self.spent = _number(state), 0
+
+
+def _number(state: PackMLState) -> StateNumber:
+    return int(state)  # type: ignore[return-value]
