@@ -206,8 +206,8 @@ def test_every_effect_is_decided_and_says_why_not() -> None:
 @pytest.mark.parametrize(
     ("fields", "why"),
     [
-        ({"accuracy": {"integrator": "rk4"}}, "with rk4 a step leaves nobody out"),
-        ({"accuracy": {"integrator": "linearly_implicit"}}, "with linearly_implicit a step leaves nobody out"),
+        ({"accuracy": {"integrator": "rk4"}}, "rk4 can't leave bottles out of a step"),
+        ({"accuracy": {"integrator": "linearly_implicit"}}, "linearly_implicit can't leave bottles out of a step"),
         ({"base": [{**base(0.4)[0], "tangential": {"stiffness": 900.0}}]}, "springs under the bottles pull anew"),
         ({"belts": {"bend": CURVED}}, "no straight belt"),
     ],

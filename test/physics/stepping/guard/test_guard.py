@@ -249,8 +249,8 @@ def test_listening_for_chatter_leaves_no_trace() -> None:
             bottles=[bottle(0.6 - (2 * i + 1.05) * RADIUS, 0.002 * (i % 2)) for i in range(5)],
             outputs={**NO_OUTPUTS, "ledger": 100},
         )
-        assert sim._integration._listening > 0
-        sim._integration._listening = every
+        assert sim._integration._chatter_ticks > 0
+        sim._integration._chatter_ticks = every
         hashes = []
         for _ in range(30):
             sim.advance()
