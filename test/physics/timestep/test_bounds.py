@@ -1,4 +1,4 @@
-"""What bounds the time step, and the steps in a tick that follow."""
+"""Bounds on the time step, and the resulting steps in a tick."""
 
 import math
 
@@ -71,7 +71,7 @@ def test_a_tick_that_is_a_whole_number_of_bounds_takes_no_step_more() -> None:
 
 
 def test_a_given_number_is_taken_and_judged_by_stability() -> None:
-    """How exact it is, the prediction tells."""
+    """The prediction reports its accuracy."""
     assert steps_per_tick(0.01, BOUNDS, 40, CHOICE) == (
         40,
         "40 steps a tick, given in the scene; within every bound of stability; "
