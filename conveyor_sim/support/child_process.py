@@ -35,7 +35,7 @@ def start_python(
 ) -> subprocess.Popen[bytes]:
     """Start a Python process that runs `main()` of a module and inherits `pipes`; the caller closes its copies.
 
-    name: last argument of the process. environment: variables to add. The process leads a session of its own: Ctrl-C
+    name: last argument of the process. environment: variables to add. The process leads a separate session: Ctrl-C
     at the terminal reaches only the parent, which ends its children in order.
     """
     numbers = [pipe.fileno() for pipe in pipes]
@@ -92,7 +92,7 @@ class Process:
     """One process, from its start until stop()."""
 
     def __init__(self, name: str, command: Sequence[str], environment: Mapping[str, str], log_folder: Path) -> None:
-        """Runs a command; its output goes to `<log_folder>/<name>.log`. Raises OSError if there is no such command.
+        """Run a command; its output goes to `<log_folder>/<name>.log`. Raises OSError if there is no such command.
 
         When this process ends, even by SIGKILL, the command is interrupted as by stop().
         """
@@ -105,7 +105,7 @@ class Process:
         lead = [sys.executable, "-I", "-S", str(LIFELINE), str(watched), str(PATIENCE)]
         try:
             with self.log.open("wb") as output:
-                # A session of its own: Ctrl-C at the terminal reaches the parent alone, which ends its children.
+                # A separate session: Ctrl-C at the terminal reaches only the parent, which ends its children.
                 self._process = subprocess.Popen(
                     [*lead, *command],
                     env=dict(environment),
@@ -123,16 +123,16 @@ class Process:
 
     @property
     def pid(self) -> int:
-        """Its process."""
+        """ID of the process."""
         return self._process.pid
 
     @property
     def exit_code(self) -> int | None:
-        """None while it runs."""
+        """Exit code; None while it runs."""
         return self._process.poll()
 
     def stop(self) -> None:
-        """End it and what it has started, if it still runs, orderly if it lets itself be."""
+        """End the command and its children, if it still runs: by SIGINT, and by SIGKILL after PATIENCE."""
         if self.exit_code is None:
             os.killpg(self.pid, signal.SIGINT)
             try:
@@ -145,10 +145,10 @@ class Process:
             self._lifeline = None
 
     def last_words(self) -> str:
-        """The end of its log, indented."""
+        """Return the end of its log, indented."""
         lines = self.log.read_text(encoding="utf-8", errors="replace").splitlines()[-TAIL:]
         return "\n".join(f"  {line}" for line in lines or ["(empty)"])
 
     def obituary(self) -> str:
-        """How it ended, and the end of its log."""
+        """Return how it ended, and the end of its log."""
         return f"{self.name} {how_it_ended(self.exit_code)}; the end of its log:\n{self.last_words()}"

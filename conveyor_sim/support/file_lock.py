@@ -15,7 +15,7 @@ _INTERVAL = 0.02
 
 
 def lock(stream: IO[bytes] | IO[str] | int) -> None:
-    """Lock an open file until it is closed. Raise BlockingIOError if another process has locked it.
+    """Lock an open file until it is closed. Raises BlockingIOError if another process has locked it.
 
     A file system without locks counts as free.
     """

@@ -130,7 +130,7 @@ def test_everything_fits_and_has_a_name_for_those_who_hear_it(page: Any, size: t
 
 def test_who_has_not_signed_in_is_refused_with_the_reason(page: Any, live: Live) -> None:
     set_speed(page, "0.3")
-    told(page, "Refused: nobody has signed in")
+    told(page, "Refused: not signed in")
     assert live.source.shown.values[SETPOINT] == 0.5
 
 

@@ -52,7 +52,7 @@ class FoxgloveServer:
         self._context = foxglove.Context()  # without it channels are closed
         self._channels: dict[str, foxglove.Channel] = {}
         self._server: WebSocketServer | None = None
-        self._looks: dict[str, set[int]] = defaultdict(set)  # by topic, clients
+        self._looks: dict[str, set[int]] = defaultdict(set)  # clients by topic
         self._ends: list[Callable[[], None]] = []
         self._end_watch: Callable[[], None] | None = None
         self._changed = asyncio.Event()
@@ -87,7 +87,7 @@ class FoxgloveServer:
                 server_listener=_Listener(self._in_loop, self._look, self._look_away),
                 message_backlog_size=WAITING,
             )
-        except Exception as error:  # the library has no type of its own for it
+        except Exception as error:  # the library raises plain exceptions
             raise ServerError(f"foxglove: {self._at[0]}:{self._at[1]} can't be served ({error})") from error
         self._ends = [self._source.hear(self._heard), self._source.listen(lambda: self._in_loop(self._changed.set))]
         self._task = asyncio.create_task(self._draw_all())
@@ -104,7 +104,7 @@ class FoxgloveServer:
         self._looks.clear()
         self._watch()
         if self._server is not None:
-            await asyncio.to_thread(self._server.stop)  # it waits for threads that may wait for the interpreter
+            await asyncio.to_thread(self._server.stop)  # it waits for threads that may need the interpreter's lock
             self._server = None
 
     def status(self) -> Status:
@@ -116,7 +116,7 @@ class FoxgloveServer:
     def _heard(self, topic: str, data: bytes) -> None:
         """Pass a message on. Called by the thread of the tag provider."""
         server = self._server
-        if topic == "line" and server is not None:  # another run or time: they forget what they have
+        if topic == "line" and server is not None:  # another run or a seek: clients discard their data
             server.clear_session()
             self._in_loop(self._draw_plant)
         self._channels[topic].log(data)
@@ -157,7 +157,7 @@ class FoxgloveServer:
             await self._changed.wait()
             self._changed.clear()
             if self._looks[MARKERS]:
-                with suppress(Exception):  # of a damaged recording, messages may be anything; the next may be sound
+                with suppress(Exception):  # messages of a damaged recording may have any content; the next may be valid
                     self._draw()
             await asyncio.sleep(SHORTEST)
 

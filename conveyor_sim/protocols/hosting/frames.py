@@ -80,7 +80,7 @@ class Frames:
             self._ended = True
             self._wake.notify_all()
 
-    # By the thread of the view
+    # Called by the thread of the mirror
 
     def _hear(self, topic: str, data: bytes) -> None:
         with self._wake:

@@ -97,7 +97,7 @@ class ServerHost:
         self._address = ""
         self._restarts = 0
         self._before = self._now = _NONE  # counts of earlier processes; status of the present one
-        self._lag = self._latency = 0.0  # s, the longest since the last status
+        self._lag = self._latency = 0.0  # longest since the last status, s
         self._recent: deque[float] = deque(maxlen=RECENT)
         self._silent = 0.0  # s of wall time since the last heartbeat
         self._process: subprocess.Popen[bytes] | None = None
@@ -257,7 +257,7 @@ class ServerHost:
         while True:
             message = pipe.recv() if pipe.poll(LOOK) else None
             now = time.monotonic()
-            # Time in which this process did not run itself does not count.
+            # Time in which this process itself was stopped does not count.
             self._silent += min(now - looked, 2 * LOOK)
             looked = now
             if self._ending.is_set():

@@ -107,7 +107,7 @@ def _mode_row(tag: Tag, word_order: WordOrder) -> Row:
 
 def _type(tag: Tag) -> Type:
     if tag.kind == "number":
-        return "float64" if tag.unit == "s" else "float32"  # a time of days keeps its microseconds
+        return "float64" if tag.unit == "s" else "float32"  # days with a resolution of microseconds
     if tag.kind == "enumeration":
         return "uint16"
     return "int32" if tag.low < 0.0 else "uint32"

@@ -51,7 +51,7 @@ _ONE_COIL, _ONE_REGISTER = 5, 6  # functions
 _ON_OR_OFF = (b"\xff\x00", b"\x00\x00")
 _LENGTHS = range(2, 255)  # of unit, function and data (Modbus Messaging on TCP/IP 1.0b, 3.1.3 and 4.1)
 
-_LOOK = 0.5  # s of wall time between two looks at who is silent
+_LOOK = 0.5  # wall time between two checks for silent holders, s
 _KEEP_ALIVE = {socket.TCP_KEEPIDLE: 10, socket.TCP_KEEPINTVL: 5, socket.TCP_KEEPCNT: 3}  # s, s, 1
 
 _TABLE_OF: dict[int, Table] = {
@@ -123,10 +123,10 @@ class ModbusServer:
 
     async def start(self) -> None:
         """Listen. Raises ServerError if that is not possible."""
-        logging.getLogger("pymodbus.logging").setLevel(logging.CRITICAL)  # it logs whatever clients send
+        logging.getLogger("pymodbus.logging").setLevel(logging.CRITICAL)  # it logs all input of clients
         host, port = self._at
         require_free(MODBUS, host, port)
-        # The library wants a device of its own; the image takes its place at each request.
+        # The library requires a device; the image replaces it at each request.
         server = _Server(SimDevice(0, simdata=SimData(0, datatype=DataType.REGISTERS)), address=(host, port))
         server.image, server.holding = self._image, self._image.holding
         server.places = ConnectionSlots(self._quota, keeps_active=True)
@@ -157,7 +157,7 @@ class _Server(ModbusTcpServer):
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
         self.connected: set[_Handler] = set()
-        self.longest = 0.0  # s of wall time from a request to its answer, since somebody asked
+        self.longest = 0.0  # longest wall time from a request to its answer since the last status, s
 
     def callback_new_connection(self) -> ServerRequestHandler:
         return _Handler(self, self.trace_packet, self.trace_pdu, self.trace_connect)
@@ -197,7 +197,7 @@ class _Handler(ServerRequestHandler):
         if peer is not None:
             self.writer = f"{MODBUS} {peer[0]}:{peer[1]}"
         if (connection := self.transport.get_extra_info("socket")) is not None:
-            # A client that is gone without a word is noticed.
+            # Detect clients that vanish without closing the connection.
             connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
             connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, MOST_UNREAD)
             for option, value in _KEEP_ALIVE.items():
@@ -235,12 +235,12 @@ class _Handler(ServerRequestHandler):
                 if self.place is not None:
                     self.place.touch(GUEST)
                 if self._stream.get_write_buffer_size() > MOST_UNREAD:
-                    self.cut()  # it asks, and does not read what it is answered
+                    self.cut()  # the client does not read its answers
                     return
                 _writer.set(self.writer)
                 self.server_send(await self._answer(*asked), None)
                 self.server.longest = max(self.server.longest, time.perf_counter() - began)
-                await asyncio.sleep(0)  # others, too
+                await asyncio.sleep(0)  # let other tasks run
         finally:
             self._answering = None
         if self.is_active() and not self._stream.is_closing():
@@ -252,7 +252,7 @@ class _Handler(ServerRequestHandler):
             return None
         transaction, protocol, length, unit = _HEADER.unpack_from(self._received)
         if protocol != 0 or length not in _LENGTHS:
-            self.cut()  # where a next one would begin, nobody knows
+            self.cut()  # the start of the next request is unknown
             return None
         end = _HEADER.size - 1 + length
         if len(self._received) < end:
@@ -262,7 +262,7 @@ class _Handler(ServerRequestHandler):
 
     async def _answer(self, transaction: int, unit: int, asked: bytes) -> ModbusPDU:
         function = asked[0]
-        # Of the library's own functions some would change how it serves all others.
+        # Some functions of the library would change the server for all clients.
         request = self.framer.decoder.decode(asked) if function in _TABLE_OF else None
         answer: ModbusPDU
         if function not in _TABLE_OF:
@@ -272,11 +272,13 @@ class _Handler(ServerRequestHandler):
         else:
             try:
                 answer = await request.datastore_update(self.server.image, unit)
-            except Exception as error:  # rather an answer than silence
+            except Exception as error:  # the client needs an answer
                 logging.getLogger(__name__).error("modbus: function %d failed: %r", function, error)
                 answer = ExceptionResponse(function, ExcCodes.DEVICE_FAILURE)
             if function in (_ONE_COIL, _ONE_REGISTER) and not answer.isError():
-                answer = request  # by the standard; the library answers with what is in force before the next tick
+                answer = (
+                    request  # required by the standard; the library would answer with the value before the next tick
+                )
         answer.transaction_id, answer.dev_id = transaction, unit
         return answer
 
@@ -305,7 +307,7 @@ class _Image:
             if row is None:
                 return ExcCodes.ILLEGAL_ADDRESS
             value = float(shown.tick) if row.name in (TICK, TARGET) else shown.values.get(_shown_as(row), 0.0)
-            words = encode(row, value)  # 0 for one that is gone
+            words = encode(row, value)  # 0 for a tag that the line no longer has
             values += words[at - row.address :]
         values = values[:count]
         return [bool(value) for value in values] if table in ("coil", "discrete input") else values
@@ -332,7 +334,7 @@ class _Image:
             words, address = words[row.words :], address + row.words
         if any(name.endswith(SET_MODE) for name in names):
             return self._put_into_mode(names, numbers)
-        # It has the last address, so it is the last that one request writes.
+        # It has the last address, so a request writes it last.
         target = numbers.pop() if names[-1] == TARGET and names.pop() else None
         writer = claimant = _writer.get()
         given = Input(MODBUS, writer, self._role, SET, tuple(names), tuple(numbers))
@@ -351,7 +353,7 @@ class _Image:
             return ExcCodes.ILLEGAL_FUNCTION
         if target is not None and not in_lockstep:
             return ExcCodes.DEVICE_BUSY
-        # Whoever attached a PLC that goes in lockstep has said whose the line is.
+        # In lockstep, the attached PLC owns the line.
         if self._role == "controller" and not in_lockstep and self.holding.take(writer):
             return ExcCodes.DEVICE_BUSY
         if names and self._source.give(given):

@@ -56,8 +56,7 @@ def identity(folder: Path) -> Identity:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         if (mode := stat.S_IMODE(folder.stat().st_mode)) & 0o077 or folder.stat().st_uid != os.geteuid():
             raise CertificateError(
-                f"{folder}: mode {mode:o} given, expected a folder of this user's own that nobody else can read "
-                f"(chmod 700)"
+                f"{folder}: mode {mode:o} given, expected a folder that only this user can read (chmod 700)"
             )
         (folder / TRUSTED).mkdir(mode=0o700, exist_ok=True)
         if not (folder / KEY).exists():
@@ -89,7 +88,8 @@ def _make(folder: Path) -> None:
         *(x509.DNSName(known) for known in dict.fromkeys((host, "localhost"))),
         x509.IPAddress(ip_address("127.0.0.1")),
     ]
-    # OPC 10000-6, 6.2.2: what the certificate of an application has to have.
+    # OPC 10000-6, 6.2.2: certificate of an application. asyncua.crypto.cert_gen was considered: its certificates are
+    # those of an authority (CA:TRUE, keyCertSign), which browsers and users should not trust for a server.
     certificate = (
         x509.CertificateBuilder()
         .subject_name(name)
@@ -121,7 +121,7 @@ def _make(folder: Path) -> None:
         .sign(key, hashes.SHA256())
     )
     pem = key.private_bytes(serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, serialization.NoEncryption())
-    # The key comes last: while it is not there, both are made anew.
+    # The key comes last: if it is missing, both are made again.
     _write(folder / CERTIFICATE, certificate.public_bytes(serialization.Encoding.DER))
     _write(folder / KEY, pem)
 

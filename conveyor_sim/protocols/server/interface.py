@@ -70,7 +70,7 @@ class ProtocolServer(Protocol):
         """Address for clients: "modbus://127.0.0.1:5020"."""
 
     async def start(self) -> None:
-        """Serve from now on. Raise ServerError, in one sentence, if that fails; nothing is left behind then."""
+        """Serve from now on. Raises ServerError, in one sentence, if that is not possible; it leaves nothing behind."""
 
     async def stop(self) -> None:
         """End all connections. Do nothing if it was not started or is stopped."""
@@ -79,7 +79,7 @@ class ProtocolServer(Protocol):
         """Return its activity."""
 
 
-def require_free(face: str, host: str, port: int) -> None:
+def require_free(protocol: str, host: str, port: int) -> None:
     """Raise ServerError, with the reason that libraries leave out, if a server can't listen at an address."""
     expected = "an address of this machine"
     try:
@@ -92,4 +92,4 @@ def require_free(face: str, host: str, port: int) -> None:
             probe.bind((host, port))
     except (OSError, OverflowError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise ServerError(f"{face}: {host}:{port} can't be listened on ({reason}), expected {expected}") from error
+        raise ServerError(f"{protocol}: {host}:{port} can't be listened on ({reason}), expected {expected}") from error

@@ -1,6 +1,6 @@
 """Users of OPC UA and of the page: a file with one line per user, and checks of passwords.
 
-jo:operator:scrypt:<salt>:<hash>
+    jo:operator:scrypt:<salt>:<hash>
 
 Salt and hash are in base 64; the hash is scrypt's (RFC 7914), so a password can't be read from the file.
 """
@@ -116,9 +116,9 @@ def keep_user(path: Path, name: str, user: User) -> None:
 
 def authenticate(users: Mapping[str, User], name: str, password: str) -> User | None:
     """Return the user of a name if the password is right. The time does not show whether there is such a user."""
-    user = users.get(name, _NOBODY)
+    user = users.get(name, _UNKNOWN)
     given = _hash(password[: _LONGEST_PASSWORD + 1], user.salt)
-    return user if hmac.compare_digest(given, user.hash) and user is not _NOBODY else None
+    return user if hmac.compare_digest(given, user.hash) and user is not _UNKNOWN else None
 
 
 class LoginService(Protocol):
@@ -142,7 +142,9 @@ class Logins:
         self.has_users = bool(users)
         self._checking = threading.Lock()
         self._users = users
-        self._wrong: dict[tuple[str, str], tuple[int, float]] = {}  # how often, and s when first, the latest at last
+        self._wrong: dict[
+            tuple[str, str], tuple[int, float]
+        ] = {}  # count, and time of the first, s; ordered by the latest
 
     def enter(self, name: str, password: str, origin: str, now: float) -> User | None:
         """Return the user, or None: wrong name or password, or too many wrong passwords before, which are not checked.
@@ -172,4 +174,4 @@ def _hash(password: str, salt: bytes) -> bytes:
     return hashlib.scrypt(password.encode(errors="surrogatepass"), salt=salt, n=2**14, r=8, p=1, dklen=_BYTES)
 
 
-_NOBODY = User("viewer", b"\0" * 16, b"\0" * _BYTES)
+_UNKNOWN = User("viewer", b"\0" * 16, b"\0" * _BYTES)

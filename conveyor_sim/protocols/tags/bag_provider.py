@@ -79,7 +79,7 @@ class BagTagProvider(LineMirror, AbstractContextManager["BagTagProvider"]):
         if what == "seek" and not first <= value <= last:
             return f"seek: {value:g} given, expected a time of the recording, {first:g} to {last:g} (s)"
         if what == "speed" and not 0.0 <= value <= 1e6:
-            return f"speed: {value:g} given, expected times real time from 0, for as fast as it goes, to 1e6"
+            return f"speed: {value:g} given, expected a factor of real time from 0 (as fast as possible) to 1e6"
         asked = self._calls.request(partial(self._do, what, value))
         return str(asked.exception()) if asked.done() and asked.exception() else ""
 
@@ -93,7 +93,7 @@ class BagTagProvider(LineMirror, AbstractContextManager["BagTagProvider"]):
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    # The thread that plays
+    # The playback thread
 
     def _play(self) -> None:
         player = self._player
@@ -162,7 +162,7 @@ class BagTagProvider(LineMirror, AbstractContextManager["BagTagProvider"]):
         states, self._states = self._states, {}
         events, self._new_events = self._new_events, []
         for topic in STATE_TOPICS:
-            if topic in states and topic != "run_state":  # a playback's own, whatever was recorded
+            if topic in states and topic != "run_state":  # the playback has its own state
                 self.take(topic, self._bag.decode(topic, states[topic]))
                 self.pass_on(topic, states[topic])
         for topic in states.keys() & set(DRAWING_TOPICS):

@@ -38,7 +38,7 @@ FURTHEST = 100_000
 def problem(what: Control, value: float, tick: int) -> str:
     """Return why a request can't be made of a line in lockstep at a tick; "" if it can."""
     if what != "target":
-        return f"{what}: the line is in lockstep, expected {TARGET} alone"
+        return f"{what}: the line is in lockstep, expected only {TARGET}"
     if not float(value).is_integer() or not 0 <= value <= tick + FURTHEST:
         return f"{TARGET}: {value:g} given, expected a whole number from 0 to {tick + FURTHEST}"
     return ""
@@ -52,7 +52,7 @@ class HandshakeTagProvider(SteppedTagProvider):
     def __init__(self, simulation: Simulation) -> None:
         """Start at the present tick."""
         self._target = simulation.tick
-        self._sets: deque[tuple[int, tuple[Input, ...]]] = deque()  # each with the tick at which it acts
+        self._sets: deque[tuple[int, tuple[Input, ...]]] = deque()  # sets of inputs with their ticks
         self._written = threading.Condition()
         super().__init__(simulation)
 

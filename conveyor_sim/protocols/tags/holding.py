@@ -44,14 +44,14 @@ class Holding:
         """Start without a holder. protocol: source of the inputs."""
         self._source, self._protocol = source, protocol
         self._holder = ""
-        self._run_id = ""  # in which it took the line
+        self._run_id = ""  # run in which the holder took the line
         self._leaving = False
-        self._away_until = 0.0  # s of wall time, while the holder may come back after a restart; 0: it is not away
+        self._away_until = 0.0  # end of the wait for the holder after a restart, s of wall time; 0: no wait
 
     @property
     def holder(self) -> str:
         """Writer that holds the line; empty: none."""
-        return self._holder if self._run_id == self._source.shown.run_id else ""  # another run is nobody's
+        return self._holder if self._run_id == self._source.shown.run_id else ""  # another run has no holder
 
     def take(self, writer: str) -> str:
         """Give a writer the line from the next tick on. Return the reason for a refusal, "" if there is none."""

@@ -36,7 +36,7 @@ STATE_TOPICS = ("line", "run_state", "signals", "events", "readback", "alarm_sta
 DRAWING_TOPICS = ("bottles", "contacts", "belts", "counters", "rail_wear")
 """Topics for drawings only. They are decoded on demand."""
 
-NOTHING = "nothing has been heard of the line yet"
+NOTHING = "no data of the line have arrived yet"
 
 
 class LineMirrorError(ConveyorError):
@@ -122,7 +122,7 @@ class LineMirror:
         self._listeners = Listeners()
         self._events = RecentEvents()
         self._known = threading.Event()
-        self._strange = False  # whether it has become another line
+        self._strange = False  # True if the topics describe another line now
         self._shown = LineSnapshot(0, {}, lost=NOTHING)
         self._picture: DrawableFrame | None = None
         self._watchers = 0
@@ -150,7 +150,7 @@ class LineMirror:
     def picture(self) -> DrawableFrame:
         """Latest data for drawing. Raises RuntimeError before there are any."""
         if self._picture is None:
-            raise RuntimeError("nothing has been shown yet")
+            raise RuntimeError("there is no snapshot yet")
         return self._picture
 
     @property
@@ -198,7 +198,7 @@ class LineMirror:
             return f"the run has {shown.run.text}, expected a reset"
         return TOO_LARGE if size_of(given) > MESSAGE_BYTES else ""
 
-    # By the thread that hears
+    # Called by the thread that receives messages
 
     def take(self, topic: str, message: Any) -> None:
         """Take a decoded message of one of STATE_TOPICS.
@@ -304,7 +304,7 @@ class LineMirror:
             self._forget(message.run_id)
             raise LineMirrorError(
                 f"{about.name}: another line than before, or with other tags; expected {self._about.name} as it was: "
-                "start serving anew"
+                "restart serving"
             )
         if message.run_id != self._run_id or self._about is None:
             self._forget(message.run_id)
@@ -385,7 +385,7 @@ def _tag(
     device: str,
     device_class: str,
 ) -> Tag:
-    said = {int(number): text for number, text in _TEXT.findall(texts)}
+    named = {int(number): text for number, text in _TEXT.findall(texts)}
     return Tag(
         name,
         kind,
@@ -396,7 +396,7 @@ def _tag(
         high,
         initial,
         nominal or None,
-        said,
+        named,
         device=device,
         device_class=device_class,
     )

@@ -67,7 +67,7 @@ class DrawingRequest(NamedTuple):
     on: bool
 
 
-class LineCopy(NamedTuple):
+class LineUpdate(NamedTuple):
     """Sent by the process: serialized messages, and the progress with inputs."""
 
     states: Mapping[str, bytes]

@@ -30,7 +30,7 @@ from conveyor_sim.protocols.tags.scene_messages import (
     ControlRequest,
     DrawingRequest,
     InputRequest,
-    LineCopy,
+    LineUpdate,
     SceneTask,
     SimulationFailed,
     TargetRequest,
@@ -73,7 +73,7 @@ class Copies:
     """Sink whose messages a separate thread sends."""
 
     def __init__(self, pipe: Connection, shortest: float) -> None:
-        """Start sending. shortest: wall time between two copies, s; messages in between are merged into one copy."""
+        """Start sending. shortest: wall time between two copies, s; messages of that time are merged into one copy."""
         self._pipe, self._shortest = pipe, shortest
         self.watched = False
         """True if frames for drawing are requested."""
@@ -143,14 +143,14 @@ class Copies:
         self._thread.join(PATIENCE)
 
     def _send(self) -> None:
-        with suppress(OSError):  # nobody is there any more
+        with suppress(OSError):  # the receiver has gone
             while True:
                 with self._wake:
                     while not (self._new or self._others or self._closed):
                         self._wake.wait()
                     done = self._closed
                     others = list(self._others)
-                    copy = LineCopy(self._states, list(self._events), *self._counts, self._at)
+                    copy = LineUpdate(self._states, list(self._events), *self._counts, self._at)
                     self._states, self._new, self._sent = {}, False, time.monotonic()
                     self._events.clear()
                     self._others.clear()
@@ -187,8 +187,8 @@ class _Process:
         self._stepper: Stepper | None = None
         self._handed = 0
         self._goals: deque[TargetRequest] = deque()
-        self._goal: TargetRequest | None = None  # where the line is on its way to
-        self._shown = self._pictured = ("", -1)  # run and tick of the signals, and the picture, that were copied last
+        self._goal: TargetRequest | None = None  # target that the line is advancing to
+        self._shown = self._pictured = ("", -1)  # run and tick of the latest copied signals and frame
         self._next_picture = 0.0  # s of wall time
 
     def run(self) -> None:
@@ -232,7 +232,7 @@ class _Process:
             return
         simulation = stepper.simulation
         if self._goal is not None and simulation.tick < self._goal.target and not stepper.standstill:
-            self._copies.live()  # nobody sees a tick before the target
+            self._copies.live()  # ticks before the target are not shown
             return
         if self._shown != (now := (stepper.run_id, simulation.tick)):
             self._shown = now
@@ -276,7 +276,7 @@ class _Process:
             self._copies.watched = request.on
             return
         stepper = self._stepper
-        if stepper is None:  # nobody knows the line yet
+        if stepper is None:  # the line is not known yet
             return
         if isinstance(request, InputRequest):
             if request.given.operation == SET:  # commands are counted
@@ -302,11 +302,11 @@ class _Process:
 
         def done(future: Future[Any]) -> None:
             error = future.exception()
-            told = f"{what}, asked for by {by}"
+            text = f"{what}, requested by {by}"
             if error is not None:
-                self._copies.tell(UserMessage(f"{told}, refused: {error}", bad=True))
+                self._copies.tell(UserMessage(f"{text}, refused: {error}", bad=True))
             elif by:
-                self._copies.tell(UserMessage(told))
+                self._copies.tell(UserMessage(text))
 
         stepper.call(todo[what]).add_done_callback(done)
 
@@ -317,7 +317,7 @@ class _Process:
         goal = self._goals.popleft()
         try:
             reached = stepper.step(goal.target - stepper.simulation.tick)
-        except Refused:  # it stands for good, and its state says why
+        except Refused:  # the run has ended, and its state has the reason
             return
         self._goal = goal
         for given in goal.inputs:
@@ -340,6 +340,6 @@ def main() -> None:
     with StopRequest() as stop:
         try:
             task = pipe.recv()
-        except EOFError:  # the parent was interrupted before it could say
+        except EOFError:  # the parent was interrupted before it sent the task
             return
         _Process(pipe, task, stop).run()

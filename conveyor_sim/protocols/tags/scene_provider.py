@@ -26,7 +26,7 @@ from conveyor_sim.protocols.tags.scene_messages import (
     ControlRequest,
     DrawingRequest,
     InputRequest,
-    LineCopy,
+    LineUpdate,
     SceneTask,
     SimulationFailed,
     TargetRequest,
@@ -59,11 +59,11 @@ class SceneTagProvider(LineMirror, AbstractContextManager["SceneTagProvider"]):
         super().__init__()
         self._task, self._say = task, say
         self._closing = False
-        self._failure = ""  # why there is nothing to wait for
+        self._failure = ""  # reason why the line can't start
         self._lock = threading.Lock()
         self._given = self._handed = self._waiting = 0
-        self._target = 0  # in lockstep: up to which tick it goes
-        self._set: list[Input] = []  # that acts with the next target
+        self._target = 0  # target of a line in lockstep
+        self._set: list[Input] = []  # inputs for the next target
         self._requests: SimpleQueue[
             SceneTask | InputRequest | TargetRequest | ControlRequest | VariablesRequest | DrawingRequest | None
         ] = SimpleQueue()
@@ -139,12 +139,12 @@ class SceneTagProvider(LineMirror, AbstractContextManager["SceneTagProvider"]):
         if what == "step" and not (value >= 1.0 and float(value).is_integer()):
             return f"step: {value:g} given, expected a whole number of ticks of at least 1"
         if what == "speed" and not 0.0 <= value <= 1e6:
-            return f"speed: {value:g} given, expected times real time from 0, for as fast as it goes, to 1e6"
+            return f"speed: {value:g} given, expected a factor of real time from 0 (as fast as possible) to 1e6"
         with self._lock:
-            if self._requests.qsize() >= 2 * MOST_WAITING:  # beside inputs, which may wait as long as it is paused
+            if self._requests.qsize() >= 2 * MOST_WAITING:  # inputs may also wait, while the run is paused
                 return f"{MOST_WAITING} requests wait already"
             if what in ("pause", "resume"):
-                self._task = replace(self._task, playing=what == "resume")  # of one that begins it anew, too
+                self._task = replace(self._task, playing=what == "resume")  # also after a restart of the process
             self._requests.put(ControlRequest(what, value, by))
         return ""
 
@@ -208,23 +208,23 @@ class SceneTagProvider(LineMirror, AbstractContextManager["SceneTagProvider"]):
             self._process.kill()
             self._process.wait()
 
-    # The thread that hears
+    # The thread that receives messages
 
     def _supervise(self) -> None:
         while not self._closing:
             try:
                 reason = self._simulate()
-            except Exception as error:  # whatever it is, nothing may go on looking as if it were there
+            except Exception as error:  # the line must not look alive after any error
                 reason = str(error) if isinstance(error, ConveyorError) else f"{type(error).__name__}: {error}"
                 self._begun = False
                 self._kill()
             self.lose(reason)
             if self._closing or not self._begun:
                 self._failure = reason
-                if self._about is not None and not self._closing:  # else `wait_for_line` says so
-                    self._say(f"{reason}; it is not begun anew again")
+                if self._about is not None and not self._closing:  # otherwise `wait_for_line` raises it
+                    self._say(f"{reason}; the scene is not restarted again")
                 return
-            self._say(f"{reason}; the scene begins anew")
+            self._say(f"{reason}; the scene is restarted")
 
     def _simulate(self) -> str:
         """Run one process until it ends. Return the reason."""
@@ -259,11 +259,11 @@ class SceneTagProvider(LineMirror, AbstractContextManager["SceneTagProvider"]):
         while True:
             if not pipe.poll(LOOK):
                 if self._begun and time.monotonic() > heard + SILENCE:
-                    self.lose(f"nothing was heard of the simulation for {SILENCE:g} s")
+                    self.lose(f"no message of the simulation for {SILENCE:g} s")
                 continue
             message, heard = pipe.recv(), time.monotonic()
             match message:
-                case LineCopy():
+                case LineUpdate():
                     self._take_copy(message)
                 case UserMessage():
                     if message.bad or not self._closing:
@@ -271,7 +271,7 @@ class SceneTagProvider(LineMirror, AbstractContextManager["SceneTagProvider"]):
                 case SimulationFailed():
                     return message.reason
 
-    def _take_copy(self, copy: LineCopy) -> None:
+    def _take_copy(self, copy: LineUpdate) -> None:
         for topic in STATE_TOPICS:
             if (data := copy.states.get(topic)) is not None:
                 self.take(topic, decoded(topic, data))

@@ -1,4 +1,4 @@
-"""`TagProvider`: interface between protocol servers and a line; the provider of a simulation that a test steps."""
+"""`TagProvider`: interface between protocol servers and a line; and the provider of a simulation that a test steps."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ class TagProvider(Protocol):
 
     @property
     def about(self) -> LineInfo:
-        """What stays the same."""
+        """Constant properties of the line."""
 
     @property
     def shown(self) -> LineSnapshot:
@@ -102,7 +102,7 @@ class TagProvider(Protocol):
 
     @property
     def controls(self) -> frozenset[Control]:
-        """What `control` can do here."""
+        """Requests that `control` accepts."""
 
     @property
     def past(self) -> TagHistory | None:
@@ -154,7 +154,7 @@ class RecentEvents:
 
     def __init__(self) -> None:
         """Start without events."""
-        self._kept: tuple[int, tuple[Event, ...]] = (0, ())  # one attribute, so that both are of one moment
+        self._kept: tuple[int, tuple[Event, ...]] = (0, ())  # one attribute, so that both are consistent
 
     def add(self, events: Sequence[Event]) -> None:
         """Append events."""
@@ -199,7 +199,7 @@ class SteppedTagProvider:
 
     @property
     def about(self) -> LineInfo:
-        """What stays the same."""
+        """Constant properties of the line."""
         return self._about
 
     @property

@@ -42,7 +42,7 @@ class PageUser(NamedTuple):
         return f"{WEB} {self.name}"
 
 
-NOBODY = PageUser()
+ANONYMOUS = PageUser()
 
 
 class PageCommands:
@@ -53,7 +53,7 @@ class PageCommands:
         tags = source.about.tags
         self._commands: Mapping[str, Tag] = {tag.name: tag for tag in tags if tag.role in COMMANDS}
         self._receipt = Receipt(tags, source.about.where)
-        self.controls = source.controls - {"target"}  # how far a line in lockstep goes is its controller's affair
+        self.controls = source.controls - {"target"}  # the controller sets the target of a line in lockstep
         """Requests to control the run that pages may make."""
         self.writes = self.refused = 0
         """Requests that were passed on to the line, and requests that were refused."""
@@ -68,7 +68,7 @@ class PageCommands:
 
     def _do(self, person: PageUser, request: Mapping[str, Any]) -> str:
         if person.kind is None:
-            who = f"{person.name} is a viewer, who only reads" if person.name else "nobody has signed in"
+            who = f"{person.name} is a viewer, who only reads" if person.name else "not signed in"
             return f"{who}; expected an operator, engineer, controller or test"
         what, names, values = request.get("do"), request.get("names", []), request.get("values", [])
         if not (_are(names, str) and _are(values, (int, float)) and all(abs(value) <= LARGEST for value in values)):

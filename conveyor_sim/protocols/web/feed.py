@@ -51,7 +51,7 @@ class Feed:
         self._picture, self._shown = source.picture, source.shown
         self._story = self._new_story()
         self._told = 0.0
-        self._due = False  # whether those who look are told of something soon
+        self._due = False  # True if a message of events is scheduled
         self._heard = 0
         self._status: dict[str, Any] = {}
         self._frame: tuple[Any, bytes] = None, b""
@@ -106,19 +106,19 @@ class Feed:
             try:
                 self._follow()
                 self._failure = ""
-            except Exception as error:  # of a damaged recording, or another version, messages may be anything
+            except Exception as error:  # messages of a damaged recording or another version may have any content
                 self._failure = printable(f"it can't be drawn: {error}", SENTENCE)
             await asyncio.sleep(SHORTEST)
 
     def _follow(self) -> None:
         before, self._picture, self._shown = self._shown, self._source.picture, self._source.shown
-        if self._shown.run_id != before.run_id or self._shown.tick < before.tick:  # another run, or time has gone back
+        if self._shown.run_id != before.run_id or self._shown.tick < before.tick:  # another run, or a step back in time
             self._story, (self._heard, _) = self._new_story(), self._source.events(0)
             for viewer in self._viewers:
                 viewer.began = False
         self._look()
         now, new = time.monotonic(), [one for one in self._viewers if not one.began or (one.lagging and one.free)]
-        if new or now > self._told + STORY:  # what happened before is in what a new one begins with
+        if new or now > self._told + STORY:  # a new page's first message includes earlier events
             self._told = now
             self._tell_all()
         elif not self._due:
@@ -148,7 +148,9 @@ class Feed:
         about = {**self._head[1], "times": times, "forced": picture.forced.tolist()}
         story = self._new_story()
         total, events = self._source.events(max(0, self._heard - MOST_TOLD))
-        story.look(self._shown, picture, events[: len(events) - (total - self._heard)])  # the others are told of later
+        story.look(
+            self._shown, picture, events[: len(events) - (total - self._heard)]
+        )  # later events follow in messages
         viewer.begin(text_message("begin", head=about, story=story.take(), status=self._status_now(), **self._about))
         viewer.began, viewer.seen = True, None
 

@@ -21,7 +21,7 @@ from conveyor_sim.protocols.server.quotas import GUEST, QUOTA, ConnectionSlot, C
 from conveyor_sim.protocols.server.users import Logins, LoginService, User
 from conveyor_sim.protocols.tags.line_mirror import DrawableProvider
 from conveyor_sim.protocols.tags.tag_provider import WEB
-from conveyor_sim.protocols.web.commands import NOBODY, PageCommands, PageUser
+from conveyor_sim.protocols.web.commands import ANONYMOUS, PageCommands, PageUser
 from conveyor_sim.protocols.web.feed import Feed, text_message
 from conveyor_sim.protocols.web.viewer import Viewer
 
@@ -117,7 +117,7 @@ class WebServer:
     async def start(self) -> None:
         """Listen. Raises ServerError if that is not possible."""
         for name in ("aiohttp.server", "aiohttp.web", "aiohttp.access"):
-            logging.getLogger(name).setLevel(logging.CRITICAL)  # it logs whatever clients send
+            logging.getLogger(name).setLevel(logging.CRITICAL)  # it logs all input of clients
         host, port = self._at
         require_free(WEB, host, port)
         app = web.Application(client_max_size=LONGEST_REQUEST, middlewares=[self._guard])
@@ -154,7 +154,7 @@ class WebServer:
     def _connection(self) -> asyncio.Protocol:
         """Make the protocol of a new connection."""
         assert self._runner is not None and self._runner.server is not None
-        asyncio.get_running_loop().call_soon(self._make_room)  # then those that come with it are known
+        asyncio.get_running_loop().call_soon(self._make_room)  # then the new connection is counted
         return self._runner.server()
 
     def _make_room(self) -> None:
@@ -243,7 +243,7 @@ class WebServer:
                 expiry.cancel()
 
     async def _answer_requests(self, socket: web.WebSocketResponse, viewer: Viewer, place: ConnectionSlot) -> None:
-        person, origin = NOBODY, place.address
+        person, origin = ANONYMOUS, place.address
         if self._anonymous:
             self._feed.join(viewer)
         else:
@@ -251,7 +251,10 @@ class WebServer:
         budget = Budget(RATE, MOST_REQUESTS)
         async for message in socket:
             is_allowed = budget.spend(1.0)
-            if is_allowed and message.type in (WSMsgType.PING, WSMsgType.PONG):  # of which there can be too many, too
+            if is_allowed and message.type in (
+                WSMsgType.PING,
+                WSMsgType.PONG,
+            ):  # these count against the budget as well
                 if message.type is WSMsgType.PING:
                     await socket.pong(message.data)
                 continue
@@ -274,14 +277,14 @@ class WebServer:
                     person = await self._sign_in(request, origin)
                     refused = "" if person.name else "name or password are wrong"
                     if person.name and not self._places.admit_user(place, person.name):
-                        refused, person = f"{person.name} has too many pages open", NOBODY
+                        refused, person = f"{person.name} has too many pages open", ANONYMOUS
                     if not person.name:
                         self._sign_out(socket, place)
                     viewer.tell(_reply(request, refused, person))
                     if not self._anonymous and person.name:
                         self._feed.join(viewer)
                 case "sign_out":
-                    person = NOBODY
+                    person = ANONYMOUS
                     self._sign_out(socket, place)
                     viewer.tell(_reply(request, "", person))
                     if not self._anonymous:
@@ -294,11 +297,11 @@ class WebServer:
         name, password = request.get("name"), request.get("password")
         user = None
         if isinstance(name, str) and isinstance(password, str):
-            async with self._password:  # one at a time: it takes a processor for as long as that is
+            async with self._password:  # one at a time, because each check keeps a processor busy
                 user = await asyncio.to_thread(self._logins.enter, name, password, origin, time.monotonic())
         if user is None or not isinstance(name, str):
             await asyncio.sleep(WRONG_PASSWORD)
-            return NOBODY
+            return ANONYMOUS
         return PageUser(name, user.role, user.kind)
 
 

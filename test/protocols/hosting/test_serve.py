@@ -102,7 +102,7 @@ def test_the_process_that_simulates_may_die(command: Callable[..., Served], tmp_
         os.kill(served.simulator, signal.SIGKILL)
         until(lambda: speed_of(client) is None, "exception 11")
         until(lambda: speed_of(client) == 0.5, "another process")
-    assert "was killed by signal 9; the scene begins anew" in served.told
+    assert "was killed by signal 9; the scene is restarted" in served.told
     assert served.end().endswith("; recorded to bag_1\n")
     assert served.process.returncode == 1 and "not recorded up to the end: bag: " in served.told
 
