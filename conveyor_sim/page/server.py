@@ -1,4 +1,7 @@
-"""The page on a recording of any length, from a small server on this machine: what it asks for is read by the index."""
+"""A server on this machine for the page of a recording of any length. Each request is read by the recording's index."""
+
+# The server is that of the standard library. aiohttp, which serves the page of a running line (`protocols/web`), lacks a
+# quick start: importing it takes 0.22 s of a core, and `conveyor-sim view` answers after 0.95 s of a core in all.
 
 from __future__ import annotations
 
