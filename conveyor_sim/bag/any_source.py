@@ -14,7 +14,7 @@ from rosbags.rosbag2 import Reader
 
 from conveyor_sim.bag.messages.qos import DATA, Qos
 from conveyor_sim.bag.messages.typestore import typestore
-from conveyor_sim.bag.source import Raw, Recorded
+from conveyor_sim.bag.source import Raw, RecordedTopic
 
 
 class AnySource:
@@ -26,9 +26,9 @@ class AnySource:
         self._shares_position = _is_scanned(self._reader)
 
     @property
-    def topics(self) -> Sequence[Recorded]:
+    def topics(self) -> Sequence[RecordedTopic]:
         """What was recorded."""
-        return [Recorded(c.topic, c.msgtype, c.msgcount, _offered(c)) for c in self._reader.connections]
+        return [RecordedTopic(c.topic, c.msgtype, c.msgcount, _offered(c)) for c in self._reader.connections]
 
     @property
     def span_ns(self) -> tuple[int, int]:

@@ -18,7 +18,7 @@ RELATIVE = 1e-6
 
 
 @dataclass(frozen=True)
-class Difference:
+class ReplayDifference:
     """Where a replay first differs from its recording."""
 
     tick: int
@@ -41,17 +41,17 @@ class Difference:
         )
 
 
-def first_difference(topic: str, line: Any, recorded: Any, replayed: Any, *, exact: bool) -> Difference | None:
+def first_difference(topic: str, line: Any, recorded: Any, replayed: Any, *, exact: bool) -> ReplayDifference | None:
     """Compares two decoded messages; `replayed` gives the tick and names the entries. None if they are equal."""
     row = COMPARED[topic]
     compare = row.compare
     tick = int(replayed.tick)
     time = tick * line.tick_ns * 1e-9
 
-    def found(field: str, then: object, now: object, index: int | None = None) -> Difference:
+    def found(field: str, then: object, now: object, index: int | None = None) -> ReplayDifference:
         bottle = None if index is None or compare.bottle is None else int(getattr(replayed, compare.bottle)[index])
         part = "" if index is None else compare.entry(line, replayed, index)
-        return Difference(tick, time, topic, field, str(then), str(now), bottle, part)
+        return ReplayDifference(tick, time, topic, field, str(then), str(now), bottle, part)
 
     if recorded.tick != replayed.tick:
         return found("tick", recorded.tick, replayed.tick)
@@ -84,17 +84,17 @@ def _unequal(then: NDArray[Any], now: NDArray[Any], tolerance: float | None) -> 
 
 def outcome_difference(
     tick: int, time: float, recorded: Sequence[Outcome], replayed: Sequence[Outcome]
-) -> Difference | None:
+) -> ReplayDifference | None:
     """Compares what became of the commands of one tick. None if it is equal."""
     for then, now in zip(recorded, replayed, strict=False):
         for field in fields(Outcome):
             before, after = getattr(then, field.name), getattr(now, field.name)
             if not _same(before, after):
                 part = f"the command {', '.join(then.names)} from {then.source}"
-                return Difference(tick, time, "outcomes", field.name, str(before), str(after), part=part)
+                return ReplayDifference(tick, time, "outcomes", field.name, str(before), str(after), part=part)
     if len(recorded) != len(replayed):
         counts = (str(len(recorded)), str(len(replayed)))
-        return Difference(tick, time, "outcomes", "the number of outcomes", *counts)
+        return ReplayDifference(tick, time, "outcomes", "the number of outcomes", *counts)
     return None
 
 

@@ -25,7 +25,7 @@ from conveyor_sim.bag.mcap.salvage import Salvage
 from conveyor_sim.bag.mcap.walk import ValidChunk
 from conveyor_sim.bag.messages.qos import Qos
 from conveyor_sim.bag.messages.typestore import SEPARATOR, typestore
-from conveyor_sim.bag.source import Raw, Recorded
+from conveyor_sim.bag.source import Raw, RecordedTopic
 from conveyor_sim.errors import BagError
 
 
@@ -65,10 +65,10 @@ class McapSource:
         return tuple(f"{one.path}: skipped {one.skipped}" for one in self._files if one.skipped)
 
     @cached_property
-    def topics(self) -> Sequence[Recorded]:
+    def topics(self) -> Sequence[RecordedTopic]:
         """The ROS 2 topics."""
         return [
-            Recorded(
+            RecordedTopic(
                 channel.topic,
                 file.schemas[channel.schema_id].name,
                 file.counts[number],

@@ -19,7 +19,7 @@ from conveyor_sim.bag.mcap.records import LIMIT, MAGIC, RECORD_HEAD, Data, head_
 from conveyor_sim.bag.messages.cdr import tick_of
 from conveyor_sim.bag.messages.topics import OUTPUTS
 from conveyor_sim.bag.messages.typestore import DEFAULT, type_hash, typestore
-from conveyor_sim.bag.source import Raw, Recorded
+from conveyor_sim.bag.source import Raw, RecordedTopic
 
 
 class OwnSource:
@@ -33,12 +33,12 @@ class OwnSource:
         self._reader = SeekingReader(data, validate_crcs=True, record_size_limit=LIMIT)  # type: ignore[arg-type]
 
     @cached_property
-    def topics(self) -> Sequence[Recorded]:
+    def topics(self) -> Sequence[RecordedTopic]:
         """The recorded topics."""
         counts = self._statistics.channel_message_counts
         outputs = {number: OUTPUTS[channel.topic[1:]] for number, channel in self._channels.items()}
         return [
-            Recorded(self._channels[number].topic, output.type, counts.get(number, 0), output.qos)
+            RecordedTopic(self._channels[number].topic, output.type, counts.get(number, 0), output.qos)
             for number, output in outputs.items()
         ]
 

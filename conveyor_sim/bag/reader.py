@@ -25,7 +25,7 @@ from conveyor_sim.bag.messages.encode import LINE, Outcome
 from conveyor_sim.bag.messages.qos import Qos
 from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.bag.own_source import own_source
-from conveyor_sim.bag.source import Source
+from conveyor_sim.bag.source import MessageReader
 from conveyor_sim.columns.bottles import BeltColumns, BottleColumns, ContactColumns
 from conveyor_sim.errors import BagError, ConveyorError
 from conveyor_sim.support.printable import SENTENCE, printable
@@ -78,7 +78,7 @@ class Bag(AbstractContextManager["Bag"]):
     `line` is the recorded conveyor_msgs/Line (its fields as attributes, arrays as NumPy, texts as lists of str).
     """
 
-    def __init__(self, path: Path, source: Source, verified: bool) -> None:
+    def __init__(self, path: Path, source: MessageReader, verified: bool) -> None:
         self.path = path
         self.verified = verified
         """Every byte is as it was written; False: some carry no checksum."""
@@ -331,7 +331,7 @@ def _checked_files(path: Path) -> list[Path]:
     return files
 
 
-def _source(path: Path, files: list[Path]) -> tuple[Source, bool]:
+def _source(path: Path, files: list[Path]) -> tuple[MessageReader, bool]:
     """Open a bag, by its MCAP files if it has any: these repeat, under a checksum, what metadata.yaml says.
 
     Return also True if every byte is as it was written. Raises BagError for damage that can be seen.

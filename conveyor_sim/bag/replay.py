@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.bag.compare import Difference, first_difference, outcome_difference
+from conveyor_sim.bag.compare import ReplayDifference, first_difference, outcome_difference
 from conveyor_sim.bag.input_log import START_NAME
 from conveyor_sim.bag.messages.encode import Header, Outcome, to_outcome
 from conveyor_sim.bag.messages.topics import COMPARED, STATES, Snapshot
@@ -42,7 +42,7 @@ class ReplayReport:
     """s, simulated time up to which states were equal, or at which the first difference is."""
     compared: dict[str, int]
     """Messages compared, by topic."""
-    difference: Difference | None
+    difference: ReplayDifference | None
     """The first one; None: everything is equal."""
 
 
@@ -163,7 +163,7 @@ class _Replay:
         outcomes = map(to_outcome, self._outcomes.take(self._sim.tick))
         return [outcome for outcome in outcomes if outcome.source != ARRIVAL]  # the line never heard of those
 
-    def _compare_outcomes(self, recorded: list[Outcome]) -> Difference | None:
+    def _compare_outcomes(self, recorded: list[Outcome]) -> ReplayDifference | None:
         replayed = [Outcome.of(o.input, o.accepted, o.reason) for o in self._sim.take_outcomes()]
         if self._outcomes is not None:
             self._compared["outcomes"] = self._compared.get("outcomes", 0) + len(recorded)
@@ -172,7 +172,7 @@ class _Replay:
         tick = self._sim.tick - 1
         return outcome_difference(tick, self._bag.time(tick), recorded, replayed)
 
-    def _compare_states(self) -> Difference | None:
+    def _compare_states(self) -> ReplayDifference | None:
         now = Snapshot(self._sim)
         for state in self._states:
             for message in state.take(self._sim.tick):
@@ -183,12 +183,12 @@ class _Replay:
                     return difference
         return None
 
-    def _compare(self, topic: str, recorded: Any, now: Snapshot) -> Difference | None:
+    def _compare(self, topic: str, recorded: Any, now: Snapshot) -> ReplayDifference | None:
         header, row = Header(self._sim.tick, self._sim.stamp_ns, recorded.header.frame_id), COMPARED[topic]
         assert row.state is not None
         if (state := row.state(now)) is None:
             tick, time = self._sim.tick, self._bag.time(self._sim.tick)
-            return Difference(tick, time, topic, "the number of messages", "1", "0")
+            return ReplayDifference(tick, time, topic, "the number of messages", "1", "0")
         if topic == "signals":
             state = Image(state.values[self._signals], *NOTHING_FORCED)
         # By the definition of today: that of the bag may be an older one, with fewer fields.

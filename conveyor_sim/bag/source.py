@@ -13,7 +13,7 @@ Raw = tuple[str, int, bytes]
 
 
 @dataclass(frozen=True)
-class Recorded:
+class RecordedTopic:
     """A topic of a bag; it may be there several times, by several publishers."""
 
     topic: str
@@ -24,11 +24,11 @@ class Recorded:
     """As it was offered."""
 
 
-class Source(Protocol):
+class MessageReader(Protocol):
     """An open bag; errors are whatever its library raises."""
 
     @property
-    def topics(self) -> Sequence[Recorded]:
+    def topics(self) -> Sequence[RecordedTopic]:
         """What was recorded."""
 
     @property

@@ -57,7 +57,7 @@ class Chunk:
 
 
 @dataclass(frozen=True)
-class Content:
+class ChunkContent:
     """What a sound chunk holds, without the messages' bytes."""
 
     digest: int
@@ -176,7 +176,7 @@ def read_cut(data: Data, chunk: Chunk) -> bytes:
     return bytes(content)
 
 
-def survey(content: bytes) -> Content:
+def survey(content: bytes) -> ChunkContent:
     """Return an overview of a chunk's content. Raises Malformed unless it consists of records that a chunk may hold."""
     schemas: list[Schema] = []
     channels: list[Channel] = []
@@ -205,7 +205,7 @@ def survey(content: bytes) -> Content:
             elif isinstance(record, Channel):
                 channels.append(record)
         position = end
-    return Content(zlib.crc32(content), tuple(schemas), tuple(channels), places, tuple(unknown))
+    return ChunkContent(zlib.crc32(content), tuple(schemas), tuple(channels), places, tuple(unknown))
 
 
 def inside(content: bytes) -> Iterator[McapRecord]:
