@@ -5,8 +5,8 @@ from __future__ import annotations
 from functools import lru_cache
 from textwrap import indent
 
-from conveyor_sim.bag.mcap.file import HASH_KEY, QOS_KEY, Schema
 from conveyor_sim.bag.mcap.metadata import to_yaml
+from conveyor_sim.bag.mcap.writer import HASH_KEY, QOS_KEY, Schema
 from conveyor_sim.bag.messages.qos import Qos
 from conveyor_sim.bag.messages.topics import OUTPUTS
 from conveyor_sim.bag.messages.typestore import definition, type_hash

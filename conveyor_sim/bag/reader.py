@@ -15,17 +15,17 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.bag.any_source import AnySource
 from conveyor_sim.bag.mcap.index import sealed
 from conveyor_sim.bag.mcap.metadata import FILE_NAME, file_names, is_stated_in, read_metadata
 from conveyor_sim.bag.mcap.records import mapped
 from conveyor_sim.bag.mcap.storage import other_storage, packed_message
-from conveyor_sim.bag.mcap_source import McapSource
+from conveyor_sim.bag.mcap_reader import McapFilesReader
+from conveyor_sim.bag.message_reader import MessageReader
 from conveyor_sim.bag.messages.encode import LINE, Outcome
 from conveyor_sim.bag.messages.qos import Qos
 from conveyor_sim.bag.messages.topics import TOPICS
-from conveyor_sim.bag.own_source import own_source
-from conveyor_sim.bag.source import MessageReader
+from conveyor_sim.bag.own_reader import own_reader
+from conveyor_sim.bag.rosbags_reader import RosbagsReader
 from conveyor_sim.columns.bottles import BeltColumns, BottleColumns, ContactColumns
 from conveyor_sim.errors import BagError, ConveyorError
 from conveyor_sim.support.printable import SENTENCE, printable
@@ -262,10 +262,10 @@ def open_bag(path: str | Path, by_index: bool = False, *, report: bool = True) -
     with in_one_sentence(path):
         _require_bag(path)
         files = _checked_files(path)
-        if by_index and len(files) == 1 and (own := own_source(files[0])) is not None:
+        if by_index and len(files) == 1 and (own := own_reader(files[0])) is not None:
             return Bag(path, own, verified=False)
         source, verified = _source(path, files)
-        if report and isinstance(source, McapSource):
+        if report and isinstance(source, McapFilesReader):
             for sentence in source.skipped:
                 _report_skipped(sentence)
         try:
@@ -337,10 +337,10 @@ def _source(path: Path, files: list[Path]) -> tuple[MessageReader, bool]:
     Return also True if every byte is as it was written. Raises BagError for damage that can be seen.
     """
     if not files:
-        return AnySource([path]), False
-    if len(files) == 1 and _is_sealed(files[0]) and (own := own_source(files[0])) is not None:
+        return RosbagsReader([path]), False
+    if len(files) == 1 and _is_sealed(files[0]) and (own := own_reader(files[0])) is not None:
         return own, True
-    source = McapSource(path, files)
+    source = McapFilesReader(path, files)
     return source, source.verified
 
 

@@ -14,10 +14,10 @@ from conveyor_sim.bag.channels import ENCODING, metadata_of, schema_of
 from conveyor_sim.bag.folder import make_folder, remove_folders
 from conveyor_sim.bag.input_log import START_NAME
 from conveyor_sim.bag.lock import claim
-from conveyor_sim.bag.mcap.file import McapFile
 from conveyor_sim.bag.mcap.line_copy import NAME as LINE_COPY
 from conveyor_sim.bag.mcap.line_copy import LineCopy
 from conveyor_sim.bag.mcap.metadata import write_metadata
+from conveyor_sim.bag.mcap.writer import McapFileWriter
 from conveyor_sim.bag.messages.topics import OUTPUTS
 from conveyor_sim.bag.messages.typestore import default_distro
 from conveyor_sim.errors import BagError, CheckpointError
@@ -61,7 +61,7 @@ class Recorder(contextlib.AbstractContextManager["Recorder"]):
             raise BagError(f"{self._storage}: can't be written ({error.strerror})") from error
         try:
             claim(self._stream)
-            self._file = McapFile(self._stream, name, self._distro)
+            self._file = McapFileWriter(self._stream, name, self._distro)
             self._channels = {topic: self._register(topic) for topic in (OUTPUTS if topics is None else topics)}
             self._file.flush()  # a disk without room is noticed here
             if start is not None:

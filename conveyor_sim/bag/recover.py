@@ -13,7 +13,6 @@ from mcap.records import Channel
 from mcap.records import Schema as SchemaRecord
 
 from conveyor_sim.bag.lock import alone
-from conveyor_sim.bag.mcap.file import McapFile, Schema, topic_info
 from conveyor_sim.bag.mcap.foreign import is_ros
 from conveyor_sim.bag.mcap.index import Index, read_index, sealed
 from conveyor_sim.bag.mcap.line_copy import NAME as LINE_COPY
@@ -33,10 +32,11 @@ from conveyor_sim.bag.mcap.records import mapped
 from conveyor_sim.bag.mcap.salvage import Salvage
 from conveyor_sim.bag.mcap.storage import other_storage, packed_part
 from conveyor_sim.bag.mcap.walk import NothingLeft
+from conveyor_sim.bag.mcap.writer import McapFileWriter, Schema, topic_info
 from conveyor_sim.bag.messages.encode import LINE
 from conveyor_sim.bag.messages.topics import STATES
 from conveyor_sim.bag.messages.typestore import default_distro
-from conveyor_sim.bag.own_source import is_of_this_package
+from conveyor_sim.bag.own_reader import is_of_this_package
 from conveyor_sim.bag.reader import mcap_files, open_bag
 from conveyor_sim.errors import BagError
 
@@ -191,7 +191,7 @@ def _repair(file: Path) -> _Content:
             topics = _topics(salvage.schemas, salvage.ros_channels, salvage.counts)
             return _Content(info, topics, unverified=tuple(salvage.unverified), skipped=salvage.skipped, chained=True)
         with _temporary(file).open("wb") as stream:
-            copy = McapFile(stream, file.name, default_distro())
+            copy = McapFileWriter(stream, file.name, default_distro())
             _copy(salvage, copy)
             copy.finish()
             stream.flush()
@@ -222,7 +222,7 @@ def _topics(
     )
 
 
-def _copy(salvage: Salvage, copy: McapFile) -> None:
+def _copy(salvage: Salvage, copy: McapFileWriter) -> None:
     """Copy messages with their times, topics and types; the records that repeat others are written anew."""
     channels = {}
     for number, channel in sorted(salvage.channels.items()):

@@ -12,12 +12,12 @@ from rosbags.interfaces import Connection, ConnectionExtRosbag2, QosDurability, 
 from rosbags.interfaces import Qos as RosbagsQos
 from rosbags.rosbag2 import Reader
 
+from conveyor_sim.bag.message_reader import Raw, RecordedTopic
 from conveyor_sim.bag.messages.qos import DATA, Qos
 from conveyor_sim.bag.messages.typestore import typestore
-from conveyor_sim.bag.source import Raw, RecordedTopic
 
 
-class AnySource:
+class RosbagsReader:
     """A bag opened by rosbags."""
 
     def __init__(self, paths: Sequence[Path]) -> None:

@@ -43,7 +43,7 @@ def topic_info(name: str, type_name: str, channel_metadata: dict[str, str], mess
     return TopicInfo(name, type_name, channel_metadata.get(HASH_KEY, ""), profiles, message_count)
 
 
-class McapFile:
+class McapFileWriter:
     """Writer of one file to a binary stream, which the caller closes. Every method may raise OSError.
 
     Chunks of 1 MiB, each with a checksum, compressed by zstd at its level 3: `mcap.writer` has no setting for it. The
