@@ -1,4 +1,4 @@
-"""A walk over the records of an MCAP file that may be damaged anywhere."""
+"""Walk over the records of an MCAP file that may be damaged anywhere."""
 
 from __future__ import annotations
 
