@@ -1,4 +1,4 @@
-"""A lock on the file of a recording: whoever writes it holds it, so that nobody repairs it meanwhile."""
+"""Lock on the file of a recording. Its writer holds the lock, which keeps other processes from repairing the file."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from conveyor_sim.errors import BagError
 
 
 def claim(stream: IO[bytes]) -> None:
-    """Locks an open file until it is closed or its process ends. Raises BlockingIOError if another has locked it."""
+    """Lock an open file until it is closed or its process ends. Raise BlockingIOError if another process holds it."""
     try:
         fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
@@ -23,7 +23,7 @@ def claim(stream: IO[bytes]) -> None:
 
 @contextlib.contextmanager
 def alone(path: Path) -> Iterator[None]:
-    """Holds the lock of a file. Raises BagError if another process is recording or repairing it."""
+    """Hold the lock of a file. Raise BagError if another process is recording or repairing it."""
     with path.open("rb") as stream:
         try:
             claim(stream)
