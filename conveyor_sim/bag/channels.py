@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from textwrap import indent
 
 from conveyor_sim.bag.mcap.file import HASH_KEY, QOS_KEY, Schema
 from conveyor_sim.bag.mcap.metadata import to_yaml
@@ -27,4 +28,4 @@ def metadata_of(topic: str, distro: str) -> dict[str, str]:
 
 @lru_cache(maxsize=16)
 def _profile(qos: Qos) -> str:
-    return to_yaml([qos.as_rosbag2()])
+    return indent(to_yaml([qos.as_rosbag2()]), "  ")  # indented as in earlier recordings, which are compared as text

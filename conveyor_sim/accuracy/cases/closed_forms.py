@@ -26,7 +26,7 @@ ROUNDING = 1e-11
 """Relative error below which rounding shows in positions of some metres."""
 
 FITTED = 4
-"""The finest so many of the errors make the observed order."""
+"""Number of finest errors from which the observed order is fitted."""
 
 Case = HeadOn | SetDown
 Progress = Callable[[float, float], None]
@@ -57,7 +57,7 @@ def orders(scene: Scene, integrators: Sequence[str], progress: Progress) -> tupl
 
 
 def cases_of(scene: Scene) -> tuple[list[Case], dict[str, str]]:
-    """The cases with a closed form, and those without, with the reason."""
+    """Return the cases with a closed form, and those without, with the reason."""
     terms = terms_of(scene)
     speed = terms.plant.impact_speed
     cases: list[Case] = []

@@ -36,7 +36,7 @@ def reference_setting(scene: Scene) -> Setting:
 
 
 def reference_simulation(scene: Scene, setting: Setting) -> Simulation:
-    """The scene with a reference setting, with friction solved explicitly: in short steps both are the same law."""
+    """Build the scene with a reference setting and explicit friction: in short steps both solvers have one law."""
     return variant(scene, setting, **_explicit(scene))
 
 

@@ -37,7 +37,7 @@ def apply(scene: Scene, setting: Setting, copy: Path) -> Scene:
 
 
 def line(setting: Setting) -> str:
-    """A setting as a scene file has it."""
+    """Return a setting as it is written in a scene file."""
     error = "" if setting.error is None else f", error: {setting.error!r}"
     return f"accuracy: {{integrator: {setting.integrator}, per_tick: {setting.per_tick}{error}}}"
 
@@ -76,7 +76,7 @@ def _take_tables_along(lines: list[str], data: Any, before: Path, copy: Path) ->
 
 
 def _write(file: Path, text: str) -> None:
-    """The whole file or nothing."""
+    """Write the complete file or nothing."""
     try:
         write_file(file, text.encode(), file.parent)
     except FileError as error:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import struct
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 import lz4.frame  # type: ignore[import-untyped]
@@ -223,6 +223,23 @@ def inside(content: bytes) -> Iterator[McapRecord]:
             return
         if record is not None:
             yield record
+
+
+def messages_of(content: bytes, names: Mapping[int, str]) -> Iterator[tuple[str, int, bytes]]:
+    """Yield topic, log time (ns) and bytes of a valid chunk's messages in their order, for the channels in `names`.
+
+    Raises Malformed.
+    """
+    position, end = 0, len(content)
+    while position < end:
+        opcode, length = RECORD_HEAD.unpack_from(content, position)
+        body, position = position + RECORD_HEAD.size, position + RECORD_HEAD.size + length
+        if position > end:
+            raise Malformed("a record does not end where it should")
+        if opcode == Opcode.MESSAGE:
+            channel, _, log_time, _ = MESSAGE.unpack_from(content, body)
+            if (topic := names.get(channel)) is not None:
+                yield topic, log_time, content[body + MESSAGE.size : position]
 
 
 def _decompressed(data: bytes, compression: str, size: int) -> Iterator[bytes]:

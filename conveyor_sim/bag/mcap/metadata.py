@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from os import SEEK_END
@@ -12,6 +11,7 @@ from pathlib import Path, PurePath
 from textwrap import dedent, indent
 from typing import Any
 
+import yaml
 from ruamel.yaml import YAML
 
 from conveyor_sim.errors import BagError
@@ -23,9 +23,8 @@ SIZE_LIMIT = 1 << 24
 """Bytes of the file, at most."""
 _BEHIND = 1 << 18
 """Bytes at the end of a recording's file, the index among them, in which its metadata is looked for."""
-_PLAIN = re.compile(r"[A-Za-z/_][\w/.-]*", re.ASCII)
-_RESERVED = frozenset({"null", "true", "false", "yes", "no", "on", "off", "y", "n"})
-"""What is a text in quotes only."""
+_WIDTH = 1 << 30
+"""Characters in a line, at most: no text is broken."""
 _HEAD = "rosbag2_bagfile_information:\n"
 RECORD_NAME = "rosbag2"
 RECORD_KEY = "serialized_metadata"
@@ -96,53 +95,17 @@ def bag_information(topics: Sequence[TopicInfo], files: Sequence[FileInfo], dist
     }
 
 
+class _Dumper(getattr(yaml, "CSafeDumper", yaml.SafeDumper)):  # type: ignore[misc]
+    """libyaml's writer, or PyYAML's own where it was built without libyaml."""
+
+    def ignore_aliases(self, data: Any) -> bool:
+        """Return True: a value that occurs twice is written twice, because not every reader knows anchors."""
+        return True
+
+
 def to_yaml(value: Any) -> str:
-    """Block-style YAML text of mappings, sequences, texts, whole numbers, truth values and None, in their order.
-
-    By hand: a library takes a tenth of a second for what a recording states of itself.
-    """
-    return "".join(f"{line}\n" for line in _lines(value))
-
-
-def _lines(value: Any) -> Iterator[str]:
-    """Of a value that is not alone on its line."""
-    if isinstance(value, Mapping):
-        for key, entry in value.items():
-            yield from _entry(f"{_scalar(key)}:", entry, "  ")
-    elif isinstance(value, Sequence) and not isinstance(value, str):
-        for entry in value:
-            first, *rest = _lines(entry) if _is_nested(entry) else [_scalar(entry)]
-            yield f"  - {first}"
-            yield from (f"    {line}" for line in rest)
-    else:
-        yield _scalar(value)
-
-
-def _entry(head: str, value: Any, deeper: str) -> Iterator[str]:
-    if _is_nested(value):
-        yield head
-        # Sequences are set in by themselves.
-        yield from (line if isinstance(value, Sequence) else deeper + line for line in _lines(value))
-    else:
-        yield f"{head} {_scalar(value)}"
-
-
-def _is_nested(value: Any) -> bool:
-    return isinstance(value, (Mapping, Sequence)) and not isinstance(value, str) and len(value) > 0
-
-
-def _scalar(value: Any) -> str:
-    if value is None:
-        return "null"
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, int):
-        return str(value)
-    if not isinstance(value, str):
-        return "{}" if isinstance(value, Mapping) else "[]"
-    if _PLAIN.fullmatch(value) and value.lower() not in _RESERVED:
-        return value
-    return f"'{value}'" if value.isprintable() and "'" not in value else json.dumps(value)
+    """Return block-style YAML text of mappings, sequences and scalars, in their order."""
+    return str(yaml.dump(value, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=_WIDTH))
 
 
 @lru_cache(maxsize=64)
@@ -188,7 +151,8 @@ def is_stated_in(file: Path) -> bool:
     stated = dedent(text.removeprefix(_HEAD)).encode()
     with file.open("rb") as stream:
         stream.seek(-min(len(stated) + _BEHIND, file.stat().st_size), SEEK_END)
-        return f"\nrelative_file_paths:\n  - {file.name}\nfiles:\n".encode() in stated and stated in stream.read()
+        alone = rb"\nrelative_file_paths:\n *- %b\nfiles:\n" % re.escape(file.name.encode())
+        return re.search(alone, stated) is not None and stated in stream.read()
 
 
 def fits(information: Mapping[str, Any], expected: Mapping[str, Any]) -> bool:

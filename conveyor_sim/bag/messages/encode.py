@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.bag.messages.cdr import CdrWriter, pose_rows
-from conveyor_sim.bag.messages.packing import packer
+from conveyor_sim.bag.messages.cdr import CdrWriter, packer, pose_rows
 from conveyor_sim.columns.bottles import BottleColumns
 from conveyor_sim.columns.image import NOTHING_FORCED, Image
 from conveyor_sim.line.commands.inputs import CommandOutcome, Input, recorded_input
@@ -122,7 +121,7 @@ def poses_message(columns: BottleColumns, header: Header) -> bytes:
     """geometry_msgs/PoseArray of the bottles' axes, ordered by id, at the height of the belts (z = 0)."""
     writer = CdrWriter()
     writer.header(header.stamp_ns, header.frame_id)
-    writer.double_rows(pose_rows(columns.x, columns.y, columns.theta))
+    writer.rows(pose_rows(columns.x, columns.y, columns.theta))
     return writer.finish()
 
 

@@ -83,7 +83,7 @@ def _write(writer: CdrWriter, marker: Marker, header: Header) -> None:
     writer.stamp(header.stamp_ns)
     look = marker.ns, marker.id, marker.type, marker.action, marker.position, marker.scale, marker.colour
     writer.raw(_before_points(writer.phase, header.frame_id, *look))
-    writer.double_rows(marker.points)
+    writer.rows(marker.points)
     writer.raw(_behind_points(writer.phase, marker.text))
 
 

@@ -4,8 +4,9 @@ The preconditioner is the factorised blocks. Products are computed as forces are
 fixed order. Scalar products are added up by units of bottles, in order. So the bits do not depend on the number of
 threads. (Saad, Iterative Methods for Sparse Linear Systems, algorithm 9.1.)
 
-At the end each bottle gets its residual impulse as a change of its own velocity. The sum of all impulses is then that
-of the forces, which are equal and opposite. So momentum is conserved to rounding however early the search ends.
+At the end the residual impulse of each bottle changes the velocity of that bottle alone. The sum of all impulses is
+then that of the forces, which are equal and opposite. So momentum is conserved to rounding however early the search
+ends.
 """
 
 from typing import Any

@@ -39,7 +39,7 @@ def note_damage(world: World, worker: Worker, dt: float) -> None:
 def _note(world: World, damage: Any, worker: Worker, dt: float) -> None:
     if damage is None:
         return
-    # Velocity Verlet has just set velocities, each worker those of its own bottles.
+    # Velocity Verlet has just set velocities, each worker for its share of the bottles.
     wait_for_all(worker)
     begin, stop = share(worker, world.bottles.x.size)
     for first in range(begin, stop, BLOCK):

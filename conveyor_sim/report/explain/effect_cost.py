@@ -41,7 +41,7 @@ class Price:
     off: float
     cost: float
     low: float
-    """Between `low` and `high` lies the true median with CONFIDENCE, whatever the noise's distribution."""
+    """The true median lies between `low` and `high` with CONFIDENCE, for any distribution of the noise."""
     high: float
 
     @property

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from conveyor_sim.bag.messages.packing import CODES, packer
+from conveyor_sim.bag.messages.cdr import CODES, packer
 from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.bag.messages.typestore import typestore
 
