@@ -12,9 +12,9 @@ import tempfile
 import threading
 import time
 import uuid
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
-from contextlib import AbstractContextManager, ExitStack, suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import TypeVar
@@ -36,7 +36,9 @@ from conveyor_sim.ros.intake import Intake
 from conveyor_sim.ros.lockstep_service import LockstepService
 from conveyor_sim.ros.publishers import check_type, ros_qos
 from conveyor_sim.ros.spinner import Spinner
-from conveyor_sim.run.lockstep import Lockstep, LockstepAnswer, LockstepRequest, Refused
+from conveyor_sim.run.alarm_changes import AlarmChanges
+from conveyor_sim.run.lockstep import LOCKSTEP, Lockstep, LockstepAnswer, LockstepRequest, Refused
+from conveyor_sim.run.scan_loop import AttachedController
 from conveyor_sim.scene import Scene, parse_overrides, parse_scene
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.child_process import Process
@@ -49,8 +51,10 @@ LAST_TICK = 10**9  # at which the run ends, as the controller sees it: when it d
 ENDED = "the test has ended"
 
 
-class AttachedNode(AbstractContextManager["AttachedNode"]):
-    """Serves a controller's node from inside the test's process; it is to be scanned at every tick."""
+class AttachedNode(AttachedController):
+    """A controller's node, served from the process of the test. It must be scanned at every tick."""
+
+    source = LOCKSTEP
 
     def __init__(
         self,
@@ -89,19 +93,21 @@ class AttachedNode(AbstractContextManager["AttachedNode"]):
             stack.callback(self._turns.end)
             self._open = stack.pop_all()
 
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
     def close(self) -> None:
         """Refuse what the controller waits for, end its process and leave the domain."""
         self._open.close()
 
-    def scan(self, inputs: Inputs) -> Mapping[str, float]:
-        """Answer the request for this tick and wait for the next; its commands, {} at ticks before its target.
+    def scan(self, inputs: Inputs, alarms: AlarmChanges) -> dict[str, float]:
+        """Answer the request for this tick and wait for the next one. Return the commands and alarms of that.
 
-        After a request with `release` the controller has no more part: {} from its target on.
+        A node sends alarms only when they change. At ticks before the target of the request the answer is empty, and
+        from the target of a request with `release` on. Alarms of a controller before this one go.
         Raises ControlError if no request comes, CommandError if its commands would be refused.
         """
+        answer = self._requested(inputs)
+        return {**alarms.of({}), **answer}
+
+    def _requested(self, inputs: Inputs) -> dict[str, float]:
         turns = self._turns
         if not turns.reached():
             return {}
@@ -122,7 +128,7 @@ class AttachedNode(AbstractContextManager["AttachedNode"]):
         return dict(zip(request.names, request.values, strict=True))
 
     def note(self, outcomes: Sequence[CommandOutcome]) -> None:
-        """What became of commands in the last tick, for the next answer."""
+        """Store the command results of the last tick for the next answer."""
         self._turns.outcomes += outcomes
 
     def _serve(self, stack: ExitStack, namespace: str) -> str:

@@ -20,11 +20,9 @@ from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.control.recorded import Recorded
 from conveyor_sim.control.scan import (
     ALARMS,
-    AlarmChanges,
     ControlError,
     Controller,
     Inputs,
-    commands_of,
     declared_alarms,
 )
 from conveyor_sim.errors import ConveyorError
@@ -33,6 +31,7 @@ from conveyor_sim.ros.lockstep_client import LockstepClient
 from conveyor_sim.ros.publishers import ros_qos
 from conveyor_sim.ros.spinner import Spinner
 from conveyor_sim.ros.variables import Variables
+from conveyor_sim.run.alarm_changes import AlarmChanges
 from conveyor_sim.scene import parse_overrides, parse_scene
 from conveyor_sim.support.printable import SENTENCE, printable
 from conveyor_sim.support.stop_request import StopRequest
@@ -83,13 +82,13 @@ class Scanner:
             answer = self._controller.scan(
                 Inputs(signals, tick * self._tick_ns * 1e-9, tick, ticks * self._tick_ns * 1e-9)
             )
-            given = commands_of(answer) | self._changes.of(answer)
+            commands = self._changes.with_commands(answer)
         except ControlError as error:
             raise ConveyorError(f"scan at tick {tick}: {error}") from error
         stamp_ns = max(1, tick * self._tick_ns)
         self._alarms.tell(_alarms(answer), stamp_ns)
         self._variables.tell(self._recorded.names, self._recorded.values(), tick, stamp_ns)
-        return given
+        return commands
 
 
 class ControllerRun:

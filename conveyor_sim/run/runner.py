@@ -16,8 +16,8 @@ from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.control.scan import Controller
 from conveyor_sim.errors import ConveyorError, SimulationError
 from conveyor_sim.line.run_state import ENDED, RUNNING, STOPPED, RunState
-from conveyor_sim.run.controlled import Controlled
 from conveyor_sim.run.force_check import PeakWatch
+from conveyor_sim.run.scan_loop import ScanLoop
 from conveyor_sim.run.speed import Spent
 from conveyor_sim.run.stopped import keep_stopped
 from conveyor_sim.scene import Scene
@@ -66,12 +66,11 @@ def run_scene(
     that can't go on; one that can't begin leaves no recording.
     """
     simulation = Simulation(scene, threads)
-    controlled = None if controller is None else Controlled(simulation, controller, record)
-    if controlled is not None:
-        if told is not None:
-            for sentence in controlled.left_over:
-                told(sentence)
-        controlled.scan()
+    scans = ScanLoop(simulation, controller, record)
+    if told is not None:
+        for sentence in getattr(controller, "left_over", ()):
+            told(sentence)
+    scans.scan_tick()
     recorder = Recorder(bag) if bag is not None else None
     with recorder or nullcontext(), _stop_request() as stop:
         outputs = Outputs(simulation, [recorder] if recorder else [], run_id=uuid.uuid4().hex)
@@ -82,8 +81,7 @@ def run_scene(
         while simulation.tick < scene.duration_ticks and not stop.is_set():
             began = time.perf_counter()
             try:
-                if controlled is not None:
-                    controlled.before_tick(outputs)
+                scans.before_tick(outputs)
                 simulation.advance(1)
             except SimulationError as error:
                 outputs.after_failure()
@@ -93,9 +91,7 @@ def run_scene(
                 outputs.show_run(RunState(STOPPED, printable(error, SENTENCE)))
                 raise
             stepping += time.perf_counter() - began
-            outcomes = outputs.after_tick()
-            if controlled is not None:
-                controlled.after_tick(outcomes)
+            scans.after_tick(outputs.after_tick())
             peaks.after_tick()
             if progress is not None:
                 progress(simulation.time)

@@ -9,7 +9,7 @@ import os
 import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager, ExitStack
+from contextlib import ExitStack
 from pathlib import Path
 
 from conveyor_sim.control.scan import ControlError, Inputs
@@ -19,6 +19,8 @@ from conveyor_sim.protocols.handshake import TARGET, HandshakeSource
 from conveyor_sim.protocols.modbus.address_map import modbus_map
 from conveyor_sim.protocols.server_thread import ServerThread
 from conveyor_sim.protocols.source import TagSource
+from conveyor_sim.run.alarm_changes import AlarmChanges
+from conveyor_sim.run.scan_loop import AttachedController
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.child_process import Process
 from conveyor_sim.support.modbus_rows import Row
@@ -34,8 +36,8 @@ USER = "plc"
 LOOK = 0.2  # s of wall time between two looks at whether the PLC's process still runs
 
 
-class AttachedPlc(AbstractContextManager["AttachedPlc"]):
-    """To the test, a controller; it is to be scanned at every tick."""
+class AttachedPlc(AttachedController):
+    """A PLC that is a client of a server of the test. It must be scanned at every tick."""
 
     def __init__(
         self,
@@ -73,15 +75,12 @@ class AttachedPlc(AbstractContextManager["AttachedPlc"]):
                 stack.callback(self._process.stop)
             self._open = stack.pop_all()
 
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
     def close(self) -> None:
         """End the PLC's process and the server."""
         self._open.close()
 
-    def scan(self, inputs: Inputs) -> Mapping[str, float]:
-        """What the PLC wrote before it let the line go beyond this tick; waits until it does.
+    def scan(self, inputs: Inputs, alarms: AlarmChanges) -> dict[str, float]:
+        """Wait until the PLC lets the line go beyond this tick. Return the commands and alarms it wrote before that.
 
         Raises ControlError if it does not.
         """
@@ -98,7 +97,7 @@ class AttachedPlc(AbstractContextManager["AttachedPlc"]):
                 self.writer, self.source = given.writer, given.source
             else:
                 self._simulation.give(given)
-        return commands
+        return alarms.with_commands(commands)
 
     def _require_going_on(self, inputs: Inputs, late: bool) -> None:
         if self._process is not None and self._process.exit_code is not None:

@@ -8,22 +8,24 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
-from contextlib import AbstractContextManager, ExitStack
+from contextlib import ExitStack
 from pathlib import Path
 
+from conveyor_sim.control.recorded import Recorded
 from conveyor_sim.control.scan import ControlError, Inputs
 from conveyor_sim.line.process_image import ProcessImage
 from conveyor_sim.protocols.attach.link import LinkError
-from conveyor_sim.protocols.attach.links import all_of, link
+from conveyor_sim.protocols.attach.links import all_of, link, read_answer
 from conveyor_sim.protocols.attach.tag_map import TagMapError, read_tag_map
 from conveyor_sim.protocols.handshake import TARGET, TICK
 from conveyor_sim.protocols.server_thread import ServerThread
 from conveyor_sim.protocols.source import PLC
+from conveyor_sim.run.alarm_changes import AlarmChanges
+from conveyor_sim.run.scan_loop import AttachedController
 
 
-class ServedPlc(AbstractContextManager["ServedPlc"]):
-    """To the test, a controller; it is to be scanned at every tick."""
+class ServedPlc(AttachedController):
+    """A PLC whose server the test is a client of. It must be scanned at every tick."""
 
     source = PLC
     """By which way its commands come."""
@@ -44,6 +46,7 @@ class ServedPlc(AbstractContextManager["ServedPlc"]):
         """Values of the PLC's own (plc/<name>), as they were after its last scan; NaN before."""
         self.record = tuple(self.variables)
         """Names of those that are recorded: all."""
+        self.recorded = Recorded(self)
         with ExitStack() as stack:
             self._thread = stack.enter_context(ServerThread())
             self._link = link(url, all_of(self._map), user, password)
@@ -51,15 +54,14 @@ class ServedPlc(AbstractContextManager["ServedPlc"]):
             self._thread.run(self._link.connect())
             self._open = stack.pop_all()
 
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
     def close(self) -> None:
         """Leave the PLC."""
         self._open.close()
 
-    def scan(self, inputs: Inputs) -> Mapping[str, float]:
-        """What it answers to the inputs of this tick; the same once more before the tick that it has named.
+    def scan(self, inputs: Inputs, alarms: AlarmChanges) -> dict[str, float]:
+        """Return its commands for the inputs of this tick, and the alarms that change.
+
+        Before the target tick that it set last, the commands are those of the scan before.
 
         Raises ControlError if it does not answer, LinkError if it is lost.
         """
@@ -68,13 +70,10 @@ class ServedPlc(AbstractContextManager["ServedPlc"]):
             try:
                 self._thread.run(self._link.write({**signals, TICK: float(inputs.tick)}))
                 self._target = self._wait(inputs)
-                asked = [each.tag.name for each in (*self._map.read, *self._map.own)]
-                found = self._thread.run(self._link.read(asked))
+                self._answer, self.variables = self._thread.run(read_answer(self._link, self._map))
             except LinkError as error:
                 raise ControlError(f"at {inputs.time:.2f} s no PLC: {error}") from error
-            self.variables = {each.tag.name: found.pop(each.tag.name) for each in self._map.own}
-            self._answer = found
-        return self._answer
+        return alarms.with_commands(self._answer)
 
     def _wait(self, inputs: Inputs) -> int:
         end = time.monotonic() + self._patience

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 import secrets
 import uuid
-from collections.abc import Mapping, Sequence
+from collections import ChainMap
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from os import PathLike
 from pathlib import Path
@@ -14,11 +15,12 @@ from typing import Any, NoReturn
 from conveyor_sim.bag.input_log import InputLog, copier
 from conveyor_sim.bag.outputs import Outputs, forget_past
 from conveyor_sim.bag.recorder import Recorder
-from conveyor_sim.control.scan import Controller
+from conveyor_sim.control.scan import ALARMS, ControlError, Controller
 from conveyor_sim.errors import CommandError, SimulationError
 from conveyor_sim.line.inputs import DISOWN, FAULT, INJECT, SET, Input
 from conveyor_sim.line.run_state import ENDED, RUNNING, STOPPED, RunState
 from conveyor_sim.protocols.source import FACES, TickSource
+from conveyor_sim.run.scan_loop import AttachedController, LocalController, ScanLoop
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.modbus_rows import Row
@@ -27,11 +29,14 @@ from conveyor_sim.testing import plc
 from conveyor_sim.testing.conditions import Assertion, Condition, Present, values
 from conveyor_sim.testing.history import History
 from conveyor_sim.testing.person import Person
-from conveyor_sim.testing.scan_cycle import PATIENCE, ScanCycle, by_other_hands
+from conveyor_sim.testing.plc_server import ServedPlc
 from conveyor_sim.testing.scene_of import scene_of
 
 TEST = "test"
 """Source of commands that the test itself gives."""
+
+PATIENCE = 60.0
+"""s of wall time that an attached node or PLC has for each request."""
 
 _ROUNDING = 1e-9
 
@@ -86,7 +91,10 @@ class Scenario(AbstractContextManager["Scenario"]):
         self._outputs.show_run(RunState(RUNNING))
         self._inputs = None if inputs is None else InputLog(inputs, self.simulation, began)
         self._noting = [self._outputs.show_variables, *([self._inputs.note_variables] if self._inputs else [])]
-        self._cycle = ScanCycle(self.simulation, self._give)
+        self._loop = ScanLoop(self.simulation)
+        # Alarms of a controller before the checkpoint: the next controller clears those that it does not raise.
+        self._loop.alarms.of({f"{ALARMS}{alarm.id}": 1.0 for alarm in self.simulation.line.alarms if alarm.is_said})
+        self._read_by_controller: dict[str, None] = {}
         self._alarms: dict[str, float] = {}
         self._standing: list[Assertion] = []
         self._sources: list[TickSource] = []
@@ -99,7 +107,7 @@ class Scenario(AbstractContextManager["Scenario"]):
 
     def close(self) -> None:
         """End an attached node, and the recording, if there is one; it can't run on then."""
-        self._cycle.close()
+        self._loop.close()
         if self._recorder is not None:
             if not self._stopped:
                 self._outputs.show_run(RunState(ENDED))
@@ -118,7 +126,8 @@ class Scenario(AbstractContextManager["Scenario"]):
         """The present signals by name, alarms among them ("alarms/<id>"), 1 while they stand, and the variables of a
         PLC program (plc/main/speed).
         """
-        return self._present(self._cycle.with_variables({**self._signals, **self._alarms}))
+        variables: Any = self._loop.recorded.variables  # ChainMap is declared for mappings that change
+        return self._present(ChainMap({**self._signals, **self._alarms}, variables))
 
     @property
     def alarms(self) -> frozenset[str]:
@@ -133,7 +142,7 @@ class Scenario(AbstractContextManager["Scenario"]):
     @property
     def read_by_controller(self) -> tuple[str, ...]:
         """Names of the signals that the controller has read."""
-        return tuple(self._cycle.read)
+        return tuple(self._read_by_controller)
 
     def attach(self, controller: Controller, *, resume: bool = False) -> None:
         """Have a controller scan at this tick and every one to come, in place of the one before.
@@ -141,9 +150,9 @@ class Scenario(AbstractContextManager["Scenario"]):
         resume: it goes on from what the one of the checkpoint remembered, which `save` has kept: with the same bits as
         if the run had never stopped. Raises ControlError if it can't.
         """
-        self._cycle.attach(controller)
+        self._loop.attach(lambda: LocalController(self.simulation, controller, self._give))
         if resume:
-            self._cycle.resume(self._began)
+            self._loop.resume(self._began)
         else:
             self._scan()
 
@@ -152,7 +161,7 @@ class Scenario(AbstractContextManager["Scenario"]):
 
         Raises CheckpointError, and ControlError for a controller that can't be held.
         """
-        self.simulation.save(path, controller=self._cycle.snapshot())
+        self.simulation.save(path, controller=self._loop.snapshot())
 
     def attach_node(
         self,
@@ -171,8 +180,13 @@ class Scenario(AbstractContextManager["Scenario"]):
         Raises ControlError without ROS 2, or if no request comes, as every later tick does; CommandError, ConveyorError
         and OSError as `AttachedNode`.
         """
-        self._cycle.attach_node(command, namespace, domain, patience)
-        self._scan()
+        try:
+            from conveyor_sim.ros.attached import AttachedNode
+        except ImportError as error:
+            raise ControlError(f"a node can't be attached here: {error}; expected ROS 2 and conveyor_msgs") from error
+        self._attach(
+            lambda: AttachedNode(self.simulation, command, namespace=namespace, domain=domain, patience=patience)
+        )
 
     def attach_modbus(
         self,
@@ -193,8 +207,8 @@ class Scenario(AbstractContextManager["Scenario"]):
         Raises ControlError if it does not let the line go on, as every later tick does; FaceError, OSError as
         `AttachedPlc`; ImportError without pymodbus.
         """
-        self._cycle.attach_plc(plc.modbus(rows, port), command, {}, patience)
-        self._scan()
+        make = plc.modbus(rows, port)
+        self._attach(lambda: plc.AttachedPlc(self.simulation, make, command, {}, patience))
 
     def attach_opcua(
         self, command: Sequence[str] = (), *, port: int = 0, password: str = "", patience: float = PATIENCE
@@ -205,8 +219,8 @@ class Scenario(AbstractContextManager["Scenario"]):
         in the environment variable CONVEYOR_SIM_PASSWORD. Raises as `attach_modbus`; ImportError without asyncua.
         """
         password = password or secrets.token_urlsafe()
-        self._cycle.attach_plc(plc.opcua(password, port), command, {plc.PASSWORD: password}, patience)
-        self._scan()
+        make, environment = plc.opcua(password, port), {plc.PASSWORD: password}
+        self._attach(lambda: plc.AttachedPlc(self.simulation, make, command, environment, patience))
 
     def attach_plc(
         self,
@@ -226,8 +240,8 @@ class Scenario(AbstractContextManager["Scenario"]):
         Raises TagMapError for a map that does not fit; LinkError if the PLC can't be reached; ControlError if it does
         not answer, as every later tick does; ImportError without the protocol's library.
         """
-        self._cycle.attach_served_plc(url, Path(tags), user, password, patience)
-        self._scan()
+        image = self.simulation.process_image
+        self._attach(lambda: ServedPlc(image, url, Path(tags), user, password, patience))
 
     def source(self) -> TickSource:
         """The line as a SCADA face sees it, from now on. What clients of that give is applied at the next tick.
@@ -329,7 +343,7 @@ class Scenario(AbstractContextManager["Scenario"]):
         __tracebackhide__ = True
         for source in self._sources:
             source.before_tick()
-        self._cycle.give()
+        self._loop.give()
         if self._inputs is not None:
             self._inputs.before_tick()
         try:
@@ -345,18 +359,20 @@ class Scenario(AbstractContextManager["Scenario"]):
             self._inputs.after_tick()
         refused = []
         outcomes = self._outputs.after_tick()
-        self._cycle.note(outcomes)
+        self._loop.note(outcomes)
         for outcome in outcomes:
             if outcome.accepted:
                 self.history.take(outcome, outcome.source == TEST)
-            elif (outcome.source not in FACES or self._cycle.answers_for(outcome)) and not by_other_hands(outcome):
+            elif outcome.source in FACES and not self._loop.wrote(outcome):
+                continue
+            elif not (outcome.without_control and outcome.input.writer_kind == "controller"):
                 refused.append(outcome.reason)
         self._look()
         for source in self._sources:
             source.after_tick()
         if refused:
             raise CommandError(f"at {self.time - self.scene.tick:.2f} s a command was refused: {'; '.join(refused)}")
-        if self._cycle.attached:
+        if self._loop.attached:
             self._scan()
         for assertion in self._standing:
             self._check(assertion)
@@ -374,15 +390,21 @@ class Scenario(AbstractContextManager["Scenario"]):
 
     def _watch(self) -> None:
         """Note the controller's variables that conditions have read: the history has them from then on."""
-        variables = self._cycle.variables
+        variables = self._loop.recorded.variables
         self.history.watch({name: variables[name] for name in self._read if name in variables})
 
+    def _attach(self, make: Callable[[], AttachedController]) -> None:
+        self._loop.attach(make)
+        self._scan()
+
     def _scan(self) -> None:
-        said = self._cycle.scan(self._present(self._signals))
+        inputs, recorded = self._present(self._signals), self._loop.recorded
+        raised = self._loop.scan(inputs)
+        self._read_by_controller |= inputs.read
         for note in self._noting:
-            note(self._cycle.recorded.names, self._cycle.recorded.values())
+            note(recorded.names, recorded.values())
         # The line is given them as the next tick begins; until then they are there, and don't stand.
-        if new := {name: 0.0 for name in said if name not in self._alarms}:
+        if new := {name: 0.0 for name in raised if name not in self._alarms}:
             self._alarms |= new
             self.history.alarms(new)
 

@@ -13,17 +13,17 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 
-from conveyor_sim.control.scan import ALARMS, AlarmChanges
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.line.commands import refusal
+from conveyor_sim.line.commands import ALARMS, refusal
 from conveyor_sim.line.inputs import SET, Input
 from conveyor_sim.line.tag import COMMANDS
 from conveyor_sim.protocols.attach.link import Link, LinkError
-from conveyor_sim.protocols.attach.links import all_of, link
+from conveyor_sim.protocols.attach.links import all_of, link, read_answer
 from conveyor_sim.protocols.attach.tag_map import TagMap, read_tag_map
 from conveyor_sim.protocols.face import Face, Status
 from conveyor_sim.protocols.faces import Kind
 from conveyor_sim.protocols.source import PLC, Shown, TagSource
+from conveyor_sim.run.alarm_changes import AlarmChanges
 from conveyor_sim.support.printable import SENTENCE, printable
 
 AGAIN = 1.0
@@ -115,11 +115,10 @@ class PlcFace:
         if changed:
             await link.write(changed)
         self._written = shown
-        if asked := [each.tag.name for each in (*self._tags.read, *self._tags.own)]:
-            found = await link.read(asked)
-            if own := {each.tag.name: found.pop(each.tag.name) for each in self._tags.own}:
-                self._observe(own)
-            self._give(found)
+        answer, own = await read_answer(link, self._tags)
+        if own:
+            self._observe(own)
+        self._give(answer)
         self._lag = max(self._lag, time.monotonic() - began)
 
     def _give(self, answer: dict[str, float]) -> None:

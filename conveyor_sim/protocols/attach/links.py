@@ -15,6 +15,14 @@ def all_of(tags: TagMap) -> tuple[Mapped, ...]:
     return (*tags.written, *tags.read, *tags.own, *(each for each in (tags.tick, tags.target) if each is not None))
 
 
+async def read_answer(link: Link, tags: TagMap) -> tuple[dict[str, float], dict[str, float]]:
+    """Return commands and alarms of a PLC by tag, and its own values (plc/<name>). Raise LinkError."""
+    names = [each.tag.name for each in (*tags.read, *tags.own)]
+    answer = await link.read(names) if names else {}
+    own = {each.tag.name: answer.pop(each.tag.name) for each in tags.own}
+    return answer, own
+
+
 def link(url: str, mapped: Sequence[Mapped], user: str = "", password: str = "") -> Link:
     """The way to the tags of a map. url: "opc.tcp://host:port" or "modbus://host:port"; user: "" for anonymous.
 
