@@ -216,7 +216,7 @@ class _Process:
         if (stepper := self._stepper) is None:
             return
         simulation = stepper.simulation
-        if self._goal is not None and simulation.tick < self._goal.target and not stepper.standstill:
+        if self._goal is not None and simulation.tick < self._goal.target and not stepper.run.standstill:
             self._copies.live()  # nobody sees a tick before the target
             return
         if self._shown != (now := (stepper.run_id, simulation.tick)):
@@ -225,7 +225,7 @@ class _Process:
             self._copies.write("signals", TOPICS["signals"].pack(simulation.line.signals(), header), header.stamp_ns)
         if self._copies.watched and self._pictured != now and self._copies.sent:
             self._take_picture(simulation, now)
-        self._copies.cut(self._handed, stepper.inbox.counts.waiting)
+        self._copies.cut(self._handed, stepper.run.inbox.counts.waiting)
 
     def _take_picture(self, simulation: Simulation, now: tuple[str, int]) -> None:
         """If it is time for one: what is drawn, as topics have it."""
@@ -265,12 +265,12 @@ class _Process:
             return
         if isinstance(request, Give):
             if request.given.operation == SET:  # commands are counted
-                stepper.inbox.receive()
+                stepper.run.inbox.receive()
             stepper.give(request.given, size_of(request.given))
             self._handed += 1
             return
         if isinstance(request, Observe):
-            stepper.call(lambda: stepper.session.outputs.show_variables(*request))
+            stepper.call(lambda: stepper.run.session.outputs.show_variables(*request))
             return
         if isinstance(request, Go):
             self._goals.append(request)
@@ -308,9 +308,9 @@ class _Process:
         for given in goal.inputs:
             size = size_of(given)
             if given.operation == SET:
-                stepper.inbox.receive()
-            stepper.inbox.occupy(1, size)
-            stepper.reception.hand_over(stepper.session, given, size)
+                stepper.run.inbox.receive()
+            stepper.run.inbox.occupy(1, size)
+            stepper.run.reception.hand_over(stepper.run.session, given, size)
 
         def arrived(_: Future[None]) -> None:
             self._goal = None

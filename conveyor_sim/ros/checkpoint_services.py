@@ -105,7 +105,7 @@ class CheckpointServices:
         return response
 
     def _stamp(self, response: Any) -> None:
-        simulation = self._stepper.session.simulation
+        simulation = self._stepper.run.session.simulation
         response.tick, response.time = simulation.tick, to_time(simulation.stamp_ns)
 
 

@@ -34,7 +34,7 @@ def subscribe_commands(node: Node, stepper: Stepper) -> list[CommandTopic]:
         CommandTopic(node, stepper, "commands", Commands, qos, _commands),
         *(
             CommandTopic(node, stepper, name, Float64, CMD_SPEED.qos, partial(_speed, name))
-            for name in map(speed_command, stepper.session.simulation.model.belts)
+            for name in map(speed_command, stepper.run.session.simulation.model.belts)
         ),
     ]
 
@@ -86,7 +86,7 @@ class CommandTopic:
             self._hand_over(*taken)
 
     def _hand_over(self, data: bytes, info: dict[str, Any]) -> None:
-        inbox = self._stepper.inbox
+        inbox = self._stepper.run.inbox
         missing = self._gaps.before(info["publication_sequence_number"], self.subscription.get_publisher_count)
         if missing:
             inbox.miss(self._name, missing)

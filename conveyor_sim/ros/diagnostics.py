@@ -45,14 +45,14 @@ class Diagnostics:
     def publish(self) -> None:
         """How it fares now; in the thread of the executor."""
         stepper = self._stepper
-        session, pacer = stepper.session, stepper.pacer
+        session, pacer = stepper.run.session, stepper.pacer
         simulation = session.simulation
         tick, counts = simulation.tick, simulation.counts
         overruns = pacer.overruns - self._last_overruns
-        counts_in, reception = stepper.inbox.counts, stepper.reception
+        counts_in, reception = stepper.run.inbox.counts, stepper.run.reception
         refusals = reception.refused + counts_in.turned_away
         refused, lost = refusals - self._last_refused, counts_in.lost - self._last_lost
-        noticed = stepper.guard_events - self._last_guard_events
+        noticed = stepper.run.guard_events - self._last_guard_events
         status = DiagnosticStatus(name=self._name, hardware_id=simulation.model.name)
         status.level, status.message = _verdict(stepper, overruns, refused, lost, noticed)
         not_alone = self._graph.look()
@@ -60,7 +60,7 @@ class Diagnostics:
             status.level = DiagnosticStatus.WARN
             status.message = f"{status.message}; not alone in this ROS domain"
         values = {
-            "state": stepper.state.name,
+            "state": stepper.run.state.name,
             "run_id": session.run_id,
             TICK: tick,
             "simulated time (s)": f"{simulation.time:.9g}",
@@ -79,10 +79,10 @@ class Diagnostics:
             "lost commands": counts_in.lost,
             "waiting commands": counts_in.waiting,
             "waiting commands (bytes)": counts_in.waiting_bytes,
-            "guard events": stepper.guard_events,
+            "guard events": stepper.run.guard_events,
             "ticks in shorter steps": simulation.shortened_ticks,
             "deepest overlap (of a radius)": f"{simulation.deepest_overlap:.3g}",
-            "lockstep owner": printable(stepper.lockstep.owner),
+            "lockstep owner": printable(stepper.run.lockstep.owner),
             "bottles present": counts.present,
             "bottles fed": counts.fed,
             "bottles removed": counts.removed,
@@ -95,7 +95,7 @@ class Diagnostics:
         message.header.stamp = to_time(simulation.stamp_ns)
         self._publisher.publish(message)
         self._last_overruns, self._last_refused, self._last_lost = pacer.overruns, refusals, counts_in.lost
-        self._last_guard_events = stepper.guard_events
+        self._last_guard_events = stepper.run.guard_events
 
     def _measured(self, run: str, tick: int, tick_s: float) -> float:
         """Simulated seconds per wall second since the last message; 0 in the first one of a run."""
@@ -107,11 +107,11 @@ class Diagnostics:
 
 
 def _verdict(stepper: Stepper, overruns: int, refused: int, lost: int, noticed: int) -> tuple[bytes, str]:
-    if stepper.failure:
-        return DiagnosticStatus.ERROR, f"stopped: {stepper.failure}"
+    if stepper.run.failure:
+        return DiagnosticStatus.ERROR, f"stopped: {stepper.run.failure}"
     warnings = [f"{overruns} overruns"] * bool(overruns) + [f"{refused} refused commands"] * bool(refused)
     warnings += [f"{lost} lost commands"] * bool(lost)
     warnings += [f"{noticed} warnings of the guard"] * bool(noticed)
     if warnings:
         return DiagnosticStatus.WARN, f"{' and '.join(warnings)} since the last message"
-    return DiagnosticStatus.OK, State(stepper.state).name
+    return DiagnosticStatus.OK, State(stepper.run.state).name

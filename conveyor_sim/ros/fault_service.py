@@ -28,11 +28,11 @@ class FaultService:
         def between_ticks() -> None:
             stepper = self._stepper
             given = Input(FAULT, "inject_fault", "test", INJECT, (request.name,), (request.value,))
-            simulation, size = stepper.session.simulation, size_of(given)
+            simulation, size = stepper.run.session.simulation, size_of(given)
             response.tick = simulation.tick
-            response.message = stepper.standstill or simulation.refusal(given) or stepper.inbox.admit(size)
+            response.message = stepper.run.standstill or simulation.refusal(given) or stepper.run.inbox.admit(size)
             if not response.message:
-                stepper.reception.hand_over(stepper.session, given, size)
+                stepper.run.reception.hand_over(stepper.run.session, given, size)
                 response.success = True
 
         try:

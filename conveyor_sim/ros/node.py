@@ -165,7 +165,7 @@ class SimNode:
 
 
 def _greeting(stepper: Stepper) -> str:
-    session = stepper.session
+    session = stepper.run.session
     model = session.simulation.model
     bag = f", recorded to {session.bag}" if session.bag else ""
-    return f"scene {model.name}, run {session.run_id}, {stepper.state.name}, {setting_line(model)}{bag}"
+    return f"scene {model.name}, run {session.run_id}, {stepper.run.state.name}, {setting_line(model)}{bag}"

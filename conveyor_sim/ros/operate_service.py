@@ -36,15 +36,15 @@ class OperateService:
             given = Input(OPERATE, request.writer, request.writer_kind, request.operation, names, values, texts)
             size = size_of(given)
             response.reason = (
-                stepper.standstill
+                stepper.run.standstill
                 or _stranger(request)
                 or (TOO_LARGE if size > MESSAGE_BYTES else "")  # before it is looked at, name by name
                 or stepper.simulation.refusal(given)
-                or stepper.inbox.admit(size)
+                or stepper.run.inbox.admit(size)
             )
             if not response.reason:
                 response.accepted = True
-                stepper.reception.hand_over(stepper.session, given, size)
+                stepper.run.reception.hand_over(stepper.run.session, given, size)
 
         try:
             await settled(self._executor, self._stepper.call(between_ticks))

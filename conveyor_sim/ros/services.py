@@ -111,7 +111,7 @@ class Services:
         return response
 
     def _get_state(self, _: Any, response: Any) -> Any:
-        state = State.STOPPED if self._stepper is None else self._stepper.state
+        state = State.STOPPED if self._stepper is None else self._stepper.run.state
         response.state.state = int(State.QUITTING if self._quitting else state)
         return _set(response, OK, self._waiting_for() if self._stepper is None else "")
 
@@ -120,7 +120,7 @@ class Services:
         if wanted == State.QUITTING:
             self._quitting = True
             if self._stepper is not None:
-                self._stepper.state = State.QUITTING
+                self._stepper.run.state = State.QUITTING
             self._quit_soon()
             return _set(response, OK)
         try:
@@ -131,7 +131,7 @@ class Services:
         if wanted not in actions:
             text = f"state: {wanted} given, expected STOPPED (0), PLAYING (1), PAUSED (2) or QUITTING (3)"
             return _set(response, UNSUPPORTED, text)
-        if wanted == stepper.state:
+        if wanted == stepper.run.state:
             return _set(response, ALREADY_IN_TARGET_STATE, f"the simulation is {State(wanted).name} already")
         return await self._carry_out(response, self._ask(actions[State(wanted)]), STATE_TRANSITION_ERROR)
 
