@@ -112,7 +112,7 @@ class ScanLoop:
 
     @property
     def attached(self) -> bool:
-        """Whether a controller is attached."""
+        """True while a controller is attached."""
         return self._attached is not None
 
     @property

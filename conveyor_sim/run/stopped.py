@@ -1,4 +1,4 @@
-"""The state in which the guard stopped a run, kept beside its recording for inspection."""
+"""Saves the state in which the guard stopped a run, beside its recording."""
 
 from pathlib import Path
 
@@ -10,7 +10,7 @@ FILE_NAME = "stopped.npz"
 
 
 def keep_stopped(simulation: Simulation, folder: Path | None, error: SimulationError) -> SimulationError:
-    """Write the state at the beginning of the tick that failed into a folder, if given; an error that says where."""
+    """Write the state before the failed tick into a folder, if one is passed. Return the error with the path."""
     if folder is None:
         return error
     path = folder / FILE_NAME
