@@ -83,7 +83,7 @@ class InputLog(contextlib.AbstractContextManager["InputLog"]):
         """Note what waits for the tick that is about to begin. Raises BagError if it can't be written."""
         if self._failed:
             return
-        tick, waiting = self._sim.tick, tuple(map(tuple, self._sim.waiting))
+        tick, waiting = self._sim.tick, tuple(map(tuple, self._sim.line.waiting))
         now = repr(waiting)  # -0.0 and 0.0 are equal, but not the same bits
         if tick != self._next and self._last != _NONE:  # somebody else has stepped it meanwhile
             self._write({"tick": self._next, "inputs": []})

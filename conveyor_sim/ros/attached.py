@@ -121,7 +121,7 @@ class AttachedNode(AttachedController):
         for given in request.inputs:
             # What it has no control of is refused as the tick begins, and is no error of the controller.
             _, own, _ = turns.simulation.line.modes.divide(given)
-            if own is not None and (reason := turns.simulation.refusal(own)):
+            if own is not None and (reason := turns.simulation.line.refusal(own)):
                 raise CommandError(f"at {inputs.time:.2f} s a command was refused: {reason}")
             if given.operation == DECLARE:
                 turns.simulation.give(given)

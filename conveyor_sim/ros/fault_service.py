@@ -30,7 +30,7 @@ class FaultService:
             given = Input(FAULT, "inject_fault", "test", INJECT, (request.name,), (request.value,))
             simulation, size = stepper.run.session.simulation, size_of(given)
             response.tick = simulation.tick
-            response.message = stepper.run.standstill or simulation.refusal(given) or stepper.run.inbox.admit(size)
+            response.message = stepper.run.standstill or simulation.line.refusal(given) or stepper.run.inbox.admit(size)
             if not response.message:
                 stepper.run.reception.hand_over(stepper.run.session, given, size)
                 response.success = True

@@ -39,7 +39,7 @@ class OperateService:
                 stepper.run.standstill
                 or _stranger(request)
                 or (TOO_LARGE if size > MESSAGE_BYTES else "")  # before it is looked at, name by name
-                or stepper.simulation.refusal(given)
+                or stepper.simulation.line.refusal(given)
                 or stepper.run.inbox.admit(size)
             )
             if not response.reason:

@@ -45,7 +45,7 @@ def compile_kernels(scene: Scene) -> None:
     rehearsal.contacts()
     rehearsal.ledger()
     rehearsal.signals()
-    rehearsal.rehearse()
+    rehearsal.line.rehearse()
 
 
 class Cancelled(Exception):

@@ -51,7 +51,7 @@ class Reception:
 
     def begin(self, session: Session) -> None:
         """Begin a run. Inputs that wait in it come from a checkpoint."""
-        waiting = session.simulation.waiting
+        waiting = session.simulation.line.waiting
         for given in waiting:
             if given.operation == SET:
                 self._inbox.receive()
@@ -72,7 +72,7 @@ class Reception:
 
     def give_up(self, session: Session, reason: str) -> None:
         """Refuse the inputs that wait for a tick that will not come. The recording is closed by then."""
-        for given in session.simulation.take_waiting():
+        for given in session.simulation.line.take_waiting():
             self.refuse(session, given, reason)
         self._release()
 

@@ -102,7 +102,7 @@ def run_scene(
             recorder.close()
         wall = time.monotonic() - start
         guard = tuple(event.text for event in outputs.take_noticed())
-        kernels = simulation.kernel_seconds
+        kernels = simulation.integration.kernel_seconds
         spent = Spent(kernels, stepping - kernels, 0.0 if recorder is None else wall - stepping)
         return Run(bag, simulation.tick * scene.tick, wall, stop.is_set(), peaks.force, peaks.load, guard, spent)
 

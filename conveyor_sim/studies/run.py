@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from conveyor_sim.bag.outputs import Outputs, forget_past
+from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.errors import BagError, ConveyorError, StudyError
 from conveyor_sim.line.inputs import Input
@@ -115,7 +115,7 @@ def simulate(work: Work, bag: Path | None, clock: _Clock | None = None) -> Row:
     try:
         outputs = Outputs(simulation, [recorder] if recorder else [], run_id=uuid.uuid4().hex)
         if work.start is not None:
-            forget_past(simulation)
+            simulation.take_events()  # of the warm start
         outputs.start()
         outputs.show_run(RunState(RUNNING))
         scans = ScanLoop(simulation, controller)
