@@ -1,6 +1,6 @@
-"""`AttachedPlc`: a soft PLC as the controller of a line under test, as a client of a server that the test runs.
+"""`AttachedPlc`: a soft PLC as the controller of a line under test, and a client of a server of the test.
 
-It goes in lockstep by two tags (protocols/handshake.py), so the test has the same bits however fast the PLC is.
+It runs in lockstep by two tags (protocols/handshake.py), so the speed of the PLC does not change the bits of the test.
 """
 
 from __future__ import annotations
@@ -26,14 +26,15 @@ from conveyor_sim.support.child_process import Process
 from conveyor_sim.support.modbus_rows import Row
 
 ADDRESS = "CONVEYOR_SIM_ADDRESS"
-"""Environment variable of the PLC's process: where the server is, "modbus://127.0.0.1:49152"."""
+"""Environment variable of the PLC process: address of the server, such as "modbus://127.0.0.1:49152"."""
 
 PASSWORD = "CONVEYOR_SIM_PASSWORD"
-"""The same of an OPC UA client: the password of the user "plc"."""
+"""Environment variable of an OPC UA client: password of the user "plc"."""
 
 USER = "plc"
 
-LOOK = 0.2  # s of wall time between two looks at whether the PLC's process still runs
+LOOK = 0.2
+"""Time between two checks that the PLC process runs, s of wall time."""
 
 
 class AttachedPlc(AttachedController):
@@ -47,15 +48,18 @@ class AttachedPlc(AttachedController):
         environment: Mapping[str, str],
         patience: float,
     ) -> None:
-        """make: the server, not started, which may keep files in a folder. command: starts the PLC; empty: others do.
-        environment: of it, besides. patience: s of wall time that it has for each scan.
+        """Start the server, and the PLC by a command.
 
-        Raises FaceError if the server can't be, OSError if the command can't be run.
+        make: returns the server, not started, which may write files to a folder. command: starts the PLC; empty: the
+        PLC is started elsewhere. environment: further environment variables of the PLC. patience: longest time for each
+        scan, s of wall time.
+
+        Raises FaceError if the server can't start, OSError if the command can't be run.
         """
         self.writer = "plc"
-        """Who its commands are recorded under: the client that wrote last."""
+        """Writer of its commands: the client that wrote last."""
         self.source = ""
-        """By which way they came."""
+        """Source of its commands: the protocol of that client."""
         self._simulation = simulation
         self._patience = patience
         self._tags = HandshakeSource(simulation)
@@ -68,10 +72,10 @@ class AttachedPlc(AttachedController):
             thread.run(face.start())
             stack.callback(lambda: thread.run(face.stop()))
             self.address = face.address
-            """Where the server is."""
+            """Address of the server."""
             if command:
-                whole = {**os.environ, **environment, ADDRESS: face.address, "PYTHONUNBUFFERED": "1"}
-                self._process = Process("PLC", command, whole, logs)
+                variables = {**os.environ, **environment, ADDRESS: face.address, "PYTHONUNBUFFERED": "1"}
+                self._process = Process("PLC", command, variables, logs)
                 stack.callback(self._process.stop)
             self._open = stack.pop_all()
 
@@ -91,12 +95,12 @@ class AttachedPlc(AttachedController):
         while (taken := self._tags.take(min(LOOK, self._patience))) is None:
             self._require_going_on(inputs, time.monotonic() > end)
         commands: dict[str, float] = {}
-        for given in taken:
-            if given.operation == SET and given.writer_kind == "controller":
-                commands.update(zip(given.names, given.values, strict=True))
-                self.writer, self.source = given.writer, given.source
+        for request in taken:
+            if request.operation == SET and request.writer_kind == "controller":
+                commands.update(zip(request.names, request.values, strict=True))
+                self.writer, self.source = request.writer, request.source
             else:
-                self._simulation.give(given)
+                self._simulation.give(request)
         return alarms.with_commands(commands)
 
     def _require_going_on(self, inputs: Inputs, late: bool) -> None:
@@ -113,7 +117,7 @@ class AttachedPlc(AttachedController):
 
 
 def modbus(rows: Sequence[Row] | None, port: int) -> Callable[[TagSource, Path], Face]:
-    """What makes the server of a Modbus client. Raises ImportError without pymodbus."""
+    """Return a function that makes the server of a Modbus client. Raise ImportError without pymodbus."""
     from conveyor_sim.protocols.modbus.server import ModbusServer
 
     return lambda source, _: ModbusServer(
@@ -122,7 +126,7 @@ def modbus(rows: Sequence[Row] | None, port: int) -> Callable[[TagSource, Path],
 
 
 def opcua(password: str, port: int) -> Callable[[TagSource, Path], Face]:
-    """What makes the server of an OPC UA client. Raises ImportError without asyncua."""
+    """Return a function that makes the server of an OPC UA client. Raise ImportError without asyncua."""
     from conveyor_sim.protocols.opcua.server import OpcUaServer
     from conveyor_sim.protocols.users import new_user
 

@@ -95,7 +95,7 @@ def test_what_cannot_be_kept_is_told(pytester: pytest.Pytester) -> None:
     (pytester.path / "kept").write_text("a file in the way")
     result = pytester.runpytest_inprocess(*PLUGIN, "--line-failures", "kept", "-k", "test_fails")
     result.assert_outcomes(failed=1, deselected=5)
-    result.stdout.fnmatch_lines(["bag: not kept: *", "page: not kept: *", "picture: not kept: *"])
+    result.stdout.fnmatch_lines(["bag: not saved: *", "page: not saved: *", "picture: not saved: *"])
 
 
 def test_another_run_replaces_what_the_last_one_left(pytester: pytest.Pytester) -> None:
