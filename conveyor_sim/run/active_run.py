@@ -14,7 +14,7 @@ from conveyor_sim.line.inputs import CommandOutcome
 from conveyor_sim.run.inbox import Inbox
 from conveyor_sim.run.lockstep import Lockstep, Refused
 from conveyor_sim.run.reception import Reception
-from conveyor_sim.run.run_state import Log, State, run_state_of
+from conveyor_sim.run.run_state import Log, SimulationState, run_state_of
 from conveyor_sim.run.session import Session
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.printable import printable
@@ -59,7 +59,7 @@ class ActiveRun:
         self._log = log
         self.session = open_session(0, None)
         self._before = 0  # number of runs before this one
-        self.state = State.PLAYING if playing else State.PAUSED
+        self.state = SimulationState.PLAYING if playing else SimulationState.PAUSED
         self.failure = ""
         """Reason why the run can't go on before a reset; empty: it can."""
         self.ended = False
@@ -90,7 +90,7 @@ class ActiveRun:
 
     def require_paused(self) -> None:
         """Raise Refused unless the run is PAUSED."""
-        if self.state is not State.PAUSED:
+        if self.state is not SimulationState.PAUSED:
             raise Refused(f"the simulation is {self.state.name}, expected PAUSED")
 
     def require_able(self) -> None:
@@ -135,7 +135,7 @@ class ActiveRun:
         broken_off = self._leave(reason)
         prepare()
         self._enter(session)
-        self.state = State.PAUSED
+        self.state = SimulationState.PAUSED
         refuse(broken_off, reason)
 
     def note(self, outcomes: list[CommandOutcome]) -> None:
@@ -163,7 +163,7 @@ class ActiveRun:
 
     def end(self) -> None:
         """Complete the recording at the last tick of the scene."""
-        self.state, self.ended = State.PAUSED, True
+        self.state, self.ended = SimulationState.PAUSED, True
         self.show()
         self.close_recording()
         self._log.info(f"end of the run, {self.session.account}" + self.session.to_bag)
@@ -173,7 +173,7 @@ class ActiveRun:
         """Stop the run. Published messages stay; only a reset opens another run."""
         is_known = isinstance(error, ConveyorError)
         self.failure = str(error) if is_known else f"{type(error).__name__}: {error}"
-        self.state = State.PAUSED
+        self.state = SimulationState.PAUSED
         self._log.error(f"stopped: {self.failure}" if is_known else traceback.format_exc())
         self._abandon(f"the simulation has stopped: {self.failure}")
         self.show()

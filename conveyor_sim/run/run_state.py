@@ -8,7 +8,7 @@ from conveyor_sim.line.run_state import RunState
 from conveyor_sim.support.printable import SENTENCE, printable
 
 
-class State(IntEnum):
+class SimulationState(IntEnum):
     """State of a run; the numbers of simulation_interfaces/msg/SimulationState."""
 
     STOPPED = 0
@@ -17,7 +17,7 @@ class State(IntEnum):
     QUITTING = 3
 
 
-def run_state_of(state: State, failure: str, ended: bool, owner: str) -> RunState:
+def run_state_of(state: SimulationState, failure: str, ended: bool, owner: str) -> RunState:
     """Return the content of topic `run_state`.
 
     failure: reason why the run can't go on. ended: the scene has ended. owner: owner in lockstep.
@@ -28,9 +28,9 @@ def run_state_of(state: State, failure: str, ended: bool, owner: str) -> RunStat
         return RunState(run_state.ENDED)
     if owner:
         return RunState(run_state.LOCKSTEP, printable(owner))
-    if state is State.STOPPED:
+    if state is SimulationState.STOPPED:
         return RunState(run_state.STOPPED, "reset and stopped on request")
-    return RunState(run_state.RUNNING if state is State.PLAYING else run_state.PAUSED)
+    return RunState(run_state.RUNNING if state is SimulationState.PLAYING else run_state.PAUSED)
 
 
 class Log(Protocol):

@@ -9,7 +9,7 @@ from conveyor_sim.errors import ConveyorError
 from conveyor_sim.run.active_run import ActiveRun
 from conveyor_sim.run.calls import Calls
 from conveyor_sim.run.pacing import Pacer
-from conveyor_sim.run.run_state import State
+from conveyor_sim.run.run_state import SimulationState
 
 IDLE = 0.05
 """Longest wait between two beats, s of wall time."""
@@ -91,7 +91,7 @@ class StepLoop:
 
     def _seconds_to_tick(self, now: float) -> float:
         advance = self._active.advance
-        if advance is None and self._active.state is not State.PLAYING:
+        if advance is None and self._active.state is not SimulationState.PLAYING:
             return IDLE
         if advance is not None and not advance.paced:
             return 0.0

@@ -20,7 +20,7 @@ from conveyor_sim.run.calls import Calls
 from conveyor_sim.run.inbox import sizes_of
 from conveyor_sim.run.lockstep import LOCKSTEP, LockstepAnswer, LockstepRequest, Refused
 from conveyor_sim.run.pacing import Pacer
-from conveyor_sim.run.run_state import Log, State
+from conveyor_sim.run.run_state import Log, SimulationState
 from conveyor_sim.run.step_loop import StepLoop
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.printable import SENTENCE, printable
@@ -122,19 +122,19 @@ class Stepper:
 
     def play(self) -> None:
         """Run freely. Raise Refused if the run can't."""
-        if self.run.state is not State.PLAYING:
+        if self.run.state is not SimulationState.PLAYING:
             self.run.require_free()
             self.pacer.restart()
-            self.run.state = State.PLAYING
+            self.run.state = SimulationState.PLAYING
 
     def pause(self) -> None:
         """Stop running freely; simulated time stands still."""
-        self.run.state = State.PAUSED
+        self.run.state = SimulationState.PAUSED
 
     def stop(self) -> None:
         """Reset, and be STOPPED. Raise ConveyorError if the new run can't be opened."""
         self.reset()
-        self.run.state = State.STOPPED
+        self.run.state = SimulationState.STOPPED
 
     def reset(self) -> None:
         """Close this run and its recording and open the next at tick 0; a run that was playing goes on playing.
