@@ -82,8 +82,8 @@ def line(shared_node: Child, client: LineClient) -> LineClient:
     return client
 
 
-class Nobody:
-    """A sink to which nobody listens."""
+class NullSink:
+    """A sink that wants no topic."""
 
     def wants(self, topic: str) -> bool:
         return False
@@ -97,7 +97,7 @@ def stepper() -> Iterator[Stepper]:
     """Paused, and not started."""
     scene = load_scene(SMALL_LINE)
     made = Stepper(
-        lambda runs, loaded: Session(Simulation(scene), Nobody(), None, "world", default_distro()),
+        lambda runs, loaded: Session(Simulation(scene), NullSink(), None, "world", default_distro()),
         real_time_factor=0.0,
         playing=False,
         lockstep_max_ticks=1,

@@ -1,4 +1,4 @@
-"""What of a recording is published when, told to a list: order, rate, pause, seek, and the commands in it."""
+"""Messages of a played recording, collected in a list: order, rate, pause, seek, and the commands in it."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class Played:
             self.now = min(end, self.now + self.player.step(self.now))
 
     def take(self) -> list[Message]:
-        """What was published since the last time."""
+        """Return the messages published since the last call."""
         taken, self.messages[:] = list(self.messages), []
         return taken
 

@@ -55,7 +55,7 @@ def nanoseconds(clock: Any) -> int:
 
 
 def played(bag: Bag) -> dict[str, list[bytes]]:
-    """What the whole recording comes to, by topic."""
+    """Return all messages of a played recording, by topic."""
     playback = Playback(bag)
     told: list[Message] = [*playback.cue(0), *playback.take(TICKS)]
     return {topic: [message.data for message in told if message.topic == topic] for topic in {**bag.types, **MADE}}

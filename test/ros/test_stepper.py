@@ -98,7 +98,7 @@ class Watcher:
 
 
 def test_what_the_run_is_doing_is_said_whenever_that_changes() -> None:
-    """Lockstep is a state of its own, so that a line that waits for its controller is not taken for a paused one."""
+    """Lockstep is a separate state, so that a line that waits for its controller does not look paused."""
     scene, watcher = load_scene(Path(__file__).with_name("small_line.yaml"), {"duration": 0.05}), Watcher()
     stepper = Stepper(
         lambda runs, loaded: Session(Simulation(scene), watcher, None, "world", default_distro()),

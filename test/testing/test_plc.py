@@ -20,7 +20,7 @@ SECONDS = 4.0
 
 
 class Twin:
-    """The same program, in this process."""
+    """The program of the PLC, in this process."""
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
         return {SETPOINT: speed(inputs[BOTTLES])}

@@ -108,7 +108,7 @@ def test_another_run_replaces_what_the_last_one_left(pytester: pytest.Pytester) 
 
 
 def test_pytest_finds_it_by_itself() -> None:
-    """As installed: after an edit of setup.py, `make` brings the environment up to date."""
+    """The installed entry point; after an edit of setup.py, `make` updates it."""
     assert PLUGIN[1] in {entry.value for entry in entry_points(group="pytest11")}
 
 

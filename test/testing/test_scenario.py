@@ -18,7 +18,7 @@ from conveyor_sim.testing import Scenario
 
 @dataclass
 class Hold:
-    """Holds the feeder while there are so many bottles on the table; remembers its scans."""
+    """Holds the feeder while `high` bottles or more are on the table, and records its scans."""
 
     high: float
     ticks: list[int] = field(default_factory=list)
