@@ -5,6 +5,7 @@
 # make promises  sets up the same, then holds all shipped scenes and fifteen unseen ones to the presets' promises, 5 to 25 minutes
 # make fuzz    sets up the same, then attacks with random input (ARGS="--minutes 60 --jobs 2"; --target bags for one; failures are kept)
 # make stability  sets up the same, then runs the hard cases of docs/stability.md in all settings, about 15 minutes
+# make numba-next  sets up the same, then runs the engine's tests on the newest numba that pip offers, pre-releases included
 # make lint    style and types
 # make docs-check  are the pages of docs/ that programs make up to date? make docs writes them anew
 # make site    the pages of docs/ and the Python API as a web site in build/site; fails on a broken link
@@ -28,7 +29,7 @@ unexport ROS_DISTRO ROS_VERSION ROS_PYTHON_VERSION RMW_IMPLEMENTATION _ROS_WHEEL
 # Without bytecode on disk every process parses 350 files of ours anew, half a second of a core each: hundreds in the tests.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help run test bench accuracy promises fuzz stability lint docs docs-check site clean set-up set-up-test set-up-bench set-up-docs set-up-ci
+.PHONY: help run test bench accuracy promises fuzz stability numba-next lint docs docs-check site clean set-up set-up-test set-up-bench set-up-docs set-up-ci
 
 help:
 	@sed -n 's/^# \(make .*\)/\1/p' Makefile
@@ -54,6 +55,13 @@ fuzz: set-up-test
 
 stability: set-up
 	@$(PYTHON) docs/studies/stability.py $(ARGS)
+
+# Installed into a folder of its own that comes before the environment: the environment keeps its version.
+numba-next: set-up-test
+	@rm -rf build/numba-next
+	@$(PYTHON) -m pip install --quiet --pre --target build/numba-next numba
+	@PYTHONPATH="$(CURDIR)/build/numba-next" $(PYTHON) -c "import numba, llvmlite; print('numba', numba.__version__, 'llvmlite', llvmlite.__version__)"
+	@PYTHONPATH="$(CURDIR)/build/numba-next" $(PYTHON) -m pytest test/engine $(ARGS)
 
 lint: set-up-test
 	@$(PYTHON) -m ruff check .

@@ -23,7 +23,7 @@ from typing import IO
 from bench.markdown import table as markdown
 from bench.measure import Effort, say
 from bench.rows import Row, Rows
-from conveyor_sim.protocols.faces import FACES
+from conveyor_sim.protocols.hosting.server_kinds import SERVER_KINDS
 
 CASE = "attacked"
 CORES = 2
@@ -41,7 +41,7 @@ GREETING = r"^(\w[\w.]*)(://\S+): clients can"
 
 def measure(effort: Effort) -> list[Row]:
     """Return latencies without an attack and during each attack."""
-    if missing := [kind.libraries[0] for kind in FACES if kind.name in SERVERS and not kind.installed]:
+    if missing := [kind.libraries[0] for kind in SERVER_KINDS if kind.name in SERVERS and not kind.installed]:
         say(f"isolation is left out: {', '.join(missing)} not installed")
         return []
     from bench.isolation_attacks import ATTACKS

@@ -22,15 +22,15 @@ from bench.markdown import table as markdown
 from bench.measure import Effort, say
 from bench.rows import Row, Rows
 from conveyor_sim.columns.events import Event
-from conveyor_sim.line.inputs import Input
+from conveyor_sim.line.commands.inputs import Input
 from conveyor_sim.line.run_state import RUNNING, RunState
 from conveyor_sim.line.tag import Tag, count
-from conveyor_sim.protocols.face import Settings
-from conveyor_sim.protocols.faces import FACES
-from conveyor_sim.protocols.scene_messages import Task
-from conveyor_sim.protocols.scene_source import SceneSource
-from conveyor_sim.protocols.serving import Serving
-from conveyor_sim.protocols.source import About, Control, Listeners, Shown
+from conveyor_sim.protocols.hosting.server_kinds import SERVER_KINDS
+from conveyor_sim.protocols.hosting.serving import Serving
+from conveyor_sim.protocols.hosting.settings import ServerSettings
+from conveyor_sim.protocols.tags.scene_messages import SceneTask
+from conveyor_sim.protocols.tags.scene_provider import SceneTagProvider
+from conveyor_sim.protocols.tags.tag_provider import Control, LineInfo, LineSnapshot, Listeners
 from conveyor_sim.scene import load_scene
 
 CASE, TICKS = "faces", "ticks"
@@ -38,7 +38,7 @@ TAGS, CHANGING, EVERY, TICK = 500, 50, 10, 0.01
 """EVERY: ticks, from one change to the next."""
 CLIENTS = 5
 """Of each protocol."""
-KINDS = [kind for kind in FACES if kind.by_default]
+KINDS = [kind for kind in SERVER_KINDS if kind.by_default]
 SCENE = "config/scenarios/zoned_line.yaml"
 LOST, SEEN, LATENCY = "changes lost", "changes seen", "ms at most from a request or a change on"
 CPU, MEMORY, GROWTH = "cores of the servers", "MB", "MB more after than before"
@@ -60,7 +60,7 @@ class Counting:
         tags = [
             replace(count(f"belts/belt{n}/count", "counter", "Goes up."), device=f"belts/belt{n}") for n in range(TAGS)
         ]
-        self.about = About(
+        self.about = LineInfo(
             "bench", "", TICK, "2025-01-01T00:00:00Z", [replace(tag, device_class="belt") for tag in tags]
         )
         self._listeners = Listeners()
@@ -71,9 +71,9 @@ class Counting:
         self.shown = self._at(tick)
         self._listeners.tell()
 
-    def _at(self, tick: int) -> Shown:
+    def _at(self, tick: int) -> LineSnapshot:
         values = {tag.name: float(tick // EVERY if n < CHANGING else n) for n, tag in enumerate(self.about.tags)}
-        return Shown(tick, values, run=RunState(RUNNING))
+        return LineSnapshot(tick, values, run=RunState(RUNNING))
 
     def events(self, after: int) -> tuple[int, Sequence[Event]]:
         return 0, ()
@@ -127,7 +127,7 @@ def _faces(seconds: float) -> list[Row]:
     say(f"scada: {CLIENTS} clients of each protocol for {seconds:g} s")
     source = Changing()
     try:
-        with Serving(source, [(kind, 0) for kind in KINDS], Settings()) as serving:  # type: ignore[arg-type]
+        with Serving(source, [(kind, 0) for kind in KINDS], ServerSettings()) as serving:  # type: ignore[arg-type]
             with _clients(serving, seconds + SETTLE) as clients:
                 time.sleep(SETTLE)
                 serving.latencies()  # from now on
@@ -153,17 +153,17 @@ def _ticks(effort: Effort) -> list[Row]:
         for how in (ALONE, SERVED):
             say(f"scada: the ticks of a line, {how}, round {turn + 1}")
             seconds = QUICK_SECONDS if effort.quick else TICK_SECONDS
-            task = Task(load_scene(SCENE, {"duration": 1e6}), None, 0, 1.0, 1)
-            with SceneSource(task, say) as source:
+            task = SceneTask(load_scene(SCENE, {"duration": 1e6}), None, 0, 1.0, 1)
+            with SceneTagProvider(task, say) as source:
                 source.wait_for_line()
                 cores = _cores_of(source.pid, seconds) if how == ALONE else _cores_served(source, seconds)
             rows.append(Row(TICKS, CLIENTS, how, TICK_CPU, turn, cores))
     return rows
 
 
-def _cores_served(source: SceneSource, seconds: float) -> float:
+def _cores_served(source: SceneTagProvider, seconds: float) -> float:
     with (
-        Serving(source, [(kind, 0) for kind in KINDS], Settings()) as serving,
+        Serving(source, [(kind, 0) for kind in KINDS], ServerSettings()) as serving,
         _clients(serving, seconds + SETTLE) as clients,
     ):
         time.sleep(SETTLE)

@@ -1,7 +1,7 @@
-"""Bottles on industrial conveyors, simulated by force and recorded like a real line.
+"""Bottles on industrial conveyors: discrete-element simulation, recorded like a real line.
 
-A scene file (YAML) says which belts, rails, bottles, infeeds and outfeeds there are. `load_scene` checks it,
-`Simulation` turns it into compiled kernels and advances it by whole ticks:
+A scene file (YAML) describes belts, rails, bottles, infeeds and outfeeds. `load_scene` validates it.
+`Simulation` compiles the kernels that it needs and advances it in ticks:
 
     from conveyor_sim import Simulation, load_scene
     simulation = Simulation(load_scene("config/two_bottles.yaml"))

@@ -1,4 +1,4 @@
-"""What can go wrong, one class a cause; every message is a sentence meant for the user."""
+"""Exceptions of this package, one class per cause; every message is one sentence for the user."""
 
 
 class ConveyorError(Exception):
@@ -6,31 +6,31 @@ class ConveyorError(Exception):
 
 
 class Interrupted(ConveyorError):
-    """What was asked for was broken off by Ctrl-C or a request to terminate."""
+    """Work that was stopped by Ctrl-C or a termination request."""
 
 
 class SceneError(ConveyorError):
-    """A scene file that can't be: one line per problem, with file, line, field, value and what was expected."""
+    """Invalid scene: one line per problem, with file, line, field, value and expectation."""
 
 
 class StudyError(ConveyorError):
-    """A study that can't be: one line per problem of its file, or what a run of it lacks."""
+    """Invalid study, with one line per problem of its file; or a study that can't run."""
 
 
 class CommandError(ConveyorError):
-    """A command that names what is not there, or asks for what can't be."""
+    """Command with an unknown name or an invalid value."""
 
 
 class BagError(ConveyorError):
-    """A recording that can't be written, read, recovered or replayed."""
+    """Recording that can't be written, read, recovered or replayed."""
 
 
 class CheckpointError(ConveyorError):
-    """A checkpoint that can't be written, read or gone on from."""
+    """Checkpoint that can't be written, read or continued."""
 
 
 class SimulationError(ConveyorError):
-    """A simulation that can't go on. `kind`: `unstable`, or `tunnelling` for what is about to be passed through."""
+    """Simulation that can't continue. `kind`: `unstable`, or `tunnelling` if a bottle would pass through an object."""
 
     def __init__(self, message: str, kind: str = "unstable") -> None:
         super().__init__(message)

@@ -17,7 +17,17 @@ from conveyor_sim.columns.events import GuardEvent
 from conveyor_sim.columns.ledger import Ledger
 from conveyor_sim.engine.arrays.bodies import Bottles
 from conveyor_sim.engine.observers.contact_list import closed_contacts
-from conveyor_sim.line.inputs import ARRIVAL, FAULT, INJECT, OPERATE, SET, WATCHDOG, CommandOutcome, Input, WriterKind
+from conveyor_sim.line.commands.inputs import (
+    ARRIVAL,
+    FAULT,
+    INJECT,
+    OPERATE,
+    SET,
+    WATCHDOG,
+    CommandOutcome,
+    Input,
+    WriterKind,
+)
 from conveyor_sim.line.line import Line
 from conveyor_sim.line.process_image import ProcessImage
 from conveyor_sim.physics.accounts.accounts import Accounts
@@ -29,7 +39,7 @@ from conveyor_sim.physics.state.state import FIRST_SLOTS, Held, State
 from conveyor_sim.physics.state.state_hash import COLUMNS, state_hash
 from conveyor_sim.physics.state.world_arrays import changing_arrays
 from conveyor_sim.physics.stepping.tick import Integration
-from conveyor_sim.scene.geometry import RailShape, initial_bottles
+from conveyor_sim.scene.geometry import RailShape
 from conveyor_sim.scene.schema import Scene
 
 LAST_STAMP_NS = 2**31 * 10**9 - 1
@@ -66,7 +76,7 @@ class Simulation:
         self.scene = scene
         self.model = build_model(scene)
         self.tick = 0
-        bottles = list(initial_bottles(scene))
+        bottles = self.model.plant.bottles
         self._state = State(self.model, len(bottles) or FIRST_SLOTS)
         self.integration = Integration(self._state, threads, shorten)
         """Threads, kernel time and guard of the steps."""

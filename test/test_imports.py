@@ -131,8 +131,8 @@ def test_no_files_import_each_other_in_a_cycle() -> None:
         "bag.reader",
         "report.figures.aside",
         "ros.controller_node",
-        "protocols.scene_source",
-        "protocols.serving",
+        "protocols.tags.scene_provider",
+        "protocols.hosting.serving",
     ],
 )
 def test_readers_figures_and_controllers_load_no_compiler(module: str) -> None:

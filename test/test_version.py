@@ -47,7 +47,7 @@ def test_what_decides_bits_changes_the_hash_and_nothing_else_does(copied: Path) 
     assert edited("engine/integrators/motion.py", "\n\n\n", "\n\n\nUNUSED = 1\n\n\n") != before
     assert edited("scene/geometry.py", "\n\n\n", "\n\n\nUNUSED = 1\n\n\n") != before
     assert edited("physics/stepping/guard/guard.py", "DEEPEST = 0.75", "DEEPEST = 0.74") != before
-    assert edited("line/entry.py", "\n\n\n", "\n\n\nUNUSED = 1\n\n\n") != before
+    assert edited("line/devices/entry.py", "\n\n\n", "\n\n\nUNUSED = 1\n\n\n") != before
     assert edited("simulation.py", "def state_hash(self", "def bits(self") != before
     assert edited("physics/stepping/guard/guard.py", "\n\n\n", "\n\n\n# A comment.\n") == before
     assert edited("cli/run.py", "\n\n\n", "\n\n\nUNUSED = 1\n\n\n") == before

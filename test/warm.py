@@ -30,13 +30,13 @@ FORKED.set_forkserver_preload([
     "conveyor_sim.report.explain.choices",
     "conveyor_sim.run.stepper",
     "conveyor_sim.run.compilation",
-    "conveyor_sim.protocols.bag_source",
+    "conveyor_sim.protocols.tags.bag_provider",
     "conveyor_sim.protocols.foxglove.server",
     "conveyor_sim.protocols.modbus.server",
     "conveyor_sim.protocols.mqtt.edge_node",
     "conveyor_sim.protocols.opcua.server",
-    "conveyor_sim.protocols.scene_source",
-    "conveyor_sim.protocols.serving",
+    "conveyor_sim.protocols.tags.scene_provider",
+    "conveyor_sim.protocols.hosting.serving",
     "conveyor_sim.protocols.web.server",
 ])  # fmt: skip
 

@@ -12,9 +12,9 @@ from rosbags.interfaces import Connection, ConnectionExtRosbag2, QosDurability, 
 from rosbags.interfaces import Qos as RosbagsQos
 from rosbags.rosbag2 import Reader
 
-from conveyor_sim.bag.qos import DATA, Qos
+from conveyor_sim.bag.messages.qos import DATA, Qos
+from conveyor_sim.bag.messages.typestore import typestore
 from conveyor_sim.bag.source import Raw, Recorded
-from conveyor_sim.bag.typestore import typestore
 
 
 class AnySource:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from textwrap import indent
 
-from conveyor_sim.bag.mcap_file import HASH_KEY, QOS_KEY, Schema
-from conveyor_sim.bag.metadata import to_yaml
-from conveyor_sim.bag.qos import Qos
-from conveyor_sim.bag.topics import OUTPUTS
-from conveyor_sim.bag.typestore import definition, type_hash
+from conveyor_sim.bag.mcap.file import HASH_KEY, QOS_KEY, Schema
+from conveyor_sim.bag.mcap.metadata import to_yaml
+from conveyor_sim.bag.messages.qos import Qos
+from conveyor_sim.bag.messages.topics import OUTPUTS
+from conveyor_sim.bag.messages.typestore import definition, type_hash
 
 ENCODING = "cdr"
 
@@ -27,4 +28,4 @@ def metadata_of(topic: str, distro: str) -> dict[str, str]:
 
 @lru_cache(maxsize=16)
 def _profile(qos: Qos) -> str:
-    return to_yaml([qos.as_rosbag2()])
+    return indent(to_yaml([qos.as_rosbag2()]), "  ")  # indented as in earlier recordings, which are compared as text

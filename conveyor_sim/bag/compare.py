@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.bag.messages import Outcome
-from conveyor_sim.bag.topics import COMPARED
+from conveyor_sim.bag.messages.encode import Outcome
+from conveyor_sim.bag.messages.topics import COMPARED
 
 RELATIVE = 1e-6
 """Of the value, beside the absolute tolerance of a field (topics.Compare)."""

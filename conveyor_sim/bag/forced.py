@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from conveyor_sim.bag.messages import to_image
+from conveyor_sim.bag.messages.encode import to_image
 from conveyor_sim.bag.reader import Bag
-from conveyor_sim.line.inputs import FORCE
+from conveyor_sim.line.commands.inputs import FORCE
 from conveyor_sim.support.printable import printable
 
 

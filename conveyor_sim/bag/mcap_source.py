@@ -17,16 +17,15 @@ from rosbags.typesys import Stores, TypesysError, get_types_from_idl, get_types_
 from rosbags.typesys.store import Typestore
 
 from conveyor_sim.bag.any_source import offered
-from conveyor_sim.bag.chunk import MESSAGE, read_content
-from conveyor_sim.bag.foreign import IDL
-from conveyor_sim.bag.mcap_file import QOS_KEY
-from conveyor_sim.bag.own_source import messages_of
-from conveyor_sim.bag.qos import Qos
-from conveyor_sim.bag.records import Data
-from conveyor_sim.bag.salvage import Salvage
+from conveyor_sim.bag.mcap.chunk import MESSAGE, messages_of, read_content
+from conveyor_sim.bag.mcap.file import QOS_KEY
+from conveyor_sim.bag.mcap.foreign import IDL
+from conveyor_sim.bag.mcap.records import Data
+from conveyor_sim.bag.mcap.salvage import Salvage
+from conveyor_sim.bag.mcap.walk import ValidChunk
+from conveyor_sim.bag.messages.qos import Qos
+from conveyor_sim.bag.messages.typestore import SEPARATOR, typestore
 from conveyor_sim.bag.source import Raw, Recorded
-from conveyor_sim.bag.typestore import SEPARATOR, typestore
-from conveyor_sim.bag.walk import ValidChunk
 from conveyor_sim.errors import BagError
 
 

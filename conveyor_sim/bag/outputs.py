@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from conveyor_sim.bag.messages import Header
-from conveyor_sim.bag.topics import OUTPUTS, TOPICS, Snapshot, Topic
+from conveyor_sim.bag.messages.encode import Header
+from conveyor_sim.bag.messages.topics import OUTPUTS, TOPICS, Snapshot, Topic
 from conveyor_sim.columns.variables import VariableColumns
 
 if TYPE_CHECKING:
     from conveyor_sim.columns.events import GuardEvent
-    from conveyor_sim.line.inputs import CommandOutcome
+    from conveyor_sim.line.commands.inputs import CommandOutcome
     from conveyor_sim.line.run_state import RunState
     from conveyor_sim.simulation import Simulation
 

@@ -16,16 +16,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conveyor_sim.bag.any_source import AnySource
-from conveyor_sim.bag.index import sealed
+from conveyor_sim.bag.mcap.index import sealed
+from conveyor_sim.bag.mcap.metadata import FILE_NAME, file_names, is_stated_in, read_metadata
+from conveyor_sim.bag.mcap.records import mapped
+from conveyor_sim.bag.mcap.storage import other_storage, packed_message
 from conveyor_sim.bag.mcap_source import McapSource
-from conveyor_sim.bag.messages import LINE, Outcome
-from conveyor_sim.bag.metadata import FILE_NAME, file_names, is_stated_in, read_metadata
+from conveyor_sim.bag.messages.encode import LINE, Outcome
+from conveyor_sim.bag.messages.qos import Qos
+from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.bag.own_source import own_source
-from conveyor_sim.bag.qos import Qos
-from conveyor_sim.bag.records import mapped
 from conveyor_sim.bag.source import Source
-from conveyor_sim.bag.storage import other_storage, packed_message
-from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.columns.bottles import BeltColumns, BottleColumns, ContactColumns
 from conveyor_sim.errors import BagError, ConveyorError
 from conveyor_sim.support.printable import SENTENCE, printable

@@ -13,13 +13,13 @@ from pathlib import Path
 from conveyor_sim.bag.channels import ENCODING, metadata_of, schema_of
 from conveyor_sim.bag.folder import make_folder, remove_folders
 from conveyor_sim.bag.input_log import START_NAME
-from conveyor_sim.bag.line_copy import NAME as LINE_COPY
-from conveyor_sim.bag.line_copy import LineCopy
 from conveyor_sim.bag.lock import claim
-from conveyor_sim.bag.mcap_file import McapFile
-from conveyor_sim.bag.metadata import write_metadata
-from conveyor_sim.bag.topics import OUTPUTS
-from conveyor_sim.bag.typestore import default_distro
+from conveyor_sim.bag.mcap.file import McapFile
+from conveyor_sim.bag.mcap.line_copy import NAME as LINE_COPY
+from conveyor_sim.bag.mcap.line_copy import LineCopy
+from conveyor_sim.bag.mcap.metadata import write_metadata
+from conveyor_sim.bag.messages.topics import OUTPUTS
+from conveyor_sim.bag.messages.typestore import default_distro
 from conveyor_sim.errors import BagError, CheckpointError
 
 LINE_TOPIC = "line"

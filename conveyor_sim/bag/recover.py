@@ -12,12 +12,12 @@ from pathlib import Path, PurePath
 from mcap.records import Channel
 from mcap.records import Schema as SchemaRecord
 
-from conveyor_sim.bag.foreign import is_ros
-from conveyor_sim.bag.index import Index, read_index, sealed
-from conveyor_sim.bag.line_copy import NAME as LINE_COPY
 from conveyor_sim.bag.lock import alone
-from conveyor_sim.bag.mcap_file import McapFile, Schema, topic_info
-from conveyor_sim.bag.metadata import (
+from conveyor_sim.bag.mcap.file import McapFile, Schema, topic_info
+from conveyor_sim.bag.mcap.foreign import is_ros
+from conveyor_sim.bag.mcap.index import Index, read_index, sealed
+from conveyor_sim.bag.mcap.line_copy import NAME as LINE_COPY
+from conveyor_sim.bag.mcap.metadata import (
     FILE_NAME,
     RECORD_NAME,
     FileInfo,
@@ -29,14 +29,15 @@ from conveyor_sim.bag.metadata import (
     to_yaml,
     write_metadata,
 )
+from conveyor_sim.bag.mcap.records import mapped
+from conveyor_sim.bag.mcap.salvage import Salvage
+from conveyor_sim.bag.mcap.storage import other_storage, packed_part
+from conveyor_sim.bag.mcap.walk import NothingLeft
+from conveyor_sim.bag.messages.encode import LINE
+from conveyor_sim.bag.messages.topics import STATES
+from conveyor_sim.bag.messages.typestore import default_distro
 from conveyor_sim.bag.own_source import is_of_this_package
 from conveyor_sim.bag.reader import mcap_files, open_bag
-from conveyor_sim.bag.records import mapped
-from conveyor_sim.bag.salvage import Salvage
-from conveyor_sim.bag.storage import other_storage, packed_part
-from conveyor_sim.bag.topics import STATES
-from conveyor_sim.bag.typestore import default_distro
-from conveyor_sim.bag.walk import NothingLeft
 from conveyor_sim.errors import BagError
 
 WRITTEN_ANEW = (RECORD_NAME, LINE_COPY)
@@ -231,7 +232,7 @@ def _copy(salvage: Salvage, copy: McapFile) -> None:
             channels[number] = copy.add_topic(channel.topic, schema, channel.message_encoding, channel.metadata)
         else:
             channels[number] = copy.add_foreign(channel.topic, schema, channel.message_encoding, channel.metadata)
-    if (line := salvage.line) is not None:
+    if (line := salvage.line(LINE)) is not None:
         copy.add_metadata(LINE_COPY, line.to_record())
     for message in salvage.messages():
         copy.add_message(

@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 
 from conveyor_sim.bag.compare import Difference, first_difference, outcome_difference
 from conveyor_sim.bag.input_log import START_NAME
-from conveyor_sim.bag.messages import Header, Outcome, to_outcome
+from conveyor_sim.bag.messages.encode import Header, Outcome, to_outcome
+from conveyor_sim.bag.messages.topics import COMPARED, STATES, Snapshot
+from conveyor_sim.bag.messages.typestore import typestore
 from conveyor_sim.bag.reader import Bag, open_bag
 from conveyor_sim.bag.recorded_scene import recorded_scene
-from conveyor_sim.bag.topics import COMPARED, STATES, Snapshot
-from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.columns.image import NOTHING_FORCED, Image
 from conveyor_sim.errors import BagError, SceneError
-from conveyor_sim.line.inputs import ARRIVAL
+from conveyor_sim.line.commands.inputs import ARRIVAL
 from conveyor_sim.scene import parse_overrides, parse_scene
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.printable import printable
@@ -200,7 +200,7 @@ def _simulation(bag: Bag) -> Simulation:
         simulation = Simulation(recorded_scene(bag.line, f"{bag.path} (recorded scene)"))
     except SceneError as error:
         raise SceneError(f"{bag.path}: the recorded scene is refused by this version:\n{error}") from error
-    for shape in simulation.model.moving_shapes:
+    for shape in simulation.model.plant.moving:
         if f"{shape.name}/blocked" not in bag.line.signal_names:
             raise BagError(
                 f"{bag.path}: recorded when {shape.name} pushed with unlimited force, expected a recording with the "

@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from conveyor_sim.bag.qos import Qos
+from conveyor_sim.bag.messages.qos import Qos
 
 Raw = tuple[str, int, bytes]
 """Topic, log time (ns) and serialized bytes of a message."""

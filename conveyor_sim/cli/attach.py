@@ -32,19 +32,19 @@ def attach(scene: str, url: str, tags: Path, user: str, period: float, **of_scen
     """Have the PLC at URL control SCENE in real time.
 
     URL is that of the PLC's server: opc.tcp://host:port or modbus://host:port. The line writes its signals there, and
-    reads what the PLC commands. The PLC is not waited for: the lag is told. Ctrl-C ends it.
+    reads what the PLC commands. The simulation does not wait for the PLC; the lag is reported. Ctrl-C ends it.
     """
     with collected_later():
         from conveyor_sim.protocols.attach.free_running import plc_kind
-        from conveyor_sim.protocols.face import Settings
-        from conveyor_sim.protocols.serving import Serving
+        from conveyor_sim.protocols.hosting.serving import Serving
+        from conveyor_sim.protocols.hosting.settings import ServerSettings
 
     console = Console(stderr=True, markup=False, highlight=False, soft_wrap=True)
     password = click.prompt("password", hide_input=True, err=True) if user else ""
     with ExitStack() as stack:
         source = stack.enter_context(scene_source(scene, console, **of_scene))
         kind = plc_kind(url, tags, user, password, period, console.print, source.observe)
-        with Serving(source, [(kind, 0)], Settings()) as serving:
+        with Serving(source, [(kind, 0)], ServerSettings()) as serving:
             source.control("resume", 0.0, "")
             watch(serving, console, [f"{url} commands the line, and reads its signals"])
             summary = serving.summary()

@@ -15,19 +15,20 @@ from conveyor_sim.errors import BagError, ConveyorError
 from conveyor_sim.support.garbage import collected_later
 
 if TYPE_CHECKING:
-    from conveyor_sim.protocols.bag_source import BagSource
-    from conveyor_sim.protocols.face import Settings, Stamps
-    from conveyor_sim.protocols.faces import Kind
-    from conveyor_sim.protocols.scene_source import SceneSource
-    from conveyor_sim.protocols.serving import Serving
+    from conveyor_sim.protocols.hosting.server_kinds import ServerKind
+    from conveyor_sim.protocols.hosting.serving import Serving
+    from conveyor_sim.protocols.hosting.settings import ServerSettings
+    from conveyor_sim.protocols.server.interface import Stamps
+    from conveyor_sim.protocols.tags.bag_provider import BagTagProvider
+    from conveyor_sim.protocols.tags.scene_provider import SceneTagProvider
     from conveyor_sim.ros.node_source import NodeSource
 
-    Source = SceneSource | BagSource | NodeSource
+    Source = SceneTagProvider | BagTagProvider | NodeSource
 
 LOOK = 1.0
-"""s of wall time between two looks at how it goes, on a terminal."""
+"""Wall time between two updates of the progress on a terminal, s."""
 PLAIN_LOOK = 10.0
-"""The same where lines stay."""
+"""Wall time between two progress lines where output is not a terminal, s."""
 
 IN_LOCKSTEP = "in lockstep: the line stands until a client writes run/target_tick"
 
@@ -103,7 +104,7 @@ _WHERE = {
 @click.option("--real-time-factor", type=Number(0.0, 1e6), default=1.0, help="0: as fast as possible.")
 @click.option("--lockstep", is_flag=True, help="Of SCENE: it waits for each scan of a PLC that is a client.")
 @click.option("--loop", is_flag=True, help="Of BAG: begin anew at its end.")
-@click.option("--duration", type=float, help="Of SCENE: simulated time in s, instead of its own.")
+@click.option("--duration", type=float, help="Of SCENE: simulated time in s, instead of the scene's.")
 @click.option(
     "--out",
     "--record",
@@ -122,21 +123,25 @@ def serve(what: str | None, node: str | None, bind: str, stamps: Stamps, **given
     port. Ctrl-C ends it.
     """
     with collected_later():
-        from conveyor_sim.protocols.face import Settings
-        from conveyor_sim.protocols.faces import FACES
-        from conveyor_sim.protocols.limit_options import limit_settings
-        from conveyor_sim.protocols.server_child import ServerChild
-        from conveyor_sim.protocols.serving import Serving
+        from conveyor_sim.protocols.hosting.limit_options import limit_settings
+        from conveyor_sim.protocols.hosting.server_child import ServerChild
+        from conveyor_sim.protocols.hosting.server_kinds import SERVER_KINDS
+        from conveyor_sim.protocols.hosting.serving import Serving
+        from conveyor_sim.protocols.hosting.settings import ServerSettings
 
     console = Console(stderr=True, markup=False, highlight=False, soft_wrap=True)
-    chosen: list[tuple[Kind, Any]] = [(kind, place) for kind in FACES if (place := given[kind.name]) is not None]
-    chosen = chosen or [(kind, kind.port) for kind in FACES if kind.by_default and kind.installed]
-    for kind, _ in chosen or [(FACES[0], 0)]:
+    chosen: list[tuple[ServerKind, Any]] = [
+        (kind, place) for kind in SERVER_KINDS if (place := given[kind.name]) is not None
+    ]
+    chosen = chosen or [(kind, kind.port) for kind in SERVER_KINDS if kind.by_default and kind.installed]
+    for kind, _ in chosen or [(SERVER_KINDS[0], 0)]:
         kind.require()
-    settings = Settings(bind, stamps, **{name: given[name] for name in OF_FACES}, **limit_settings(given["limits"]))
+    settings = ServerSettings(
+        bind, stamps, **{name: given[name] for name in OF_FACES}, **limit_settings(given["limits"])
+    )
     for kind, place in chosen:
         kind.require_place(place, settings)  # not only once everything has been compiled
-    paused: SceneSource | None = None
+    paused: SceneTagProvider | None = None
     with ExitStack() as stack:
         if (what is None) == (node is None):
             raise ConveyorError("serve: expected one of SCENE, BAG and --node")
@@ -166,7 +171,7 @@ def serve(what: str | None, node: str | None, bind: str, stamps: Stamps, **given
 
 
 def tell_end(summary: str, bags: Sequence[Path]) -> None:
-    """What was served, and where it is recorded. Raises BagError if a recording is not whole: the disk was full, ..."""
+    """Print the summary and the paths of recordings. Raise BagError if one is not intact, as on a full disk."""
     from conveyor_sim.bag.reader import open_bag
 
     whole: list[str] = []
@@ -183,18 +188,18 @@ def tell_end(summary: str, bags: Sequence[Path]) -> None:
 
 
 def _is_bag(what: str) -> bool:
+    from conveyor_sim.bag.mcap.storage import other_storage
     from conveyor_sim.bag.reader import SUFFIXES
-    from conveyor_sim.bag.storage import other_storage
 
     return Path(what).is_dir() or Path(what).suffix in SUFFIXES or bool(other_storage(Path(what)))
 
 
-def _require_lockstep(settings: Settings) -> None:
+def _require_lockstep(settings: ServerSettings) -> None:
     _require_not_given("--lockstep", ("real_time_factor",), "none: the PLC says when")
     if settings.modbus_role != "controller" and settings.users is None:
         raise ConveyorError(
-            "--lockstep: nobody may say how far the line goes, expected --modbus-role controller, or --users with "
-            "a controller"
+            "--lockstep: no client may advance the line, expected --modbus-role controller, or --users with a "
+            "controller"
         )
 
 
@@ -217,15 +222,15 @@ def scene_source(
     threads: int | None,
     outside_tables: bool,
     lockstep: bool = False,
-) -> Iterator[SceneSource]:
-    """A scene, paused, once its tags are known. lockstep: whether clients say how far it goes.
+) -> Iterator[SceneTagProvider]:
+    """Yield a paused scene once its tags are known. lockstep: clients advance it.
 
-    What goes wrong before its first tick leaves no recording.
+    A failure before its first tick leaves no recording.
     """
     from conveyor_sim.bag.folder import require_recordable
     from conveyor_sim.bag.recorder import run_folder
-    from conveyor_sim.protocols.scene_messages import Task
-    from conveyor_sim.protocols.scene_source import SceneSource
+    from conveyor_sim.protocols.tags.scene_messages import SceneTask
+    from conveyor_sim.protocols.tags.scene_provider import SceneTagProvider
     from conveyor_sim.scene import load_scene
     from conveyor_sim.support.resources import scene_path
     from conveyor_sim.support.stop_request import StopRequest
@@ -237,8 +242,8 @@ def scene_source(
         if not no_record:
             folder = click.get_current_context().with_resource(run_folder(out))
             require_recordable(folder)
-        task = Task(scene, folder, 0, real_time_factor, threads, playing=False, lockstep=lockstep)
-        source = SceneSource(task, console.print)
+        task = SceneTask(scene, folder, 0, real_time_factor, threads, playing=False, lockstep=lockstep)
+        source = SceneTagProvider(task, console.print)
         try:
             with source:
                 if not source.wait_for_line(lambda: stop.requested) or stop.requested:
@@ -250,15 +255,15 @@ def scene_source(
             raise
 
 
-def _bag(path: Path, console: Console, speed: float, loop: bool) -> BagSource:
-    from conveyor_sim.protocols.bag_source import BagSource
+def _bag(path: Path, console: Console, speed: float, loop: bool) -> BagTagProvider:
+    from conveyor_sim.protocols.tags.bag_provider import BagTagProvider
 
-    return BagSource(path, console.print, speed=speed, loop=loop)
+    return BagTagProvider(path, console.print, speed=speed, loop=loop)
 
 
 @contextmanager
 def _node(namespace: str, console: Console, drawn: bool) -> Iterator[NodeSource]:
-    """A node's line, once its tags are known. drawn: whether a page shows it."""
+    """Yield the line of a node once its tags are known. drawn: True if a page shows it."""
     try:
         from conveyor_sim.ros.node_source import NodeSource
     except ImportError as error:

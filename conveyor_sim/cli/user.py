@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 if TYPE_CHECKING:
-    from conveyor_sim.protocols.users import Role
+    from conveyor_sim.protocols.server.users import Role
 
 ROLES = ("viewer", "operator", "engineer", "controller", "test")
 
@@ -24,7 +24,7 @@ def user(file: Path, name: str, role: Role, password: str) -> None:
 
     FILE is for `conveyor-sim serve --users`. It has hashes of passwords; a line that is deleted is a user less.
     """
-    from conveyor_sim.protocols.users import keep_user, new_user
+    from conveyor_sim.protocols.server.users import keep_user, new_user
 
     os.umask(0o077)
     keep_user(file, name, new_user(role, password))

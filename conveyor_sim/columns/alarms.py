@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True)
 class AlarmColumns:
-    """All alarms that are known, in the order in which they became so; the fields of conveyor_msgs/AlarmStates."""
+    """All declared alarms, in order of declaration; the fields of conveyor_msgs/AlarmStates."""
 
     number: NDArray[np.uint64]
-    """From 1; an alarm keeps its own."""
+    """Number of the alarm, from 1; it never changes."""
     id: Sequence[str]
     text: Sequence[str]
     alarm_class: Sequence[str]
@@ -20,22 +20,22 @@ class AlarmColumns:
     priority: NDArray[np.uint16]
     """1 to 1000, the severity of OPC UA."""
     tag: Sequence[str]
-    """Signal that it is about; empty: none."""
+    """Signal that the alarm monitors; empty: none."""
     group: Sequence[str]
     suppressed_by: Sequence[str]
     """JSON lists of ids."""
     latching: NDArray[np.bool_]
     declared_by: Sequence[str]
-    """line, scene or who declared it; empty: nobody did."""
+    """line, scene or the name of the controller that declared the alarm; empty: not declared."""
     state: NDArray[np.uint8]
-    """Of `line/alarms/alarm.py`."""
+    """Alarm state as numbered in `line/alarms/alarm.py`."""
     active: NDArray[np.bool_]
-    """Whether its condition holds, after its delays, whatever its state."""
+    """True while the alarm condition holds, after its delays, in every alarm state."""
     first_out: NDArray[np.bool_]
-    """Whether it was the first of its group."""
+    """True for the first active alarm of its group."""
     shelved_until: NDArray[np.int64]
-    """Tick; -1: not shelved for a time."""
+    """Tick at which shelving ends; -1: not shelved for a limited time."""
     since: NDArray[np.uint64]
-    """Tick of the last change of its state."""
+    """Tick of the last state change."""
     changed_by: Sequence[str]
-    """Who acknowledged, shelved or reset it, or took it out of service or back, last."""
+    """Author of the last acknowledgement, shelving, reset, or change of service."""

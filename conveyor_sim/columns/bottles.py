@@ -1,4 +1,4 @@
-"""Observations as columns: one 1-D array a quantity, entry i of each belonging together. SI units."""
+"""Bottles, contacts and belts as columns: 1-D arrays in SI units, whose entries i belong together."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ F8 = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class BottleColumns:
-    """Every bottle present, ordered by id; the fields of conveyor_msgs/Bottles in its order."""
+    """All bottles present, ordered by ID; the fields of conveyor_msgs/Bottles in message order."""
 
     id: NDArray[np.uint64]
     """Never reused within a run."""
@@ -29,25 +29,25 @@ class BottleColumns:
     omega: F8
     """rad/s"""
     belt: NDArray[np.int32]
-    """Index of the belt that carries it, -1 on the floor."""
+    """Index of the carrying belt; -1 on the floor."""
     peak_force: F8
-    """N, the largest normal force of any one contact since the last output of bottles."""
+    """Largest normal force of one contact since the last output of bottles, N."""
     impulse: F8
-    """N s, the normal forces of all its contacts summed over time since the last output of bottles."""
+    """Time integral of the normal forces of all contacts since the last output of bottles, N s."""
 
 
 @dataclass(frozen=True)
 class ContactColumns:
-    """Every closed contact, bottle pairs first; the fields of conveyor_msgs/Contacts in its order."""
+    """All closed contacts, bottle pairs first; the fields of conveyor_msgs/Contacts in message order."""
 
     kind: NDArray[np.uint8]
-    """0 bottle and bottle, 1 bottle and rail."""
+    """0: two bottles; 1: bottle and rail."""
     a: NDArray[np.uint64]
-    """Bottle id."""
+    """Bottle ID."""
     b: NDArray[np.uint64]
-    """Bottle id or rail index."""
+    """Bottle ID or rail index."""
     x: F8
-    """m, point of contact: the middle of the overlap in a pair, the nearest point of the rail."""
+    """Point of contact, m: the middle of the overlap of a pair, or the nearest point of the rail."""
     y: F8
     """m"""
     nx: F8
@@ -56,9 +56,9 @@ class ContactColumns:
     overlap: F8
     """m"""
     normal_force: F8
-    """N, on a along -n; damping included."""
+    """Force on `a` along -n, damping included, N."""
     tangential_force: F8
-    """N, on a along (-ny, nx); damping included."""
+    """Force on `a` along (-ny, nx), damping included, N."""
 
 
 @dataclass(frozen=True)
@@ -68,4 +68,4 @@ class BeltColumns:
     commanded: F8
     """The last accepted command, or the scene's speed."""
     actual: F8
-    """What the surface does."""
+    """Speed of the surface."""

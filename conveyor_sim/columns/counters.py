@@ -1,4 +1,4 @@
-"""What machines have made, and where their time went."""
+"""Production counters and time categories of machines."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,38 +7,38 @@ import numpy as np
 from numpy.typing import NDArray
 
 LINE = "line"
-"""Name of the last entry: the line as a whole."""
+"""Name of the last entry, the complete line."""
 
 
 @dataclass(frozen=True)
 class CounterColumns:
-    """Each device that counts bottles, then the line, (n,); the fields of conveyor_msgs/Counters in its order.
+    """All devices that count bottles, then the line, (n,); the fields of conveyor_msgs/Counters in message order.
 
-    All of it since the last reset, or the start. Times and what follows from them are those of machines that can be
-    started and stopped; of other devices times are 0, and the rest NaN. Those of the line are its bottleneck's.
+    Values accumulate since the last reset, or the start. Only machines that can be started and stopped have times and
+    ratios; for other devices times are 0 and ratios NaN. The line has those of its bottleneck.
     """
 
     name: Sequence[str]
     since: NDArray[np.uint64]
     """Tick of the last reset."""
     processed: NDArray[np.uint64]
-    """Bottles; of the line, those that left it by a sink or an outfeed."""
+    """Processed bottles; for the line, bottles that left by a sink or an outfeed."""
     good: NDArray[np.uint64]
     defective: NDArray[np.uint64]
     rejected: NDArray[np.uint64]
-    """Thrown out."""
+    """Rejected bottles."""
     failures: NDArray[np.uint64]
     running: NDArray[np.float64]
-    """s, as those that follow; `line/time_account.py` says what each is."""
+    """Time in this category and in those that follow, s; `line/machines/time_account.py` defines them."""
     starved: NDArray[np.float64]
     blocked: NDArray[np.float64]
     down: NDArray[np.float64]
     planned: NDArray[np.float64]
     idle: NDArray[np.float64]
     rate: NDArray[np.float64]
-    """1/s, nominal."""
+    """Nominal rate, 1/s."""
     availability: NDArray[np.float64]
-    """These by `line/efficiency.py`; NaN while nothing is known."""
+    """Ratios as defined in `line/machines/efficiency.py`; NaN before the first cycle."""
     effectiveness: NDArray[np.float64]
     quality: NDArray[np.float64]
     oee: NDArray[np.float64]
@@ -47,8 +47,8 @@ class CounterColumns:
     mttr: NDArray[np.float64]
     """s"""
     category: Sequence[str]
-    """Where its time goes now; "" without times."""
+    """Present time category; "" for a device without times."""
     stop_reason: Sequence[str]
-    """Why it does not run, or last did not; "" without times."""
+    """Reason of the present or the last stop; "" for a device without times."""
     bottleneck: Sequence[str]
-    """The machines that bound the line by their nominal rates, in parallel if several."""
+    """Machines whose nominal rates limit the line; several if they run in parallel."""

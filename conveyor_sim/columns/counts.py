@@ -1,18 +1,18 @@
-"""How many bottles came and went."""
+"""Numbers of bottles that entered and left."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
 class Counts:
-    """Bottles so far."""
+    """Numbers of bottles since the start."""
 
     fed: int
-    """Entered through infeeds."""
+    """Bottles that entered through infeeds."""
     removed: int
-    """Left through outfeeds."""
+    """Bottles that left through outfeeds."""
     present: int
     blocked_ticks: int
-    """Ticks at which an infeed had a bottle to feed and no room."""
+    """Ticks at which an infeed had a bottle to feed but no room."""
     held: int = 0
-    """In stations: not on the line, and not removed. fed + at the start = removed + present + held."""
+    """Bottles inside stations. fed + number at the start = removed + present + held."""

@@ -1,4 +1,4 @@
-"""What bottles and rails have borne, as columns, and what went beyond a limit. SI units."""
+"""Damage of bottles and wear of rails as columns; events at passed limits. SI units."""
 
 from dataclasses import dataclass
 
@@ -10,9 +10,9 @@ F8 = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class DamageColumns:
-    """Every bottle present, ordered by id; the fields of conveyor_msgs/Damage in its order. NaN: not looked at.
+    """All bottles present, ordered by ID; the fields of conveyor_msgs/Damage in message order. NaN: not observed.
 
-    The largest of each quantity is that since the last output of damage.
+    Maxima are those since the last output of damage.
     """
 
     id: NDArray[np.uint64]
@@ -23,52 +23,52 @@ class DamageColumns:
     y: F8
     """m"""
     scuffing_work: F8
-    """J, sliding work at its wall since it entered."""
+    """Sliding work at the bottle wall since the bottle entered, J."""
     crushing_force: F8
-    """N, the largest sum of the normal forces on it."""
+    """Largest sum of the normal forces on the bottle, N."""
     opposed_force: F8
-    """N, the largest squeeze by two contacts that oppose each other."""
+    """Largest squeeze by two opposed contacts, N."""
     impact_speed: F8
-    """m/s, the largest relative normal speed just before a contact closed."""
+    """Largest relative normal speed just before a contact closed, m/s."""
     impact_force: F8
-    """N, the largest normal force of any one contact."""
+    """Largest normal force of one contact, N."""
     tipping: F8
-    """The largest index of tipping: 1 where a load that lasts would tip it."""
+    """Largest tipping index: a static load of index 1 tips the bottle."""
 
 
 @dataclass(frozen=True)
 class RailWearColumns:
-    """Every bin of the rails, since the start; the fields of conveyor_msgs/RailWear in its order."""
+    """All bins of the rails, since the start; the fields of conveyor_msgs/RailWear in message order."""
 
     rail: NDArray[np.uint32]
     """Index of the rail."""
     x: F8
-    """m, middle of the bin."""
+    """Middle of the bin, m."""
     y: F8
     """m"""
     length: F8
-    """m, along the rail."""
+    """Length of the bin along the rail, m."""
     scuffing_work: F8
     """J"""
     impulse: F8
-    """N s, normal forces summed over time: over the time and the length, the mean pressure in N/m."""
+    """Time integral of the normal forces, N s; divided by time and length, the mean line load in N/m."""
 
 
 @dataclass(frozen=True)
 class DamageEvent:
-    """A limit of the scene that was passed; the fields of conveyor_msgs/DamageEvent in its order."""
+    """Event at a passed limit of the scene; the fields of conveyor_msgs/DamageEvent in message order."""
 
     tick: int
-    """By the end of which it was passed."""
+    """Tick at whose end the limit had been passed."""
     kind: str
     """Name of the limit (`scene/limits.py`)."""
     bottle: int
-    """Id; of a clogging, the bottle that waits nearest to the outfeed."""
+    """Bottle ID; for clogging, the waiting bottle nearest to the outfeed."""
     x: float
-    """m, its axis at the end of the tick."""
+    """Position of the bottle axis at the end of the tick, m."""
     y: float
     value: float
-    """In the unit of the limit: the largest of the tick; of scuffing, all so far; of clogging, the time so far."""
+    """Maximum in the tick, in the unit of the limit; for scuffing the total so far, for clogging the time so far."""
     limit: float
     text: str
     """One sentence."""

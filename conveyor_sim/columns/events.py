@@ -1,4 +1,4 @@
-"""What happens on a line."""
+"""Events of a line."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -34,31 +34,30 @@ Kind = Literal[
 
 
 class Event(NamedTuple):
-    """Something that happened on a line."""
+    """Event of a line."""
 
     at: int
-    """The tick at which it took effect: of what was given to the line (command, fault, alarm), that at which the scan
-    began; of all else, that at which it ended."""
+    """Tick at which the event took effect: the start of the scan for inputs (command, fault, alarm), else its end."""
     kind: str
-    """One of Kind."""
+    """One of `Kind`."""
     name: str
-    """Of a bottle's event the device; of a machine's state the signal; else the alarm, fault, command, limit, signal
-    that is forced, device whose mode has changed, or controller that has taken the line or given it up."""
+    """Name of the device for bottle events, of the signal for machine states; else of the alarm, fault, command, limit,
+    forced signal, device with a new mode, or controller that took or released the line."""
     bottle: int
-    """Id; -1: none."""
+    """Bottle ID; -1: none."""
     value: float
-    """Of the state, fault, alarm, limit, command, force or mode; 1 for who takes the line, 0 for who gives it up; of a
-    bottle's event, how many the device has fed or removed."""
+    """Value of the state, fault, alarm, limit, command, force or mode. Ownership: 1 taken, 0 released. Bottle events:
+    number of bottles that the device has fed or removed."""
     text: str
-    """The reason, or a sentence; empty: nothing to add."""
+    """Reason or description; may be empty."""
 
 
 @dataclass(frozen=True)
 class EventColumns:
-    """What happened since the tick before, in order; the fields of conveyor_msgs/Events."""
+    """Events since the previous tick, in order; the fields of conveyor_msgs/Events."""
 
     total: int
-    """Since the start of the run, these included."""
+    """Number of events since the start of the run, these included."""
     at: NDArray[np.uint64]
     kind: Sequence[str]
     name: Sequence[str]
@@ -68,7 +67,7 @@ class EventColumns:
 
 
 def event_columns(events: Sequence[Event], total: int) -> EventColumns | None:
-    """None if nothing happened. total: events since the start, these included."""
+    """Return events as columns, or None without events. total: number of events since the start, these included."""
     if not events:
         return None
     at, kind, name, bottle, value, text = zip(*events, strict=True)

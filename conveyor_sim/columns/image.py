@@ -1,4 +1,4 @@
-"""The process image as it is read, and what is true where it is forced."""
+"""Process image as controllers read it, with the true values of forced signals."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ NOTHING_FORCED = np.empty(0, dtype=np.uint32), np.empty(0)
 
 @dataclass(frozen=True)
 class Image:
-    """The signals at a tick; the fields of conveyor_msgs/Signals in its order."""
+    """Signals at a tick; the fields of conveyor_msgs/Signals in message order."""
 
     values: NDArray[np.float64]
-    """Of all signals, as controllers read them."""
+    """Values of all signals as controllers read them."""
     forced: NDArray[np.uint32]
-    """Indices of those that are forced, ascending."""
+    """Indices of forced signals, ascending."""
     actual: NDArray[np.float64]
-    """What the line has there."""
+    """True values of the forced signals."""
 
     @property
     def truth(self) -> NDArray[np.float64]:
-        """Of all signals, what the line has."""
+        """Return the true values of all signals."""
         if not len(self.forced):
             return self.values
         values = self.values.copy()

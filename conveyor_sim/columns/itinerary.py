@@ -1,4 +1,4 @@
-"""Where bottles went: entries onto belts and rounds of a closed loop, from columns of bottles over time."""
+"""Entries of bottles onto belts and rounds of a closed loop, from bottle columns over time."""
 
 from __future__ import annotations
 
@@ -8,26 +8,26 @@ from conveyor_sim.columns.bottles import BottleColumns
 
 
 class Itinerary:
-    """When bottles came onto belts, and back onto them.
+    """Times at which bottles came onto belts, and returned to them.
 
     A bottle has returned when it comes onto a belt that it had left, with at least two other belts in between.
     """
 
     def __init__(self, belts: int) -> None:
-        """belts: how many the line has; nothing has been seen yet."""
+        """Start without entries. belts: number of belts of the line."""
         self.entries: list[list[float]] = [[] for _ in range(belts)]
-        """Times by belt, s, at which a bottle came onto it from elsewhere on the line or from an infeed."""
+        """Times by belt, s, at which a bottle came onto it from another belt or an infeed."""
         self.returns: list[list[float]] = [[] for _ in range(belts)]
-        """Those of them at which it had been on the belt before, and on at least two other belts since."""
+        """Entry times, s, of bottles that had been on the belt before, and on at least two other belts since."""
         self._since: dict[int, dict[int, set[int]]] = {}
-        """By bottle, then by belt it has been on: the other belts it has been on since."""
+        """Belts visited since, by bottle and belt."""
         self._ids = np.zeros(0, dtype=np.uint64)
         self._belt = np.zeros(0, dtype=np.int32)
         self._first: float | None = None
         self._last = 0.0
 
     def take(self, time: float, bottles: BottleColumns) -> None:
-        """The next output of bottles, at a time (s)."""
+        """Add the next output of bottles, at `time` (s)."""
         stayed = np.zeros(len(bottles.id), dtype=bool)
         if len(self._ids):
             at = np.searchsorted(self._ids, bottles.id).clip(max=len(self._ids) - 1)
@@ -40,7 +40,7 @@ class Itinerary:
 
     def _enter(self, bottle: int, belt: int, time: float) -> None:
         since = self._since.setdefault(bottle, {})
-        if self._first is not None:  # what stands on a belt at the start has not come onto it
+        if self._first is not None:  # a bottle that stands on a belt at the start did not enter it
             self.entries[belt].append(time)
             if len(since.get(belt, ())) >= 2:
                 self.returns[belt].append(time)
@@ -49,7 +49,7 @@ class Itinerary:
         since[belt] = set()
 
     def per_minute(self, times: list[float]) -> tuple[float, float]:
-        """Rates over all that was taken and over its second half, 1/min."""
+        """Return the rates over the complete time and over its second half, 1/min."""
         if self._first is None or self._last <= self._first:
             return 0.0, 0.0
         span = self._last - self._first

@@ -1,4 +1,4 @@
-"""The energy ledger of a run, as numbers (effect `energy_ledger`)."""
+"""Energy ledger of a run (effect `energy_ledger`)."""
 
 from dataclasses import dataclass
 
@@ -10,36 +10,36 @@ F8 = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Ledger:
-    """Where energy came from, where it is and where it went since the start, J; fields of conveyor_msgs/Ledger.
+    """Energy supplied, stored and removed since the start, J; the fields of conveyor_msgs/Ledger.
 
     kinetic + elastic + springs = fed - removed + sum(belt_work) + sum(rail_work)
         - base_friction - contact_friction - damping + residual
     """
 
     kinetic: float
-    """Of all bottles now, spin included."""
+    """Kinetic energy of all bottles now, spin included."""
     elastic: float
-    """In the overlaps of contacts now."""
+    """Elastic energy in contact overlaps now."""
     springs: float
-    """In tangential springs now, those under the bottles included."""
+    """Energy in tangential springs now, those under the bottles included."""
     fed: float
-    """That bottles brought: those that were there at the start, and those that entered."""
+    """Energy of the bottles at the start, and of bottles as they entered."""
     removed: float
-    """That bottles took along as they left."""
+    """Energy of bottles as they left."""
     belt_work: F8
-    """(H + 1,), done by each belt in the order of the scene, and by the floor, which rests: 0."""
+    """Work of each belt in scene order, then of the floor, which rests (0); (H + 1,)."""
     base_friction: float
-    """Dissipated between bottles and what they stand on."""
+    """Energy dissipated by friction under the bottles."""
     contact_friction: float
-    """Dissipated by friction between bottles and at rails, dashpots of tangential springs included."""
+    """Energy dissipated by friction between bottles and at rails, dashpots of tangential springs included."""
     damping: float
-    """Dissipated by damping in contacts."""
+    """Energy dissipated by damping in contacts."""
     residual: float
-    """What came from nowhere: the integrator's error, negative where energy was lost."""
+    """Energy error of the integrator; negative where energy was lost."""
     turnover: float
-    """All that came or went, without signs: what to hold the residual against."""
+    """Sum of the absolute values of all supplied and removed energies, as a scale for the residual."""
     rail_work: F8
-    """(Q,), done by each rail that moves: gates, pushers, diverters, in the order of the scene."""
+    """Work of each moving rail (gates, pushers, diverters) in scene order; (Q,)."""
 
 
 def balance(
@@ -52,7 +52,7 @@ def balance(
     contact_friction: float,
     damping: float,
 ) -> Ledger:
-    """The ledger of what is stored and of what came and went, in J.
+    """Return the ledger from stored, supplied and removed energies, J.
 
     stored: (4,), kinetic, elastic, in tangential springs of contacts, in springs under the bottles.
     """

@@ -1,4 +1,4 @@
-"""What commands are set to, and who set them, as columns."""
+"""Command values in force and their writers, as columns."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,15 +9,15 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True)
 class ReadBackColumns:
-    """Every command in the order of the process image; the fields of conveyor_msgs/ReadBack in its order."""
+    """All commands in the order of the process image; the fields of conveyor_msgs/ReadBack in message order."""
 
     value: NDArray[np.float64]
-    """In force."""
+    """Value in force."""
     since: NDArray[np.uint64]
-    """Tick from which on it has had this value from this writer."""
+    """Tick since which this value of this writer is in force."""
     writer: NDArray[np.uint16]
     """Index in `writers`."""
     writers: Sequence[str]
-    """By name; the first is "scene": what was there at the start."""
+    """Names of the writers; the first is "scene", for initial values."""
     writer_kinds: Sequence[str]
-    """Of these."""
+    """Kinds of the writers."""

@@ -1,4 +1,4 @@
-"""What a controller's variables were after a scan, those that are recorded."""
+"""Recorded variables of a controller after a scan."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True)
 class VariableColumns:
-    """Each variable, (n,); the fields of conveyor_msgs/Variables in its order."""
+    """All recorded variables, (n,); the fields of conveyor_msgs/Variables in message order."""
 
     name: Sequence[str]
-    """As conditions have them: plc/main/speed."""
+    """Names as used in conditions, such as plc/main/speed."""
     value: NDArray[np.float64]
-    """A BOOL is 0 or 1, a TIME is in s, a text is its length."""
+    """Values: a BOOL as 0 or 1, a TIME in s, a text as its length."""

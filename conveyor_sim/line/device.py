@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conveyor_sim.engine.arrays.types import F8
-from conveyor_sim.engine.compiler.compile import entry
+from conveyor_sim.engine.compiler.numba_internals.machine_code import entry
 from conveyor_sim.engine.support.footing import find_carriers
 from conveyor_sim.line.alarms.declaration import Declared
 from conveyor_sim.line.process_image import of_roles
@@ -178,15 +178,19 @@ class Device:
         """Why its mode can't change as it stands now, "" if it can."""
         return ""
 
+    def stops(self, name: str, value: float) -> bool:
+        """Return True if a command stops the device. People may send such a command in every mode."""
+        return False
+
     def stop_by_hand(self, name: str, value: float) -> None:
-        """Take a command that stops it (`authority.stops`) from a person who has no control of it."""
+        """Take a command that stops the device (`stops`) from a person who has no control of it."""
         raise NotImplementedError(f"{self.name} takes no stops")
 
     def take_mode(self, mode: int, now: ScanContext) -> None:
         """It is in other hands (authority.MODES) from this tick on; commands in force stay."""
 
-    def wake(self) -> None:
-        """Forget what was only kept to save work: what it remembers was restored."""
+    def restored(self, tick: int) -> None:
+        """Derive again what depends on public attributes, which were restored for a tick."""
 
     @property
     def held(self) -> Sequence[int]:

@@ -4,8 +4,8 @@ import math
 from collections.abc import Sequence
 
 from conveyor_sim.columns.events import Event, Kind
+from conveyor_sim.line.commands.inputs import INJECT, CommandOutcome
 from conveyor_sim.line.device import Device, ScanContext
-from conveyor_sim.line.inputs import INJECT, CommandOutcome
 from conveyor_sim.scene.types import Unchecked
 from conveyor_sim.support.printable import printable
 

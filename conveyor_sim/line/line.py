@@ -1,8 +1,8 @@
 """`Line`: the devices of a scene, and the commands and faults that reach them at ticks."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import fields, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,23 +11,23 @@ from conveyor_sim.columns.counters import CounterColumns
 from conveyor_sim.columns.damage import DamageEvent
 from conveyor_sim.columns.events import Event
 from conveyor_sim.columns.image import Image
+from conveyor_sim.line.alarm_system import AlarmSystem
 from conveyor_sim.line.alarms.alarms import Alarms
-from conveyor_sim.line.alarms.system import AlarmSystem
-from conveyor_sim.line.authority import MAY, PEOPLE, unauthorized
-from conveyor_sim.line.belt_surfaces import BeltSurfaces
-from conveyor_sim.line.commands import refusal, shown
-from conveyor_sim.line.counters import RESET_COUNTERS, Counters
+from conveyor_sim.line.commands.authority import MAY, PEOPLE, unauthorized
+from conveyor_sim.line.commands.forcing import Forcing
+from conveyor_sim.line.commands.inputs import FAULT, INJECT, SET, WATCHDOG, CommandOutcome, Input, as_kept
+from conveyor_sim.line.commands.modes import Modes
+from conveyor_sim.line.commands.operation import Operation
+from conveyor_sim.line.commands.read_back import ReadBack
+from conveyor_sim.line.commands.refusal import refusal, shown
 from conveyor_sim.line.device import Device, ScanContext
-from conveyor_sim.line.devices import build_devices
+from conveyor_sim.line.device_kinds import build_devices
 from conveyor_sim.line.devices.belt import BeltDevice
+from conveyor_sim.line.devices.belt_surfaces import BeltSurfaces
 from conveyor_sim.line.devices.photo_eye import PhotoEyeDevice
 from conveyor_sim.line.event_log import EventLog
-from conveyor_sim.line.forcing import Forcing
-from conveyor_sim.line.inputs import FAULT, INJECT, SET, WATCHDOG, CommandOutcome, Input, as_kept
-from conveyor_sim.line.modes import Modes
-from conveyor_sim.line.operation import Operation
+from conveyor_sim.line.machines.counters import RESET_COUNTERS, Counters
 from conveyor_sim.line.process_image import ProcessImage
-from conveyor_sim.line.read_back import ReadBack
 from conveyor_sim.line.run_state import RUN_TAGS
 from conveyor_sim.line.tag import Adds
 from conveyor_sim.physics.model import build_model
@@ -39,6 +39,14 @@ from conveyor_sim.scene.schema import Scene
 _Outcome = tuple[int, Input, bool, str, bool, bool, bool]
 
 _REMOVED: tuple[Adds, ...] = ("removed", "rejected")
+
+
+class _Part(NamedTuple):
+    """Part of a line whose state lasts from tick to tick, as plain data."""
+
+    snapshot: Callable[[], Any]
+    restore: Callable[[int, Any], None]
+    """Takes the tick and the data. Raises ValueError for data of another kind."""
 
 
 class Line:
@@ -100,6 +108,15 @@ class Line:
             RESET_COUNTERS: Operation(self._counters.refusal, self._counters.reset),
         }
         self._surfaces = BeltSurfaces(state)
+        self._parts = {
+            "devices": _part("devices", {device.name: device for device in devices}, *devices),
+            "log": _part("log", self._log),
+            "read_back": _part("read_back", self.read_back, self.read_back),
+            "modes": _part("modes", self.modes, self.modes),
+            "forcing": _part("forcing", self.forcing, self.forcing),
+            "alarms": _Part(self._alarms.snapshot, self._alarms.restore),
+            "counters": _part("counters", self._counters.memory),
+        }
         self.now.begin_scan()  # which its look at the devices began, before there are bottles
 
     @property
@@ -299,42 +316,26 @@ class Line:
         return self.now.carriers()
 
     def restore_from(self, other: "Line") -> None:
-        """Stand as another line of the same scene does; watchdogs too."""
-        self.now.tick = other.now.tick
-        self.now.setpoints[:], self.now.speeds[:] = other.now.setpoints, other.now.speeds
-        self.now.bad = set(other.now.bad)
-        self.now.attributes = {name: dict(values) for name, values in other.now.attributes.items()}
-        self._restore_devices(snapshot(other._by_name()))
-        restore(self._log, snapshot(other._log))
-        restore(self.read_back, snapshot(other.read_back))
-        self.read_back.wake(self.now.tick)
-        restore(self.modes, snapshot(other.modes))
-        self.modes.wake()
-        restore(self.forcing, snapshot(other.forcing))
-        self.forcing.wake()
-        self._alarms.restore(self.now.tick, other._alarms.snapshot())
-        restore(self._counters.memory, snapshot(other._counters.memory))
+        """Take over the state of another line of the same scene, except waiting inputs and unread command results."""
+        own = self.snapshot()
+        self.restore(other.now.tick, {**other.snapshot(), "pending": own["pending"], "outcomes": own["outcomes"]})
 
     def snapshot(self) -> dict[str, Any]:
-        """All that it remembers from tick to tick, as plain data."""
+        """Return all state that lasts from tick to tick, as plain data."""
         return {
-            "pending": [tuple(given) for given in self._pending],
-            "outcomes": [tuple(getattr(made, field.name) for field in fields(made)) for made in self._outcomes],
+            "pending": [tuple(request) for request in self._pending],
+            "outcomes": [
+                tuple(getattr(outcome, field.name) for field in fields(outcome)) for outcome in self._outcomes
+            ],
             "setpoints": self.now.setpoints.tolist(),
             "speeds": self.now.speeds.tolist(),
             "bad": sorted(self.now.bad),
             "attributes": {name: list(values.items()) for name, values in self.now.attributes.items()},
-            "devices": snapshot(self._by_name()),
-            "log": snapshot(self._log),
-            "read_back": snapshot(self.read_back),
-            "modes": snapshot(self.modes),
-            "forcing": snapshot(self.forcing),
-            "alarms": self._alarms.snapshot(),
-            "counters": snapshot(self._counters.memory),
+            **{name: part.snapshot() for name, part in self._parts.items()},
         }
 
     def restore(self, tick: int, memory: dict[str, Any]) -> None:
-        """Stand as one of the same scene did at a tick. Raises ValueError for what is no memory of one."""
+        """Restore the state at a tick from what `snapshot` returned. Raise ValueError for any other data."""
         entries(memory, self.snapshot(), "line")
         self.now.tick = tick
         self._pending = typed(list[Input], memory["pending"], "line.pending")
@@ -347,26 +348,13 @@ class Line:
         self.now.bad = set(typed(list[int], memory["bad"], "line.bad"))
         attributes = typed(dict[str, list[tuple[int, float]]], memory["attributes"], "line.attributes")
         self.now.attributes = {name: dict(values) for name, values in attributes.items()}
-        self._restore_devices(memory["devices"])
-        restore(self._log, memory["log"], "line.log")
-        restore(self.read_back, memory["read_back"], "line.read_back")
-        self.read_back.wake(tick)
-        restore(self.modes, memory["modes"], "line.modes")
-        self.modes.wake()
-        restore(self.forcing, memory["forcing"], "line.forcing")
-        self.forcing.wake()
-        self._alarms.restore(tick, memory["alarms"])
-        restore(self._counters.memory, memory["counters"], "line.counters")
+        for name, part in self._parts.items():
+            part.restore(tick, memory[name])
 
     @property
     def held(self) -> list[int]:
         """Ids of the bottles that devices have taken off the line and will give back, in order."""
         return sorted(bottle for device in self._devices for bottle in device.held)
-
-    def _restore_devices(self, memory: Any) -> None:
-        restore(self._by_name(), memory, "line.devices")
-        for device in self._devices:
-            device.wake()
 
     def _note(self, outcome: CommandOutcome) -> None:
         if not outcome.accepted:
@@ -380,9 +368,6 @@ class Line:
             values = device.read(self.now)
             yield device.name, sum([int(values[place]) for place in places])
 
-    def _by_name(self) -> dict[str, Device]:
-        return {device.name: device for device in self._devices}
-
     def _at(self, tick: int) -> None:
         self.now.tick = tick
         self.now.begin_scan()
@@ -390,6 +375,17 @@ class Line:
 
 def _with_texts(given: Input) -> str:
     return f"{len(given.texts)} texts given, expected none" if given.texts else ""
+
+
+def _part(name: str, part: Any, *waking: Device | ReadBack | Modes | Forcing) -> _Part:
+    """Return a part that is stored by its public attributes. waking: to be updated after a restore."""
+
+    def put_back(tick: int, memory: Any) -> None:
+        restore(part, memory, f"line.{name}")
+        for one in waking:
+            one.restored(tick)
+
+    return _Part(lambda: snapshot(part), put_back)
 
 
 def image_of(scene: Scene) -> ProcessImage:

@@ -2,11 +2,11 @@
 
 from collections.abc import Iterator
 
-from conveyor_sim.line.authority import MAY
-from conveyor_sim.line.inputs import WRITER_KINDS
+from conveyor_sim.line.commands.authority import MAY
+from conveyor_sim.line.commands.inputs import WRITER_KINDS
 from conveyor_sim.line.line import image_of
+from conveyor_sim.line.machines.weihenstephan import DATA_POINTS
 from conveyor_sim.line.tag import Tag
-from conveyor_sim.line.weihenstephan import DATA_POINTS
 from conveyor_sim.scene import parse_scene
 from conveyor_sim.scene.parts.alarm import PREFIX
 

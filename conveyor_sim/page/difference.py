@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from conveyor_sim.bag.compare import first_difference
-from conveyor_sim.bag.messages import to_image, to_outcome
+from conveyor_sim.bag.messages.encode import to_image, to_outcome
+from conveyor_sim.bag.messages.topics import COMPARED, TOPICS, Topic
 from conveyor_sim.bag.reader import Bag
-from conveyor_sim.bag.topics import COMPARED, TOPICS, Topic
 from conveyor_sim.columns.bottles import BottleColumns
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.page.stamps import Stamps

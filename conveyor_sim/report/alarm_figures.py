@@ -1,4 +1,4 @@
-"""What a run's alarms amount to: how many came, how many at most in ten minutes, and what stands at its end."""
+"""Alarm statistics of a run: number of alarms, most in ten minutes, and active alarms at the end."""
 
 from collections import Counter, deque
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ WINDOW = 600.0
 """s; rates of alarms are given for ten minutes (EEMUA 191, ISA-18.2)."""
 
 FLOOD = 10
-"""More than so many within the window are a flood: an operator can't follow."""
+"""Alarm flood: more alarms than this in the window are too many for an operator (ISA-18.2)."""
 
 LISTED = 5
 """Alarms that a sentence names."""
@@ -32,32 +32,32 @@ class Listed(NamedTuple):
 
 @dataclass(frozen=True)
 class AlarmFigures:
-    """What a run's alarms amount to."""
+    """Alarm statistics of a run."""
 
     raised: int
     per_window: float
-    """Came in ten minutes, over the whole run."""
+    """Mean number of alarms in ten minutes."""
     most_in_window: int
     by_alarm: dict[str, int]
-    """How often each came, the most frequent first."""
+    """Number of occurrences by alarm, the most frequent first."""
     standing: list[Listed]
-    """At the end: the highest priority first, then what has stood longest."""
+    """Active alarms at the end, by priority, then the oldest first."""
     hidden: list[Listed]
-    """Shelved, suppressed or out of service then."""
+    """Alarms that were shelved, suppressed or out of service at the end."""
 
     @property
     def flood(self) -> bool:
-        """Whether there was one."""
+        """Return True if there was an alarm flood."""
         return self.most_in_window > FLOOD
 
     @property
     def any(self) -> bool:
-        """Whether there is anything to be said."""
+        """Return True if any alarm occurred or is active."""
         return bool(self.raised or self.standing)
 
     @property
     def sentence(self) -> str:
-        """How many came, the most frequent, and what stands."""
+        """Return one sentence: number of alarms, the most frequent ones, and active alarms."""
         often = [f"{times} x {id}" for id, times in self.by_alarm.items()]
         came = f"{self.raised} came: {_listed(often)}" if often else "none came"
         flood = f"; a flood, {self.most_in_window} in ten minutes" if self.flood else ""
@@ -72,7 +72,7 @@ def _listed(texts: Sequence[str]) -> str:
 
 @dataclass
 class AlarmTally:
-    """Counts alarms while the events of a run go by, in the order of time."""
+    """Counter of alarms over the events of a run in time order."""
 
     by_alarm: Counter[str] = field(default_factory=Counter)
     most: int = 0
@@ -80,7 +80,7 @@ class AlarmTally:
     _recent: deque[float] = field(default_factory=deque)
 
     def event(self, time: float, kind: str, name: str) -> None:
-        """One event. time: s."""
+        """Count one event at `time`, s."""
         if kind != "alarm_raised":
             return
         self.by_alarm[name.removeprefix("alarms/")] += 1
@@ -90,7 +90,7 @@ class AlarmTally:
         self.most = max(self.most, len(self._recent))
 
     def figures(self, seconds: float, tick: float) -> AlarmFigures:
-        """Of a run so long. tick: its length, s."""
+        """Return the statistics of a run of `seconds`. tick: length of a tick, s."""
         raised = self.by_alarm.total()
         return AlarmFigures(
             raised,

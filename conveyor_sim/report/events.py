@@ -1,4 +1,4 @@
-"""What happened in a recording (topic `events`): chosen by kind, name and time, as a table or as CSV."""
+"""Events of a recording (topic `events`), selected by kind, name and time, as a table or as CSV."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from rich.box import SIMPLE
 from rich.console import RenderableType
 from rich.table import Table
 
+from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.bag.reader import mcap_files, open_bag
-from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.columns.events import Kind
 from conveyor_sim.errors import BagError, ConveyorError
 from conveyor_sim.support.files import FileError, write_file
@@ -45,10 +45,11 @@ def chosen_events(
     start: float | None = None,
     stop: float | None = None,
 ) -> list[Row]:
-    """The events of a bag in order. kinds, names: patterns (`alarm_*`, `machines/*`), of which one must fit; none: all.
-    start, stop: s, the first and the last time.
+    """Return the selected events of a bag in order.
 
-    Raises ConveyorError for a pattern that fits no kind or times in no order, BagError for a bag without the topic.
+    kinds, names: patterns (`alarm_*`, `machines/*`), one of which must match; empty: all. start, stop: first and last
+    time, s. Raise ConveyorError for a pattern that matches no kind or for a stop before the start, BagError for a bag
+    without the topic.
     """
     for kind in kinds:
         if not any(fnmatchcase(known, kind) for known in KINDS):
@@ -110,9 +111,9 @@ def event_table(rows: Sequence[Row]) -> RenderableType:
 
 
 def write_csv(rows: Sequence[Row], file: Path, bag: Path) -> None:
-    """A line for each event, below one of heads; if that can't be written, what the file held is untouched.
+    """Write one line per event below a header; a failure leaves the previous content of the file.
 
-    Raises ConveyorError, also for a file of the bag that they are from.
+    Raise ConveyorError if the file can't be written, or if it is part of the bag.
     """
     parts = [part for part in (*mcap_files(bag), bag / "metadata.yaml") if part.exists()]
     if file.exists() and any(map(file.samefile, parts)):

@@ -50,7 +50,7 @@ class LoadHistory:
 
     @property
     def sentence(self) -> str:
-        """The same in words."""
+        """Return one sentence with these values."""
         there = {field.name: worst for field in fields(LoadHistory) if (worst := getattr(self, field.name)) is not None}
         return "at most " + "; ".join(
             f"{WORDS[name].format(worst.value)} (bottle {worst.bottle})" for name, worst in there.items()

@@ -1,4 +1,4 @@
-"""What machines spent their time on, stretch by stretch."""
+"""Time periods of machines by category and stop reason."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ class Period(NamedTuple):
     end: float
     """s"""
     category: str
-    """As in `line/time_account.py`."""
+    """Time category of `line/machines/time_account.py`."""
     reason: str
     """Why it was down, idle or stopped by plan; "" else."""
 
     @property
     def length(self) -> float:
-        """s"""
+        """Return the length, s."""
         return self.end - self.begin
 
     @property
@@ -69,13 +69,13 @@ def stop_reasons(periods: Iterable[Period]) -> list[StopReason]:
 
 
 def longest_stops(periods: Iterable[Period], most: int) -> list[Period]:
-    """The longest periods in which machines did not run, the longest first."""
+    """Return the longest periods in which machines did not run, the longest first."""
     stops = (period for period in periods if period.category != "running")
     return sorted(stops, key=lambda period: (-period.length, period))[:most]
 
 
 def shares(periods: Sequence[Period], categories: Sequence[str], edges: NDArray[np.float64]) -> NDArray[np.float64]:
-    """What part of each interval between edges (n + 1,), s, a machine spent in each category, (categories, n)."""
+    """Return the share of each category in each interval between `edges` (n + 1,), s; (categories, n)."""
     found = np.zeros((len(categories), len(edges) - 1))
     for row, category in enumerate(categories):
         mine = [period for period in periods if period.category == category]

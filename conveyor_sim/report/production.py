@@ -1,4 +1,4 @@
-"""How a recorded line produced, read from its bag."""
+"""Production of a recorded line, read from its bag."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conveyor_sim.bag.forced import forced_signals
+from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.bag.reader import Bag, Frame, open_bag
-from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.columns.counters import CounterColumns
 from conveyor_sim.errors import BagError
 from conveyor_sim.report.alarm_figures import AlarmTally
@@ -19,10 +19,10 @@ from conveyor_sim.report.production_record import Production
 from conveyor_sim.support.printable import printable
 
 CATEGORY, REASON = "category", "stop_reason"
-"""Ends of the signals whose changes are events, and of the columns of counters that say how they were at first."""
+"""Suffixes of signals whose changes are events, and names of the counter columns with their initial values."""
 
 NO_REASON = "none"
-"""What the latter says where nothing has stopped a machine yet."""
+"""Stop reason of a machine that has not stopped yet."""
 
 
 def read_production(path: Path) -> Production:
@@ -97,7 +97,7 @@ class _Follower:
         self._done: dict[str, list[Period]] = {name: [] for name in self._now}
 
     def take(self, time: float, signal: str, text: str) -> None:
-        """A signal has changed at a time (s), to what a text says."""
+        """Take a changed signal: at `time` (s), with the new state in `text`."""
         machine, _, which = signal.rpartition("/")
         if which in self._now.get(machine, ()) and time >= self._since[machine]:
             self._end(machine, time)

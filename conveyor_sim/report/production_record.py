@@ -1,4 +1,4 @@
-"""How a recorded line produced: counters at its end, what its machines did when, and alarms."""
+"""Production of a recorded line: final counters, machine periods and alarms."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from conveyor_sim.report.periods import Period
 
 @dataclass(frozen=True)
 class Production:
-    """Of one recording."""
+    """Production of one recording."""
 
     scene: str
     start: float
@@ -23,7 +23,7 @@ class Production:
     counters: CounterColumns
     """The last ones."""
     resets: int
-    """How often the line's counters were reset."""
+    """Number of resets of the line's counters."""
     periods: Mapping[str, Sequence[Period]]
     """By machine, one after the other from start to end."""
     alarms: AlarmFigures

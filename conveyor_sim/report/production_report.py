@@ -1,4 +1,4 @@
-"""What a person sees of how a line produced: tables, and pictures with their paths."""
+"""Production report: tables, and figures with their paths."""
 
 from __future__ import annotations
 

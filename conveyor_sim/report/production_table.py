@@ -1,4 +1,4 @@
-"""How a line produced, for a terminal."""
+"""Production tables for a terminal."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 
 from conveyor_sim.columns.counters import CounterColumns
-from conveyor_sim.line.efficiency import DEFINITIONS
-from conveyor_sim.line.time_account import CATEGORIES
+from conveyor_sim.line.machines.efficiency import DEFINITIONS
+from conveyor_sim.line.machines.time_account import CATEGORIES
 from conveyor_sim.report.alarm_figures import WINDOW, AlarmFigures
 from conveyor_sim.report.periods import longest_stops, stop_reasons
 from conveyor_sim.report.production_record import Production
@@ -24,7 +24,7 @@ FACTORS = ("availability", "effectiveness", "quality", "oee")
 
 
 def render(production: Production) -> Group:
-    """All that there is to say, the line first."""
+    """Return all tables, that of the line first."""
     parts: list[RenderableType] = [_headline(production), _bottles(production.counters)]
     if production.periods:
         periods = [period for machine in production.periods.values() for period in machine]
@@ -78,7 +78,7 @@ def _times(counters: CounterColumns) -> Table:
 
 
 def _efficiency(counters: CounterColumns) -> Table:
-    """What follows from times and bottles."""
+    """Return the table of ratios derived from times and bottle counts."""
     table = _table("efficiency", *FACTORS[:-1], "OEE")
     for row in _timed(counters):
         table.add_row(printable(counters.name[row]), *(_percent(getattr(counters, factor)[row]) for factor in FACTORS))

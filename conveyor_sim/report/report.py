@@ -1,4 +1,4 @@
-"""What a person sees at the end of a run: the summary, the page and pictures by their paths, how fast it went."""
+"""Output at the end of a run: summary, paths of page and figures, speed."""
 
 from __future__ import annotations
 

@@ -9,20 +9,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.bag.messages import to_image
+from conveyor_sim.bag.messages.encode import to_image
+from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.bag.reader import Bag, open_bag
 from conveyor_sim.bag.recorded_scene import recorded_scene
-from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.columns.bottles import BottleColumns
 from conveyor_sim.columns.itinerary import Itinerary
 from conveyor_sim.columns.ledger import Ledger
 from conveyor_sim.errors import SceneError
-from conveyor_sim.line.devices import build_devices
-from conveyor_sim.line.inputs import ARRIVAL
+from conveyor_sim.line.commands.inputs import ARRIVAL
+from conveyor_sim.line.device_kinds import build_devices
 from conveyor_sim.line.tag import Adds
 from conveyor_sim.physics.model import Model, build_model
 from conveyor_sim.physics.model.remedies import StepLimit, step_limit
 from conveyor_sim.physics.model.step_choice import choose_steps
+from conveyor_sim.physics.plant import Plant
 from conveyor_sim.report.alarm_figures import AlarmTally
 from conveyor_sim.report.load_history import LoadHistory
 from conveyor_sim.report.summary import BeltFlow, Energy, Loop, Summary
@@ -34,11 +35,11 @@ from conveyor_sim.support.printable import SENTENCE, printable
 GUARD_TEXTS = 3
 SUMMED = ("bottles", "signals", "ledger", "damage", "damage_events", "outcomes", "guard", "events", "alarm_states")
 TAKEN = {TOPICS[name].type: TOPICS[name] for name in SUMMED}
-"""What is summed up, by message type: the topics may have been renamed."""
+"""Summarised topics by message type, because topics may have been renamed."""
 
 
 def summarize(path: str | Path, wall: float | None = None) -> Summary:
-    """Sums a bag up in one pass; wall: how long the run took, s, if known. Raises BagError if it can't be read."""
+    """Summarise a bag in one pass. wall: wall time of the run, s, if known. Raise BagError if it can't be read."""
     with open_bag(path) as bag, bag.sense():
         return _Tally(bag).summary(wall)
 
@@ -138,7 +139,7 @@ class _Tally:
         )
 
     def _counted(self, roles: dict[str, Adds] | None, *wanted: Adds) -> int | None:
-        """The sum at the end of the signals that add to something."""
+        """Return the final sum of the signals with one of these roles."""
         if roles is None:
             return None
         names = self._bag.line.signal_names
@@ -181,13 +182,13 @@ def _energy(ledger: Ledger, belts: list[str], rails: list[str]) -> Energy:
 
 
 def _roles(line: Any, model: Model) -> dict[str, Adds]:
-    """What the signals of a recorded scene add to, by name."""
+    """Return the roles of signals in sums, by signal name, for a recorded scene."""
     devices = build_devices(recorded_scene(line, line.scene_name), model)
     return {signal.name: signal.adds_to for device in devices for signal in device.signals}
 
 
 def _model(line: Any) -> Model | None:
-    """The model of a recorded scene in the steps that it ran with; None if this version refuses the scene."""
+    """Return the model of a recorded scene at its recorded number of steps; None if this version refuses the scene."""
     try:
         return build_model(recorded_scene(line, line.scene_name))
     except SceneError:
@@ -195,10 +196,10 @@ def _model(line: Any) -> Model | None:
 
 
 def _step_limit(line: Any) -> StepLimit | None:
-    """What sets the steps of a recorded scene; None if this version would choose others than were recorded."""
+    """Return the step limit of a recorded scene; None if this version would choose another number of steps."""
     try:
         scene = parse_scene(line.scene_text, line.scene_name, parse_overrides(line.overrides))
-        choice = choose_steps(scene)
+        choice = choose_steps(Plant.of(scene))
     except SceneError:
         return None
     same = (scene.accuracy.integrator, choice.steps) == (line.integrator, line.steps_per_tick)

@@ -1,4 +1,4 @@
-"""What a run amounts to: the same for the node and for a run without ROS."""
+"""Summary of a run, equal for the node and for a run without ROS."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class BeltFlow:
     per_minute: float
     """Bottles that came onto it, per simulated minute, over the whole run."""
     per_minute_second_half: float
-    """The same over the second half, when the line has filled."""
+    """Rate over the second half, when the line has filled, 1/min."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Energy:
 
     @property
     def sentence(self) -> str:
-        """The same in words."""
+        """Return one sentence with these values."""
         share = self.residual / self.turnover if self.turnover else 0.0
         rails = f", {sum(self.rails.values()):.4g} J from rails that move" if self.rails else ""
         return (
@@ -90,7 +90,7 @@ class Summary:
     present: int
     """Bottles on the line at the end."""
     on_floor: int
-    """Of them, on no belt."""
+    """Number of these bottles that are on no belt."""
     belts: dict[str, BeltFlow]
     loop: Loop | None
     """None if no bottle came back."""
@@ -103,28 +103,28 @@ class Summary:
     predicted: str | None
     """The errors to expect; None if this version refuses the recorded scene."""
     limit: StepLimit | None
-    """What sets the number of steps, and what would lower it; None if this version would choose another number."""
+    """Bound that sets the number of steps, with remedies; None if this version would choose another number."""
     achieved: ForceCheck | None
-    """What the peak force says; None if it or the prediction is not known."""
+    """Check of the peak force; None if it or its prediction is unknown."""
     pressed: Pressed | None
-    """What pressed for long; None if it is not known, or no bound on the time step rests on it."""
+    """Largest sustained force; None if unknown, or if no bound on the time step depends on it."""
     guard: dict[str, int]
-    """How often the guard said something, by kind (`GuardEvent.kind`)."""
+    """Number of guard events by kind (`GuardEvent.kind`)."""
     guard_texts: list[str]
-    """What it said, the first times."""
+    """Texts of the first guard events."""
     energy: Energy | None
     """None if no energy ledger was recorded."""
     borne: LoadHistory | None
     """Loads on the bottles; None if it was not recorded."""
     damage_events: dict[str, int]
-    """How often a limit was passed, by limit."""
+    """Number of passed limits, by limit."""
     damage_texts: list[str]
-    """What was said of it, the first times."""
+    """Texts of the first passed limits."""
     alarms: AlarmFigures | None
     """None if events were not recorded."""
     commands: int
     refused: int
-    """Of the commands."""
+    """Number of refused commands."""
     occasions: int | None
     """On how many occasions: what a controller has no control of counts once until hands change, however long it goes
     on commanding it; None if events were not recorded.
@@ -138,7 +138,7 @@ class Summary:
 
 
 def write_summary(summary: Summary, folder: Path) -> Path:
-    """Writes summary.json into the folder; returns its path. Raises ConveyorError if it can't be written."""
+    """Write summary.json into the folder and return its path. Raise ConveyorError if it can't be written."""
     file = folder / FILE_NAME
     content = {**asdict(replace(summary, limit=None)), "real_time_factor": summary.real_time_factor}
     del content["limit"]

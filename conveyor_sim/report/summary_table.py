@@ -10,7 +10,7 @@ from conveyor_sim.report.summary import Summary
 
 
 def render(summary: Summary) -> Group:
-    """The summary for a terminal."""
+    """Return the summary for a terminal."""
     account = Table.grid(padding=(0, 2))
     for name, text in _account(summary):
         account.add_row(name, text)
@@ -65,7 +65,7 @@ def _account(summary: Summary) -> list[tuple[str, str]]:
 
 
 def _on_occasions(summary: Summary) -> str:
-    """Where fewer than the refusals: a controller goes on commanding what is in other hands."""
+    """Return the number of occasions if it differs: a controller without control authority repeats refused commands."""
     if summary.occasions in (None, summary.refused):
         return ""
     return f" on {summary.occasions} occasion{'s' * (summary.occasions != 1)}"

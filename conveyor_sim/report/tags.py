@@ -11,16 +11,16 @@ from rich.console import RenderableType
 from rich.table import Table
 
 from conveyor_sim.line.line import image_of
+from conveyor_sim.line.machines.weihenstephan import names_of
 from conveyor_sim.line.tag import MOST_COUNT, Tag
-from conveyor_sim.line.weihenstephan import names_of
 from conveyor_sim.scene import Scene
 
 NONE = "-"
-"""Of what a tag can't have: a rate it is designed for, texts of what is no enumeration, a name elsewhere."""
+"""Placeholder for an absent property: no nominal rate, no texts, no name in another standard."""
 
 
 class Row(NamedTuple):
-    """All that is known of a tag, as texts; none is empty."""
+    """Properties of a tag as texts; none is empty."""
 
     path: str
     """Its name below the path of the line in the plant (`where`)."""
@@ -48,7 +48,7 @@ def line_tags(scene: Scene) -> tuple[Tag, ...]:
 
 
 def tag_rows(scene: Scene) -> list[Row]:
-    """A row for each tag, in the order of the process image."""
+    """Return one row per tag, in the order of the process image."""
     return [_row(tag, scene.where) for tag in line_tags(scene)]
 
 
@@ -99,7 +99,7 @@ def _range(tag: Tag) -> str:
 
 
 def tag_csv(scene: Scene) -> str:
-    """A line for each tag, below one of heads."""
+    """Return one CSV line per tag, below a header."""
     text = io.StringIO(newline="")
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(Row._fields)

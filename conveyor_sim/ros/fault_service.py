@@ -9,7 +9,7 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.executors import Executor
 from rclpy.node import Node
 
-from conveyor_sim.line.inputs import FAULT, INJECT, Input
+from conveyor_sim.line.commands.inputs import FAULT, INJECT, Input
 from conveyor_sim.ros.services import settled
 from conveyor_sim.run.inbox import size_of
 from conveyor_sim.run.lockstep import Refused

@@ -15,9 +15,9 @@ from conveyor_msgs.srv import Lockstep
 from rclpy.node import Node
 from rclpy.service import Service
 
-from conveyor_sim.bag.qos import ANSWERS
+from conveyor_sim.bag.messages.qos import ANSWERS
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.line.inputs import CommandOutcome
+from conveyor_sim.line.commands.inputs import CommandOutcome
 from conveyor_sim.ros.clock import to_time
 from conveyor_sim.ros.direct import Aside, take_request
 from conveyor_sim.ros.publishers import ros_qos

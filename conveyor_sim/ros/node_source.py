@@ -15,12 +15,12 @@ from rclpy.context import Context
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
-from conveyor_sim.bag.topics import TOPICS
+from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.columns.events import Event
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.line.inputs import Input
-from conveyor_sim.protocols.source import MOST_WAITING, Control
-from conveyor_sim.protocols.view import DRAWN, HEARD, View, ViewError, decoded
+from conveyor_sim.line.commands.inputs import Input
+from conveyor_sim.protocols.tags.line_mirror import DRAWING_TOPICS, STATE_TOPICS, LineMirror, LineMirrorError, decoded
+from conveyor_sim.protocols.tags.tag_provider import MOST_WAITING, Control
 from conveyor_sim.ros.context import new_node, one_sentence, start_ros
 from conveyor_sim.ros.direct import Aside, WaitSet, take_message
 from conveyor_sim.ros.publishers import message_class, ros_qos
@@ -34,7 +34,7 @@ SILENCE = 5.0
 """Time without an answer after which the shown line is stale, s of wall time."""
 
 
-class NodeSource(View, AbstractContextManager["NodeSource"]):
+class NodeSource(LineMirror, AbstractContextManager["NodeSource"]):
     """Subscribes until close(). The node may start, end and restart meanwhile."""
 
     controls: frozenset[Control] = frozenset({"pause", "resume", "step", "reset"})
@@ -62,7 +62,7 @@ class NodeSource(View, AbstractContextManager["NodeSource"]):
                     callback_group=Aside(),
                     raw=True,
                 )
-                for name in (*HEARD, *(DRAWN if drawn else ()))
+                for name in (*STATE_TOPICS, *(DRAWING_TOPICS if drawn else ()))
             }
             self._alive_client = self._node.create_client(srv.GetSimulationState, "get_simulation_state")
             self._operate = self._node.create_client(srv.Operate, "operate")
@@ -182,7 +182,7 @@ class NodeSource(View, AbstractContextManager["NodeSource"]):
                 self._lose(self._why)
 
     def _take_all(self) -> bool:
-        """Take the messages that have come. Return True if there were any. Raise ViewError."""
+        """Take the messages that have come. Return True if there were any. Raise LineMirrorError."""
         came, strange = False, None
         for name, subscription in self._topics.items():
             taken = []
@@ -192,12 +192,12 @@ class NodeSource(View, AbstractContextManager["NodeSource"]):
                 came = True
                 self.pass_on(name, data)
                 decode = partial(decoded, name, data)
-                if name in DRAWN:
+                if name in DRAWING_TOPICS:
                     self.keep(name, decode)
                     continue
                 try:
                     self.take(name, decode())
-                except ViewError as error:
+                except LineMirrorError as error:
                     strange = error
         while self._refusals:
             self.add(self._refusals.popleft())

@@ -9,8 +9,8 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.executors import Executor
 from rclpy.node import Node
 
-from conveyor_sim.line.authority import PEOPLE
-from conveyor_sim.line.inputs import OPERATE, Input
+from conveyor_sim.line.commands.authority import PEOPLE
+from conveyor_sim.line.commands.inputs import OPERATE, Input
 from conveyor_sim.ros.services import settled
 from conveyor_sim.run.inbox import MESSAGE_BYTES, TOO_LARGE, size_of
 from conveyor_sim.run.lockstep import Refused

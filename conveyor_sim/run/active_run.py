@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.line.inputs import CommandOutcome
+from conveyor_sim.line.commands.inputs import CommandOutcome
 from conveyor_sim.run.inbox import Inbox
 from conveyor_sim.run.lockstep import Lockstep, Refused
 from conveyor_sim.run.reception import Reception

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from conveyor_sim.columns.image import Image
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.line.inputs import DECLARE, SET, CommandOutcome, Input
+from conveyor_sim.line.commands.inputs import DECLARE, SET, CommandOutcome, Input
 from conveyor_sim.support.printable import MOST, printable
 
 if TYPE_CHECKING:

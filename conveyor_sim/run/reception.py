@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from conveyor_sim.line.inputs import DISOWN, MODE, OWN, SET, CommandOutcome, Input, arrival
+from conveyor_sim.line.commands.inputs import DISOWN, MODE, OWN, SET, CommandOutcome, Input, arrival
 from conveyor_sim.run.inbox import Inbox, size_of
 from conveyor_sim.run.session import Session
 

@@ -15,7 +15,7 @@ from conveyor_sim.control.memory import restore, snapshot
 from conveyor_sim.control.recorded import Recorded
 from conveyor_sim.control.scan import ALARMS, ControlError, Controller, Inputs, declared_alarms
 from conveyor_sim.errors import CommandError, ConveyorError
-from conveyor_sim.line.inputs import DECLARE, CommandOutcome, Input
+from conveyor_sim.line.commands.inputs import DECLARE, CommandOutcome, Input
 from conveyor_sim.physics.state.checkpoint import read_checkpoint
 from conveyor_sim.run.alarm_changes import AlarmChanges
 from conveyor_sim.simulation import Simulation

@@ -9,8 +9,8 @@ from pathlib import Path
 from conveyor_sim.bag.outputs import Outputs, Sink
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.errors import SimulationError
-from conveyor_sim.line.commands import shown
-from conveyor_sim.line.inputs import CommandOutcome, Input
+from conveyor_sim.line.commands.inputs import CommandOutcome, Input
+from conveyor_sim.line.commands.refusal import shown
 from conveyor_sim.run.force_check import PeakWatch, achieved
 from conveyor_sim.run.stopped import keep_stopped
 from conveyor_sim.simulation import Simulation

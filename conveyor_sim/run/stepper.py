@@ -14,7 +14,7 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
-from conveyor_sim.line.inputs import DISOWN, OWN, SET, Input
+from conveyor_sim.line.commands.inputs import DISOWN, OWN, SET, Input
 from conveyor_sim.run.active_run import ActiveRun, Advance, OpenSession
 from conveyor_sim.run.calls import Calls
 from conveyor_sim.run.inbox import sizes_of

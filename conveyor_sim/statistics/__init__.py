@@ -1,1 +1,1 @@
-"""What runs show and what they can't: intervals, differences, warm-up, batch means, many comparisons. Arrays only."""
+"""Statistics of runs: confidence intervals, paired differences, warm-up, batch means, multiple comparisons."""

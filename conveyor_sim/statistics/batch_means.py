@@ -1,7 +1,7 @@
-"""Batch means: the interval of a mean from one long run, whose values depend on those just before.
+"""Batch means: confidence interval of a mean from one long run with autocorrelated values.
 
-The run is cut into batches so long that their means are as good as independent. They are taken for that when von
-Neumann's ratio does not say otherwise (Fishman 1978): batches are made twice as long until it passes.
+The run is cut into batches. Their length is doubled until von Neumann's ratio accepts the batch means as independent
+(Fishman 1978).
 """
 
 from __future__ import annotations
@@ -17,26 +17,27 @@ from scipy.special import ndtri
 from conveyor_sim.statistics.intervals import CONFIDENCE, Interval, mean_interval
 
 MOST, FEWEST = 64, 8
-"""Batches: with more, they are short for nothing; with fewer, neither test nor interval says much."""
+"""Numbers of batches: more make them needlessly short, fewer weaken both the test and the interval."""
 
 LEVEL = 0.1
-"""Chance to take independent batches for dependent ones: not small, as the other error is the costly one."""
+"""Significance level of the test: large, because treating dependent batches as independent is the costlier error."""
 
 
 @dataclass(frozen=True)
 class BatchMeans:
-    """The mean of one long run."""
+    """Mean of one long run."""
 
     interval: Interval
-    """Of as many values as there are batches."""
+    """Interval from one value per batch."""
     size: int
-    """Values a batch."""
+    """Values per batch."""
 
 
 def batch_means(series: Sequence[float] | NDArray[np.float64], confidence: float = CONFIDENCE) -> BatchMeans | None:
-    """Interval of the mean of a series (n,) without its warm-up; None: too short, its batches depend on each other.
+    """Return the interval of the mean of a series (n,) without its warm-up.
 
-    What does not fill a batch is left out at the start.
+    Values at the start that do not fill a batch are left out. Return None if the series is too short, so that its
+    batches depend on each other.
     """
     values = np.asarray(series, dtype=np.float64)
     batches = MOST
@@ -51,10 +52,11 @@ def batch_means(series: Sequence[float] | NDArray[np.float64], confidence: float
 
 
 def independent(values: NDArray[np.float64]) -> bool:
-    """Whether values (n,) pass for independent: von Neumann's ratio (1941), one-sided at LEVEL.
+    """Return True if values (n,) may be independent: von Neumann's ratio (1941), one-sided at LEVEL.
 
-    The squares of differences of neighbours are on average twice those from the mean, and less where each is like the
-    one before. 1 - half their ratio is nearly normal with a variance of (n - 2) / (n^2 - 1).
+    For independent values, the squared differences of neighbours average twice the squared deviations from the mean.
+    With positive autocorrelation they average less. 1 - half their ratio is nearly normal with variance
+    (n - 2) / (n^2 - 1).
     """
     count, about = len(values), values - values.mean()
     squares = float(np.square(about).sum())

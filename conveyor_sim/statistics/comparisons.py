@@ -1,7 +1,7 @@
-"""Many comparisons at once: of twenty pairs that are alike, one differs at 95 % by chance, if nothing corrects it.
+"""Multiple comparisons: without correction, one of twenty equal pairs differs at 95 % confidence by chance.
 
-Points that ran with the same seeds are compared in pairs of runs: intervals by Bonferroni, which hold all together with
-the stated confidence, and the verdict by Holm (1979), which finds more and errs no more often.
+Points that ran with the same seeds are compared in pairs of runs. Bonferroni intervals hold simultaneously with the
+stated confidence. The verdict is Holm's (1979), which has more power at the same error rate.
 """
 
 from __future__ import annotations
@@ -19,35 +19,35 @@ from conveyor_sim.statistics.paired import paired_difference, paired_probability
 
 @dataclass(frozen=True)
 class Difference:
-    """One point less another."""
+    """Difference of two points: the first minus the second."""
 
     first: int
     second: int
-    """Places in the order given."""
+    """Positions of both points in the argument."""
     interval: Interval
-    """All intervals of a comparison hold together with its confidence."""
+    """Interval; all intervals of a comparison hold simultaneously with its confidence."""
     probability: float
-    """Chance to see such a difference somewhere among all, were there none (p-value, corrected)."""
+    """P-value, corrected for multiple comparisons."""
     told: bool
-    """Whether they can be told apart."""
+    """True if the difference is significant."""
 
 
 def bonferroni(level: float, count: int) -> float:
-    """Chance to err that each of so many verdicts may have, for a chance of `level` that any of them errs."""
+    """Return the error probability allowed for each of `count` verdicts, so that any errs with at most `level`."""
     return level / count
 
 
 def holm(probabilities: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]:
-    """P-values (n,) corrected for being so many: whichever are below a level, all are right with 1 - that level."""
-    given = np.asarray(probabilities, dtype=np.float64)
-    order = np.argsort(given, kind="stable")
-    corrected = np.empty_like(given)
-    corrected[order] = np.minimum(np.maximum.accumulate(given[order] * (len(given) - np.arange(len(given)))), 1.0)
+    """Return p-values (n,) corrected by Holm: those below a level are all correct with probability 1 - level."""
+    raw = np.asarray(probabilities, dtype=np.float64)
+    order = np.argsort(raw, kind="stable")
+    corrected = np.empty_like(raw)
+    corrected[order] = np.minimum(np.maximum.accumulate(raw[order] * (len(raw) - np.arange(len(raw)))), 1.0)
     return corrected
 
 
 def compare_paired(points: Sequence[NDArray[np.float64]], confidence: float = CONFIDENCE) -> list[Difference]:
-    """Every point (n,) with every later one, by seed in the same order. Raises ValueError for unequal lengths."""
+    """Compare each point (n,), by seed, with each later one. Raise ValueError for unequal lengths."""
     pairs = list(combinations(range(len(points)), 2))
     each = 1.0 - bonferroni(1.0 - confidence, max(1, len(pairs)))
     chances = holm([paired_probability(points[one], points[other]) for one, other in pairs])
@@ -58,7 +58,7 @@ def compare_paired(points: Sequence[NDArray[np.float64]], confidence: float = CO
 
 
 def best(points: Sequence[NDArray[np.float64]], highest: bool = True, confidence: float = CONFIDENCE) -> list[int]:
-    """Places of the point with the best mean, first, and of all that can't be told from it, in their order."""
+    """Return the positions of the point with the best mean, then of all points not significantly different from it."""
     means = np.array([np.nanmean(values) for values in points])
     top = int(np.argmax(means) if highest else np.argmin(means))
     told = [pair for pair in compare_paired(points, confidence) if pair.told and top in (pair.first, pair.second)]

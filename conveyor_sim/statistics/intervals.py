@@ -11,47 +11,47 @@ from numpy.typing import NDArray
 from scipy.special import stdtr, stdtrit
 
 CONFIDENCE = 0.95
-"""Of intervals, where no other is asked for."""
+"""Default confidence of intervals."""
 
 
 @dataclass(frozen=True)
 class Interval:
-    """Where a true mean lies, with a stated confidence."""
+    """Confidence interval of a mean."""
 
     mean: float
     half_width: float
-    """Half the length of the interval; infinite with a single value."""
+    """Half the length of the interval; infinite for a single value."""
     values: int
-    """How many independent values it rests on."""
+    """Number of independent values."""
 
     @property
     def low(self) -> float:
-        """Its lower end."""
+        """Return the lower end."""
         return self.mean - self.half_width
 
     @property
     def high(self) -> float:
-        """Its upper end."""
+        """Return the upper end."""
         return self.mean + self.half_width
 
     @property
     def excludes_zero(self) -> bool:
-        """Whether the mean can be told from none."""
+        """Return True if the mean differs significantly from zero."""
         return self.low > 0.0 or self.high < 0.0
 
 
 def t_quantile(freedom: float, confidence: float) -> float:
-    """Of Student's distribution: between its minus and its plus lies a share `confidence` (Student 1908)."""
+    """Return t so that Student's distribution has probability `confidence` between -t and t (Student 1908)."""
     return float(stdtrit(freedom, 0.5 * (1.0 + confidence)))
 
 
 def t_probability(t: float, freedom: float) -> float:
-    """Chance of a |t| as large as this or larger where the true mean is none (two-sided p-value)."""
+    """Return the two-sided p-value of `t`: the probability of |t| or more if the true mean is zero."""
     return 2.0 * float(stdtr(freedom, -abs(t)))
 
 
 def mean_and_variance(values: NDArray[np.float64]) -> tuple[float, float]:
-    """Mean of those (n,) that are finite, and the variance of that mean: NaN of none, infinite of one."""
+    """Return the mean of the finite values of (n,), and its variance: NaN without values, infinite for one value."""
     values = values[np.isfinite(values)]
     if not len(values):
         return math.nan, math.nan
@@ -59,9 +59,9 @@ def mean_and_variance(values: NDArray[np.float64]) -> tuple[float, float]:
 
 
 def mean_interval(values: Sequence[float] | NDArray[np.float64], confidence: float = CONFIDENCE) -> Interval:
-    """Of the mean of independent values (n,), such as one figure of n runs with different seeds.
+    """Return the interval of the mean of independent values (n,), such as one metric of n runs with different seeds.
 
-    Values that are not finite are left out. Exact for values that are normal, close for means of long runs.
+    Values that are not finite are left out. The interval is exact for normal values, close for means of long runs.
     """
     known = np.asarray(values, dtype=np.float64)
     known = known[np.isfinite(known)]
@@ -74,11 +74,11 @@ def mean_interval(values: Sequence[float] | NDArray[np.float64], confidence: flo
 def ratio_interval(
     values: NDArray[np.float64], base: NDArray[np.float64], confidence: float = CONFIDENCE
 ) -> tuple[float, float] | None:
-    """Low and high of mean of `values` (n,) / mean of `base` (m,), independent of each other.
+    """Return both ends of the interval of mean(`values`) / mean(`base`) for independent (n,) and (m,).
 
-    All ratios r for which values - r base can't be told from 0 (Fieller 1954), with the degrees of freedom of Welch
-    (1947) at the ratio that was found. None where the mean of the base may as well be 0, or there are less than two of
-    either, or any is not finite.
+    The interval holds all ratios r for which values - r base does not differ significantly from 0 (Fieller 1954), with
+    the degrees of freedom of Welch (1947) at the estimated ratio. Return None if the mean of the base may be 0, if
+    either has fewer than two values, or if a value is not finite.
     """
     if min(len(values), len(base)) < 2 or not np.isfinite([*values, *base]).all():
         return None

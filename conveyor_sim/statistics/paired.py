@@ -1,7 +1,7 @@
-"""Paired differences: what one point of a study has over another, seed by seed.
+"""Paired differences between two points of a study, seed by seed.
 
 Both points run with the same seeds (common random numbers), so a machine that fails early does so in both runs of a
-pair. What the failures do to both is gone from the difference, which needs fewer runs than two means would.
+pair. The common effect of failures cancels in the difference, which needs fewer runs than two independent means.
 """
 
 from __future__ import annotations
@@ -18,21 +18,21 @@ Values = Sequence[float] | NDArray[np.float64]
 
 
 def differences(first: Values, second: Values) -> NDArray[np.float64]:
-    """First less second (n,), of pairs of which both are finite. Raises ValueError for unequal lengths."""
+    """Return first - second (n,) for pairs of finite values. Raise ValueError for unequal lengths."""
     one, other = np.asarray(first, dtype=np.float64), np.asarray(second, dtype=np.float64)
     if one.shape != other.shape:
         raise ValueError(f"{one.size} and {other.size} values given, expected pairs: as many of one as of the other")
-    found: NDArray[np.float64] = one - other
-    return found[np.isfinite(found)]
+    apart: NDArray[np.float64] = one - other
+    return apart[np.isfinite(apart)]
 
 
 def paired_difference(first: Values, second: Values, confidence: float = CONFIDENCE) -> Interval:
-    """Mean of first less second, both (n,) by seed in the same order. Raises ValueError for unequal lengths."""
+    """Return the interval of mean(first - second), both (n,) by seed. Raise ValueError for unequal lengths."""
     return mean_interval(differences(first, second), confidence)
 
 
 def paired_probability(first: Values, second: Values) -> float:
-    """Chance of a mean difference as large as this, were there none (paired t-test); 1 with less than two pairs."""
+    """Return the p-value of the mean difference (paired t-test); 1 for fewer than two pairs."""
     interval = mean_interval(apart := differences(first, second), CONFIDENCE)
     if interval.values < 2:
         return 1.0
@@ -43,10 +43,10 @@ def paired_probability(first: Values, second: Values) -> float:
 
 
 def pairing_gain(first: Values, second: Values) -> float:
-    """By how many times more runs the same interval would have needed with seeds of their own for both points.
+    """Return the factor of runs that common seeds save for the same interval.
 
-    Variance of the difference of independent runs over that of pairs: above 1 where the common seeds help. NaN with
-    less than two pairs, infinite where all pairs differ by the same.
+    The factor is the variance of the difference of independent runs over that of pairs: above 1 where common seeds
+    help, NaN for fewer than two pairs, infinite if all pairs have the same difference.
     """
     one, other = np.asarray(first, dtype=np.float64), np.asarray(second, dtype=np.float64)
     both = np.isfinite(one - other)

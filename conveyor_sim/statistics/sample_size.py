@@ -1,4 +1,4 @@
-"""How many runs it takes to know a mean well enough, or to tell a difference from none."""
+"""Number of runs for an interval of a given width, or for a significant difference."""
 
 from __future__ import annotations
 
@@ -8,23 +8,24 @@ from collections.abc import Callable
 from conveyor_sim.statistics.intervals import CONFIDENCE, Interval, t_quantile
 
 POWER = 0.8
-"""Chance that as many runs as `runs_to_tell` says do tell a difference that is as large as it seems."""
+"""Statistical power: probability that the runs of `runs_to_tell` show a difference of the estimated size."""
 
 MOST = 10**6
-"""Runs: beyond this, nobody will make them."""
+"""Largest number of runs that is considered feasible."""
 
 
 def runs_for(interval: Interval, half_width: float, confidence: float = CONFIDENCE) -> int | None:
-    """Runs for an interval of a half-width, from one of `confidence` that some runs gave; None: more than MOST.
+    """Return the number of runs for an interval of `half_width`, or None if it exceeds MOST.
 
-    As the values scatter in those runs (Law 2015, 9.4.1). Not fewer than there are.
+    The scatter is estimated from `interval`, which has confidence `confidence` (Law 2015, 9.4.1). The result is at
+    least the present number of runs.
     """
     deviation = _deviation(interval, confidence)
     return _least(interval, lambda runs: t_quantile(runs - 1, confidence) * deviation / math.sqrt(runs) <= half_width)
 
 
 def runs_to_tell(difference: Interval, confidence: float = CONFIDENCE) -> int | None:
-    """Pairs of runs that tell a difference of this size from none, with a chance of POWER; None: more than MOST."""
+    """Return the pairs of runs that show a difference of this size with probability POWER; None: more than MOST."""
     deviation = _deviation(difference, confidence)
 
     def enough(runs: int) -> bool:
@@ -35,14 +36,14 @@ def runs_to_tell(difference: Interval, confidence: float = CONFIDENCE) -> int | 
 
 
 def _deviation(interval: Interval, confidence: float) -> float:
-    """Standard deviation of the values that an interval was made of."""
+    """Return the standard deviation of the values behind an interval."""
     if interval.values < 2:
         return math.inf
     return interval.half_width * math.sqrt(interval.values) / t_quantile(interval.values - 1, confidence)
 
 
 def _least(interval: Interval, enough: Callable[[int], bool]) -> int | None:
-    """The least number of runs that are enough, which more then are, too: by doubling, then halving."""
+    """Return the least sufficient number of runs, by doubling, then bisection."""
     low = high = max(2, interval.values)
     if enough(low):
         return low

@@ -1,12 +1,12 @@
-"""Warm-up removal: how much of the start of a run says more of how it was started than of the line.
+"""Warm-up removal: length of the initial transient of a run.
 
-Rule MSER-5 (White 1997; White, Cobb and Spratt 2000): means of five values after the other; of these leave out the
-first d for which the standard error of the mean of the rest is least. What is left out at first lowers the error, as it
-is off; what is left out beyond that raises it, as less is left.
+Rule MSER-5 (White 1997; White, Cobb and Spratt 2000): average five successive values at a time. Of these means, leave
+out the first d that minimise the standard error of the mean of the rest. Removing transient values lowers the error;
+removing more raises it, because fewer values remain.
 
-Where the least error is in the second half, the rule says that the series is too short. In a steady one whose values
-depend on those before, that happens by chance: a few of the last ones may lie close together. So the best cut of the
-first half stands unless it is its last one, or the mean behind the other one differs.
+If the minimum lies in the second half, the rule calls the series too short. In a steady autocorrelated series this
+happens by chance, if a few of the last values lie close together. Therefore the best cut of the first half is used
+unless it is the last one of that half, or the mean after the other cut differs.
 """
 
 from __future__ import annotations
@@ -18,23 +18,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 BATCH = 5
-"""Values a mean."""
+"""Values per mean."""
 
 LEAST = 10
-"""Means of BATCH values that a series must have for the rule."""
+"""Fewest means of BATCH values for the rule."""
 
 
 SURE = 3.0
-"""Standard errors between two means that are taken for different."""
+"""Standard errors between two means that count as different."""
 
 
 def warm_up(series: Sequence[float] | NDArray[np.float64], batch: int = BATCH) -> int | None:
-    """How many values of a series (n,), at even times, to leave out; None: it is too short to say.
+    """Return the number of values to leave out of a series (n,) with even time steps; None: the series is too short.
 
-    That is where the mean still changes in the second half, so that the run may never have warmed up, or with less than
-    LEAST means, or where one is not finite. Of runs with many seeds, (runs, n), the rule is put to their mean series.
-    To put it to each run by itself would be wrong for what is skewed, such as queues: it leaves out the start of those
-    that happen to get long.
+    A series is too short if its mean still changes in the second half, so that the run may not have warmed up. It is
+    also too short with fewer than LEAST means, or with a value that is not finite. For runs with several seeds,
+    (runs, n), the rule is applied to their mean series. Applied to each run it would be biased for skewed quantities
+    such as queues: it would leave out the start of queues that happen to become long.
     """
     values = np.asarray(series, dtype=np.float64)
     if values.ndim == 2:
@@ -43,13 +43,13 @@ def warm_up(series: Sequence[float] | NDArray[np.float64], batch: int = BATCH) -
     count = len(means)
     if count < LEAST or not np.isfinite(means).all():
         return None
-    left = count - np.arange(count)  # by how many are left out
+    left = count - np.arange(count)  # by number of removed means
     about = means - means.mean()
     rest, squares = (np.cumsum(part[::-1])[::-1] / left for part in (about, np.square(about)))
-    # The last ones are left out of the search: the error of two or three values may be anything.
+    # The search excludes the last means: the error of two or three values is unreliable.
     error = (np.maximum(squares - np.square(rest), 0.0) / left)[:-BATCH]
     first, best = int(np.argmin(error[: count // 2 + 1])), int(np.argmin(error))
-    of_best = math.sqrt(error[first] * left[first] / left[best])  # of so few, as they scatter behind the first one
+    of_best = math.sqrt(error[first] * left[first] / left[best])  # from the scatter behind `first`
     if first == count // 2 or abs(rest[first] - rest[best]) > SURE * of_best:
         return None
     return first * batch

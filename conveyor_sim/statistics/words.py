@@ -1,4 +1,4 @@
-"""What can be said of a mean or a difference, and what can't, in a sentence."""
+"""Sentences about means and differences, with their significance."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from conveyor_sim.statistics.intervals import CONFIDENCE, Interval
 from conveyor_sim.statistics.sample_size import runs_to_tell
 
 ROUNDING = 1e-12
-"""Of a mean: a half-width below it comes of how numbers are rounded, not of how runs scatter."""
+"""Relative half-width below which the scatter comes from rounding of numbers."""
 
 
 def plus_minus(interval: Interval, unit: str = "", sign: bool = False) -> str:
-    """`73.2 ± 2.1 %`: the half-width to two digits, the mean as far. sign: show that of what is positive, too."""
+    """Return text such as `73.2 ± 2.1 %`, with two digits of the half-width. sign: show a plus sign as well."""
     after = f" {unit}" if unit else ""
     flag = "+" if sign else ""
     if not math.isfinite(interval.mean):
@@ -27,23 +27,23 @@ def plus_minus(interval: Interval, unit: str = "", sign: bool = False) -> str:
 
 
 def told(difference: Interval, first: str, second: str, unit: str = "", confidence: float = CONFIDENCE) -> str:
-    """Whether first less second, over seeds, can be told from none; if not, how many seeds would tell it."""
+    """Return a sentence: is first - second, over seeds, significant? If not, how many seeds would show it?"""
     what = f"the difference of {first} and {second}, {plus_minus(difference, unit, sign=True)}"
     seeds = f"{difference.values} seed{'' if difference.values == 1 else 's'}"
     if difference.excludes_zero:
         more, less = (first, second) if difference.mean > 0.0 else (second, first)
-        return f"{what}, is told from none with {seeds}: {more} has more than {less}"
+        return f"{what}, is significant with {seeds}: {more} is higher than {less}"
     if difference.values > 1 and difference.mean == 0.0 == difference.half_width:
-        return f"{first} and {second} are the same with each of {seeds}"
+        return f"{first} and {second} are equal with each of {seeds}"
     needed = runs_to_tell(difference, confidence)
     if needed is None:
-        rest = "no number of seeds that can be run would tell it, if it is as it seems"
+        rest = "no feasible number of seeds would show a difference of this size"
     else:
-        rest = f"about {rounded(needed)} would, if it is as large as it seems"
-    return f"{what}, can't be told from none with {seeds}; {rest}"
+        rest = f"about {rounded(needed)} seeds would show a difference of this size"
+    return f"{what}, is not significant with {seeds}; {rest}"
 
 
 def rounded(runs: int) -> int:
-    """Up to two digits: the rest would claim too much."""
+    """Return `runs` rounded up to two digits."""
     step = int(10 ** max(0, len(str(runs)) - 2))
     return -(-runs // step) * step

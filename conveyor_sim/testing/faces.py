@@ -8,16 +8,16 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
-from conveyor_sim.line.inputs import WriterKind
-from conveyor_sim.protocols.face import Face, Stamps
+from conveyor_sim.line.commands.inputs import WriterKind
+from conveyor_sim.protocols.hosting.server_thread import ServerThread
 from conveyor_sim.protocols.modbus.address_map import modbus_map
-from conveyor_sim.protocols.server_thread import ServerThread
+from conveyor_sim.protocols.server.interface import ProtocolServer, Stamps
 from conveyor_sim.support.modbus_rows import Row
 
 if TYPE_CHECKING:
     from conveyor_sim.protocols.modbus.server import ModbusServer
     from conveyor_sim.protocols.opcua.server import OpcUaServer
-    from conveyor_sim.protocols.users import Role
+    from conveyor_sim.protocols.server.users import Role
     from conveyor_sim.testing.scenario import Scenario
 
 MODBUS_MISSING = "pymodbus is not installed: pip install 'conveyor_sim[scada]'"
@@ -29,9 +29,9 @@ class _Servers:
 
     def __init__(self) -> None:
         self._thread: ServerThread | None = None
-        self._servers: list[Face] = []
+        self._servers: list[ProtocolServer] = []
 
-    def _start(self, server: Face) -> None:
+    def _start(self, server: ProtocolServer) -> None:
         self._thread = self._thread or ServerThread()
         self._thread.run(server.start())
         self._servers.append(server)
@@ -55,7 +55,7 @@ class ModbusFaces(_Servers, AbstractContextManager["ModbusFaces"]):
 
         role: role of clients that write, "controller" or "operator"; None: read only. rows: map of addresses; None:
         that of `conveyor-sim tags --modbus`. Writes of clients act at the next tick that the test makes.
-        Raises FaceError if there is no port, ImportError without pymodbus.
+        Raises ServerError if there is no port, ImportError without pymodbus.
         """
         from conveyor_sim.protocols.modbus.server import ModbusServer
 
@@ -82,10 +82,10 @@ class OpcUaFaces(_Servers, AbstractContextManager["OpcUaFaces"]):
 
         users: role and password of each user who may do more than read, by name. stamps: meaning of the times of
         values. Writes of clients act at the next tick that the test makes. The certificate is made for the test.
-        Raises FaceError if there is no port, ImportError without asyncua.
+        Raises ServerError if there is no port, ImportError without asyncua.
         """
         from conveyor_sim.protocols.opcua.server import OpcUaServer
-        from conveyor_sim.protocols.users import new_user
+        from conveyor_sim.protocols.server.users import new_user
 
         known = {name: new_user(role, password) for name, (role, password) in (users or {}).items()}
         server = OpcUaServer(line.source(), known, stamps=stamps, certificates=Path(self._folder.name) / "own")

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from conveyor_sim.errors import CommandError
-from conveyor_sim.line.authority import MODES
-from conveyor_sim.line.inputs import FORCE, MODE, SET, UNFORCE, Input, WriterKind
+from conveyor_sim.line.commands.authority import MODES
+from conveyor_sim.line.commands.inputs import FORCE, MODE, SET, UNFORCE, Input, WriterKind
 
 NUMBERS = {text.lower(): number for number, text in MODES.items()}
 """Numbers of the modes, by name."""

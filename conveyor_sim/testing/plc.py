@@ -1,6 +1,6 @@
 """`AttachedPlc`: a soft PLC as the controller of a line under test, and a client of a server of the test.
 
-It runs in lockstep by two tags (protocols/handshake.py), so the speed of the PLC does not change the bits of the test.
+It runs in lockstep by two tags (protocols/tags/handshake.py), so its speed does not change the bits of the test.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from conveyor_sim.control.scan import ControlError, Inputs
-from conveyor_sim.line.inputs import SET
-from conveyor_sim.protocols.face import Face
-from conveyor_sim.protocols.handshake import TARGET, HandshakeSource
+from conveyor_sim.line.commands.inputs import SET
+from conveyor_sim.protocols.hosting.server_thread import ServerThread
 from conveyor_sim.protocols.modbus.address_map import modbus_map
-from conveyor_sim.protocols.server_thread import ServerThread
-from conveyor_sim.protocols.source import TagSource
+from conveyor_sim.protocols.server.interface import ProtocolServer
+from conveyor_sim.protocols.tags.handshake import TARGET, HandshakeTagProvider
+from conveyor_sim.protocols.tags.tag_provider import TagProvider
 from conveyor_sim.run.alarm_changes import AlarmChanges
 from conveyor_sim.run.scan_loop import AttachedController
 from conveyor_sim.simulation import Simulation
@@ -43,7 +43,7 @@ class AttachedPlc(AttachedController):
     def __init__(
         self,
         simulation: Simulation,
-        make: Callable[[TagSource, Path], Face],
+        make: Callable[[TagProvider, Path], ProtocolServer],
         command: Sequence[str],
         environment: Mapping[str, str],
         patience: float,
@@ -54,7 +54,7 @@ class AttachedPlc(AttachedController):
         PLC is started elsewhere. environment: further environment variables of the PLC. patience: longest time for each
         scan, s of wall time.
 
-        Raises FaceError if the server can't start, OSError if the command can't be run.
+        Raises ServerError if the server can't start, OSError if the command can't be run.
         """
         self.writer = "plc"
         """Writer of its commands: the client that wrote last."""
@@ -62,7 +62,7 @@ class AttachedPlc(AttachedController):
         """Source of its commands: the protocol of that client."""
         self._simulation = simulation
         self._patience = patience
-        self._tags = HandshakeSource(simulation)
+        self._tags = HandshakeTagProvider(simulation)
         self._process: Process | None = None
         self._shown = simulation.tick
         with ExitStack() as stack:
@@ -116,7 +116,7 @@ class AttachedPlc(AttachedController):
             raise ControlError(text)
 
 
-def modbus(rows: Sequence[Row] | None, port: int) -> Callable[[TagSource, Path], Face]:
+def modbus(rows: Sequence[Row] | None, port: int) -> Callable[[TagProvider, Path], ProtocolServer]:
     """Return a function that makes the server of a Modbus client. Raise ImportError without pymodbus."""
     from conveyor_sim.protocols.modbus.server import ModbusServer
 
@@ -125,10 +125,10 @@ def modbus(rows: Sequence[Row] | None, port: int) -> Callable[[TagSource, Path],
     )
 
 
-def opcua(password: str, port: int) -> Callable[[TagSource, Path], Face]:
+def opcua(password: str, port: int) -> Callable[[TagProvider, Path], ProtocolServer]:
     """Return a function that makes the server of an OPC UA client. Raise ImportError without asyncua."""
     from conveyor_sim.protocols.opcua.server import OpcUaServer
-    from conveyor_sim.protocols.users import new_user
+    from conveyor_sim.protocols.server.users import new_user
 
     users = {USER: new_user("controller", password)}
     return lambda source, folder: OpcUaServer(source, users, port=port, certificates=folder / "certificates")

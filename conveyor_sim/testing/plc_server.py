@@ -17,9 +17,9 @@ from conveyor_sim.line.process_image import ProcessImage
 from conveyor_sim.protocols.attach.links import plc_link
 from conveyor_sim.protocols.attach.plc_link import PlcLinkError, read_answer
 from conveyor_sim.protocols.attach.tag_map import TagMapError, read_tag_map
-from conveyor_sim.protocols.handshake import TARGET, TICK
-from conveyor_sim.protocols.server_thread import ServerThread
-from conveyor_sim.protocols.source import PLC
+from conveyor_sim.protocols.hosting.server_thread import ServerThread
+from conveyor_sim.protocols.tags.handshake import TARGET, TICK
+from conveyor_sim.protocols.tags.tag_provider import PLC
 from conveyor_sim.run.alarm_changes import AlarmChanges
 from conveyor_sim.run.scan_loop import AttachedController
 

@@ -17,9 +17,9 @@ from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.control.scan import ALARMS, ControlError, Controller
 from conveyor_sim.errors import CommandError, SimulationError
-from conveyor_sim.line.inputs import DISOWN, FAULT, INJECT, SET, Input
+from conveyor_sim.line.commands.inputs import DISOWN, FAULT, INJECT, SET, Input
 from conveyor_sim.line.run_state import ENDED, RUNNING, STOPPED, RunState
-from conveyor_sim.protocols.source import FACES, TickSource
+from conveyor_sim.protocols.tags.tag_provider import SCADA_SOURCES, SteppedTagProvider
 from conveyor_sim.run.scan_loop import AttachedController, LocalController, ScanLoop
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
@@ -97,7 +97,7 @@ class Scenario(AbstractContextManager["Scenario"]):
         self._read_by_controller: dict[str, None] = {}
         self._alarms: dict[str, float] = {}
         self._standing: list[Assertion] = []
-        self._sources: list[TickSource] = []
+        self._sources: list[SteppedTagProvider] = []
         self._signals: dict[str, float] = {}
         self._stopped = False  # True once the guard stopped the run
         self._look()
@@ -204,8 +204,8 @@ class Scenario(AbstractContextManager["Scenario"]):
         it is started elsewhere. port: 0 for any free port. rows: map of addresses; None: that of `conveyor-sim tags
         --modbus`. patience: longest time for each scan, s of wall time.
 
-        Raises ControlError if the PLC does not let the line go on, which every later tick may raise as well; FaceError,
-        OSError as `AttachedPlc`; ImportError without pymodbus.
+        Raises ControlError if the PLC does not let the line go on, which every later tick may raise as well;
+        ServerError, OSError as `AttachedPlc`; ImportError without pymodbus.
         """
         make = plc.modbus(rows, port)
         self._attach(lambda: plc.AttachedPlc(self.simulation, make, command, {}, patience))
@@ -245,12 +245,12 @@ class Scenario(AbstractContextManager["Scenario"]):
         image = self.simulation.process_image
         self._attach(lambda: ServedPlc(image, url, Path(tags), user, password, patience))
 
-    def source(self) -> TickSource:
+    def source(self) -> SteppedTagProvider:
         """Return the line as a source for a protocol server. Inputs of clients are applied at the next tick.
 
         A refused input is a command result and an event, and fails no test.
         """
-        self._sources.append(TickSource(self.simulation))
+        self._sources.append(SteppedTagProvider(self.simulation))
         return self._sources[-1]
 
     def command(self, name: str, value: float) -> None:
@@ -365,7 +365,7 @@ class Scenario(AbstractContextManager["Scenario"]):
         for outcome in outcomes:
             if outcome.accepted:
                 self.history.take(outcome, outcome.source == TEST)
-            elif outcome.source in FACES and not self._loop.wrote(outcome):
+            elif outcome.source in SCADA_SOURCES and not self._loop.wrote(outcome):
                 continue
             elif not (outcome.without_control and outcome.input.writer_kind == "controller"):
                 refused.append(outcome.reason)

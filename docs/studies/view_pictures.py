@@ -20,9 +20,9 @@ from PIL import Image, ImageDraw
 from playwright.sync_api import sync_playwright
 
 from conveyor_sim.page.one_file import Failure, write_page
-from conveyor_sim.protocols.scene_messages import Task
-from conveyor_sim.protocols.scene_source import SceneSource
-from conveyor_sim.protocols.users import keep_user, new_user
+from conveyor_sim.protocols.server.users import keep_user, new_user
+from conveyor_sim.protocols.tags.scene_messages import SceneTask
+from conveyor_sim.protocols.tags.scene_provider import SceneTagProvider
 from conveyor_sim.run.runner import run_scene
 from conveyor_sim.scene import load_scene
 from conveyor_sim.support.resources import scene_path
@@ -182,7 +182,10 @@ def live(studio: Studio) -> None:
     """A line that runs, on which an operator has put a belt into manual and slowed it down."""
     keep_user(studio.folder / "users", "jo", new_user("operator", PASSWORD))
     scene = load_scene(LINE, {"duration": 3600.0})
-    with SceneSource(Task(scene, None, 0, 1.0, 1), lambda text: None) as source, studio.opened((1280, 720)) as page:
+    with (
+        SceneTagProvider(SceneTask(scene, None, 0, 1.0, 1), lambda text: None) as source,
+        studio.opened((1280, 720)) as page,
+    ):
         source.wait_for_line()
         served = Live(studio.folder, source)
         served.serve()

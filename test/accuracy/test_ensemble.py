@@ -12,6 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from facts import stating
 from scenes import RADIUS, base, belt, bottle, contact, scene, segment
 
 import conveyor_sim
@@ -286,7 +287,7 @@ def test_only_what_is_open_is_run_again(tmp_path: Path) -> None:
 
 
 def test_the_reference_must_run(tmp_path: Path) -> None:
-    with pytest.raises(ConveyorError, match="the reference, semi_implicit_euler 10000001, failed with seed 0"):
+    with pytest.raises(ConveyorError, match=stating("reference", "semi_implicit_euler 10000001", "failed", "seed 0")):
         run_until_decided(filling(), [FINE], IMPOSSIBLE, 0.1, 1.0, tmp_path, silent, 1)
 
 

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from bag.hand_made import HEADER, bottles, contacts
 
-from conveyor_sim.bag import messages
 from conveyor_sim.bag.compare import Difference, first_difference, outcome_difference
-from conveyor_sim.bag.messages import Outcome
-from conveyor_sim.bag.topics import TOPICS
-from conveyor_sim.bag.typestore import typestore
+from conveyor_sim.bag.messages import encode
+from conveyor_sim.bag.messages.encode import Outcome
+from conveyor_sim.bag.messages.topics import TOPICS
+from conveyor_sim.bag.messages.typestore import typestore
 from conveyor_sim.columns.bottles import BottleColumns, ContactColumns
-from conveyor_sim.line.inputs import Input
+from conveyor_sim.line.commands.inputs import Input
 
 
 class Line:
@@ -26,7 +26,7 @@ class Line:
     signal_names = ("belts/one/speed",)
 
 
-def of_bottles(columns: BottleColumns, header: messages.Header = HEADER) -> Any:
+def of_bottles(columns: BottleColumns, header: encode.Header = HEADER) -> Any:
     """A decoded Bottles."""
     return typestore().deserialize_cdr(TOPICS["bottles"].pack(columns, header), TOPICS["bottles"].type)
 

@@ -12,14 +12,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from conveyor_sim.bag import own_source as module
 from conveyor_sim.bag.any_source import AnySource
-from conveyor_sim.bag.cdr import tick_of
-from conveyor_sim.bag.messages import Header, commands_message
+from conveyor_sim.bag.messages.cdr import tick_of
+from conveyor_sim.bag.messages.encode import Header, commands_message
+from conveyor_sim.bag.messages.topics import OUTPUTS
 from conveyor_sim.bag.own_source import OwnSource, own_source
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recorder import Recorder
-from conveyor_sim.bag.topics import OUTPUTS
 
 SECOND = 1_000_000_000
 
@@ -96,13 +95,10 @@ def test_what_belongs_to_an_earlier_time_comes_earlier(tmp_path: Path) -> None:
     assert messages == list(other.messages(topics, None, None))
 
 
-def test_a_recording_longer_than_what_is_kept_is_read_to_its_end(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_recording_of_several_chunks_is_read_to_its_end(tmp_path: Path) -> None:
     with Recorder(tmp_path / "long") as recorder:
         for number in range(40):
             recorder.write("signals", bytes(100_000) + bytes([number]), 1 + number)
-    monkeypatch.setattr(module, "KEPT", 1_500_000)
     own = own_source(file_of(tmp_path / "long"))
     assert own is not None
     for _ in range(2):

@@ -20,12 +20,12 @@ from mcap.writer import CompressionType, IndexType, Writer
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as StockWriter
 
-from conveyor_sim.bag.mcap_file import McapFile, Schema
+from conveyor_sim.bag.mcap.file import McapFile, Schema
+from conveyor_sim.bag.messages.topics import OUTPUTS
+from conveyor_sim.bag.messages.typestore import definition, typestore
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recover import recover
 from conveyor_sim.bag.replay import replay
-from conveyor_sim.bag.topics import OUTPUTS
-from conveyor_sim.bag.typestore import definition, typestore
 from conveyor_sim.cli import main
 from conveyor_sim.errors import BagError
 from conveyor_sim.report.figures.recording import Recording

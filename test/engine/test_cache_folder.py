@@ -1,4 +1,4 @@
-"""The folder of compiled kernels: no other user can have put anything there."""
+"""Folder of compiled kernels: no other user can add a file to it."""
 
 import os
 import pickle
@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from conveyor_sim.engine.compiler.cache_folder import Unfit, own_folder
+from conveyor_sim.engine.compiler.cache_folder import choose_cache_folder
 
 NOBODY = 65534
 needs_root = pytest.mark.skipif(os.geteuid() != 0, reason="only root can make files of another user")
@@ -26,7 +26,7 @@ print(contact_force(law, np.uint64(0), None, 0.01, None, 0.002, 1.0, 0.0, 1.0, N
 
 
 class Intrusion:
-    """Unpickled, it leaves a trace."""
+    """Leaves a trace when it is unpickled."""
 
     def __init__(self, trace: Path) -> None:
         self._trace = trace
@@ -39,88 +39,90 @@ def mode(folder: Path) -> int:
     return folder.stat().st_mode & 0o7777
 
 
-def test_a_new_folder_is_for_this_user_only(tmp_path: Path) -> None:
-    folder = own_folder(tmp_path / "some" / "cache", "here")
-    assert folder == tmp_path / "some" / "cache" / "here"
-    assert [mode(path) for path in (folder, folder.parent, folder.parent.parent)] == [0o700] * 3
-    assert own_folder(tmp_path / "some" / "cache", "here") == folder
+@pytest.fixture
+def base(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return the folder of the caches of all programs."""
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "caches"))
+    return tmp_path / "caches"
 
 
-def test_a_folder_that_others_could_read_is_closed(tmp_path: Path) -> None:
-    (tmp_path / "cache").mkdir(mode=0o755)
-    assert mode(own_folder(tmp_path / "cache", "here").parent) == 0o700
+def refused(folder: Path, fault: str) -> None:
+    """Assert that there is no cache, and that one sentence names the folder and what is wrong with it."""
+    before = folder.lstat()
+    assert choose_cache_folder("here") == (
+        None,
+        f"kernels are not cached, so every start compiles them: "
+        f"{folder} {fault}, expected a folder of user {os.geteuid()} with mode 0700",
+    )
+    assert folder.lstat() == before, "left alone"
 
 
-def test_a_sticky_folder_like_tmp_is_fine(tmp_path: Path) -> None:
-    (tmp_path / "tmp").mkdir()
-    (tmp_path / "tmp").chmod(0o1777)
-    assert own_folder(tmp_path / "tmp" / "cache", "here").is_dir()
+def test_a_new_folder_is_for_this_user_only(base: Path) -> None:
+    for _ in range(2):
+        assert choose_cache_folder("here") == (base / "conveyor_sim" / "here", "")
+    assert [mode(base / path) for path in ("conveyor_sim", "conveyor_sim/here")] == [0o700] * 2
 
 
-def test_a_link_of_ours_is_followed(tmp_path: Path) -> None:
-    (tmp_path / "link").symlink_to("elsewhere")
-    folder = own_folder(tmp_path / "link" / "cache", "here")
-    assert folder.resolve() == tmp_path.resolve() / "elsewhere" / "cache" / "here"
+def test_a_new_folder_in_a_folder_with_a_group_of_its_own_is_used(base: Path) -> None:
+    """Subfolders of a folder with the set-group-ID bit get this bit, too."""
+    base.mkdir()
+    base.chmod(0o2775)
+    assert choose_cache_folder("here") == (base / "conveyor_sim" / "here", "")
 
 
-@pytest.mark.parametrize("depth", range(3))
-def test_a_folder_that_others_can_write_to_is_not_used(tmp_path: Path, depth: int) -> None:
-    folder = tmp_path / "above" / "cache" / "here"
-    folder.mkdir(parents=True)
-    wide_open = [folder, *folder.parents][depth]
-    wide_open.chmod(0o777)
-    with pytest.raises(Unfit, match=f"^others can write to {wide_open} \\(mode 0777\\)$"):
-        own_folder(folder.parent, "here")
-    assert mode(wide_open) == 0o777
+OWN = ["conveyor_sim", "conveyor_sim/here"]
 
 
-@pytest.mark.parametrize("depth", range(2))
-def test_our_own_folders_are_no_links(tmp_path: Path, depth: int) -> None:
-    elsewhere = tmp_path / "elsewhere"
-    (elsewhere / "here").mkdir(parents=True)
-    (tmp_path / "cache").mkdir()
-    link = (tmp_path / "link", tmp_path / "cache" / "here")[depth]
-    link.symlink_to(elsewhere)
-    with pytest.raises(Unfit, match=f"^{link} is a link, expected a folder$"):
-        own_folder((tmp_path / "link", tmp_path / "cache")[depth], "here")
+@pytest.mark.parametrize("own", OWN)
+@pytest.mark.parametrize("wrong", [0o777, 0o755, 0o770, 0o1777, 0o720, 0o701])
+def test_a_folder_of_another_mode_is_not_used(base: Path, own: str, wrong: int) -> None:
+    (base / "conveyor_sim" / "here").mkdir(parents=True)
+    (base / "conveyor_sim").chmod(0o700)
+    (base / own).chmod(wrong)
+    refused(base / own, f"has mode {wrong & 0o777:04o}")
 
 
-def test_a_path_that_leads_nowhere_is_not_used(tmp_path: Path) -> None:
-    (tmp_path / "loop").symlink_to("loop")
-    with pytest.raises(Unfit, match="leads through more than 40 links"):
-        own_folder(tmp_path / "loop" / "cache", "here")
-    (tmp_path / "file").touch()
-    with pytest.raises(Unfit, match="file is not a folder"):
-        own_folder(tmp_path / "file" / "cache", "here")
+@pytest.mark.parametrize("own", OWN)
+def test_a_link_is_not_used(base: Path, tmp_path: Path, own: str) -> None:
+    (tmp_path / "elsewhere" / "here").mkdir(parents=True)
+    for folder in (tmp_path / "elsewhere", tmp_path / "elsewhere" / "here"):
+        folder.chmod(0o700)
+    (base / own).parent.mkdir(parents=True)
+    (base / own).parent.chmod(0o700)
+    (base / own).symlink_to(tmp_path / "elsewhere")
+    refused(base / own, "is a symbolic link")
 
 
-@needs_root
-@pytest.mark.parametrize("depth", range(3))
-def test_a_folder_of_another_user_is_not_used(tmp_path: Path, depth: int) -> None:
-    folder = tmp_path / "above" / "cache" / "here"
-    folder.mkdir(parents=True, mode=0o700)
-    theirs = [folder, *folder.parents][depth]
-    os.chown(theirs, NOBODY, NOBODY)
-    with pytest.raises(Unfit, match=f"^{theirs} belongs to user "):
-        own_folder(folder.parent, "here")
+@pytest.mark.parametrize("own", OWN)
+def test_a_file_is_not_used(base: Path, own: str) -> None:
+    (base / own).parent.mkdir(parents=True)
+    (base / own).parent.chmod(0o700)
+    (base / own).touch(mode=0o700)
+    refused(base / own, "is not a folder")
 
 
 @needs_root
-def test_a_link_of_another_user_is_not_followed(tmp_path: Path) -> None:
-    (tmp_path / "elsewhere").mkdir()
-    (tmp_path / "link").symlink_to("elsewhere")
-    os.lchown(tmp_path / "link", NOBODY, NOBODY)
-    with pytest.raises(Unfit, match=f"^{tmp_path}/link belongs to user "):
-        own_folder(tmp_path / "link" / "cache", "here")
-    assert not list((tmp_path / "elsewhere").iterdir())
+@pytest.mark.parametrize("own", OWN)
+def test_a_folder_of_another_user_is_not_used(base: Path, own: str) -> None:
+    (base / "conveyor_sim" / "here").mkdir(parents=True)
+    for folder in OWN:
+        (base / folder).chmod(0o700)
+    os.chown(base / own, NOBODY, NOBODY)
+    refused(base / own, f"belongs to user {NOBODY}")
 
 
-def force(**environment: str) -> subprocess.CompletedProcess[str]:
-    """What a process prints that needs one kernel, with no folder for it but the given ones."""
-    nowhere = {"NUMBA_CACHE_DIR": "/proc/nowhere", "XDG_CACHE_HOME": "", "TMPDIR": "/proc/nowhere"}
+def test_a_folder_that_can_not_be_created_is_not_used(base: Path) -> None:
+    base.touch()
+    folder, remark = choose_cache_folder("here")
+    assert folder is None
+    assert remark == f"kernels are not cached, so every start compiles them: {base} can't be used (File exists)"
+
+
+def force(folder: Path, **environment: str) -> subprocess.CompletedProcess[str]:
+    """Run a process that needs one kernel, with its cache in a folder."""
     return subprocess.run(
         [sys.executable, "-c", FORCE],
-        env={**os.environ, **nowhere, **environment},
+        env={**os.environ, "NUMBA_CACHE_DIR": str(folder), **environment},
         capture_output=True,
         text=True,
         check=True,
@@ -129,43 +131,38 @@ def force(**environment: str) -> subprocess.CompletedProcess[str]:
 
 @pytest.fixture(scope="module")
 def filled(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder as the process leaves it where it has its cache in the temporary folder."""
+    """Return a folder of caches with one kernel."""
     folder = tmp_path_factory.mktemp("filled")
-    force(TMPDIR=str(folder))
-    assert [path for path in folder.rglob("*") if path.is_file()]
+    force(folder)
+    assert list(folder.rglob("*.kernel"))
     return folder
 
 
 @needs_root
-@pytest.mark.parametrize("variable", ["NUMBA_CACHE_DIR", "XDG_CACHE_HOME", "TMPDIR"])
+@pytest.mark.parametrize("variable", ["NUMBA_CACHE_DIR", "XDG_CACHE_HOME", "HOME"])
 def test_files_that_another_user_has_put_are_not_run(filled: Path, tmp_path: Path, variable: str) -> None:
-    """He knows our files' names, for they are the same for every user."""
+    """The names of the files are no secret, because they are the same for every user."""
     shared = tmp_path / "shared"
-    shared.mkdir()
-    shared.chmod(0o1777)
-    theirs = shared / ("conveyor_sim-0" if variable == "TMPDIR" else "conveyor_sim")
-    shutil.copytree(next(filled.iterdir()), theirs)
+    base = shared / ".cache" if variable == "HOME" else shared
+    base.mkdir(parents=True)
+    base.chmod(0o1777)
+    theirs = base / "conveyor_sim"
+    shutil.copytree(filled / "conveyor_sim", theirs)
     trace = tmp_path / "trace"
     for path in [theirs, *theirs.rglob("*")]:
         if path.is_file():
             path.write_bytes(pickle.dumps(Intrusion(trace)))
         os.chown(path, NOBODY, NOBODY)
-    given = {"NUMBA_CACHE_DIR": "/proc/nowhere"} if variable == "TMPDIR" else {"NUMBA_CACHE_DIR": ""}
-    done = force(**{"TMPDIR": str(tmp_path), **given, variable: str(shared)})
+    before = sorted(theirs.rglob("*"))
+    done = force(shared, **{"NUMBA_CACHE_DIR": "", "XDG_CACHE_HOME": "", variable: str(shared)})
     assert done.stdout == "-3.0\n"
     assert not trace.exists()
-    assert f"{theirs} belongs to user " in done.stderr
-    told = "kernels are not cached, so every start" if variable == "TMPDIR" else f"kernels are cached in {tmp_path}/"
-    assert done.stderr.startswith(told)
-    assert done.stderr.count("\n") == 1
+    assert done.stderr == (
+        "kernels are not cached, so every start compiles them: "
+        f"{theirs} belongs to user {NOBODY}, expected a folder of user 0 with mode 0700\n"
+    )
+    assert sorted(theirs.rglob("*")) == before
     assert all(path.stat().st_uid == NOBODY for path in theirs.rglob("*"))
-
-
-def test_a_folder_instead_of_the_one_asked_for_is_told(tmp_path: Path) -> None:
-    (tmp_path / "file").touch()
-    done = force(NUMBA_CACHE_DIR=str(tmp_path / "file"), TMPDIR=str(tmp_path))
-    (folder,) = (path for path in (tmp_path / f"conveyor_sim-{os.geteuid()}").iterdir() if path.name != "sources")
-    assert done.stderr == f"kernels are cached in {folder}, for {tmp_path}/file is not a folder\n"
 
 
 def test_damage_in_every_file_is_compiled_away(filled: Path) -> None:
@@ -174,9 +171,9 @@ def test_damage_in_every_file_is_compiled_away(filled: Path) -> None:
         content = bytearray(path.read_bytes())
         content[len(content) // 2] ^= 1
         path.write_bytes(content)
-    damaged = force(TMPDIR=str(filled))
+    damaged = force(filled)
     assert damaged.stdout == "-3.0\n"
-    assert damaged.stderr.count(" cached kernel not used, for it is damaged; compiling it again\n") == len(files)
-    again = force(TMPDIR=str(filled))
+    assert damaged.stderr.count(" cached kernel not used because it is damaged; compiling it again\n") == len(files)
+    again = force(filled)
     assert again.stdout == "-3.0\n"
     assert "not used" not in again.stderr

@@ -1,4 +1,4 @@
-"""Of processes that want a kernel at the same time, one compiles it."""
+"""Claims: if several processes need a kernel at the same time, one compiles it."""
 
 import signal
 import subprocess
@@ -11,19 +11,16 @@ import pytest
 
 from conveyor_sim.engine.compiler import claims
 from conveyor_sim.engine.compiler.claims import Claims
-from conveyor_sim.engine.compiler.compile import OPTIONS
-from conveyor_sim.engine.compiler.dispatcher import KernelDispatcher
-from conveyor_sim.engine.compiler.kernel_cache import KernelCache, KernelFolder
-from conveyor_sim.engine.compiler.pipelines import KernelCompiler
+from conveyor_sim.engine.compiler.kernel_folder import KernelFolder
+from conveyor_sim.engine.compiler.numba_internals.dispatcher import kernel_dispatcher
+from conveyor_sim.engine.compiler.numba_internals.kernel_cache import KernelCache
 
-# It says when it waits: before the second look, for the first comes before it reads.
+# Prints "waits" before the second look, because the first look comes before it reads.
 WANTING = """
 import sys
 from pathlib import Path
-from conveyor_sim.engine.compiler.compile import OPTIONS
-from conveyor_sim.engine.compiler.dispatcher import KernelDispatcher
-from conveyor_sim.engine.compiler.kernel_cache import KernelCache, KernelFolder
-from conveyor_sim.engine.compiler.pipelines import KernelCompiler
+from conveyor_sim.engine.compiler.kernel_folder import KernelFolder
+from conveyor_sim.engine.compiler.numba_internals.dispatcher import kernel_dispatcher
 
 def twice(x):
     return 2.0 * x
@@ -38,10 +35,9 @@ def look():
     if looks > 2 and len(sys.argv) > 2:
         raise SystemExit("ended while it waited")
 
-function = KernelDispatcher(twice, targetoptions=OPTIONS, pipeline_class=KernelCompiler)
 folder = KernelFolder(Path(sys.argv[1]), "")
 folder.before_read = look
-function._cache = KernelCache(twice, {}, folder)
+function = kernel_dispatcher(twice, folder)
 assert function(1.5) == 3.0
 loaded, missed = (sum(counts.values()) for counts in (function.stats.cache_hits, function.stats.cache_misses))
 print(loaded, "loaded,", missed, "compiled", flush=True)
@@ -61,7 +57,7 @@ sys.stdin.read()
 
 @pytest.fixture
 def start(tmp_path: Path) -> Iterator[Callable[..., "subprocess.Popen[str]"]]:
-    """Starts a program of those above."""
+    """Yield a function that starts one of the programs above."""
     processes = []
 
     def started(program: str, *arguments: str) -> "subprocess.Popen[str]":
@@ -79,7 +75,7 @@ def start(tmp_path: Path) -> Iterator[Callable[..., "subprocess.Popen[str]"]]:
 
 @pytest.fixture
 def kernel(tmp_path: Path, start: Callable[..., "subprocess.Popen[str]"]) -> Path:
-    """The file that the program makes."""
+    """Return the file that the program makes."""
     (tmp_path / "kernels").mkdir()
     assert start(WANTING, str(tmp_path / "kernels")).communicate()[0] == "0 loaded, 1 compiled\n"
     (found,) = (tmp_path / "kernels").glob("*.kernel")
@@ -155,8 +151,9 @@ def test_a_kernel_that_can_not_be_compiled_is_given_back(
         def _name(self, key: object) -> str:
             return "one"
 
-    function = KernelDispatcher(wrong, targetoptions=OPTIONS, pipeline_class=KernelCompiler)
-    function._cache = Named(wrong, {}, KernelFolder(tmp_path, ""))
+    folder = KernelFolder(tmp_path, "")
+    function = kernel_dispatcher(wrong, folder)
+    function._cache = Named(wrong, {}, folder)
     with pytest.raises(numba.TypingError, match="no_such_thing"):
         function(1.5)
     assert (tmp_path / claims.NAME).exists()

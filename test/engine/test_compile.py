@@ -1,4 +1,4 @@
-"""Compiled kernels: kept on disk, and never served to sources that have changed."""
+"""Compiled kernels are cached on disk, and never used for sources that have changed."""
 
 import os
 import shutil
@@ -52,16 +52,21 @@ print(len(said))
 
 @pytest.fixture
 def copied(tmp_path: Path) -> Path:
-    """A folder with a copy of the package, to edit."""
+    """Return a folder with a copy of the package, to edit."""
     source = Path(conveyor_sim.__file__).parent
     shutil.copytree(source, tmp_path / "conveyor_sim", ignore=shutil.ignore_patterns("__pycache__"))
     return tmp_path
 
 
 def python(folder: Path, code: str, **variables: str) -> list[str]:
-    """Output of a new interpreter that imports from a folder, with its cache there unless said otherwise."""
+    """Return the output of a new interpreter that imports from a folder and has its cache there by default."""
     kept = {key: value for key, value in os.environ.items() if key not in ("XDG_CACHE_HOME", "NUMBA_CACHE_DIR")}
-    environment = {**kept, "PYTHONPATH": str(folder), "NUMBA_CACHE_DIR": str(folder / "cache"), **variables}
+    environment = {
+        **kept,
+        "PYTHONPATH": os.pathsep.join([str(folder), *kept.get("PYTHONPATH", "").split(os.pathsep)]),
+        "NUMBA_CACHE_DIR": str(folder / "cache"),
+        **variables,
+    }
     done = subprocess.run(
         [sys.executable, "-c", code], cwd=folder, env=environment, capture_output=True, text=True, check=True
     )
@@ -69,7 +74,7 @@ def python(folder: Path, code: str, **variables: str) -> list[str]:
 
 
 def test_an_edit_in_a_helper_reaches_its_callers(copied: Path) -> None:
-    """The cache of `contact.py` would hold, by numba's own rule, when only `friction.py` changes."""
+    """Numba's own rule would use the cache of `contact.py` if only `friction.py` changes."""
     assert python(copied, FORCE) == ["-3.0", "0", "1"]
     assert python(copied, FORCE) == ["-3.0", "1", "0"]
     friction = copied / "conveyor_sim" / "engine" / "contact" / "friction.py"
@@ -82,12 +87,12 @@ def test_an_edit_in_a_helper_reaches_its_callers(copied: Path) -> None:
 
 
 def hash_of(folder: Path) -> str:
-    """Of the engine's sources in a folder, with what is kept of it left as it is."""
+    """Return the hash of the engine's sources in a folder; the cached hash stays."""
     return python(folder, "from conveyor_sim.engine.compiler.compile import ENGINE_HASH as h; print(h)")[0]
 
 
 def test_a_better_comment_throws_no_kernels_away(copied: Path) -> None:
-    """The hash is over what the sources do: comments, docstrings and layout are nothing to it."""
+    """The hash is over the syntax of sources, without comments, docstrings and layout."""
     friction, before = copied / "conveyor_sim" / "engine" / "contact" / "friction.py", hash_of(copied)
     text = friction.read_text()
     friction.write_text(
@@ -112,7 +117,7 @@ def test_a_kept_hash_that_is_damaged_is_found_again(copied: Path) -> None:
 
 
 def test_a_second_process_compiles_nothing(copied: Path) -> None:
-    """And the first has a process of its own compile for it."""
+    """The first process has another process compile for it."""
     for said in (1, 0):
         hits, misses, sentences = (int(number) for number in python(copied, RUN))
         assert hits >= 3
@@ -121,17 +126,13 @@ def test_a_second_process_compiles_nothing(copied: Path) -> None:
 
 
 def test_without_a_cache_kernels_come_from_a_process_of_their_own(copied: Path) -> None:
-    nowhere = {"NUMBA_CACHE_DIR": "/proc/nowhere", "TMPDIR": str(copied / "open")}
-    (copied / "open").mkdir()
-    (copied / "open").chmod(0o777)
-    hits, misses, sentences = (int(number) for number in python(copied, RUN, **nowhere))
+    hits, misses, sentences = (int(number) for number in python(copied, RUN, NUMBA_CACHE_DIR="/proc/nowhere"))
     assert hits >= 3
     assert (misses, sentences) == (0, 1)
-    assert not list((copied / "open").iterdir())
 
 
 def test_where_the_cache_is(copied: Path) -> None:
-    """NUMBA_CACHE_DIR, else XDG_CACHE_HOME, else the home's cache; a temporary folder if that can't be written."""
+    """NUMBA_CACHE_DIR, else XDG_CACHE_HOME, else the home's cache."""
     code = (
         "from conveyor_sim.engine.compiler.compile import ENGINE_HASH, KERNELS; print(KERNELS.path.parent, ENGINE_HASH)"
     )
@@ -142,10 +143,3 @@ def test_where_the_cache_is(copied: Path) -> None:
     assert xdg == [str(copied / "xdg" / "conveyor_sim"), digest]
     home = python(copied, code, NUMBA_CACHE_DIR="", HOME=str(copied))
     assert home == [str(copied / ".cache" / "conveyor_sim"), digest]
-    file = copied / "file"
-    file.write_text("")
-    temporary = copied / "temporary"
-    temporary.mkdir()
-    fallback = python(copied, code, NUMBA_CACHE_DIR=str(file / "cache"), TMPDIR=str(temporary))
-    assert fallback[0].startswith(str(temporary / "conveyor_sim-"))
-    assert fallback[1] == digest

@@ -1,4 +1,4 @@
-"""Files of compiled kernels: whatever is wrong with one, it is compiled again."""
+"""Files of compiled kernels: a faulty file is compiled again."""
 
 import os
 import pickle
@@ -10,39 +10,33 @@ from typing import Any
 
 import numba
 import pytest
+from numba_source import relies_on
 
-from conveyor_sim.engine.compiler.kernel_cache import (
-    CHECKSUM,
-    MAGIC,
-    KernelCache,
-    KernelFolder,
-    NotCached,
-    _checksum,
-    cached_only,
-)
+from conveyor_sim.engine.compiler.kernel_folder import CHECKSUM, MAGIC, KernelFolder, NotCached, cached_only, checksum
+from conveyor_sim.engine.compiler.numba_internals.kernel_cache import KernelCache
 
 
 def twice(x: float) -> float:
-    """What is compiled."""
+    """Return twice the number; this function is compiled."""
     return 2.0 * x
 
 
 def compiled(folder: Path | None) -> Any:
-    """The function as a process finds it that has not used it yet."""
+    """Return the function as in a process that has not used it yet."""
     function = numba.njit(twice)
     function._cache = KernelCache(twice, {}, KernelFolder(folder, ""))
     return function
 
 
 def counts(function: Any) -> tuple[int, int]:
-    """Calls it; how many kernels were loaded, and how many compiled."""
+    """Call it, and return how many kernels were loaded and how many compiled."""
     assert function(1.5) == 3.0
     return sum(function.stats.cache_hits.values()), sum(function.stats.cache_misses.values())
 
 
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
-    """The kernel's file."""
+    """Return the kernel's file."""
     assert counts(compiled(tmp_path)) == (0, 1)
     (found,) = tmp_path.glob("*.kernel")
     assert counts(compiled(tmp_path)) == (1, 0)
@@ -55,8 +49,8 @@ def flipped(content: bytes, place: float) -> bytes:
     return bytes(changed)
 
 
-def with_checksum(payload: bytes) -> bytes:
-    return MAGIC + _checksum(payload) + payload
+def withchecksum(payload: bytes) -> bytes:
+    return MAGIC + checksum(payload) + payload
 
 
 LOADING = """
@@ -64,7 +58,8 @@ import sys
 from pathlib import Path
 import numba
 import numpy
-from conveyor_sim.engine.compiler.kernel_cache import KernelCache, KernelFolder
+from conveyor_sim.engine.compiler.kernel_folder import KernelFolder
+from conveyor_sim.engine.compiler.numba_internals.kernel_cache import KernelCache
 
 def total(values):
     summed = 0.0
@@ -89,11 +84,11 @@ DAMAGE: dict[str, Callable[[bytes], bytes]] = {
     **{f"flipped at {place}": lambda content, place=place: flipped(content, place) for place in (0.0, 0.01, 0.5, 1.0)},
     "a text": lambda content: "Zuführung\n".encode("latin-1") * 100,
     "zeros": lambda content: bytes(len(content)),
-    "no pickle": lambda content: with_checksum(b"\x80\x04 not a pickle"),
-    "another pickle": lambda content: with_checksum(pickle.dumps({"one": 1})),
-    "other types": lambda content: with_checksum(pickle.dumps((("another", "key"), ()))),
-    "of a module that is gone": lambda content: with_checksum(b"cno_such_module\nThing\n."),
-    "no machine code": lambda content: with_checksum(
+    "no pickle": lambda content: withchecksum(b"\x80\x04 not a pickle"),
+    "another pickle": lambda content: withchecksum(pickle.dumps({"one": 1})),
+    "other types": lambda content: withchecksum(pickle.dumps((("another", "key"), ()))),
+    "of a module that is gone": lambda content: withchecksum(b"cno_such_module\nThing\n."),
+    "no machine code": lambda content: withchecksum(
         pickle.dumps((pickle.loads(content[HEADER:])[0], ("not", "a", "kernel")))
     ),
 }
@@ -106,7 +101,7 @@ def test_a_damaged_file_is_compiled_again(
     file.write_bytes(damage(file.read_bytes()))
     assert counts(compiled(file.parent)) == (0, 1)
     (line,) = caplog.messages
-    assert line.startswith(f"{file}: cached kernel not used, for it ")
+    assert line.startswith(f"{file}: cached kernel not used because it ")
     assert counts(compiled(file.parent)) == (1, 0)
     assert len(caplog.messages) == 1
 
@@ -125,7 +120,7 @@ def test_a_file_that_another_could_have_put_is_compiled_again(
             "folder": lambda: file.mkdir(),
         }[kind]()
     assert counts(compiled(file.parent)) == (0, 1)
-    assert caplog.messages[0].startswith(f"{file}: cached kernel not used, for ")
+    assert caplog.messages[0].startswith(f"{file}: cached kernel not used because ")
     assert counts(compiled(file.parent)) == ((0, 1) if kind == "folder" else (1, 0))
 
 
@@ -164,8 +159,9 @@ def test_what_is_not_cached_is_not_compiled_where_that_is_not_wanted(file: Path)
     assert counts(compiled(file.parent)) == (0, 1)
 
 
+@relies_on("core/runtime/nrt.py: _Runtime.initialize", "core/caching.py: _Cache")
 def test_a_process_that_loads_a_kernel_needs_no_compiler_and_can_compile_another(tmp_path: Path) -> None:
-    """A start that finds all kernels does without numba's tables of what it can compile."""
+    """A start that loads all kernels does not need numba's tables of compilable functions."""
     program = tmp_path / "loading.py"
     program.write_text(LOADING)
     command = [sys.executable, str(program), str(tmp_path / "kernels")]

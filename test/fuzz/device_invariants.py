@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 from fuzz.crossing import crossed
@@ -11,7 +10,8 @@ from fuzz.violation import Violation
 from numpy.typing import NDArray
 
 from conveyor_sim.columns.bottles import BottleColumns
-from conveyor_sim.line.packml import State
+from conveyor_sim.line.commands.inputs import INJECT, CommandOutcome
+from conveyor_sim.line.machines.packml import State
 from conveyor_sim.scene.geometry import SegmentPiece
 from conveyor_sim.scene.moving import MovingShape, moving_shapes
 from conveyor_sim.scene.parts.inspection import Inspection
@@ -45,8 +45,8 @@ class DeviceWatch:
         self._sim = simulation
         self._signals = simulation.process_image.signals
         self._scene = simulation.scene
-        self._faulty: set[str] = set()
-        """Devices that a fault was ever sent to."""
+        self._injected: dict[str, float] = {}
+        """The last accepted value of each injected fault."""
         self._shapes = moving_shapes(simulation.scene) if simulation.model.has("moving_rails") else []
         self._now = self._before = self._values()
         self._still = dict.fromkeys((shape.name for shape in self._shapes), 0)
@@ -55,13 +55,16 @@ class DeviceWatch:
         self._work = None if ledger is None else ledger.rail_work.copy()
         self._image()
 
-    def check(self, before: BottleColumns, now: BottleColumns, sent: list[tuple[Any, ...]]) -> None:
-        """The checks, between two ticks. sent: names, values, and whether they are faults."""
-        self._faulty |= {name.rpartition("/")[0] for names, _, fault in sent if fault for name in names}
+    def check(self, before: BottleColumns, now: BottleColumns, outcomes: list[CommandOutcome]) -> None:
+        """Check the devices between two ticks. outcomes: of the inputs of the second one."""
+        for outcome in outcomes:
+            if outcome.accepted and outcome.operation == INJECT:
+                self._injected |= dict(zip(outcome.names, outcome.values, strict=True))
         self._before, self._now = self._now, self._values()
         self._image()
         self._rising()
         self._conservation()
+        self._stopped()
         self._lines(before, now)
         self._zones(now)
         self._eyes(before, now)
@@ -78,6 +81,10 @@ class DeviceWatch:
 
     def _values(self) -> dict[str, float]:
         return dict(zip(self._sim.process_image.signal_names, self._sim.signals().tolist(), strict=True))
+
+    def _fault(self, name: str) -> float:
+        """Return the value of an injected fault, 0 if it was never injected."""
+        return self._injected.get(name, 0.0)
 
     def _place(self, shape: MovingShape, values: dict[str, float]) -> float:
         return values[f"{shape.name}/position"] * shape.stroke
@@ -141,8 +148,17 @@ class DeviceWatch:
         if moved and (state not in RUNNING or now[f"{place}/fault"]):
             raise Violation("machine", f"{place} works on a bottle in state {state} at tick {self._sim.tick}")
 
+    def _stopped(self) -> None:
+        """Check that an inspection or a reject runs unless the fault `stop` is injected."""
+        for name, machine in self._scene.machines.items():
+            place = f"machines/{name}"
+            if isinstance(machine, (Inspection, Reject)):
+                running, stop = self._now[f"{place}/running"], self._fault(f"{place}/stop")
+                if running == stop:
+                    raise Violation("machine", f"{place}/running is {running} with {place}/stop at {stop}")
+
     def _lines(self, before: BottleColumns, now: BottleColumns) -> None:
-        """Counters and inspections count those that passed."""
+        """Check that counters and inspections count the bottles that passed; a stopped inspection counts none."""
         scene = self._scene
         lines = [(f"counters/{name}", line, ("forward", "backward")) for name, line in scene.counters.items()]
         lines += [
@@ -153,16 +169,19 @@ class DeviceWatch:
         gone = np.setdiff1d(before.id, now.id).size
         for place, line, words in lines:
             passed = _passed(np.array(line.from_), np.array(line.to), before, now)
+            blind, taken = self._fault(f"{place}/stop") != 0.0, gone
+            if blind:
+                passed, taken = [(0, 0), (0, 0)], 0
             for word, (least, most) in zip(words, passed, strict=True):
                 counted = 0.0 if not word else self._now[f"{place}/{word}"] - self._before[f"{place}/{word}"]
                 # Those that were taken away after this tick's steps may have passed.
-                if word and not least <= counted <= most + gone:
+                if word and not least <= counted <= most + taken:
                     raise Violation("counted wrongly", f"{place}/{word}: {counted} in a tick, {least} to {most} passed")
 
     def _zones(self, now: BottleColumns) -> None:
+        """Check that zones count the bottles inside, plus the injected offset, and never less than none."""
         for name, zone in self._scene.zones.items():
-            if f"zones/{name}" in self._faulty:
-                continue
+            offset = self._fault(f"zones/{name}/offset")
             corners, at = np.array(zone.region), np.column_stack([now.x, now.y])
             count = self._now[f"zones/{name}/bottles"]
             size = float(np.ptp(corners, axis=0).max())
@@ -170,10 +189,12 @@ class DeviceWatch:
             edge = np.min([SegmentPiece(tuple(a), tuple(b)).distance(at) for a, b in sides], axis=0, initial=math.inf)
             inside, unsure = _winds(corners, at), edge < NEAR * size
             least, most = np.count_nonzero(inside & ~unsure), np.count_nonzero(inside | unsure)
-            if not least <= count <= most:
-                raise Violation("counted wrongly", f"zones/{name}: {count} told, {least} to {most} inside")
+            if not max(0.0, least + offset) <= count <= max(0.0, most + offset):
+                raise Violation(
+                    "zone counted wrongly", f"zones/{name}: {count} with offset {offset}, {least} to {most} inside"
+                )
             if zone.full_at is not None and self._now[f"zones/{name}/full"] != (count >= zone.full_at):
-                raise Violation("counted wrongly", f"zones/{name}/full with {count} of {zone.full_at}")
+                raise Violation("zone counted wrongly", f"zones/{name}/full with {count} of {zone.full_at}")
 
     def _eyes(self, before: BottleColumns, now: BottleColumns) -> None:
         """An eye without delays and faults shows who is in its beam; later comers are seen at the next tick."""
@@ -181,7 +202,12 @@ class DeviceWatch:
         at, there = np.column_stack([now.x, now.y]), np.isin(now.id, before.id)
         gone = np.setdiff1d(before.id, now.id).size
         for name, eye in self._scene.photo_eyes.items():
-            if f"photo_eyes/{name}" in self._faulty or eye.debounce or eye.on_delay or eye.off_delay:
+            if (
+                any(fault.startswith(f"photo_eyes/{name}/") for fault in self._injected)
+                or eye.debounce
+                or eye.on_delay
+                or eye.off_delay
+            ):
                 continue
             away = SegmentPiece(eye.from_, eye.to).distance(at)
             sure, perhaps = away < radius * (1.0 - 1e-4), away < radius * (1.0 + 1e-4)

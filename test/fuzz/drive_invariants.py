@@ -9,8 +9,8 @@ import numpy as np
 from fuzz.inputs import accepted, commands_of, faults_of
 from fuzz.violation import Violation
 
-from conveyor_sim.line.commands import shown
-from conveyor_sim.line.inputs import CommandOutcome
+from conveyor_sim.line.commands.inputs import CommandOutcome
+from conveyor_sim.line.commands.refusal import shown
 from conveyor_sim.simulation import Simulation
 
 

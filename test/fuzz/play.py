@@ -20,7 +20,7 @@ from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.bag.replay import replay
 from conveyor_sim.errors import SceneError, SimulationError
-from conveyor_sim.line.inputs import CommandOutcome
+from conveyor_sim.line.commands.inputs import CommandOutcome
 from conveyor_sim.physics.model import build_model
 from conveyor_sim.scene import Scene, parse_scene
 from conveyor_sim.simulation import Simulation

@@ -13,7 +13,7 @@ from fuzz.commands import Command
 from fuzz.crossing import crossed
 from fuzz.families import CI_FAMILIES, Family, random_family
 from fuzz.invariants import Invariants, Sent
-from fuzz.play import failure_kind, play
+from fuzz.play import failure_kind, play, send
 from fuzz.violation import Violation
 from fuzz.wrong import judge, wrong_texts
 from hypothesis import HealthCheck, Phase, given, settings
@@ -123,6 +123,7 @@ DEVICES = {
     "counters": {"c": {"from": [0.02, -0.5], "to": [0.02, 0.5]}},
     "zones": {"z": {"region": [[-0.1, -0.1], [0.1, -0.1], [0.1, 0.1], [-0.1, 0.1]]}},
     "photo_eyes": {"e": {"from": [0.03, 0.5], "to": [0.03, -0.5]}},
+    "machines": {"i": {"kind": "inspection", "from": [0.025, -0.5], "to": [0.025, 0.5]}},
 }
 
 
@@ -144,25 +145,53 @@ class Misread(Simulation):
         ("counters/c/forward", 0.0, ""),
         ("counters/c/forward", 1.0, "counted wrongly"),
         ("counters/c/backward", -1.0, "signal of another type"),
-        ("zones/z/bottles", 1.0, "counted wrongly"),
+        ("zones/z/bottles", 1.0, "zone counted wrongly"),
         ("zones/z/bottles", 0.5, "signal of another type"),
         ("photo_eyes/e/blocked", -1.0, "eye"),
         ("photo_eyes/e/rose", 1.0, "eye"),
+        ("machines/i/count", 1.0, "counted wrongly"),
+        ("machines/i/running", -1.0, "machine"),
     ],
 )
 def test_a_signal_that_is_wrong_is_noticed(signal: str, by: float, kind: str) -> None:
     simulation = Misread(parse_scene(small(**DEVICES).scene_text))
     simulation.signal, simulation.by = signal, by
+    assert violation_of(simulation, []) == kind
+
+
+@pytest.mark.parametrize(
+    ("fault", "value", "signal", "by", "kind"),
+    [
+        ("machines/i/stop", 1.0, "machines/i/count", 0.0, ""),
+        ("machines/i/stop", 1.0, "machines/i/count", 1.0, "counted wrongly"),
+        ("machines/i/stop", 1.0, "machines/i/running", 1.0, "machine"),
+        ("machines/i/stop", 0.5, "machines/i/count", 0.0, ""),
+        ("zones/z/offset", 3.0, "zones/z/bottles", 0.0, ""),
+        ("zones/z/offset", 3.0, "zones/z/bottles", -3.0, "zone counted wrongly"),
+        ("zones/z/offset", -3.0, "zones/z/bottles", 0.0, ""),
+        ("zones/z/offset", 1001.0, "zones/z/bottles", 0.0, ""),
+    ],
+)
+def test_an_injected_fault_has_its_effect_and_no_other(
+    fault: str, value: float, signal: str, by: float, kind: str
+) -> None:
+    simulation = Misread(parse_scene(small(**DEVICES).scene_text))
+    simulation.signal, simulation.by = signal, by
+    assert violation_of(simulation, [((fault,), (value,), True)]) == kind
+
+
+def violation_of(simulation: Simulation, first: Sent) -> str:
+    """Return the kind of the violation at tick 5, or "". first: inputs of the first tick."""
     invariants = Invariants(simulation)
-    found = ""
+    send(simulation, first)
     try:
-        for _ in range(7):
+        for tick in range(7):
             simulation.advance()
-            invariants.after_tick([], simulation.take_outcomes())
+            invariants.after_tick([] if tick else first, simulation.take_outcomes())
     except Violation as violation:
-        found = violation.kind
         assert simulation.tick == 5
-    assert found == kind
+        return violation.kind
+    return ""
 
 
 def test_a_drive_that_does_not_ramp_is_noticed() -> None:

@@ -10,7 +10,7 @@ import pytest
 from fuzz.targets.operations import TrueLine, Watch, attack, drawn
 from fuzz.violation import Violation
 
-from conveyor_sim.line.inputs import MODE, SET, CommandOutcome, Input
+from conveyor_sim.line.commands.inputs import MODE, SET, CommandOutcome, Input
 
 STOP = Input("operate", "Jo", "operator", SET, ("machines/capper/cntrl_cmd",), (3.0,))
 MANUAL = Input("operate", "Jo", "operator", MODE, ("machines/capper",), (3.0,))

@@ -7,8 +7,8 @@ import pytest
 from conveyor_sim.columns.events import Event
 from conveyor_sim.control.scan import ALARMS as CONTROLLERS
 from conveyor_sim.line.alarms.declaration import MOST_ALARMS
-from conveyor_sim.line.commands import ALARMS
-from conveyor_sim.line.inputs import INJECT, SET, Input
+from conveyor_sim.line.commands.inputs import INJECT, SET, Input
+from conveyor_sim.line.commands.refusal import ALARMS
 from conveyor_sim.scene import Scene, load_scene
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.resources import scene_path

@@ -10,7 +10,7 @@ from testing.conftest import ON_TABLE, TABLE
 
 from conveyor_sim.columns.events import Event
 from conveyor_sim.errors import CheckpointError, SceneError
-from conveyor_sim.line.inputs import DECLARE, FORCE, MODE, UNFORCE, Input
+from conveyor_sim.line.commands.inputs import DECLARE, FORCE, MODE, UNFORCE, Input
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 

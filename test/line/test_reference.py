@@ -1,6 +1,6 @@
 """The tables of docs/line.md have every device."""
 
-from conveyor_sim.line.devices import DEVICES
+from conveyor_sim.line.device_kinds import DEVICES
 from conveyor_sim.line.line import image_of
 from conveyor_sim.line.reference import EVERYTHING, tables
 from conveyor_sim.scene import parse_scene

@@ -7,7 +7,7 @@ import pytest
 from scenes import SHIPPED, base, belt, bottle, shipped_name, simulation
 
 from conveyor_sim.line.device import Device, ScanContext
-from conveyor_sim.line.devices import DEVICES, build_devices
+from conveyor_sim.line.device_kinds import DEVICES, build_devices
 from conveyor_sim.line.process_image import ProcessImage
 from conveyor_sim.line.tag import MOST_COUNT, Tag, choice, count, number, seconds, switch
 from conveyor_sim.line.units import UNITS

@@ -14,9 +14,9 @@ from page.live_line import PASSWORD, PEOPLE, Live
 from protocols.waiting import PATIENCE
 
 from conveyor_sim.page.one_file import Failure, write_page
-from conveyor_sim.protocols.scene_messages import Task
-from conveyor_sim.protocols.scene_source import SceneSource
-from conveyor_sim.protocols.users import keep_user, new_user
+from conveyor_sim.protocols.server.users import keep_user, new_user
+from conveyor_sim.protocols.tags.scene_messages import SceneTask
+from conveyor_sim.protocols.tags.scene_provider import SceneTagProvider
 from conveyor_sim.scene import load_scene
 
 BROWSERS = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome")
@@ -90,7 +90,7 @@ def live(users: Path) -> Iterator[Live]:
     """The line, in real time, recorded; its end is an hour away."""
     pytest.importorskip("aiohttp", reason="aiohttp is not installed: pip install conveyor-sim[scada]")
     scene = load_scene(LINE, {"duration": 3600.0})
-    with SceneSource(Task(scene, users / "bag", 0, 1.0, 1), lambda text: None) as source:
+    with SceneTagProvider(SceneTask(scene, users / "bag", 0, 1.0, 1), lambda text: None) as source:
         source.wait_for_line()
         made = Live(users, source)
         made.serve()

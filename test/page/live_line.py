@@ -9,12 +9,12 @@ from typing import Any
 from page.pixels import settled
 from protocols.waiting import until
 
-from conveyor_sim.protocols.face import Settings
-from conveyor_sim.protocols.faces import FACES
-from conveyor_sim.protocols.serving import Serving
-from conveyor_sim.protocols.users import Role
+from conveyor_sim.protocols.hosting.server_kinds import SERVER_KINDS
+from conveyor_sim.protocols.hosting.serving import Serving
+from conveyor_sim.protocols.hosting.settings import ServerSettings
+from conveyor_sim.protocols.server.users import Role
 
-WEB = next(kind for kind in FACES if kind.name == "web")
+WEB = next(kind for kind in SERVER_KINDS if kind.name == "web")
 PEOPLE: dict[str, Role] = {"vic": "viewer", "jo": "operator", "tess": "test"}
 PASSWORD = "open sesame"
 SPEED, SETPOINT = "belts/line/speed", "belts/line/cmd_speed"
@@ -28,7 +28,7 @@ class Live:
         self.serving: Serving | None = None
 
     def serve(self, host: str = "127.0.0.1") -> None:
-        settings = Settings(host, users=self.folder / "users", opcua_certificates=self.folder / "certificates")
+        settings = ServerSettings(host, users=self.folder / "users", opcua_certificates=self.folder / "certificates")
         self.serving = Serving(self.source, [(WEB, self.port)], settings)
         self.port = int(self.serving.faces[0].address.rstrip("/").rpartition(":")[2])
 

@@ -21,10 +21,11 @@ pytest.importorskip("aiohttp", reason="aiohttp is not installed: pip install con
 
 from aiohttp import ClientSession, WSCloseCode, WSMsgType, WSServerHandshakeError
 
-from conveyor_sim.protocols.face import FaceError, Settings
-from conveyor_sim.protocols.quotas import QUOTA, share_of_guests
-from conveyor_sim.protocols.server_thread import ServerThread
-from conveyor_sim.protocols.serving import Serving
+from conveyor_sim.protocols.hosting.server_thread import ServerThread
+from conveyor_sim.protocols.hosting.serving import Serving
+from conveyor_sim.protocols.hosting.settings import ServerSettings
+from conveyor_sim.protocols.server.interface import ServerError
+from conveyor_sim.protocols.server.quotas import QUOTA, share_of_guests
 from conveyor_sim.protocols.web import feed, server
 from conveyor_sim.protocols.web.server import LONGEST_REQUEST, MOST_CONNECTIONS, MOST_REQUESTS, WebServer
 from conveyor_sim.protocols.web.tls import server_context
@@ -372,7 +373,7 @@ def test_what_waits_for_a_page_is_bounded() -> None:
 
 
 def test_nobody_who_is_not_let_in_sees_anything(browser: Any, live: Live, users: Path) -> None:
-    settings = Settings(users=users / "users", anonymous=False)
+    settings = ServerSettings(users=users / "users", anonymous=False)
     with Serving(live.source, [(WEB, 0)], settings) as serving:
         url = serving.faces[0].address.rstrip("/")
 
@@ -396,7 +397,7 @@ def test_nobody_who_is_not_let_in_sees_anything(browser: Any, live: Live, users:
 
 
 def test_other_machines_get_it_by_tls_alone(open_page: Callable[[str], Any], live: Live, users: Path) -> None:
-    settings = Settings("127.0.0.2", users=users / "users", opcua_certificates=users / "certificates")
+    settings = ServerSettings("127.0.0.2", users=users / "users", opcua_certificates=users / "certificates")
     with Serving(live.source, [(WEB, 0)], settings) as serving:
         address = serving.faces[0].address
         assert address.startswith("https://127.0.0.2:")
@@ -412,10 +413,10 @@ def test_other_machines_get_it_by_tls_alone(open_page: Callable[[str], Any], liv
 
 
 def test_a_certificate_that_cant_be_is_told_in_a_sentence(live: Live, tmp_path: Path) -> None:
-    settings = Settings(web_certificates=tmp_path)
-    with pytest.raises(FaceError, match=r"certificate\.pem: can't be read, expected a certificate and its key"):
+    settings = ServerSettings(web_certificates=tmp_path)
+    with pytest.raises(ServerError, match=r"certificate\.pem: can't be read, expected a certificate and its key"):
         Serving(live.source, [(WEB, 0)], settings)
     (tmp_path / "certificate.pem").write_text("no")
     (tmp_path / "key.pem").write_text("no")
-    with pytest.raises(FaceError, match=r"certificate\.pem: .*expected a certificate in PEM"):
+    with pytest.raises(ServerError, match=r"certificate\.pem: .*expected a certificate in PEM"):
         Serving(live.source, [(WEB, 0)], settings)

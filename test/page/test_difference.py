@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from page.line import LINE, record
 
-from conveyor_sim.bag.messages import Header
+from conveyor_sim.bag.messages.encode import Header
+from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recorder import Recorder
-from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.columns.bottles import BottleColumns
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.page.difference import Comparison

@@ -25,14 +25,14 @@ from page.live_line import (
 from page.pixels import count_where_they_are, settled
 from protocols.waiting import until
 
+from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.replay import replay
-from conveyor_sim.bag.topics import TOPICS
-from conveyor_sim.protocols.bag_source import BagSource
-from conveyor_sim.protocols.face import Settings
-from conveyor_sim.protocols.scene_messages import Task
-from conveyor_sim.protocols.scene_source import SceneSource
-from conveyor_sim.protocols.serving import Serving
+from conveyor_sim.protocols.hosting.serving import Serving
+from conveyor_sim.protocols.hosting.settings import ServerSettings
+from conveyor_sim.protocols.tags.bag_provider import BagTagProvider
+from conveyor_sim.protocols.tags.scene_messages import SceneTask
+from conveyor_sim.protocols.tags.scene_provider import SceneTagProvider
 from conveyor_sim.scene import load_scene
 
 pytest.importorskip("aiohttp", reason="aiohttp is not installed: pip install conveyor-sim[scada]")
@@ -130,7 +130,7 @@ def test_everything_fits_and_has_a_name_for_those_who_hear_it(page: Any, size: t
 
 def test_who_has_not_signed_in_is_refused_with_the_reason(page: Any, live: Live) -> None:
     set_speed(page, "0.3")
-    told(page, "Refused: nobody has signed in")
+    told(page, "Refused: not signed in")
     assert live.source.shown.values[SETPOINT] == 0.5
 
 
@@ -227,9 +227,9 @@ def test_alarms_are_shelved_acknowledged_and_reset(page: Any) -> None:
 
 
 def test_a_line_that_has_ended_says_so_and_begins_anew(open_page: Callable[[str], Any], users: Path) -> None:
-    with SceneSource(Task(load_scene(LINE, {"duration": 1.0}), None, 0, 1.0, 1), lambda text: None) as source:
+    with SceneTagProvider(SceneTask(load_scene(LINE, {"duration": 1.0}), None, 0, 1.0, 1), lambda text: None) as source:
         source.wait_for_line()
-        with Serving(source, [(WEB, 0)], Settings(users=users / "users")) as serving:
+        with Serving(source, [(WEB, 0)], ServerSettings(users=users / "users")) as serving:
             page = open_page(serving.faces[0].address)
             page.wait_for_selector("#run.stands:has-text('ended')")
             assert clock(page) == 1.0 and not page.locator("text=Pause run").is_visible()
@@ -248,9 +248,9 @@ def test_a_command_given_on_the_page_is_in_the_recording_which_replays(
     open_page: Callable[[str], Any], users: Path, tmp_path: Path
 ) -> None:
     scene = load_scene(LINE, {"duration": 3600.0})
-    with SceneSource(Task(scene, tmp_path / "bag", 0, 1.0, 1), lambda text: None) as source:
+    with SceneTagProvider(SceneTask(scene, tmp_path / "bag", 0, 1.0, 1), lambda text: None) as source:
         source.wait_for_line()
-        with Serving(source, [(WEB, 0)], Settings(users=users / "users")) as serving:
+        with Serving(source, [(WEB, 0)], ServerSettings(users=users / "users")) as serving:
             page = open_page(serving.faces[0].address)
             signed_in(page, "jo")
             put_into_mode(page, "3")
@@ -271,8 +271,8 @@ def test_a_command_given_on_the_page_is_in_the_recording_which_replays(
 
 def test_a_recording_is_played_on_the_page(open_page: Callable[[str], Any], users: Path, bag: Path) -> None:
     with (
-        BagSource(bag, lambda text: None, loop=True) as source,
-        Serving(source, [(WEB, 0)], Settings(users=users / "users")) as serving,
+        BagTagProvider(bag, lambda text: None, loop=True) as source,
+        Serving(source, [(WEB, 0)], ServerSettings(users=users / "users")) as serving,
     ):
         page = open_page(serving.faces[0].address)
         soon(page, lambda: int(page.get_attribute("body", "data-bottles") or 0) > 3, "its bottles")  # "": none yet

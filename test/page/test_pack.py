@@ -10,8 +10,8 @@ import pytest
 from page.line import record
 from rosbags.rosbag2 import StoragePlugin, Writer
 
+from conveyor_sim.bag.messages.typestore import typestore
 from conveyor_sim.bag.reader import open_bag
-from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.columns.bottles import BottleColumns, ContactColumns
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.page.block import Content, levels, pack

@@ -7,18 +7,18 @@ from typing import Any, cast
 
 import pytest
 
-from conveyor_sim.protocols.source import TickSource
-from conveyor_sim.protocols.view import PictureSource
-from conveyor_sim.protocols.web.commands import Commands, Person
+from conveyor_sim.protocols.tags.line_mirror import DrawableProvider
+from conveyor_sim.protocols.tags.tag_provider import SteppedTagProvider
+from conveyor_sim.protocols.web.commands import PageCommands, PageUser
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 
-OPERATOR, TEST = Person("jo", "operator", "operator"), Person("ann", "test", "test")
+OPERATOR, TEST = PageUser("jo", "operator", "operator"), PageUser("ann", "test", "test")
 
 
 @pytest.fixture
-def source() -> TickSource:
-    return TickSource(Simulation(load_scene("config/scenarios/zoned_line.yaml"), threads=1))
+def source() -> SteppedTagProvider:
+    return SteppedTagProvider(Simulation(load_scene("config/scenarios/zoned_line.yaml"), threads=1))
 
 
 @pytest.mark.parametrize(
@@ -36,9 +36,9 @@ def source() -> TickSource:
     ],
 )
 def test_what_no_state_makes_good_is_refused_at_once(
-    source: TickSource, person: Person, request_: dict[str, Any], reason: str
+    source: SteppedTagProvider, person: PageUser, request_: dict[str, Any], reason: str
 ) -> None:
-    commands = Commands(cast(PictureSource, source))
+    commands = PageCommands(cast(DrawableProvider, source))
     assert reason in commands.do(person, request_)
     assert (commands.writes, commands.refused) == (0, 1)
     source.before_tick()
@@ -49,8 +49,8 @@ def test_what_no_state_makes_good_is_refused_at_once(
 
 
 @pytest.mark.parametrize("value", [1e6, math.nan, -1])
-def test_a_command_out_of_range_is_not_handed_on(source: TickSource, value: float) -> None:
-    commands = Commands(cast(PictureSource, source))
+def test_a_command_out_of_range_is_not_handed_on(source: SteppedTagProvider, value: float) -> None:
+    commands = PageCommands(cast(DrawableProvider, source))
     assert commands.do(TEST, {"do": "set", "names": ["belts/zone1/cmd_speed"], "values": [value]})
     source.before_tick()
     source._simulation.advance()

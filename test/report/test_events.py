@@ -9,13 +9,13 @@ import pytest
 from bag.small_line import SMALL_LINE
 from click.testing import CliRunner, Result
 
-from conveyor_sim.bag.mcap_file import McapFile, Schema
-from conveyor_sim.bag.messages import Header, bool_message
+from conveyor_sim.bag.mcap.file import McapFile, Schema
+from conveyor_sim.bag.messages.encode import Header, bool_message
+from conveyor_sim.bag.messages.topics import OUTPUTS
+from conveyor_sim.bag.messages.typestore import definition
 from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recorder import Recorder
-from conveyor_sim.bag.topics import OUTPUTS
-from conveyor_sim.bag.typestore import definition
 from conveyor_sim.cli import main
 from conveyor_sim.report.events import KINDS
 from conveyor_sim.scene import load_scene

@@ -9,15 +9,16 @@ import numpy as np
 import pytest
 from bag.small_line import SMALL_LINE
 from click.testing import CliRunner
+from facts import missing, stating
 
 from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.bag.replay import replay
 from conveyor_sim.cli import main
 from conveyor_sim.errors import BagError
-from conveyor_sim.line.counters import RESET_COUNTERS
-from conveyor_sim.line.inputs import FORCE, Input
-from conveyor_sim.line.time_account import CATEGORIES
+from conveyor_sim.line.commands.inputs import FORCE, Input
+from conveyor_sim.line.machines.counters import RESET_COUNTERS
+from conveyor_sim.line.machines.time_account import CATEGORIES
 from conveyor_sim.report.periods import longest_stops, stop_reasons
 from conveyor_sim.report.production import read_production
 from conveyor_sim.report.production_record import Production
@@ -145,8 +146,9 @@ def test_of_a_line_that_has_made_nothing_yet_it_says_so(tmp_path: Path) -> None:
     shown = CliRunner().invoke(main, ["report", str(record(tmp_path / "bag", ticks=200, scene=scene)), "--no-pictures"])
     rows = [line.split() for line in shown.output.splitlines()]
     assert ["machines/packer", "idle", "1", "2.00"] in [row[:4] for row in rows]
-    assert "efficiency  not known: no bottle has left the line" in shown.output
-    assert "alarms  0 came, 0 at most in ten minutes" in shown.output
+    assert ["efficiency", "not", "known:"] in [row[:3] for row in rows]
+    assert missing(shown.output, ["no bottle has left the line"]) == []
+    assert ["alarms", "0"] in [row[:2] for row in rows]
 
 
 def test_no_name_and_no_number_is_cut_on_a_terminal_of_80_columns(bag: Path) -> None:
@@ -212,5 +214,5 @@ def test_a_recording_without_counters_is_refused_in_a_sentence(tmp_path: Path) -
         for _ in range(10):
             sim.advance()
             outputs.after_tick()
-    with pytest.raises(BagError, match="topic counters holds no message"):
+    with pytest.raises(BagError, match=stating("topic counters", "no message")):
         read_production(tmp_path / "bag")

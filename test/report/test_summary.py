@@ -13,8 +13,8 @@ from rich.console import Console
 from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recorder import Recorder
-from conveyor_sim.line.authority import AUTOMATIC, MANUAL
-from conveyor_sim.line.inputs import MODE, Input
+from conveyor_sim.line.commands.authority import AUTOMATIC, MANUAL
+from conveyor_sim.line.commands.inputs import MODE, Input
 from conveyor_sim.physics.model import build_model
 from conveyor_sim.physics.model.remedies import step_limit
 from conveyor_sim.report.summarize import summarize

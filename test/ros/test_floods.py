@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 from conveyor_msgs import srv
 from conveyor_msgs.msg import CommandOutcome, Commands
+from facts import missing
 from ros.line_client import LineClient, until
 from std_msgs.msg import Float64
 
@@ -169,10 +170,8 @@ def test_a_message_that_says_nothing_is_refused(line: LineClient, commands: Any,
     change(line, before, {"received": 1, "waiting": 1})
     line.step()
     until(lambda: outcomes, "its outcome")
-    assert (outcomes[0].accepted, outcomes[0].reason) == (
-        False,
-        "no name and no value given, expected at least one command",
-    )
+    assert not outcomes[0].accepted
+    assert missing(outcomes[0].reason, ["no name", "no value", "at least one command"]) == []
 
 
 def test_refusals_do_not_flood_the_log(line: LineClient, shared_node: Child, commands: Any) -> None:

@@ -13,7 +13,7 @@ from conveyor_msgs.msg import CommandOutcome, Commands
 from ros.line_client import LineClient, until
 
 from conveyor_sim.bag.replay import replay
-from conveyor_sim.line.inputs import MODE, OWN, SET, Input
+from conveyor_sim.line.commands.inputs import MODE, OWN, SET, Input
 from conveyor_sim.ros.child import Child
 from conveyor_sim.run.stepper import Stepper
 

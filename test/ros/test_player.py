@@ -10,12 +10,12 @@ import pytest
 from bag.small_line import SPEED, TURN
 from ros.recording import EYE, MADE, TICKS, record
 
-from conveyor_sim.bag import messages as types
-from conveyor_sim.bag.mcap_file import McapFile, Schema
+from conveyor_sim.bag.mcap.file import McapFile, Schema
+from conveyor_sim.bag.messages import encode as types
+from conveyor_sim.bag.messages.topics import TOPICS
+from conveyor_sim.bag.messages.typestore import definition, typestore
 from conveyor_sim.bag.reader import Bag, open_bag
 from conveyor_sim.bag.recorder import Recorder
-from conveyor_sim.bag.topics import TOPICS
-from conveyor_sim.bag.typestore import definition, typestore
 from conveyor_sim.errors import BagError
 from conveyor_sim.run.lockstep import Refused
 from conveyor_sim.run.playback import Message, Playback

@@ -20,12 +20,12 @@ from ros.recording import MADE, TICKS, record
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
-from conveyor_sim.bag import messages as types
-from conveyor_sim.bag.mcap_file import McapFile, Schema
-from conveyor_sim.bag.qos import EVENTS
+from conveyor_sim.bag.mcap.file import McapFile, Schema
+from conveyor_sim.bag.messages import encode as types
+from conveyor_sim.bag.messages.qos import EVENTS
+from conveyor_sim.bag.messages.topics import TOPICS
+from conveyor_sim.bag.messages.typestore import definition
 from conveyor_sim.bag.reader import Bag, open_bag
-from conveyor_sim.bag.topics import TOPICS
-from conveyor_sim.bag.typestore import definition
 from conveyor_sim.ros.publishers import message_class, ros_qos
 from conveyor_sim.ros.replay_node import ReplayNode
 from conveyor_sim.run.playback import Message, Playback

@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from facts import stating
 from studies.small import Here, setup_of
 from studies.test_warm_up import FILLING
 from studies.waiting import until
@@ -162,7 +163,7 @@ def test_a_scheduler_that_is_started_again(tmp_path: Path, expected: list[dict[s
 
 def test_a_scheduler_that_stays_away(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(dask_engine, "PATIENCE", 0.5)
-    with pytest.raises(StudyError, match=r"no scheduler of Dask with workers within 0 s .*the same command goes on"):
+    with pytest.raises(StudyError, match=stating("Dask", "scheduler", "workers", "0 s", "same command")):
         DaskEngine("tcp://127.0.0.1:1", None, lambda _: None)
 
 

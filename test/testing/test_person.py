@@ -7,7 +7,7 @@ from testing.conftest import TABLE
 
 from conveyor_sim.control.scan import Constant
 from conveyor_sim.errors import CommandError
-from conveyor_sim.line.inputs import OWN, Input
+from conveyor_sim.line.commands.inputs import OWN, Input
 from conveyor_sim.testing import Scenario
 
 FEEDER, SPEED = "belts/feeder", "belts/feeder/cmd_speed"

@@ -4,13 +4,13 @@ import math
 from collections.abc import Sequence
 
 from conveyor_sim.line.alarms.declaration import Declared, error
-from conveyor_sim.line.authority import AUTOMATIC
+from conveyor_sim.line.commands.authority import AUTOMATIC
 from conveyor_sim.line.device import Device, ScanContext
+from conveyor_sim.line.devices.region import most_inside
+from conveyor_sim.line.devices.setup import Setup
+from conveyor_sim.line.devices.watchdog import Watchdog
 from conveyor_sim.line.process_image import speed_command
-from conveyor_sim.line.region import most_inside
-from conveyor_sim.line.setup import Setup
 from conveyor_sim.line.tag import Tag, count, number
-from conveyor_sim.line.watchdog import Watchdog
 from conveyor_sim.scene.belts import CurvedBelt, StraightBelt
 from conveyor_sim.scene.geometry import belt_shape
 

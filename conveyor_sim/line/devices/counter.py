@@ -2,9 +2,9 @@
 
 from collections.abc import Sequence
 
-from conveyor_sim.line.crossing import CrossingLine
 from conveyor_sim.line.device import Device, ScanContext
-from conveyor_sim.line.setup import Setup
+from conveyor_sim.line.devices.crossing import CrossingLine
+from conveyor_sim.line.devices.setup import Setup
 from conveyor_sim.line.tag import count
 from conveyor_sim.scene.parts.counter import Counter
 

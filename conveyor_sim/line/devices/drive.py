@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from conveyor_sim.line.alarms.declaration import Declared, error
 from conveyor_sim.line.device import ScanContext
 from conveyor_sim.line.devices.belt import BeltDevice
-from conveyor_sim.line.edge import RisingEdge
-from conveyor_sim.line.ramp import Ramp
-from conveyor_sim.line.setup import Setup
+from conveyor_sim.line.devices.edge import RisingEdge
+from conveyor_sim.line.devices.ramp import Ramp
+from conveyor_sim.line.devices.setup import Setup
 from conveyor_sim.line.tag import MOST_COUNT, count, switch
 from conveyor_sim.scene.belts import CurvedBelt, StraightBelt
 from conveyor_sim.scene.drives import Drive

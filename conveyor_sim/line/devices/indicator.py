@@ -7,8 +7,8 @@ from conveyor_sim.line.alarms.declaration import Declared, error
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.devices.belt import BeltDevice
 from conveyor_sim.line.devices.counter import CounterDevice
+from conveyor_sim.line.devices.setup import Setup
 from conveyor_sim.line.devices.zone import ZoneDevice
-from conveyor_sim.line.setup import Setup
 from conveyor_sim.line.tag import number, switch
 from conveyor_sim.scene.parts.indicator import Indicator
 

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.line.device import Device, ScanContext
-from conveyor_sim.line.entry import CLEAR, Quality
-from conveyor_sim.line.setup import BAD, JITTER, Setup
+from conveyor_sim.line.devices.entry import CLEAR, Quality
+from conveyor_sim.line.devices.setup import BAD, JITTER, Setup
 from conveyor_sim.line.tag import MOST_COUNT, count, switch
 from conveyor_sim.physics.state import State
 from conveyor_sim.scene.parts.infeed import Infeed

@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 
 from conveyor_sim.engine.arrays.moving import HELD, OFF_PROFILE, ON_PROFILE, MovingRails
-from conveyor_sim.line.course import course_to, later, position_at, resting
 from conveyor_sim.line.device import Device, ScanContext
-from conveyor_sim.line.setup import Setup
+from conveyor_sim.line.devices.course import course_to, later, position_at, resting
+from conveyor_sim.line.devices.setup import Setup
 from conveyor_sim.line.tag import number, switch
 from conveyor_sim.scene.parts.movers import Mover as MoverPart
 
@@ -28,7 +28,7 @@ class Mover(Device):
     """
 
     def __init__(self, name: str, part: MoverPart, setup: Setup) -> None:
-        shapes = setup.model.moving_shapes
+        shapes = setup.model.plant.moving
         index = [shape.name for shape in shapes].index(name)
         shape = shapes[index]
         order, home, away, at_home, at_end = WORDS[name.split("/")[0]]

@@ -1,8 +1,8 @@
 """Outfeeds: regions that remove the bottles whose axis is inside."""
 
 from conveyor_sim.line.device import Device, ScanContext
-from conveyor_sim.line.region import Region
-from conveyor_sim.line.setup import Setup
+from conveyor_sim.line.devices.region import Region
+from conveyor_sim.line.devices.setup import Setup
 from conveyor_sim.line.tag import count
 from conveyor_sim.scene.parts.outfeed import Outfeed
 

@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 
 from conveyor_sim.engine.sensors.beams import ROUNDING
-from conveyor_sim.line.beam import Beams, Span
 from conveyor_sim.line.device import Device, ScanContext
-from conveyor_sim.line.setup import CHATTER, Setup
+from conveyor_sim.line.devices.beam import Beams, Span
+from conveyor_sim.line.devices.setup import CHATTER, Setup
+from conveyor_sim.line.devices.timer import Edge, Timer
 from conveyor_sim.line.tag import count, number, seconds, switch
-from conveyor_sim.line.timer import Edge, Timer
 from conveyor_sim.scene.parts.photo_eye import PhotoEye
 
 FASTEST_CHATTER, LONGEST_DELAY = 1000.0, 60.0
@@ -77,8 +77,8 @@ class PhotoEyeDevice(Device):
             self.next_flip = now.time
             self._draw()
 
-    def wake(self) -> None:
-        """It was restored, and may have been in the middle of something."""
+    def restored(self, tick: int) -> None:
+        """Evaluate the beam again in the next tick, because a delay may be running."""
         self._quiet = False
 
     def end(self, now: ScanContext) -> None:

@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 
 from conveyor_sim.line.device import Device, ScanContext
-from conveyor_sim.line.edge import RisingEdge
-from conveyor_sim.line.region import Region
-from conveyor_sim.line.setup import Setup
+from conveyor_sim.line.devices.edge import RisingEdge
+from conveyor_sim.line.devices.region import Region
+from conveyor_sim.line.devices.setup import Setup
 from conveyor_sim.line.tag import count, switch
 from conveyor_sim.scene.parts.reject import Reject
 

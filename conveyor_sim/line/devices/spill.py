@@ -1,8 +1,8 @@
 """Spills: bottles that a test has dropped onto the line."""
 
 from conveyor_sim.line.device import Device, ScanContext
-from conveyor_sim.line.edge import RisingEdge
-from conveyor_sim.line.setup import Setup
+from conveyor_sim.line.devices.edge import RisingEdge
+from conveyor_sim.line.devices.setup import Setup
 from conveyor_sim.line.tag import count, switch
 from conveyor_sim.scene.parts.spill import Spill
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from conveyor_sim.line.device import Device, ScanContext
-from conveyor_sim.line.region import Region, most_inside
-from conveyor_sim.line.setup import Setup
+from conveyor_sim.line.devices.region import Region, most_inside
+from conveyor_sim.line.devices.setup import Setup
 from conveyor_sim.line.tag import count, number, switch
 from conveyor_sim.scene.parts.zone import Zone
 

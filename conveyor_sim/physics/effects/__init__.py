@@ -9,19 +9,26 @@ from collections.abc import Mapping, Sequence
 from conveyor_sim.errors import SceneError
 from conveyor_sim.physics.effects.base import BASE_FRICTION, BELTS, CURVED_BELTS, RING_BASE
 from conveyor_sim.physics.effects.contacts import BOTTLE_CONTACT, HERTZ, LINEAR, TABLE
-from conveyor_sim.physics.effects.damage import CRUSHING, IMPACTS, SCUFFING, TIPPING
 from conveyor_sim.physics.effects.damping import DAMPING_EFFECTS
 from conveyor_sim.physics.effects.declaration import Cause, Effect, EffectChoice
 from conveyor_sim.physics.effects.friction import ATAN_FRICTION, CONTACT_FRICTION, IMPLICIT_FRICTION, TANGENTIAL_SPRING
 from conveyor_sim.physics.effects.geometry import ARC_RAILS, MOVING_RAILS, SEGMENT_RAILS, UNEQUAL_RADII
 from conveyor_sim.physics.effects.impacts import impact_bounds, impacts
-from conveyor_sim.physics.effects.load import contact_load
-from conveyor_sim.physics.effects.observers import CONTACT_ARRAYS, ENERGY_LEDGER, PEAKS
+from conveyor_sim.physics.effects.observers import (
+    CONTACT_ARRAYS,
+    CRUSHING,
+    ENERGY_LEDGER,
+    IMPACTS,
+    PEAKS,
+    SCUFFING,
+    TIPPING,
+)
 from conveyor_sim.physics.effects.riding import RIDING
 from conveyor_sim.physics.effects.rotation import ROTATION
 from conveyor_sim.physics.effects.static_friction import STATIC_FRICTION
 from conveyor_sim.physics.effects.supply import INFEED, OUTFEED
-from conveyor_sim.physics.effects.terms import Terms, most_bottles
+from conveyor_sim.physics.effects.terms import Terms
+from conveyor_sim.physics.plant import Plant
 from conveyor_sim.physics.timestep.bounds import Bound
 from conveyor_sim.physics.timestep.prediction import Impact, Prediction, predict
 from conveyor_sim.scene.effect_names import EffectName
@@ -37,7 +44,6 @@ __all__ = [
     "bounds_of",
     "choose_effects",
     "impacts_of",
-    "most_bottles",
     "prediction_of",
 ]
 
@@ -75,21 +81,21 @@ EFFECTS: tuple[Effect, ...] = (
 """In the order in which they are decided: what is on may call for those after it."""
 
 
-def choose_effects(scene: Scene) -> tuple[EffectChoice, ...]:
-    """Decide every effect for a scene, in the order of EFFECTS. SceneError if one can't be forced as the scene says."""
+def choose_effects(plant: Plant) -> tuple[EffectChoice, ...]:
+    """Decide every effect for a plant, in the order of EFFECTS. SceneError if one can't be forced as the scene says."""
     choices: list[EffectChoice] = []
     refused: dict[EffectName, str] = {}
     on: set[str] = set()
     for effect in EFFECTS:
-        choice = _choose(effect, scene, on)
+        choice = _choose(effect, plant, on)
         if choice is None:
-            refused[effect.name] = _absent(effect, scene, on)
+            refused[effect.name] = _absent(effect, plant, on)
             continue
         choices.append(choice)
         if choice.on:
             on.add(effect.name)
     if refused:
-        raise SceneError("\n".join(_refusals(scene, refused)))
+        raise SceneError("\n".join(_refusals(plant.scene, refused)))
     return tuple(choices)
 
 
@@ -109,16 +115,15 @@ def prediction_of(terms: Terms, expected: Sequence[Impact], dt: float) -> Predic
     on = [effect for effect in EFFECTS if effect.name in terms.on]
     sides = [term for effect in on if effect.side is not None for term in effect.side(terms, dt)]
     resting = [term for effect in on if effect.resting is not None for term in effect.resting(terms, dt)]
-    load = contact_load(terms)
-    return predict(expected, resting, sides, (load.force, load.reason), dt)
+    return predict(expected, resting, sides, (terms.load.force, terms.load.reason), dt)
 
 
-def _choose(effect: Effect, scene: Scene, on: set[str]) -> EffectChoice | None:
+def _choose(effect: Effect, plant: Plant, on: set[str]) -> EffectChoice | None:
     """The choice; None if the scene forces what can't be."""
-    cause = effect.called_for(scene, on)
-    forced = scene.effects.get(effect.name)
+    cause = effect.called_for(plant, on)
+    forced = plant.scene.effects.get(effect.name)
     if forced is None:
-        why = _absent(effect, scene, on) if cause is None else str(cause)
+        why = _absent(effect, plant, on) if cause is None else str(cause)
         return EffectChoice(effect.name, cause is not None, why, None if cause is None else cause.path)
     possible = effect.can_force_off if forced == "off" else effect.can_force_on
     if not possible and (cause is not None) != (forced == "on"):
@@ -127,8 +132,8 @@ def _choose(effect: Effect, scene: Scene, on: set[str]) -> EffectChoice | None:
     return EffectChoice(effect.name, forced == "on", why, ("effects", effect.name), forced=True)
 
 
-def _absent(effect: Effect, scene: Scene, on: set[str]) -> str:
-    here = "" if effect.absent_here is None else effect.absent_here(scene, on)
+def _absent(effect: Effect, plant: Plant, on: set[str]) -> str:
+    here = "" if effect.absent_here is None else effect.absent_here(plant, on)
     return here or effect.absent
 
 

@@ -5,23 +5,23 @@ from collections.abc import Collection
 from conveyor_sim.engine.integrators import RIDES
 from conveyor_sim.physics.effects.declaration import Cause, Effect
 from conveyor_sim.physics.laws.coefficients import base_friction
-from conveyor_sim.scene.schema import Scene
+from conveyor_sim.physics.plant import Plant
 
 
-def _riding(scene: Scene, on: Collection[str]) -> Cause | None:
-    if _prevented(scene, on) or "belts" not in on:
+def _riding(plant: Plant, on: Collection[str]) -> Cause | None:
+    if _prevented(plant, on) or "belts" not in on:
         return None
-    table = base_friction(scene)
-    for row, (name, belt) in enumerate(scene.belts.items()):
+    table = base_friction(plant.scene)
+    for row, (name, belt) in enumerate(plant.scene.belts.items()):
         if belt.kind == "straight" and table[row].any():
             return Cause(("belts", name))
     return None
 
 
-def _prevented(scene: Scene, on: Collection[str]) -> str:
-    """Why no bottle of a scene can ride, "" if one may."""
-    if scene.accuracy.integrator not in RIDES:
-        return f"with {scene.accuracy.integrator} a step leaves nobody out"
+def _prevented(plant: Plant, on: Collection[str]) -> str:
+    """Why no bottle of a plant can ride, "" if one may."""
+    if plant.scene.accuracy.integrator not in RIDES:
+        return f"with {plant.scene.accuracy.integrator} a step leaves nobody out"
     return "springs under the bottles pull anew at every step" if "static_friction" in on else ""
 
 

@@ -6,14 +6,15 @@ from conveyor_sim.physics.effects.base import RING_BASE
 from conveyor_sim.physics.effects.damping import TURNING
 from conveyor_sim.physics.effects.declaration import Cause, Effect
 from conveyor_sim.physics.effects.friction import CONTACT_FRICTION
-from conveyor_sim.scene.schema import Scene, Single
+from conveyor_sim.physics.plant import Plant
+from conveyor_sim.scene.schema import Single
 
 
-def _rotation(scene: Scene, on: Collection[str]) -> Cause | None:
+def _rotation(plant: Plant, on: Collection[str]) -> Cause | None:
     for turning in (CONTACT_FRICTION, *TURNING, RING_BASE):
-        if turning.name in on and (cause := turning.called_for(scene, on)) is not None:
+        if turning.name in on and (cause := turning.called_for(plant, on)) is not None:
             return cause
-    for index, bottle in enumerate(scene.bottles):
+    for index, bottle in enumerate(plant.scene.bottles):
         if isinstance(bottle, Single) and bottle.spin != 0.0:
             return Cause(("bottles", index, "spin"), f"{bottle.spin:g} rad/s")
         if isinstance(bottle, Single) and bottle.angle != 0.0:

@@ -3,15 +3,15 @@
 from collections.abc import Collection
 
 from conveyor_sim.physics.effects.declaration import Cause, Effect
-from conveyor_sim.scene.schema import Scene
+from conveyor_sim.physics.plant import Plant
 
 
-def _infeed(scene: Scene, on: Collection[str]) -> Cause | None:
-    return next((Cause(path) for path, _ in scene.givers()), None)
+def _infeed(plant: Plant, on: Collection[str]) -> Cause | None:
+    return next((Cause(path) for path, _ in plant.scene.givers()), None)
 
 
-def _outfeed(scene: Scene, on: Collection[str]) -> Cause | None:
-    return next((Cause(path) for path, _ in scene.exits()), None)
+def _outfeed(plant: Plant, on: Collection[str]) -> Cause | None:
+    return next((Cause(path) for path, _ in plant.scene.exits()), None)
 
 
 INFEED = Effect(

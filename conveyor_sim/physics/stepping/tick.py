@@ -57,7 +57,7 @@ class Integration:
     @property
     def found(self) -> RailContacts:
         """Scratch of the calling thread."""
-        return self._pool.group(1)[0].found
+        return self._pool.group(1)[0].rail_contacts
 
     @property
     def deepest_overlap(self) -> float:

@@ -14,15 +14,15 @@ from contextlib import suppress
 from pathlib import Path
 
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.line.commands import ALARMS, refusal
-from conveyor_sim.line.inputs import SET, Input
+from conveyor_sim.line.commands.inputs import SET, Input
+from conveyor_sim.line.commands.refusal import ALARMS, refusal
 from conveyor_sim.line.tag import COMMANDS
 from conveyor_sim.protocols.attach.links import plc_link
 from conveyor_sim.protocols.attach.plc_link import PlcLink, PlcLinkError, read_answer
 from conveyor_sim.protocols.attach.tag_map import TagMap, read_tag_map
-from conveyor_sim.protocols.face import Face, Status
-from conveyor_sim.protocols.faces import Kind
-from conveyor_sim.protocols.source import PLC, Shown, TagSource
+from conveyor_sim.protocols.hosting.server_kinds import ServerKind
+from conveyor_sim.protocols.server.interface import ProtocolServer, Status
+from conveyor_sim.protocols.tags.tag_provider import PLC, LineSnapshot, TagProvider
 from conveyor_sim.run.alarm_changes import AlarmChanges
 from conveyor_sim.support.printable import SENTENCE, printable
 
@@ -31,11 +31,11 @@ AGAIN = 1.0
 
 
 class FreeRunningPlc:
-    """One PLC, as a protocol server (`Face`) of a line."""
+    """One PLC, as a protocol server (`ProtocolServer`) of a line."""
 
     def __init__(
         self,
-        source: TagSource,
+        source: TagProvider,
         url: str,
         tags: TagMap,
         make: Callable[[], PlcLink],
@@ -54,7 +54,7 @@ class FreeRunningPlc:
         self._alarms = AlarmChanges()
         self._commands = {tag.name: tag for tag in source.about.tags if tag.role in COMMANDS}
         self._bad: set[str] = set()  # names of commands out of range
-        self._written: Shown | None = None
+        self._written: LineSnapshot | None = None
         self._passed_on = self._refused = 0
         self._lag = 0.0
 
@@ -168,13 +168,13 @@ def plc_kind(
     period: float,
     say: Callable[[str], object],
     observe: Callable[[Mapping[str, float]], object],
-) -> Kind:
+) -> ServerKind:
     """Return the kind of protocol server that attaches a PLC.
 
     url, user, password: as for `plc_link`. tags: file of the map. Other parameters: as for `FreeRunningPlc`.
     """
 
-    def make(source: TagSource, *_: object) -> Face:
+    def make(source: TagProvider, *_: object) -> ProtocolServer:
         mapped = read_tag_map(tags, source.about.tags)
         return FreeRunningPlc(
             source, url, mapped, lambda: plc_link(url, mapped.all, user, password), period, say, observe
@@ -182,4 +182,4 @@ def plc_kind(
 
     library = "pymodbus" if url.startswith("modbus") else "asyncua"
     # Not isolated in a child process, because it needs functions of this one.
-    return Kind(PLC, 0, (library,), __name__, make, lambda _: "command it", isolated=False)
+    return ServerKind(PLC, 0, (library,), __name__, make, lambda _: "command it", isolated=False)

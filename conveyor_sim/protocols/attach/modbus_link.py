@@ -13,7 +13,7 @@ from pymodbus.exceptions import ModbusException
 from conveyor_sim.line.tag import SIGNALS
 from conveyor_sim.protocols.attach.plc_link import PATIENCE, PlcLinkError
 from conveyor_sim.protocols.attach.tag_map import OWN, MappedTag, TagMapError
-from conveyor_sim.protocols.handshake import TICK
+from conveyor_sim.protocols.tags.handshake import TICK
 from conveyor_sim.support.modbus_rows import MOST_ADDRESSES, Row, Table, Type, WordOrder, decode, encode
 from conveyor_sim.support.printable import printable
 

@@ -6,13 +6,13 @@ from collections.abc import Mapping, Sequence
 from typing import Protocol
 
 from conveyor_sim.protocols.attach.tag_map import TagMap
-from conveyor_sim.protocols.face import FaceError
+from conveyor_sim.protocols.server.interface import ServerError
 
 PATIENCE = 5.0
 """Longest time of a PLC for each request, s of wall time."""
 
 
-class PlcLinkError(FaceError):
+class PlcLinkError(ServerError):
     """A PLC that can't be reached, or does not answer correctly."""
 
 

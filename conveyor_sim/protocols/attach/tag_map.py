@@ -21,9 +21,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.line.commands import ALARMS
+from conveyor_sim.line.commands.refusal import ALARMS
 from conveyor_sim.line.tag import COMMANDS, SIGNALS, Tag, count, switch
-from conveyor_sim.protocols.handshake import TARGET, TICK
+from conveyor_sim.protocols.tags.handshake import TARGET, TICK
 from conveyor_sim.support.files import MB, FileError, read_file
 from conveyor_sim.support.printable import printable
 

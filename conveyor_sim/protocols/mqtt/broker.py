@@ -1,4 +1,4 @@
-"""`Broker`: where the MQTT broker of a plant is, as whom the line comes there, and what it is called there."""
+"""`Broker`: address of the MQTT broker of a plant, with the user and the names of the line there."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
-from conveyor_sim.protocols.face import FaceError, Settings
-from conveyor_sim.protocols.source import About
+from conveyor_sim.protocols.server.interface import ServerError
+from conveyor_sim.protocols.tags.tag_provider import LineInfo
 from conveyor_sim.support.files import MB, FileError, read_file
 from conveyor_sim.support.printable import printable
 
 PASSWORD = "CONVEYOR_SIM_MQTT_PASSWORD"
-"""The environment variable that the password is read from where no file is named."""
+"""Environment variable of the password, if no file is given."""
 
 PATIENCE = 5.0
-"""s of wall time that a broker has to accept a connection."""
+"""Wall time in which a broker must accept a connection, s."""
 
 EXPECTED = "expected mqtt://HOST, or mqtts:// for TLS, as mqtt://USER@HOST:PORT/GROUP/NODE"
 
@@ -29,81 +29,88 @@ _ID = re.compile(r"[A-Za-z0-9_.:-]{1,100}")
 
 @dataclass(frozen=True)
 class Broker:
-    """One of them."""
+    """Address and options of a broker."""
 
     host: str
     port: int
     secured: bool
-    """By TLS."""
+    """True for TLS."""
     user: str = ""
     password: str = ""
     authority: Path | None = None
-    """File of the certificates by which it is known; None: those that this machine trusts."""
+    """File of the certificates that authenticate it; None: those that this machine trusts."""
     group: str = ""
     """Group of the edge node; empty: the line's place, or its name."""
     node: str = ""
     """Edge node; empty: the line's name."""
     primary_host: str = ""
-    """The host application without which there are no births; empty: none."""
+    """ID of the primary host application, without which there are no births; empty: none."""
 
     @property
     def address(self) -> str:
-        """As people write it."""
+        """URL of the broker."""
         host = f"[{self.host}]" if ":" in self.host else self.host
         return f"{'mqtts' if self.secured else 'mqtt'}://{host}:{self.port}"
 
     @property
     def is_here(self) -> bool:
-        """Whether what is sent there stays on this machine."""
+        """True if the broker is on this machine."""
         return self.host in ("localhost", "::1") or self.host.startswith("127.")
 
-    def named(self, about: About) -> tuple[str, str]:
-        """Group and edge node of a line."""
+    def named(self, about: LineInfo) -> tuple[str, str]:
+        """Return the group and edge node of a line."""
         return self.group or about.where.replace("/", ":") or about.name, self.node or about.name
 
     def context(self) -> ssl.SSLContext:
-        """What TLS goes by. Raises FaceError."""
+        """Return the context for TLS. Raises ServerError."""
         try:
             context = ssl.create_default_context(cafile=self.authority)
         except (OSError, ValueError) as error:
-            raise FaceError(f"{self.authority}: {_reason(error)}, expected certificates in PEM") from error
+            raise ServerError(f"{self.authority}: {_reason(error)}, expected certificates in PEM") from error
         context.minimum_version = ssl.TLSVersion.TLSv1_2
         return context
 
     def require_reachable(self) -> None:
-        """Raises FaceError, with the reason, if nothing can be connected to there."""
+        """Raise ServerError, with the reason, if the address accepts no connection."""
         try:
             socket.create_connection((self.host, self.port), PATIENCE).close()
         except OSError as error:
-            raise FaceError(f"{self.address}: can't be reached ({_reason(error)}), expected an MQTT broker") from error
+            raise ServerError(
+                f"{self.address}: can't be reached ({_reason(error)}), expected an MQTT broker"
+            ) from error
 
 
-def broker_of(url: str, settings: Settings) -> Broker:
-    """The one that a URL and the settings of the face name. Raises FaceError, with what was given and expected."""
+def broker_of(
+    url: str, *, authority: Path | None = None, password_file: Path | None = None, primary_host: str = ""
+) -> Broker:
+    """Return the broker at `url`. The other parameters are the fields of `Broker` and the file of its password.
+
+    Raises ServerError.
+    """
     given = f"mqtt: {printable(url)} given"
     try:
         parts = urlsplit(url)
         port = parts.port
     except ValueError as error:
-        raise FaceError(f"{given} ({error}), {EXPECTED}") from error
+        raise ServerError(f"{given} ({error}), {EXPECTED}") from error
     names = parts.path.strip("/").split("/") if parts.path.strip("/") else []
     if parts.password is not None:
-        raise FaceError(
+        raise ServerError(
             "mqtt: a password given in the URL, where all users of this machine see it; expected it in the environment "
             f"variable {PASSWORD} or by --mqtt-password-file"
         )
     if parts.scheme not in _PORTS or not parts.hostname or parts.query or parts.fragment or len(names) > 2:
-        raise FaceError(f"{given}, {EXPECTED}")
-    for name in (*names, settings.mqtt_primary_host or "none"):
+        raise ServerError(f"{given}, {EXPECTED}")
+    for name in (*names, primary_host or "none"):
         if not _ID.fullmatch(name) or name == "STATE":
-            raise FaceError(f"mqtt: {printable(name)} given as a name, expected letters, digits, or any of _ . : -")
+            raise ServerError(f"mqtt: {printable(name)} given as a name, expected letters, digits, or any of _ . : -")
     secured = parts.scheme == "mqtts"
-    if settings.mqtt_ca is not None and not secured:
-        raise FaceError(f"--mqtt-ca: given with {parts.scheme}://, expected mqtts://")
+    if authority is not None and not secured:
+        raise ServerError(f"--mqtt-ca: given with {parts.scheme}://, expected mqtts://")
     user = unquote(parts.username or "")
-    if settings.mqtt_password_file is not None and not user:
-        raise FaceError("--mqtt-password-file: given without a user, expected mqtt://USER@HOST")
-    password = _password(settings.mqtt_password_file) if user else ""
+    if password_file is not None and not user:
+        raise ServerError("--mqtt-password-file: given without a user, expected mqtt://USER@HOST")
+    password = _password(password_file) if user else ""
     group, node = (*names, "", "")[:2]
     return Broker(
         parts.hostname,
@@ -111,10 +118,10 @@ def broker_of(url: str, settings: Settings) -> Broker:
         secured,
         user,
         password,
-        settings.mqtt_ca,
+        authority,
         group,
         node,
-        settings.mqtt_primary_host,
+        primary_host,
     )
 
 
@@ -124,9 +131,9 @@ def _password(path: Path | None) -> str:
     try:
         return read_file(path, MB).decode().partition("\n")[0].rstrip("\r")
     except FileError as error:
-        raise FaceError(f"{path}: {error}, expected a file with the password of the broker") from error
+        raise ServerError(f"{path}: {error}, expected a file with the password of the broker") from error
     except UnicodeDecodeError as error:
-        raise FaceError(f"{path}: is not UTF-8, expected a file with the password of the broker") from error
+        raise ServerError(f"{path}: is not UTF-8, expected a file with the password of the broker") from error
 
 
 def _reason(error: Exception) -> str:

@@ -1,8 +1,8 @@
-"""`EdgeNode`: a line as an edge node of MQTT Sparkplug B 3.0, with one device, at a broker that others serve.
+"""`EdgeNode`: a line as an edge node of MQTT Sparkplug B 3.0, with one device, at an external broker.
 
-Whoever the broker lets subscribe can read; commands are refused unless the face was given a role to write in. Values go
-out as they change, and never once more as if they were of now: when the line is lost or has ended its device dies, and
-when this process or its connection does, the broker says so.
+All clients that the broker lets subscribe can read. Commands are refused unless the edge node has a role for them.
+Values are sent as they change, and stale values are never sent as present ones. The device dies when the line is lost
+or has ended. When the process or its connection ends, the broker reports it.
 """
 
 from __future__ import annotations
@@ -16,37 +16,47 @@ from datetime import datetime, timezone
 from types import MappingProxyType
 
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.line.inputs import WriterKind
-from conveyor_sim.protocols.clock import Clock
-from conveyor_sim.protocols.face import FaceError, Stamps, Status
-from conveyor_sim.protocols.holding import HoldingService
+from conveyor_sim.line.commands.inputs import WriterKind
 from conveyor_sim.protocols.mqtt.birth_numbers import BirthNumbers
 from conveyor_sim.protocols.mqtt.broker import Broker
-from conveyor_sim.protocols.mqtt.commands import SILENCE, Commands
+from conveyor_sim.protocols.mqtt.commands import SILENCE, HostCommands
 from conveyor_sim.protocols.mqtt.hosts import PrimaryHost
 from conveyor_sim.protocols.mqtt.line_metrics import LineMetrics
-from conveyor_sim.protocols.mqtt.link import MOST_BYTES, NEWEST, OLDEST, Link, LinkError, Message, TooNewError
-from conveyor_sim.protocols.mqtt.session import BETWEEN, Names, Session, death
-from conveyor_sim.protocols.source import Shown, TagSource
+from conveyor_sim.protocols.mqtt.link import (
+    MOST_BYTES,
+    NEWEST,
+    OLDEST,
+    BrokerConnection,
+    BrokerConnectionError,
+    MqttMessage,
+    TooNewError,
+)
+from conveyor_sim.protocols.mqtt.session import BETWEEN, SparkplugSession, SparkplugTopics, death
+from conveyor_sim.protocols.server.interface import ServerError, Stamps, Status
+from conveyor_sim.protocols.tags.holding import HoldingService
+from conveyor_sim.protocols.tags.tag_provider import LineSnapshot, TagProvider
+from conveyor_sim.protocols.tags.tick_clock import TickClock
 
 MOST_BEHIND = 200
-"""Ticks that wait to be sent; one more, and the last of them gives way to it."""
+"""Largest number of ticks that wait to be sent; a further one replaces the newest."""
 
 WAITS = MappingProxyType({"first": 1.0, "longest": 60.0})
-"""s of wall time from the end of a connection to the next try: the first, which doubles with each, and the longest."""
+"""Wall time from the end of a connection to the next attempt, s: the first one, which doubles with each, and the
+longest.
+"""
 
 BIRTHS_EVERY = 1.0
-"""s of wall time from births to the next that hosts ask for, at least; in between nothing else is sent either."""
+"""Shortest wall time between births that hosts request, s; in between nothing else is sent."""
 
-_LOOK = 0.5  # s of wall time between two looks at what nobody tells of
+_LOOK = 0.5  # wall time between two checks of silence and postponed messages, s
 
 
 class EdgeNode:
-    """Shows one source: a Face."""
+    """Protocol server for one tag provider, by MQTT."""
 
     def __init__(
         self,
-        source: TagSource,
+        source: TagProvider,
         broker: Broker,
         role: WriterKind | None = None,
         stamps: Stamps = "wall",
@@ -54,22 +64,22 @@ class EdgeNode:
         holding: HoldingService | None = None,
         before: tuple[int, int] = (0, 0),
     ) -> None:
-        """role: in which hosts command; None: they may not. stamps: what times of values are.
-        silence: s of wall time without a command after which a controller holds nothing any more.
+        """Prepare the edge node. role: role in which hosts command; None: they may not. stamps: kind of time stamps.
+        silence: wall time without a command after which controllers release the line, s.
         holding: decides whether hosts hold the line; None: a new one. before: commands that were passed on, and that
         were refused, before a restart.
         """
         self._source, self._broker = source, broker
-        self._names = Names(*broker.named(source.about))
-        self._commands = Commands(source, role, f"{broker.host}:{broker.port}", silence, holding)
+        self._names = SparkplugTopics(*broker.named(source.about))
+        self._commands = HostCommands(source, role, f"{broker.host}:{broker.port}", silence, holding)
         self._commands.before = before
-        self._line = LineMetrics(source.about, Clock(source.about, stamps), writes=role is not None)
+        self._line = LineMetrics(source.about, TickClock(source.about, stamps), writes=role is not None)
         self._numbers = BirthNumbers(broker.address, self._names.group, self._names.node)
         self._births = 0  # number of the present connection
         self._version = NEWEST
-        self._link: Link | None = None
+        self._link: BrokerConnection | None = None
         self._state = "not connected"
-        self._waiting: deque[tuple[Shown, datetime]] = deque()
+        self._waiting: deque[tuple[LineSnapshot, datetime]] = deque()
         self._left_out = 0
         self._longest = 0.0
         self._told = False
@@ -77,30 +87,31 @@ class EdgeNode:
 
     @property
     def address(self) -> str:
-        """The broker, and under which names the line is there."""
+        """Address of the broker, with the group and edge node of the line."""
         return f"{self._broker.address}/{self._names.group}/{self._names.node}"
 
     def status(self) -> Status:
-        """Whether the broker is there; commands that were passed on, and that were refused."""
+        """Return the state of the connection, and counts of accepted and refused commands."""
         commands = self._commands
         longest, self._longest = self._longest, 0.0
         connected = int(self._link is not None and not self._link.lost)
         return Status(connected, 0, commands.writes, commands.refused, longest, self._left_out, self._state)
 
     async def start(self) -> None:
-        """Connect to the broker, and send births, as soon as the primary host is there, if one is waited for. Raises
-        FaceError if it can't be connected to.
+        """Connect to the broker. Send births once the primary host is online, if there is one.
+
+        Raises ServerError if the connection fails.
         """
         self._loop, self._wake = asyncio.get_running_loop(), asyncio.Event()
         try:
             self._link = await self._connect()
-        except LinkError as error:
-            raise FaceError(f"mqtt: {error}") from error
+        except BrokerConnectionError as error:
+            raise ServerError(f"mqtt: {error}") from error
         self._tasks = [asyncio.create_task(self._run()), asyncio.create_task(self._watch())]
         self._tasks[0].add_done_callback(self._ended)
 
     async def stop(self) -> None:
-        """Have hosts know that it is gone, and disconnect."""
+        """Send the deaths and disconnect."""
         tasks, self._tasks = self._tasks, []
         for task in tasks:
             task.cancel()
@@ -109,7 +120,7 @@ class EdgeNode:
         await self._disconnect()
 
     async def _run(self) -> None:
-        """One connection after the other."""
+        """Serve one connection after another."""
         wait = WAITS["first"]
         while True:
             began = time.monotonic()
@@ -128,28 +139,28 @@ class EdgeNode:
                 self._state = f"not connected: {error}"
 
     async def _watch(self) -> None:
-        """Have a controller that has gone silent give the line up, and what was put off be done."""
+        """Release the line of silent controllers, and wake the loop for postponed messages."""
         while True:
             await asyncio.sleep(_LOOK)
             self._commands.look()
             self._wake.set()
 
-    async def _connect(self) -> Link:
+    async def _connect(self) -> BrokerConnection:
         """Return a connection with the next number, by the newest version of MQTT that the broker accepts.
 
-        Raises LinkError, FaceError.
+        Raises BrokerConnectionError, ServerError.
         """
         version = self._version
         while True:
             number = await asyncio.to_thread(self._numbers.take)
             last_words = death(number)
-            will = Message(self._names.of("NDEATH"), last_words, len(last_words), False)
-            link = Link(self._broker, self._name, will, version, self._notice)
+            will = MqttMessage(self._names.of("NDEATH"), last_words, len(last_words), False)
+            link = BrokerConnection(self._broker, self._name, will, version, self._notice)
             opening = asyncio.ensure_future(asyncio.to_thread(link.open))
             try:
                 await asyncio.shield(opening)
             except asyncio.CancelledError:
-                with suppress(LinkError):  # a connection that nobody knows of would look like a line that is there
+                with suppress(BrokerConnectionError):  # an open connection without owner would look like a live line
                     await opening
                     await asyncio.to_thread(link.close)
                 raise
@@ -158,7 +169,7 @@ class EdgeNode:
                     raise
                 version = OLDEST
                 continue
-            self._version = version  # of later connections, because it has worked
+            self._version = version  # for later connections
             self._births = number
             self._state = "connected"
             return link
@@ -170,12 +181,12 @@ class EdgeNode:
 
     @property
     def _name(self) -> str:
-        """By which the broker knows this client: a newer one of the same name takes its place."""
+        """Client ID; the broker disconnects an earlier client of the same ID."""
         return f"conveyor_sim-{self._names.group}-{self._names.node}"
 
-    async def _serve(self, link: Link) -> None:
-        """Send and take commands until the connection is lost, or the primary host."""
-        session = Session(link, self._names, self._births, self._line, self._commands)
+    async def _serve(self, link: BrokerConnection) -> None:
+        """Send data and take commands until the connection or the primary host is lost."""
+        session = SparkplugSession(link, self._names, self._births, self._line, self._commands)
         host = PrimaryHost(self._broker.primary_host)
         hosts = [host.topic] if host.topic else []
         link.subscribe(self._names.node_commands, self._names.line_commands, *hosts)
@@ -193,7 +204,7 @@ class EdgeNode:
                         host.hear(message.data)
                     else:
                         again += self._take(message)
-                    await asyncio.sleep(0)  # other faces, too
+                    await asyncio.sleep(0)  # let other tasks run
                 if link.dropped > dropped:
                     self._commands.refuse("commands come faster than they can be looked at", link.dropped - dropped)
                     dropped = link.dropped
@@ -208,11 +219,13 @@ class EdgeNode:
             end()
             self._waiting.clear()
 
-    async def _send(self, session: Session, link: Link, again: int) -> int:
-        """What there is to send. again: how often births were asked for again; returned is how often they still are."""
+    async def _send(self, session: SparkplugSession, link: BrokerConnection, again: int) -> int:
+        """Send births, data and state. again: number of requests for births. Return the number of those that still
+        wait.
+        """
         if session.born_at is None or again:
             if session.born_at is not None and time.monotonic() < session.born_at + BIRTHS_EVERY:
-                self._waiting.clear()  # births will have it
+                self._waiting.clear()  # the births will contain it
                 return again
             if link.full:
                 return again
@@ -230,8 +243,8 @@ class EdgeNode:
             self._loop.call_later(BETWEEN, self._wake.set)
         return 0
 
-    def _take(self, message: Message) -> int:
-        """A command; 1 if it asks for births again, else 0."""
+    def _take(self, message: MqttMessage) -> int:
+        """Take a command. Return 1 if it requests births again, else 0."""
         if message.retained:
             self._commands.refuse("a command kept by the broker, expected one that is sent without retain")
         elif message.size > MOST_BYTES:
@@ -242,13 +255,13 @@ class EdgeNode:
             self._commands.take_line(message.data)
         return 0
 
-    def _state_of(self, link: Link, host: PrimaryHost) -> str:
+    def _state_of(self, link: BrokerConnection, host: PrimaryHost) -> str:
         if not host.online:
             return f"waits for host {self._broker.primary_host}"
         return "connected, the broker lets no commands come" if link.denied else "connected"
 
     def _hear(self) -> None:
-        """Called by any thread."""
+        """Queue the present snapshot. May be called by any thread."""
         if len(self._waiting) >= MOST_BEHIND:
             with suppress(IndexError):
                 self._waiting.pop()
@@ -257,14 +270,14 @@ class EdgeNode:
         self._notice()
 
     def _notice(self) -> None:
-        """There is something to look at. Called by any thread."""
+        """Wake the loop. May be called by any thread."""
         if not self._told:
             self._told = True
             with suppress(RuntimeError):  # the loop is closed
                 self._loop.call_soon_threadsafe(self._wake.set)
 
     def _ended(self, running: asyncio.Task[None]) -> None:
-        """Rather no edge node than one that shows what is stale."""
+        """Stop the edge node after an error, because its values would be stale."""
         if not running.cancelled() and (error := running.exception()) is not None:
             logging.getLogger(__name__).error("mqtt: the edge node ends: %s", error, exc_info=error)
             self._stopping = asyncio.ensure_future(self.stop())

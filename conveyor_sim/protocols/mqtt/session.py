@@ -1,4 +1,4 @@
-"""`Session`: what an edge node sends over one connection: births, what changes, deaths, each with its number."""
+"""`SparkplugSession`: messages of an edge node over one connection: numbered births, data and deaths."""
 
 from __future__ import annotations
 
@@ -7,61 +7,65 @@ from datetime import datetime, timezone
 from typing import Any
 
 from conveyor_sim.line.run_state import RUN, STATES
-from conveyor_sim.protocols.mqtt.commands import REBIRTH, Commands
+from conveyor_sim.protocols.mqtt.commands import REBIRTH, HostCommands
 from conveyor_sim.protocols.mqtt.line_metrics import LineMetrics, is_there, milliseconds
-from conveyor_sim.protocols.mqtt.link import Link
+from conveyor_sim.protocols.mqtt.link import BrokerConnection
 from conveyor_sim.protocols.mqtt.payload import BOOLEAN, INT32, INT64, STRING, Payload, add_metric, add_property
-from conveyor_sim.protocols.source import Shown
+from conveyor_sim.protocols.tags.tag_provider import LineSnapshot
 
 NAMESPACE = "spBv1.0"
 DEVICE = "line"
-"""The device of each edge node: commands act, values change and the connection is lost for the line as a whole."""
+"""Device of each edge node. There is one device, because the line is commanded, changes and is lost as a whole."""
 
 BETWEEN = 0.1
-"""s of wall time, at least, between two messages of the edge node itself, and to one that says but how time passes."""
+"""Shortest wall time between two messages of the edge node itself, and before a message in which only clocks have
+changed, s.
+"""
 
 _NUMBERS = 256
 
 
-class Names:
+class SparkplugTopics:
     """Topics of an edge node and of its device."""
 
     def __init__(self, group: str, node: str) -> None:
-        """group, node: ids."""
+        """Prepare the topics. group, node: IDs."""
         self.group, self.node = group, node
         self.node_commands, self.line_commands = self.of("NCMD"), self.of("DCMD")
 
     def of(self, kind: str) -> str:
-        """Of a type of message: NBIRTH, DDATA, ..."""
+        """Return the topic of a type of message: NBIRTH, DDATA, ..."""
         topic = f"{NAMESPACE}/{self.group}/{kind}/{self.node}"
         return f"{topic}/{DEVICE}" if kind.startswith("D") else topic
 
 
 def death(number: int) -> bytes:
-    """Payload of NDEATH. number: of the connection."""
+    """Return the payload of NDEATH. number: of the connection."""
     payload = Payload(timestamp=_now())
     add_metric(payload, "bdSeq", INT64, number, payload.timestamp)
     return bytes(payload.SerializeToString())
 
 
-class Session:
-    """Of one connection."""
+class SparkplugSession:
+    """Messages of one connection."""
 
-    def __init__(self, link: Link, names: Names, number: int, line: LineMetrics, commands: Commands) -> None:
-        """number: of the connection, as its death has it."""
+    def __init__(
+        self, link: BrokerConnection, names: SparkplugTopics, number: int, line: LineMetrics, commands: HostCommands
+    ) -> None:
+        """Start without births. number: number of the connection, which its death has as well."""
         self._link, self._names, self._number, self._line, self._commands = link, names, number, line, commands
         self._next = 0  # sequence number
-        self._last: Shown | None = None
+        self._last: LineSnapshot | None = None
         self._node: dict[str, tuple[int, float | str]] = {}
         self._node_at = 0.0  # s of wall time
         self._alive = False
-        self._line_at = 0.0  # s of wall time, of the last data of the line
-        self._put_off: tuple[Shown, datetime] | None = None
+        self._line_at = 0.0  # wall time of the latest data of the line, s
+        self._put_off: tuple[LineSnapshot, datetime] | None = None
         self.born_at: float | None = None
-        """s of wall time of the last births; None: there were none yet."""
+        """Wall time of the latest births, s; None: there were none yet."""
 
-    def bear(self, shown: Shown, heard: datetime) -> None:
-        """All births, from the first number on."""
+    def bear(self, shown: LineSnapshot, heard: datetime) -> None:
+        """Send all births, from sequence number 0."""
         self._next, self.born_at = 0, time.monotonic()
         payload, stamp = Payload(), _now()
         add_metric(payload, "bdSeq", INT64, self._number, stamp)
@@ -76,13 +80,13 @@ class Session:
         if self._alive:
             self._bear_line(shown, heard)
 
-    def bring(self, shown: Shown, heard: datetime) -> None:
-        """What a line shows: what has changed, or its death, or that it is there again. After `bear`."""
+    def bring(self, shown: LineSnapshot, heard: datetime) -> None:
+        """Send the changes of a line, its death, or its new birth. Call it after `bear`."""
         last, self._last = self._last, shown
         back = last is not None and (shown.tick < last.tick or shown.run_id != last.run_id)
         there = is_there(shown)
         if there and (back or not self._alive):
-            # Where time has stepped back, what has stayed the same would be of the future.
+            # After a step back in time, unchanged values would have time stamps in the future.
             self._bear_line(shown, heard)
         elif self._alive and not shown.lost:
             self._say(shown, heard, passing=not there or time.monotonic() >= self._line_at + BETWEEN)
@@ -92,23 +96,23 @@ class Session:
 
     @property
     def behind(self) -> bool:
-        """Whether time has passed that was not said."""
+        """True if changes of clocks wait to be sent."""
         return self._alive and self._put_off is not None
 
     def catch_up(self) -> None:
-        """Say how time has passed, where that was put off for long enough."""
+        """Send changes of clocks that have waited for BETWEEN."""
         if self.behind and self._put_off is not None and time.monotonic() >= self._line_at + BETWEEN:
             self._say(*self._put_off, passing=True)
 
-    def _say(self, shown: Shown, heard: datetime, passing: bool) -> None:
+    def _say(self, shown: LineSnapshot, heard: datetime, passing: bool) -> None:
         changed = self._line.changes(shown, heard, passing)
         self._put_off = None if changed.metrics or passing else (shown, heard)
         if changed.metrics:
             self._line_at = time.monotonic()
             self._send("DDATA", changed)
 
-    def tell(self, shown: Shown) -> None:
-        """What has changed of the edge node itself, unless it was told just now. After `bear`."""
+    def tell(self, shown: LineSnapshot) -> None:
+        """Send changes of the edge node itself, unless some were sent within BETWEEN. Call it after `bear`."""
         now, metrics = time.monotonic(), self._of_node(shown)
         if metrics == self._node or now < self._node_at + BETWEEN:
             return
@@ -119,12 +123,12 @@ class Session:
         self._node, self._node_at = metrics, now
         self._send("NDATA", payload)
 
-    def _bear_line(self, shown: Shown, heard: datetime) -> None:
+    def _bear_line(self, shown: LineSnapshot, heard: datetime) -> None:
         self._put_off, self._line_at = None, time.monotonic()
         self._send("DBIRTH", self._line.birth(shown, heard))
 
-    def _of_node(self, shown: Shown) -> dict[str, tuple[int, float | str]]:
-        """Always good: it says what has become of the rest."""
+    def _of_node(self, shown: LineSnapshot) -> dict[str, tuple[int, float | str]]:
+        """Return the metrics of the edge node. They are always good, because they report the state of the others."""
         commands = self._commands
         written, refused = commands.before
         return {

@@ -12,9 +12,9 @@ from asyncua.common.utils import ServiceError
 from conveyor_sim.protocols.opcua.browsing import Views
 from conveyor_sim.protocols.opcua.filters import filter_units
 from conveyor_sim.protocols.opcua.items import CHANGE_UNITS, size_of
-from conveyor_sim.protocols.opcua.limits import Limits
-from conveyor_sim.protocols.quotas import share_of_guests
-from conveyor_sim.protocols.work import Budget
+from conveyor_sim.protocols.opcua.limits import OpcUaLimits
+from conveyor_sim.protocols.server.budget import Budget
+from conveyor_sim.protocols.server.quotas import share_of_guests
 
 Codes = ua.StatusCodes
 
@@ -34,7 +34,7 @@ _HISTORY_UNITS = 2
 class Bounds:
     """Limits of one session."""
 
-    def __init__(self, session: Any, limits: Limits) -> None:
+    def __init__(self, session: Any, limits: OpcUaLimits) -> None:
         """session: an asyncua InternalSession."""
         self._session, self.limits = session, limits
         self.views = Views(session.aspace, limits)

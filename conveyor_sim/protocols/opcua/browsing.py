@@ -12,7 +12,7 @@ from collections.abc import Iterable, Sequence
 from asyncua import ua
 from asyncua.server.address_space import AddressSpace
 
-from conveyor_sim.protocols.opcua.limits import Limits
+from conveyor_sim.protocols.opcua.limits import OpcUaLimits
 
 Codes = ua.StatusCodes
 
@@ -23,7 +23,7 @@ _REMAINING = ua.Index(4_294_967_295)
 class Views:
     """Browsing of one session, whose requests `WellFormedSession` has checked for their form."""
 
-    def __init__(self, aspace: AddressSpace, limits: Limits) -> None:
+    def __init__(self, aspace: AddressSpace, limits: OpcUaLimits) -> None:
         """Start without continuation points."""
         self._aspace, self._limits = aspace, limits
         self._points: dict[bytes, tuple[list[ua.ReferenceDescription], int]] = {}

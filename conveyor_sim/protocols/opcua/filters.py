@@ -8,12 +8,12 @@ from typing import Any
 from asyncua import ua
 from asyncua.common.utils import ServiceError
 
-from conveyor_sim.protocols.opcua.limits import Limits
+from conveyor_sim.protocols.opcua.limits import OpcUaLimits
 
 Codes = ua.StatusCodes
 
 
-def filter_units(wanted: Any, limits: Limits) -> int:
+def filter_units(wanted: Any, limits: OpcUaLimits) -> int:
     """Return the work units per event or change. Raise ServiceError for a filter that costs too much.
 
     wanted: the filter of one item; None: no filter. `filter_code` checks its form.
@@ -28,7 +28,7 @@ def filter_units(wanted: Any, limits: Limits) -> int:
     return len(clauses) + _evaluation(wanted.WhereClause.Elements or [], limits)
 
 
-def _evaluation(elements: Sequence[ua.ContentFilterElement], limits: Limits) -> int:
+def _evaluation(elements: Sequence[ua.ContentFilterElement], limits: OpcUaLimits) -> int:
     """Return the greatest number of operands that one evaluation visits; elements referenced twice count twice.
 
     An element may only reference later ones, which excludes cycles (OPC 10000-4, 7.7.4.2).

@@ -1,4 +1,4 @@
-"""`Limits`: the amount of work that one OPC UA client may cause.
+"""`OpcUaLimits`: the amount of work that one OPC UA client may cause.
 
 The server publishes them in Server/ServerCapabilities where the standard has a node (OPC 10000-5, 6.3.2 and 6.3.11) and
 refuses requests beyond them with the status code of OPC 10000-4.
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class Limits:
+class OpcUaLimits:
     """Upper bounds for one server. All values are positive integers: counts, unless another unit is stated."""
 
     nodes_per_read: int = 1000
@@ -92,7 +92,7 @@ class Limits:
     """
 
 
-LIMITS = Limits()
+LIMITS = OpcUaLimits()
 """Default limits."""
 
 PUBLISHED: Mapping[str, str] = {
@@ -117,7 +117,7 @@ PUBLISHED: Mapping[str, str] = {
     "MaxSelectClauseParameters": "select_clauses",
     "MaxWhereClauseParameters": "where_operands",
 }
-"""Field of `Limits` by the name of its node below Server_ServerCapabilities."""
+"""Field of `OpcUaLimits` by the name of its node below Server_ServerCapabilities."""
 
 UNSUPPORTED = (
     "OperationLimits_MaxNodesPerHistoryUpdateData",

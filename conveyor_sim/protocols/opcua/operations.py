@@ -11,7 +11,7 @@ from asyncua import ua
 from asyncua.common.utils import Buffer, ServiceError
 from asyncua.ua.ua_binary import Primitives, extensionobject_from_binary, struct_from_binary
 
-from conveyor_sim.protocols.opcua.limits import Limits
+from conveyor_sim.protocols.opcua.limits import OpcUaLimits
 
 Codes = ua.StatusCodes
 
@@ -53,7 +53,7 @@ _SERVICES: Mapping[str, tuple[Skip, str]] = {
     "TransferSubscriptions": (_bytes(0), "subscriptions"),
     "DeleteSubscriptions": (_bytes(0), "subscriptions"),
 }
-"""Fields before the operations, and the field of `Limits`, by service (OPC 10000-4, 5)."""
+"""Fields before the operations, and the field of `OpcUaLimits`, by service (OPC 10000-4, 5)."""
 
 _BY_TYPE = {
     ua.NodeId(getattr(ua.ObjectIds, f"{name}Request_Encoding_DefaultBinary")): entry
@@ -61,7 +61,7 @@ _BY_TYPE = {
 }
 
 
-def require_operations(type_id: ua.NodeId, body: Buffer, limits: Limits) -> int:
+def require_operations(type_id: ua.NodeId, body: Buffer, limits: OpcUaLimits) -> int:
     """Return the number of operations of a request; 0 for services without a list of them. The body is not consumed.
 
     Raise ServiceError with BadTooManyOperations, or BadNothingToDo for an empty list.

@@ -15,29 +15,29 @@ from asyncua import Server, ua
 from asyncua.common.instantiate_util import instantiate
 from asyncua.crypto.permission_rules import User
 
-from conveyor_sim.line.inputs import MODE, SET
-from conveyor_sim.line.packml import Command, State, objection
+from conveyor_sim.line.commands.inputs import MODE, SET
+from conveyor_sim.line.machines.packml import Command, State, objection
 from conveyor_sim.line.tag import Tag
-from conveyor_sim.protocols.clock import Clock
 from conveyor_sim.protocols.opcua.nodes import INDEX, Nodes, name_of, node_id
 from conveyor_sim.protocols.opcua.packml_admin import A_MINUTE, Admin
 from conveyor_sim.protocols.opcua.packml_admin import NAME as ADMIN
 from conveyor_sim.protocols.opcua.requests import Codes, Requests
 from conveyor_sim.protocols.opcua.values import status_of
-from conveyor_sim.protocols.source import Shown, TagSource
+from conveyor_sim.protocols.tags.tag_provider import LineSnapshot, TagProvider
+from conveyor_sim.protocols.tags.tick_clock import TickClock
 from conveyor_sim.support.rounded_limit import at_limit, single
 
 NODESET = Path(__file__).parent / "nodesets" / "Opc.Ua.PackML.NodeSet2.xml"
 NAMESPACE = "http://opcfoundation.org/UA/PackML/"
 
 NAME = "PackML"
-"""Of the object below a machine."""
+"""Name of the object below a machine."""
 
 _TYPE = 6
 """PackMLBaseObjectType."""
 
 _MODES = 11
-"""ProductionMaintenanceModeEnum: the modes are those of it, with its numbers."""
+"""ProductionMaintenanceModeEnum, whose numbers the control modes use."""
 
 _METHODS: Mapping[int, Command] = {
     361: Command.RESET,
@@ -52,7 +52,7 @@ _METHODS: Mapping[int, Command] = {
     363: Command.CLEAR,
     365: Command.COMPLETE,
 }
-"""By the ids of the NodeSet."""
+"""Commands by the IDs of their methods in the NodeSet."""
 
 _BASE, _MACHINE, _EXECUTE = (
     "BaseStateMachine",
@@ -65,7 +65,7 @@ _OF: Mapping[str, tuple[int, ...]] = {
     _MACHINE: (375, 376),
     _EXECUTE: (361, 365, 366, 367, 368, 369, 372),
 }
-"""Methods of each of the three state machines, one in the other."""
+"""Methods of each of the three nested state machines."""
 
 _TYPES: Mapping[str, int] = {_BASE: 3, _MACHINE: 2, _EXECUTE: 1}
 """Types of the state machines."""
@@ -74,7 +74,7 @@ _PARTS: Mapping[str, tuple[int, ...]] = {
     "AvailableStates": (ua.ObjectIds.StateType, ua.ObjectIds.InitialStateType),
     "AvailableTransitions": (ua.ObjectIds.TransitionType,),
 }
-"""Variables of a state machine, and of which types the parts of its own type are that they list."""
+"""Variables of a state machine that list parts of its type, with the types of these parts."""
 
 _CLEARED, _RUNNING = ("Cleared", 71), ("Running", 75)
 
@@ -96,16 +96,16 @@ _STATES: Mapping[str, Mapping[State, tuple[str, int]]] = {
         State.COMPLETE: ("Complete", 38),
     },
 }
-"""Names and ids of states, by the state machine that has them."""
+"""Names and IDs of states by state machine."""
 
 _NONE = (ua.LocalizedText(None), ua.NodeId())
 """State of a state machine that is not active, and its id."""
 
 
 class PackMl:
-    """Of one source."""
+    """PackML objects of one tag provider."""
 
-    def __init__(self, source: TagSource, requests: Requests, clock: Clock) -> None:
+    def __init__(self, source: TagProvider, requests: Requests, clock: TickClock) -> None:
         self._source, self._requests, self._clock = source, requests, clock
         self._tags: Mapping[str, Tag] = {tag.name: tag for tag in source.about.tags}
         self._machines = [tag.device for tag in source.about.tags if tag.name == f"{tag.device}/cntrl_cmd"]
@@ -116,7 +116,7 @@ class PackMl:
         self._written: dict[tuple[str, str], Any] = {}
 
     async def add(self, server: Server, nodes: Nodes) -> None:
-        """Add the types, and an object for each machine, if there is any."""
+        """Add the types, and an object for each machine, if there are machines."""
         if not self._machines:
             return
         self._nodes = nodes
@@ -147,7 +147,7 @@ class PackMl:
                 await nodes.write(f"{root}.Status.{speed}.EURange", span, now)
 
     async def _parts(self, server: Server) -> dict[str, ua.Variant]:
-        """Ids of the states and transitions of each state machine, by the variables that list them."""
+        """Return the IDs of the states and transitions of each state machine, by the variables that list them."""
         found: dict[str, ua.Variant] = {}
         for state_machine, kind in _TYPES.items():
             parts = await server.get_node(ua.NodeId(kind, self._index)).get_children_descriptions()
@@ -156,8 +156,8 @@ class PackMl:
                 found[f"{state_machine}.{name}"] = ua.Variant(ids, ua.VariantType.NodeId, is_array=True)
         return found
 
-    async def follow(self, shown: Shown, heard: datetime, back: bool) -> None:
-        """Bring in what has changed."""
+    async def follow(self, shown: LineSnapshot, heard: datetime, back: bool) -> None:
+        """Write the variables that have changed."""
         if self._nodes is None:
             return
         status, stamp = status_of(shown), self._clock.stamp(shown.tick, heard)
@@ -208,14 +208,14 @@ class PackMl:
             return int(Codes.BadUserAccessDenied)
         if objection(command, int(shown[f"{machine}/state"])):
             return int(Codes.BadInvalidState)
-        if shown.get(name) == command:  # it acts as it changes
+        if shown.get(name) == command:  # a command acts when its value changes
             code = self._requests.write_together(client, [name], [0.0])
             if code != Codes.GoodCompletesAsynchronously:
                 return code
         return self._requests.write_together(client, [name], [float(command)])
 
     def _values(self, machine: str, values: Mapping[str, float]) -> dict[str, ua.Variant]:
-        """Of the variables of a machine, by their names below its object."""
+        """Return the values of the variables of a machine, by their names below its object."""
 
         def flag(name: str) -> ua.Variant:
             return ua.Variant(values.get(f"{machine}/{name}", 0.0) != 0.0, ua.VariantType.Boolean)
@@ -239,7 +239,7 @@ class PackMl:
         return found
 
     def _current(self, number: int) -> dict[str, tuple[str | None, int]]:
-        """The present state of each state machine; no text: it has none now."""
+        """Return the present state of each state machine; without a text: it is not active."""
         none: tuple[str | None, int] = (None, 0)
         if number in _STATES[_BASE]:
             return {_BASE: _STATES[_BASE][State(number)], _MACHINE: none, _EXECUTE: none}

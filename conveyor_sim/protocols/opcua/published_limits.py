@@ -5,8 +5,8 @@ from __future__ import annotations
 from asyncua import ua
 from asyncua.server.internal_server import InternalServer
 
-from conveyor_sim.protocols.opcua.limits import PUBLISHED, UNSUPPORTED, Limits
-from conveyor_sim.protocols.quotas import Quota
+from conveyor_sim.protocols.opcua.limits import PUBLISHED, UNSUPPORTED, OpcUaLimits
+from conveyor_sim.protocols.server.quotas import Quota
 
 _CAPABILITIES = "Server_ServerCapabilities_"
 
@@ -14,7 +14,7 @@ _SHORT = ("MaxBrowseContinuationPoints",)
 """Nodes of type UInt16; the others are UInt32."""
 
 
-async def publish(server: InternalServer, limits: Limits, quota: Quota) -> None:
+async def publish(server: InternalServer, limits: OpcUaLimits, quota: Quota) -> None:
     """Write all limits that have a node. Raises UaStatusCodeError if a node is missing."""
     values = {name: int(getattr(limits, field)) for name, field in PUBLISHED.items()}
     values |= dict.fromkeys(UNSUPPORTED, 1) | {"MaxSessions": quota.connections}

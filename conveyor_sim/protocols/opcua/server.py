@@ -1,4 +1,4 @@
-"""`OpcUaServer`: a line as an OPC UA server, by names that stay."""
+"""`OpcUaServer`: a line as an OPC UA server, with permanent names."""
 
 from __future__ import annotations
 
@@ -13,13 +13,10 @@ from typing import Any
 from asyncua import ua
 from asyncua.crypto.permission_rules import SimpleRoleRuleset, UserRole
 
-from conveyor_sim.protocols.clock import Clock
-from conveyor_sim.protocols.face import HERE, FaceError, Stamps, Status, require_free
-from conveyor_sim.protocols.opcua.certificates import default_folder, identity
 from conveyor_sim.protocols.opcua.conditions import AlarmStates
 from conveyor_sim.protocols.opcua.emitter import Emitter
-from conveyor_sim.protocols.opcua.history import History, require_tags
-from conveyor_sim.protocols.opcua.limits import LIMITS, Limits
+from conveyor_sim.protocols.opcua.history import OpcUaHistory, require_tags
+from conveyor_sim.protocols.opcua.limits import LIMITS, OpcUaLimits
 from conveyor_sim.protocols.opcua.line_events import LineEvents
 from conveyor_sim.protocols.opcua.methods import Methods, add_methods
 from conveyor_sim.protocols.opcua.nodes import INDEX, NAMESPACE, Nodes
@@ -32,9 +29,12 @@ from conveyor_sim.protocols.opcua.transport import BoundedServer
 from conveyor_sim.protocols.opcua.tree import add_line
 from conveyor_sim.protocols.opcua.updates import Updates
 from conveyor_sim.protocols.opcua.weihenstephan import Weihenstephan
-from conveyor_sim.protocols.quotas import QUOTA, Places, Quota
-from conveyor_sim.protocols.source import OPCUA, TagSource
-from conveyor_sim.protocols.users import Logins, LoginService, User
+from conveyor_sim.protocols.server.certificates import default_folder, identity
+from conveyor_sim.protocols.server.interface import HERE, ServerError, Stamps, Status, require_free
+from conveyor_sim.protocols.server.quotas import QUOTA, ConnectionSlots, Quota
+from conveyor_sim.protocols.server.users import Logins, LoginService, User
+from conveyor_sim.protocols.tags.tag_provider import OPCUA, TagProvider
+from conveyor_sim.protocols.tags.tick_clock import TickClock
 
 POLICIES = [
     ua.SecurityPolicyType.NoSecurity,
@@ -46,11 +46,11 @@ POLICIES = [
 
 
 class OpcUaServer:
-    """Serves one source: a Face."""
+    """Protocol server for one tag provider, by OPC UA."""
 
     def __init__(
         self,
-        source: TagSource,
+        source: TagProvider,
         users: Mapping[str, User] | None = None,
         *,
         anonymous: bool = True,
@@ -59,16 +59,17 @@ class OpcUaServer:
         history: Sequence[str] = (),
         host: str = HERE,
         port: int = 0,
-        limits: Limits = LIMITS,
+        limits: OpcUaLimits = LIMITS,
         quota: Quota = QUOTA,
         logins: LoginService | None = None,
     ) -> None:
-        """users: who may do more than read, by name. anonymous: whether those who give no name may read.
-        stamps: what SourceTimestamp is. certificates: folder of the server's own; None: `default_folder()`.
-        history: patterns of the tags whose last values are kept. port: 0 for any that is free.
-        limits: of each client. quota: places of the connections. logins: checks passwords, in place of `users`.
+        """Prepare the server. users: users by name, who may do more than read. anonymous: True if clients without a
+        user may read.
+        stamps: kind of SourceTimestamp. certificates: folder of the server's own; None: `default_folder()`.
+        history: patterns of the tags whose latest values are stored. port: 0 for any free one.
+        limits: of each client. quota: limits of the connections. logins: checks passwords, in place of `users`.
 
-        Raises FaceError for a pattern that no tag fits.
+        Raises ServerError for a pattern that matches no tag.
         """
         require_tags(history, source.about.tags)
         self._source, self._anonymous, self._stamps = source, anonymous, stamps
@@ -84,14 +85,14 @@ class OpcUaServer:
 
     @property
     def port(self) -> int:
-        """On which it listens. RuntimeError before `start`."""
+        """Port on which it listens. Raises RuntimeError before `start`."""
         if self._server is None or self._server.bserver is None:
             raise RuntimeError("the server was not started")
         return self._server.bserver.port
 
     @property
     def address(self) -> str:
-        """Where clients find it."""
+        """Address for clients."""
         host, port = self._at
         return f"opc.tcp://{host}:{port if self._server is None else self.port}"
 
@@ -115,9 +116,9 @@ class OpcUaServer:
         return Status(len(server.bserver.clients), items, requests.writes, refused, longest, left_out)
 
     async def start(self) -> None:
-        """Listen; that takes a second or two. Raises FaceError if it is not possible, CertificateError."""
+        """Listen; this takes one to two seconds. Raises ServerError if it is not possible, CertificateError."""
         for name in ("asyncua.server", "asyncua.common", "asyncua.uaprotocol", "asyncua.crypto"):
-            logging.getLogger(name).setLevel(logging.CRITICAL)  # it logs whatever clients send
+            logging.getLogger(name).setLevel(logging.CRITICAL)  # it logs all input of clients
         host, port = self._at
         require_free(OPCUA, host, port)
         with _without_collection():
@@ -126,21 +127,22 @@ class OpcUaServer:
             await updates.bring_present()
         try:
             await server.listen(host, port)
-        except OSError as error:  # it has been taken since
-            raise FaceError(f"opcua: {host}:{port} can't be listened on ({error}), expected a free port") from error
+        except OSError as error:  # another process has taken the port since
+            raise ServerError(f"opcua: {host}:{port} can't be listened on ({error}), expected a free port") from error
         self._server, self._updates = server, updates
         self._following = asyncio.create_task(updates.run())
         self._following.add_done_callback(self._ended)
 
     async def _empty(self) -> BoundedServer:
-        """A server with the standard's nodes, and who may come in."""
+        """Return a server with the nodes of the standard, its security and its identity tokens."""
         host, port = self._at
         own = identity(self._certificates or default_folder())
         internal = SafeServer(self, own.trusted, self._limits, self._logins)
         internal.bind_condition_methods = 1
-        server = BoundedServer(internal, self._limits, Places(self._quota))
+        server = BoundedServer(internal, self._limits, ConnectionSlots(self._quota))
         server.product_uri, server.name, server.manufacturer_name = NAMESPACE, "conveyor_sim", "conveyor_sim"
-        server.application_type, server._application_uri = ua.ApplicationType.Server, own.application_uri
+        server.application_type = ua.ApplicationType.Server
+        server.state_application(own.application_uri)
         await server.init()
         await server.load_certificate(own.certificate, "der")
         await server.load_private_key(own.key, format="pem")
@@ -151,13 +153,13 @@ class OpcUaServer:
         return server
 
     async def _fill(self, server: BoundedServer) -> Updates:
-        """Add the nodes of the line; what keeps them as the source is."""
+        """Add the nodes of the line. Return what updates them."""
         internal, source, requests = server.iserver, self._source, self._requests
         await publish(internal, self._limits, self._quota)
         if await server.register_namespace(NAMESPACE) != INDEX:
-            raise FaceError(f"opcua: namespace {NAMESPACE} has another index than {INDEX}")
-        clock = Clock(source.about, self._stamps)
-        history = History(self._history, source, clock)
+            raise ServerError(f"opcua: namespace {NAMESPACE} has another index than {INDEX}")
+        clock = TickClock(source.about, self._stamps)
+        history = OpcUaHistory(self._history, source, clock)
         internal.history_manager.set_storage(history)
         nodes, emitter = Nodes(internal, history), Emitter(internal)
         add_line(nodes, source.about)
@@ -181,7 +183,7 @@ class OpcUaServer:
             await server.stop()
 
     def _ended(self, following: asyncio.Task[None]) -> None:
-        """Rather no server than one that shows what is stale."""
+        """Stop the server after an error, because its values would be stale."""
         if not following.cancelled() and (error := following.exception()) is not None:
             logging.getLogger(__name__).error("opcua: the server ends: %s", error, exc_info=error)
             self._following = None
@@ -190,7 +192,7 @@ class OpcUaServer:
     def get_user(
         self, iserver: Any, username: str | None = None, password: str | None = None, certificate: Any = None
     ) -> Client | None:
-        """Who begins a session; None: nobody who may. Called by the library."""
+        """Return the user of a new session; None: refused. The library calls it."""
         if username is None:
             return reader() if self._anonymous else None
         result = checked.get()
@@ -201,7 +203,7 @@ class OpcUaServer:
 
 @contextmanager
 def _without_collection() -> Iterator[None]:
-    """While nodes are made: looking through the standard's 6000 again and again takes longer than making them all."""
+    """Collect no garbage while nodes are made. With the standard's 6000 nodes it takes longer than making them."""
     was = gc.isenabled()
     gc.disable()
     try:

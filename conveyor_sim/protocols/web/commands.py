@@ -1,6 +1,6 @@
-"""`Commands`: what pages want of a line, judged at once as far as that is possible, and handed to its source.
+"""`PageCommands`: requests of pages, checked at once as far as possible and passed on to the tag provider.
 
-Nothing here waits for a tick. What the line refuses then is among its events, which the page is told of, too.
+Nothing here waits for a tick. What the line refuses at the tick is among its events, which pages receive as well.
 """
 
 from __future__ import annotations
@@ -9,64 +9,66 @@ import sys
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from conveyor_sim.line.authority import MAY, unauthorized
-from conveyor_sim.line.inputs import DECLARE, SET, Input, WriterKind
-from conveyor_sim.line.receipt import Receipt
+from conveyor_sim.line.commands.authority import MAY, unauthorized
+from conveyor_sim.line.commands.inputs import DECLARE, SET, Input, WriterKind
+from conveyor_sim.line.commands.receipt import Receipt
 from conveyor_sim.line.tag import COMMANDS, Tag
-from conveyor_sim.protocols.hands import MAY_CONTROL, TAKES_NO_INPUT, objection, refused_for_good
-from conveyor_sim.protocols.source import WEB
-from conveyor_sim.protocols.users import Role
-from conveyor_sim.protocols.view import PictureSource
+from conveyor_sim.protocols.server.users import Role
+from conveyor_sim.protocols.tags.control_mode import MAY_CONTROL, TAKES_NO_INPUT, objection, refused_for_good
+from conveyor_sim.protocols.tags.line_mirror import DrawableProvider
+from conveyor_sim.protocols.tags.tag_provider import WEB
 
 OPERATIONS = tuple(operation for operation in MAY if operation != DECLARE)
 
 MOST_NAMES, LONGEST_NAME = 100, 200
-"""Of one request, and characters of each."""
+"""Largest number of names in one request, and of characters in a name."""
 
 LARGEST = sys.float_info.max
-"""Of values."""
+"""Largest absolute value in a request."""
 
 
-class Person(NamedTuple):
-    """Who sits before a page."""
+class PageUser(NamedTuple):
+    """User of a page."""
 
     name: str = ""
-    """Empty: nobody who has said so."""
+    """Name; empty: not signed in."""
     role: Role = "viewer"
     kind: WriterKind | None = None
-    """As what they act on a line; None: they don't."""
+    """Kind of writer for the line; None: the user only reads."""
 
     @property
     def writer(self) -> str:
-        """As inputs are recorded."""
+        """Name of the writer in recorded inputs."""
         return f"{WEB} {self.name}"
 
 
-NOBODY = Person()
+ANONYMOUS = PageUser()
 
 
-class Commands:
-    """Of all pages of one source."""
+class PageCommands:
+    """Requests of all pages of one tag provider."""
 
-    def __init__(self, source: PictureSource) -> None:
+    def __init__(self, source: DrawableProvider) -> None:
         self._source = source
         tags = source.about.tags
         self._commands: Mapping[str, Tag] = {tag.name: tag for tag in tags if tag.role in COMMANDS}
         self._receipt = Receipt(tags, source.about.where)
-        self.controls = source.controls - {"target"}  # how far a line in lockstep goes is its controller's affair
-        """What can be asked of the run from a page."""
+        self.controls = source.controls - {"target"}  # the controller sets the target of a line in lockstep
+        """Requests to control the run that pages may make."""
         self.writes = self.refused = 0
-        """Requests that were passed on to the line, and those that were not."""
+        """Requests that were passed on to the line, and requests that were refused."""
 
-    def do(self, person: Person, request: Mapping[str, Any]) -> str:
-        """What a page asks for; why that can't be, "" if it will be done. It may be anything."""
+    def do(self, person: PageUser, request: Mapping[str, Any]) -> str:
+        """Carry out a request of a page, which may be malformed. Return the reason for a refusal, "" if it was
+        accepted.
+        """
         reason = self._do(person, request)
         self.writes, self.refused = self.writes + (not reason), self.refused + bool(reason)
         return reason
 
-    def _do(self, person: Person, request: Mapping[str, Any]) -> str:
+    def _do(self, person: PageUser, request: Mapping[str, Any]) -> str:
         if person.kind is None:
-            who = f"{person.name} is a viewer, who only reads" if person.name else "nobody has signed in"
+            who = f"{person.name} is a viewer, who only reads" if person.name else "not signed in"
             return f"{who}; expected an operator, engineer, controller or test"
         what, names, values = request.get("do"), request.get("names", []), request.get("values", [])
         if not (_are(names, str) and _are(values, (int, float)) and all(abs(value) <= LARGEST for value in values)):
@@ -79,7 +81,7 @@ class Commands:
             return f"expected one of {', '.join(OPERATIONS)}"
         return self._give(Input(WEB, person.writer, person.kind, what, tuple(names), tuple(map(float, values))))
 
-    def _control(self, person: Person, kind: WriterKind, names: list[str], values: list[float]) -> str:
+    def _control(self, person: PageUser, kind: WriterKind, names: list[str], values: list[float]) -> str:
         if kind not in MAY_CONTROL:
             return f"{person.name} is a {kind}, expected one of the kind {' or '.join(MAY_CONTROL)}"
         (what,) = names[:1] or ("",)
@@ -103,7 +105,7 @@ class Commands:
         return self._source.give(given)
 
     def _objection(self, given: Input) -> str:
-        """Why commands are refused, as the line was last."""
+        """Return why commands would be refused in the latest state of the line; "" if they would not."""
         if unknown := [name for name in given.names if name not in self._commands]:
             return f"{unknown[0]}: expected a command"
         kind: Any = given.writer_kind
@@ -115,7 +117,7 @@ class Commands:
 
 
 def _are(values: Any, kind: Any) -> bool:
-    """Whether it is a list of those, not too long."""
+    """Return True for a list of at most MOST_NAMES values of a kind, bool excluded."""
     if not isinstance(values, list) or len(values) > MOST_NAMES:
         return False
     return all(isinstance(value, kind) and not isinstance(value, bool) for value in values)

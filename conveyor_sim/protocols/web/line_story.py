@@ -1,4 +1,4 @@
-"""`LineStory`: what happens on a line that runs, as the page is told of it."""
+"""`LineStory`: events and slow data of a running line, as a page receives them."""
 
 from __future__ import annotations
 
@@ -7,21 +7,21 @@ from typing import Any
 
 from conveyor_sim.columns.events import Event, event_columns
 from conveyor_sim.page.story import Story
-from conveyor_sim.protocols.source import Shown
-from conveyor_sim.protocols.view import Picture
+from conveyor_sim.protocols.tags.line_mirror import DrawableFrame
+from conveyor_sim.protocols.tags.tag_provider import LineSnapshot
 
 COUNTERS = 0.5
-"""s of simulated time from one entry of the counters to the next, at least."""
+"""Shortest simulated time between two entries of the counters, s."""
 
 
 class LineStory(Story):
-    """Of one run, from a moment on: at first all that is so then."""
+    """Story of one run from a moment on. It starts with the complete state at that moment."""
 
     def __init__(self, tick_ns: int) -> None:
         super().__init__(lambda tick: tick * tick_ns * 1e-9, COUNTERS)
         self._seen: dict[str, Any] = {}
 
-    def look(self, shown: Shown, picture: Picture, events: Sequence[Event]) -> None:
+    def look(self, shown: LineSnapshot, picture: DrawableFrame, events: Sequence[Event]) -> None:
         """Add events, and what has changed since the last call."""
         found: dict[str, Any] = {"alarm_states": shown.alarms, "readback": shown.read_back}
         found |= {topic: picture.drawn.get(topic) for topic in ("counters", "rail_wear")}
@@ -37,7 +37,7 @@ class LineStory(Story):
                 self.add(topic, what, shown.tick)
 
     def _readback(self, message: Any, time: float) -> None:
-        """With the ticks from which on commands are what they are, which may be before the first look."""
+        """Add the commands with the ticks of their last changes, which may be before the first call."""
         before = len(self.data["readback"])
         super()._readback(message, time)
         rows = self.data["readback"][before:]

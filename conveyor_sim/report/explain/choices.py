@@ -28,18 +28,18 @@ def explanation(scene: Scene, model: Model) -> Group:
     steps.add_row("scene", f"{model.name} ({scene.source_name})")
     for name, text in [*accuracy_rows(model), *step_rows(scene)]:
         steps.add_row(name, text)
-    for name, text in note_rows(scene, model):
+    for name, text in note_rows(model):
         steps.add_row(name, text)
     return Group(_effects(scene, model), _bounds(scene, model), steps)
 
 
-def note_rows(scene: Scene, model: Model) -> list[tuple[str, str]]:
-    """What to know of how the scene was set up, each with its name; none where there is nothing to say."""
-    return [("note", text) for text in notes(scene, {choice.name for choice in model.effects if choice.on})]
+def note_rows(model: Model) -> list[tuple[str, str]]:
+    """Return notes on the set-up of a scene, each with its name; empty without notes."""
+    return [("note", text) for text in notes(model.plant, {choice.name for choice in model.effects if choice.on})]
 
 
 def accuracy_rows(model: Model) -> list[tuple[str, str]]:
-    """What is chosen, what comes of it, and the errors to expect, each with its name."""
+    """Return the accuracy settings, their consequences and the expected errors, each with its name."""
     prediction = model.prediction
     force = prediction.reason
     if prediction.value is not None:
@@ -58,7 +58,7 @@ def accuracy_rows(model: Model) -> list[tuple[str, str]]:
 
 
 def step_rows(scene: Scene) -> list[tuple[str, str]]:
-    """What sets the number of steps, and what would lower it, each with its name."""
+    """Return the bound that sets the number of steps and the changes that would lower it, each with its name."""
     return [("" if index else "steps", line) for index, line in enumerate(step_limit(scene).lines)]
 
 
@@ -70,7 +70,7 @@ def setting_line(model: Model) -> str:
 
 
 def price_table(prices: PriceList) -> Group:
-    """What was measured, the dearest effect first."""
+    """Return a table of the measured costs, the most expensive effect first."""
     table = Table(box=SIMPLE)
     for heading in ("effect", "with", "without", "cost", f"{prices.confidence:.0%} within", ""):
         left = heading in ("effect", "")
@@ -141,7 +141,7 @@ def _bounds(scene: Scene, model: Model) -> Table | str:
 
 
 def _time(seconds: float) -> str:
-    """A time of four digits in a unit in which it takes no exponent."""
+    """Return a time with four digits, in a unit without exponent."""
     scale, unit = (1e6, "us") if seconds < 1e-3 else (1e3, "ms") if seconds < 1.0 else (1.0, "s")
     return f"{seconds * scale:.4g} {unit}"
 

@@ -1,4 +1,4 @@
-"""What each effect of a scene costs: the same state advanced with it and without it, in turn, in one run."""
+"""Cost of each effect of a scene: one state advanced with and without the effect, in turn, in one run."""
 
 from __future__ import annotations
 
@@ -41,12 +41,12 @@ class Price:
     off: float
     cost: float
     low: float
-    """Between `low` and `high` lies the true median with CONFIDENCE, whatever the noise's distribution."""
+    """The true median lies between `low` and `high` with CONFIDENCE, for any distribution of the noise."""
     high: float
 
     @property
     def certain(self) -> bool:
-        """Whether the cost differs from 0."""
+        """Return True if the cost is significantly different from zero."""
         return self.low > 0.0 or self.high < 0.0
 
 
@@ -71,7 +71,7 @@ class PriceList:
 
 @dataclass(frozen=True)
 class Gain:
-    """Speed-up by a remedy (`physics/model/remedies.py`): time of a tick without it over that with it, from one state."""
+    """Speed-up by a remedy (`physics/model/remedies.py`): time of one tick without it over time with it."""
 
     words: str
     steps: int
@@ -142,7 +142,7 @@ class Pricing:
         progress(len(wanted), len(wanted))
 
     def measure(self, progress: Progress, rounds: int = ROUNDS) -> PriceList:
-        """The prices; progress in measurements."""
+        """Measure the costs; `progress` counts measurements."""
         full, warm = self._full, self._warm
         ticks = _ticks_of(full, warm)
         measured: dict[str, list[tuple[float, float]]] = {variant.name: [] for variant in self._variants}
@@ -168,7 +168,7 @@ class Pricing:
         )
 
     def gains(self, progress: Progress, rounds: int = ROUNDS) -> tuple[Gain, ...]:
-        """What the remedies of the scene bring, after `warm_up`; progress in measurements."""
+        """Measure the gains of the scene's remedies, after `warm_up`; `progress` counts measurements."""
         found, remedies = [], step_limit(self._scene).remedies
         for index, remedy in enumerate(remedies):
             simulation = Simulation(with_remedy(self._scene, remedy.overrides), threads=1, shorten=False)
@@ -191,7 +191,7 @@ def _removable(model: Model) -> list[str]:
 
 
 def _variant(scene: Scene, model: Model, off: Sequence[str]) -> Scene:
-    """The scene with some effects off, and the steps a tick that it has with them."""
+    """Return the scene without some effects, at the number of steps per tick that it has with them."""
     overrides = parse_overrides(scene.overrides_text)
     overrides["effects"] = {**scene.effects, **dict.fromkeys(off, "off")}
     overrides["accuracy"] = explicit(model.integrator, model.steps_per_tick, scene.accuracy.error)
@@ -209,7 +209,7 @@ def _ticks_of(simulation: Simulation, warm: Simulation) -> int:
 
 
 def _measure(simulation: Simulation, warm: Simulation, ticks: int) -> float:
-    """ns per bottle and step over some ticks from the warm state."""
+    """Return the time of some ticks from the warm state, in ns per bottle and step."""
     spent, bottle_ticks = _run(simulation, warm, ticks)
     return spent * 1e9 / (max(1.0, bottle_ticks) * simulation.model.steps_per_tick)
 
@@ -248,7 +248,7 @@ def _price(variant: _Variant, pairs: Sequence[tuple[float, float]]) -> Price:
 
 
 def _rank(count: int) -> int:
-    """How many of `count` sorted values may be left out at each end for a median interval of CONFIDENCE (sign test)."""
+    """Return how many of `count` sorted values a median interval of CONFIDENCE leaves out at each end (sign test)."""
     rank, outside = 0, 2.0 * 0.5**count
     while rank + 1 < count // 2:
         outside += 2.0 * math.comb(count, rank + 1) * 0.5**count

@@ -1,4 +1,4 @@
-"""What moves: bottles as circles to scale, coloured by speed, and contact forces as lines whose width is the force."""
+"""Moving parts of a figure: bottles to scale, coloured by speed, and contact forces as lines of proportional width."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ class ForceScale:
 
     @classmethod
     def covering(cls, frames: Sequence[Frame], widest: float, peak: float = 0.0) -> ForceScale | None:
-        """The scale on which the largest force of `frames` is `widest` points wide; None if there is no force.
+        """Return the scale at which the largest force of `frames` is `widest` points wide; None without forces.
 
-        `peak` (N) is the largest force of the whole run: where all forces are far below it, their lines are narrower.
+        `peak` (N) is the largest force of the complete run: if all forces are far below it, their lines are narrower.
         """
         forces = [frame.contacts.force for frame in frames if frame.contacts is not None]
         largest = max((float(force.max()) for force in forces if len(force)), default=0.0)
@@ -96,7 +96,7 @@ def draw_bottles(ax: Axes, frame: Frame, norm: Normalize, edge: float) -> list[E
 
 
 def draw_orientation(ax: Axes, frame: Frame, norm: Normalize, width: float) -> LineCollection:
-    """A tick from half the radius to the rim at each bottle's angle, light on dark; `width` in points."""
+    """Draw a tick from half the radius to the rim at each bottle's angle, light on dark; `width` in points."""
     ray = np.stack([np.cos(frame.theta), np.sin(frame.theta)], axis=1)
     axis = np.stack([frame.x, frame.y], axis=1)
     inner, outer = axis + 0.5 * frame.radius[:, None] * ray, axis + frame.radius[:, None] * ray

@@ -71,7 +71,7 @@ def rails_figure(plant: Plant, damage: Damage, title: str) -> Figure:
 
 
 def bottles_figure(damage: Damage, title: str) -> Figure:
-    """How the worst that each bottle bore is spread over the bottles; the limit where the scene gives one."""
+    """Draw the distribution of the maxima over the bottles, with the limits of the scene."""
     shown = {name: values for name, values in damage.worst.items() if len(values)}
     columns = min(3, max(1, len(shown)))
     rows = max(1, -(-len(shown) // columns))
@@ -86,7 +86,7 @@ def bottles_figure(damage: Damage, title: str) -> Figure:
 
 
 def bin_lines(plant: Plant, wear: RailWearColumns) -> list[Floats]:
-    """The course (k, 2) of every bin, m, in the order of the columns."""
+    """Return the polyline (k, 2) of each bin, m, in the order of the columns."""
     lines = []
     for rail in dict.fromkeys(wear.rail.tolist()):
         course = plant.rail_line(rail)

@@ -1,4 +1,4 @@
-"""What the drawing functions take: plain arrays and shapes, wherever they come from."""
+"""Input of the drawing functions: plain arrays and shapes."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _OUTLINE_POINTS = 96
 
 @dataclass(frozen=True)
 class Plant:
-    """What stands still: belts with their speeds in the scene (m/s) and rails, in listing order; marks of devices."""
+    """Static geometry: belts with initial speeds (m/s), rails in listing order, device markers."""
 
     belts: tuple[BeltShape, ...]
     speeds: Floats
@@ -34,7 +34,7 @@ class Plant:
 
     @classmethod
     def of(cls, scene: Scene) -> Plant:
-        """The plant that `scene` describes."""
+        """Return the static geometry of `scene`."""
         return cls(
             belts=tuple(belt_shapes(scene)),
             speeds=np.array([belt.speed for belt in scene.belts.values()], dtype=np.float64),
@@ -43,11 +43,11 @@ class Plant:
         )
 
     def drawn_as(self, look: Look) -> list[Mark]:
-        """The marks of one look."""
+        """Return the markers of one look."""
         return [mark for mark in self.marks if mark.look == look]
 
     def with_moving(self, moving: Sequence[RailShape]) -> Plant:
-        """The same with the rails that move, the last ones, somewhere else."""
+        """Return a copy with the moving rails, which come last, at other positions."""
         return replace(self, rails=(*self.rails[: len(self.rails) - len(moving)], *moving))
 
     def belt_outline(self, index: int) -> Floats:
@@ -97,7 +97,7 @@ class Frame:
 
     @classmethod
     def start_of(cls, scene: Scene) -> Frame:
-        """The initial bottles of `scene`, all belts at their speeds in the scene."""
+        """Return the initial bottles of `scene`, with all belts at their initial speeds."""
         born = list(initial_bottles(scene))
         state = np.array([row[1:] for row in born], dtype=np.float64).reshape(len(born), 6)
         return cls(
@@ -111,7 +111,10 @@ class Frame:
         )
 
     def within(self, box: tuple[float, float, float, float]) -> Frame:
-        """The same instant, of the bottles that reach into `box` (x0, y0, x1, y1) and the contacts that start in it."""
+        """Return the frame restricted to a box.
+
+        The result has the bottles that reach into `box` (x0, y0, x1, y1) and the contacts that start in it.
+        """
         x0, y0, x1, y1 = box
         keep = (
             (self.x + self.radius >= x0)
@@ -153,10 +156,9 @@ class Velocity:
 
 @dataclass(frozen=True)
 class Flow:
-    """How bottles move through the line: `time` (n,) s; `fed`, `removed`, `present` (n,) counts since the start.
+    """Flow of bottles: `time` (n,) s; `fed`, `removed`, `present` (n,) counts since the start.
 
-    `on_belt` (n, belts) counts the bottles on each belt; `entered` (n, belts) counts since the start how often a
-    bottle came onto it.
+    `on_belt` (n, belts) counts the bottles on each belt; `entered` (n, belts) counts entries onto it since the start.
     """
 
     time: Floats
@@ -202,7 +204,7 @@ class Energy:
 
 @dataclass(frozen=True)
 class Damage:
-    """What rails had borne at the end of a recording, and the worst that each bottle ever bore."""
+    """Wear of rails at the end of a recording, and the damage maxima of each bottle."""
 
     time: float
     """s, of the last output."""
@@ -211,7 +213,7 @@ class Damage:
     worst: dict[str, Floats]
     """By quantity (`DamageColumns`), one entry a bottle for which it is known."""
     limits: dict[str, float]
-    """Those of the scene."""
+    """Limits of the scene."""
 
 
 def box_around(points: Floats) -> tuple[float, float, float, float]:

@@ -60,7 +60,7 @@ def energy_figure(energy: Energy, belts: Sequence[str]) -> Figure:
 
 
 def _work(work: Floats, belts: Sequence[str]) -> list[Curve]:
-    """The belts that do most, in listing order, and the others together."""
+    """Return curves of the belts with most work, in listing order, and one curve of the others."""
     most = np.argsort(-np.abs(work).max(axis=0, initial=0.0), kind="stable")
     own, others = sorted(most[:_BELTS].tolist()), most[_BELTS:]
     curves = [(belts[index], work[:, index]) for index in own]

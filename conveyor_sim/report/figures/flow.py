@@ -103,7 +103,7 @@ def force_figure(force: PeakForce) -> Figure:
 
 
 def rate_window(time: Floats) -> float:
-    """The time (s) over which entries are counted into a rate: a round part of the run."""
+    """Return the time (s) over which entries are counted for a rate: a round part of the run."""
     span = float(time[-1] - time[0])
     return style.nice_above(span / _WINDOWS) if span > 0.0 else 1.0
 
@@ -144,7 +144,7 @@ def _steps(
 
 
 def _corners(time: Floats, values: NDArray[np.generic]) -> tuple[Floats, Floats]:
-    """The records at which a stepped curve changes, and the last: the same curve with far fewer points."""
+    """Return only the points at which a stepped curve changes, and the last: the same curve with far fewer points."""
     level = np.asarray(values, dtype=np.float64)
     keep = np.ones(len(level), dtype=np.bool_)
     keep[1:-1] = level[1:-1] != level[:-2]
@@ -152,5 +152,5 @@ def _corners(time: Floats, values: NDArray[np.generic]) -> tuple[Floats, Floats]
 
 
 def _end(time: Floats) -> float:
-    """The last time, and a little more if it is the first too, so that an axis has a length."""
+    """Return the last time, slightly increased if it is also the first, so that the axis has a length."""
     return float(time[-1]) if time[-1] > time[0] else float(time[0]) + 1.0

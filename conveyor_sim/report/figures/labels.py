@@ -98,7 +98,7 @@ def _around(corners: Floats) -> tuple[Floats, Floats]:
 
 
 def _beyond(ends: Floats) -> tuple[Floats, Floats]:
-    """Ends of a line, the last one first, and the directions beyond them."""
+    """Return the ends of a line, the last one first, and the outward directions there."""
     away = np.array([ends[1] - ends[0], ends[0] - ends[1]])
     return ends[::-1], away / np.hypot(*away.T).clip(1e-12)[:, None]
 

@@ -1,4 +1,4 @@
-"""What a line made, against what its bottleneck could have."""
+"""Figure of a line's output against the capacity of its bottleneck."""
 
 from __future__ import annotations
 

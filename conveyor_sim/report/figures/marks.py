@@ -103,7 +103,7 @@ def draw_entries(ax: Axes, plant: Plant, size: float) -> None:
 
 
 def _arrow(line: Floats, size: float) -> Floats:
-    """An arrow (6, 2) from the middle of a line to its right, forward, in one stroke."""
+    """Return an arrow (6, 2) from the middle of a line to its right, as one stroke."""
     middle = line.mean(axis=0)
     ahead = (line[1] - line[0]) / np.hypot(*(line[1] - line[0]))
     right = np.array([ahead[1], -ahead[0]])

@@ -61,9 +61,9 @@ def moment_figure(
     events: Sequence[Event] = (),
     forced: Sequence[str] = (),
 ) -> Figure:
-    """The plant at the time of `frame`; under it the traces, one a row, over `time` (n,) s, which ends at that time.
+    """Draw the plant at the time of `frame`, with one trace per row below it, over `time` (n,) s up to that time.
 
-    text: what happened. blocked: names of the photo-eyes that are blocked then. forced: signals that are forced then.
+    text: description of the event. blocked: names of photo-eyes blocked at that time. forced: signals forced then.
     """
     box = whole_region(plant, [frame])
     inches = WIDTH - 0.8
@@ -106,7 +106,7 @@ def _speeds(plant: Plant, frame: Frame) -> Normalize:
 
 
 def _draw_blocked(ax: Axes, plant: Plant, blocked: Collection[str]) -> LineCollection:
-    """The beams of the photo-eyes that are blocked: broad and full."""
+    """Draw the beams of blocked photo-eyes, broad and opaque."""
     beams = [mark.points for mark in plant.marks if mark.kind == "photo_eye" and mark.name in blocked]
     lines = LineCollection(beams, colors=style.PHOTO_EYE, linewidths=4.0, zorder=Z_LINE, gid="blocked")
     ax.add_collection(lines)
@@ -138,7 +138,7 @@ def _draw_trace(ax: Axes, trace: Trace, time: Floats, colour: str) -> None:
 
 
 def _name_events(ax: Axes, events: Sequence[Event]) -> None:
-    """The events' words above the first row, each on a line of its own, with its line led up to it."""
+    """Write the texts of events above the first row, one per line, each connected to its time."""
     low, high = ax.get_xlim()
     for number, event in enumerate(reversed(events)):
         late = event.time > 0.5 * (low + high)

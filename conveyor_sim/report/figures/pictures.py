@@ -1,4 +1,4 @@
-"""The pictures of a recording, by name: each can be drawn by itself, in whatever process."""
+"""Figures of a recording by name; each can be drawn separately, in any process."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from conveyor_sim.report.figures.series import velocity_figure
 from conveyor_sim.report.figures.views import plant_figure, table_figure
 
 Figures = Mapping[str, Callable[[], Figure]]
-"""How each picture is drawn, by the name of its files, in the order in which they are listed."""
+"""Drawing functions by file name, in listing order."""
 
 
 def figures_of(bag: Bag, times: Sequence[float] | None, bottles: Sequence[int] | None) -> Figures:
-    """The pictures that there are of an open bag, all data read; `times` and `bottles` as for `plot_bag`.
+    """Return the figures of an open bag, with all data read; `times` and `bottles` as in `plot_bag`.
 
-    Raises BagError and ConveyorError as `plot_bag` does.
+    Raise BagError and ConveyorError as `plot_bag` does.
     """
     recording = Recording(bag)
     frames, plant, name = recording.frames(times), recording.plant, recording.scene.name

@@ -1,4 +1,4 @@
-"""What stands still: belts as areas with chevrons along their travel, rails as strong lines, the rest."""
+"""Static parts of a figure: belts as areas with chevrons along their motion, rails as bold lines, devices."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the pictures need of a bag, in a few passes over it that hold no more than the pictures show."""
+"""Data of the figures of a bag, read in a few passes that retain only the drawn data."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conveyor_sim.bag.forced import forced_signals
-from conveyor_sim.bag.messages import to_image
+from conveyor_sim.bag.messages.encode import to_image
 from conveyor_sim.bag.reader import Bag
 from conveyor_sim.columns.bottles import BottleColumns, ContactColumns
 from conveyor_sim.columns.damage import DamageColumns, RailWearColumns
@@ -87,7 +87,7 @@ class Recording:
 
     @property
     def damage(self) -> Damage | None:
-        """What was borne up to the last recorded Damage; None if there is none."""
+        """Return the damage up to the last recorded Damage message; None without one."""
         known = [field.name for field in fields(DamageColumns) if field.name not in ("id", "type", "x", "y")]
         worst: dict[str, dict[int, float]] = {name: {} for name in known}
         ids: set[int] = set()
@@ -116,10 +116,10 @@ class Recording:
         )
 
     def frames(self, times: Sequence[float] | None) -> list[Frame]:
-        """The line at the recorded instants nearest to `times` (s), in ascending order, each once.
+        """Return the recorded frames nearest to `times` (s), in ascending order, without repetition.
 
         Default: a quarter, half, three quarters and the end of the recording.
-        Raises ConveyorError if a time is outside it.
+        Raise ConveyorError if a time is outside it.
         """
         ticks = self._drawable_ticks
         seconds = self._seconds(ticks)
@@ -304,5 +304,5 @@ def _peak(ids: Integers, peak_force: Floats) -> tuple[float, float, int]:
 
 
 def _scene(bag: Bag) -> Scene:
-    """The scene that was run, from the recorded text and what was changed when it was loaded."""
+    """Return the scene of the run, from the recorded text and the overrides at loading."""
     return parse_scene(bag.line.scene_text, f"{bag.path} (recorded scene)", parse_overrides(bag.line.overrides))

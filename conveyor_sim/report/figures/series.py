@@ -17,7 +17,7 @@ _STRIP: Final = 0.05  # height of the strip of belts, of the height of the axes
 
 
 def velocity_figure(velocity: Velocity, belts: Sequence[str], end: float) -> Figure:
-    """vx at the left, vy at the right, from 0 to `end` s on the same scale; a strip on top names the belts passed."""
+    """Draw vx at the left and vy at the right, from 0 to `end` s at one scale, below a strip that names the belts."""
     figure = style.new_figure(11.0, 3.9)
     axes = figure.subplots(1, 2, sharex=True, sharey=True)
     for ax, name, values in zip(axes, ("vx", "vy"), (velocity.vx, velocity.vy), strict=True):
@@ -34,7 +34,7 @@ def velocity_figure(velocity: Velocity, belts: Sequence[str], end: float) -> Fig
 
 
 def velocity_title(velocity: Velocity) -> str:
-    """Which bottle it is, in words."""
+    """Return a title that names the bottle."""
     origin = f"the {ordinal(velocity.born)} fed" if velocity.born else "on the line from the start"
     return f"Velocity of bottle {velocity.bottle}, {origin}"
 
@@ -46,7 +46,7 @@ def ordinal(number: int) -> str:
 
 
 def _belts_passed(ax: Axes, velocity: Velocity, belts: Sequence[str]) -> None:
-    """A strip above the axes, one stretch for each time on a belt, with the belt's name where it fits."""
+    """Draw a strip above the axes, with one stretch per stay on a belt and the belt's name where it fits."""
     change = np.flatnonzero(np.diff(velocity.belt)) + 1
     starts = np.concatenate([[0], change])
     ends = np.concatenate([change, [len(velocity.belt) - 1]])

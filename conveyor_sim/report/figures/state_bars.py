@@ -1,4 +1,4 @@
-"""What machines do over time: a bar each, coloured by what their time goes to."""
+"""Figure of machine states over time: one bar per machine, coloured by time category."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from conveyor_sim.line.time_account import CATEGORIES
+from conveyor_sim.line.machines.time_account import CATEGORIES
 from conveyor_sim.report.figures import style
 from conveyor_sim.report.periods import Period, shares
 
@@ -29,7 +29,7 @@ _ROW: Final = 0.42  # inches
 
 
 def state_bars_figure(periods: Mapping[str, Sequence[Period]], start: float, end: float, name: str) -> Figure:
-    """A bar a machine, from `start` to `end` s. Within a column of pixels, heights are shares of time."""
+    """Draw one bar per machine, from `start` to `end` s. Within a column of pixels, heights are shares of time."""
     figure = style.new_figure(11.0, 1.5 + _ROW * len(periods))
     ax = figure.subplots()
     edges = np.linspace(start, end if end > start else start + 1.0, _COLUMNS + 1)

@@ -78,7 +78,7 @@ _RC: Final[dict[Any, Any]] = {
 
 @contextmanager
 def look() -> Iterator[None]:
-    """Everything that draws or saves runs inside this, whatever the user's own matplotlib settings are."""
+    """Apply the drawing style, independent of the user's matplotlib settings, to all drawing and saving."""
     with matplotlib.rc_context():
         matplotlib.rcdefaults()
         matplotlib.rcParams.update(_RC)
@@ -86,7 +86,7 @@ def look() -> Iterator[None]:
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """A figure of `width` by `height` inches on the Agg canvas, laid out so that nothing overlaps."""
+    """Return a figure of `width` by `height` inches on the Agg canvas, laid out without overlaps."""
     figure = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
@@ -109,7 +109,7 @@ def lay_out(figure: Figure) -> None:
 
 
 def rendered(figure: Figure, suffixes: Sequence[str] = PNG_AND_SVG) -> Picture:
-    """A figure as files of these suffixes; equal figures give equal bytes."""
+    """Return a figure as files of these suffixes; equal figures give equal bytes."""
     lay_out(figure)
     picture = {}
     for suffix in suffixes:
@@ -142,12 +142,12 @@ def pale(colour: NDArray[np.float64], strength: float) -> NDArray[np.float64]:
 
 
 def nice_below(value: float) -> float:
-    """The largest of 1, 2, 5 times a power of ten that does not exceed `value` > 0."""
+    """Return the largest of 1, 2, 5 times a power of ten that does not exceed `value` > 0."""
     power = 10.0 ** np.floor(np.log10(value))
     return float(max(step * power for step in (1.0, 2.0, 5.0) if step * power <= value * (1.0 + 1e-12)))
 
 
 def nice_above(value: float) -> float:
-    """The smallest of 1, 2, 5 times a power of ten that is not below `value` > 0."""
+    """Return the smallest of 1, 2, 5 times a power of ten that is not below `value` > 0."""
     power = 10.0 ** np.floor(np.log10(value))
     return float(min(step * power for step in (1.0, 2.0, 5.0, 10.0) if step * power >= value * (1.0 - 1e-12)))

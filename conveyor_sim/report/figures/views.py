@@ -57,7 +57,7 @@ def table_figure(plant: Plant, frames: Sequence[Frame], title: str, peak: float 
 
 
 def plant_figure(plant: Plant, frame: Frame, title: str, peak: float = 0.0) -> Figure:
-    """The whole plant at the time of `frame`, with names and speeds of the belts.
+    """Draw the complete plant at the time of `frame`, with names and speeds of the belts.
 
     `peak` (N) is the largest force of the run, see ForceScale.
     """
@@ -81,7 +81,7 @@ def plant_figure(plant: Plant, frame: Frame, title: str, peak: float = 0.0) -> F
 
 
 def scene_figure(plant: Plant, frame: Frame, title: str) -> Figure:
-    """The plant as its scene describes it, rails named too, with the bottles that it starts with."""
+    """Draw the plant of a scene with the names of rails and the initial bottles."""
     box = whole_region(plant, [frame])
     width, height = box[2] - box[0], box[3] - box[1]
     inches = WIDTH - 0.8
@@ -98,7 +98,7 @@ def scene_figure(plant: Plant, frame: Frame, title: str) -> Figure:
 
 
 def table_region(plant: Plant, frames: Sequence[Frame]) -> Box:
-    """The box around the widest belt and a bottle's width more; the whole plant if that is nearly all of it."""
+    """Return the box around the widest belt plus one bottle width; the complete plant if that is nearly as large."""
     if not plant.belts:
         return whole_region(plant, frames)
     widest = int(np.argmax([belt.width for belt in plant.belts]))
@@ -134,7 +134,7 @@ def draw_view(
 
 
 def _lighten(axes: Iterable[Axes], frames: Sequence[Frame]) -> None:
-    """Where a figure shows very many bottles and forces, keep its SVG small."""
+    """Rasterise the bottles and forces of figures that show very many, to keep the SVG small."""
     drawn = sum(2 * len(frame.x) + (len(frame.contacts.force) if frame.contacts else 0) for frame in frames)
     if drawn > _MANY:
         for ax in axes:
@@ -144,7 +144,7 @@ def _lighten(axes: Iterable[Axes], frames: Sequence[Frame]) -> None:
 
 
 def force_scale(frames: Sequence[Frame], points_per_metre: float, peak: float) -> ForceScale | None:
-    """The largest force as wide as half a bottle, so that chains of force don't merge."""
+    """Return a scale at which the largest force is as wide as half a bottle, so that force chains stay distinct."""
     radii = np.concatenate([frame.radius for frame in frames]) if frames else np.empty(0)
     radius = float(np.median(radii)) if len(radii) else 0.0
     return ForceScale.covering(frames, float(np.clip(radius * points_per_metre, 1.5, 7.0)), peak)
@@ -197,7 +197,7 @@ def colour_bar(
 
 
 def _heading(figure: Figure, title: str) -> None:
-    """The title at the top left, where the legend of forces leaves it room at the right."""
+    """Write the title at the top left; the legend of forces has the right."""
     figure.suptitle(title, x=0.01, ha="left", fontsize=13.0, fontweight="bold")
 
 

@@ -30,7 +30,7 @@ from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
 from conveyor_sim.bag.replay import replay
-from conveyor_sim.line.authority import MAY
+from conveyor_sim.line.commands.authority import MAY
 from conveyor_sim.ros.child import Child
 from conveyor_sim.ros.domain import in_environment, own_domain
 
@@ -63,8 +63,17 @@ def attack(seed: int, folder: Path) -> str:
 
 
 def finish() -> None:
-    """End the node as Ctrl-C does, and see that it ends well. Raises Violation."""
-    _station().renew()
+    """End the node as Ctrl-C does, and look at the start of the next one: a flood, and a late request.
+
+    Raises Violation.
+    """
+    station = _station()
+    station.renew()
+    for _ in range(3000):
+        station.publish("commands", Commands(names=["nowhere"], values=[0.0]))
+    station.require_account()
+    station.ask(srv.StepSimulation, "step_simulation", wait=False, steps=99_000)  # as if it came after a reset
+    station.settle()
 
 
 class Station:
@@ -107,18 +116,16 @@ class Station:
         self._require_alive()
         self._require_known_speeds()
         self._reset()
-        for future in self.futures:
-            self._wait(future.done, "an answer to every request after a reset")
-        self.futures.clear()
+        self.settle()
         if self._cases % ACCOUNT == 0:
-            self._require_account()
+            self.require_account()
         self._replay()
         return happened
 
     def renew(self) -> None:
         """End the node, look at how it ended, and start another one."""
         if self._node is not None:
-            self._require_account()
+            self.require_account()
             os.kill(self._node.pid, signal.SIGINT)
             self._wait(lambda: self._node is not None and self._node.exit_code is not None, "the end on Ctrl-C")
             log = self._node.log.read_text(errors="replace")
@@ -126,6 +133,9 @@ class Station:
                 raise Violation("bad end", f"status {self._node.exit_code}: {log[-2000:]}")
             self._wait(lambda: not self.line.node.count_services("lockstep"), "the end of its services")
             self._node = None
+        # Before the next node starts: it would count them as publishers that have not sent anything yet.
+        for publisher in self._publishers.values():
+            self.line.node.destroy_publisher(publisher)
         self._nodes += 1
         self._cases = self._sent = self.others = 0
         place = self._folder / str(self._nodes)
@@ -141,8 +151,6 @@ class Station:
         restore_for_children()
         self._node = Child("sim_node", given | {"record": self._bag, "threads": 1}, self._environment, place)
         self.present()
-        for publisher in self._publishers.values():
-            self.line.node.destroy_publisher(publisher)
         self._publishers = {
             name: self.line.publisher(kind, name, qos)
             for name, kind, qos in (
@@ -151,7 +159,19 @@ class Station:
                 (TABLE, Float64, "cmd_speed"),
             )
         }
+        self._introduce()
         self._memory = self._resident()
+
+    def _introduce(self) -> None:
+        """Send a first message of each publisher, which is refused, and wait for it.
+
+        The node counts lost commands from the first one that it receives of a publisher. A flood that begins before it
+        knows the publisher would not be counted as a whole.
+        """
+        self.publish("commands", Commands())
+        for name in SPEEDS:
+            self.publish(name, Float64(data=math.nan))
+        self._wait(lambda: self._told()["received commands"] == self._sent, "the first commands")
 
     # What actions use
 
@@ -197,21 +217,38 @@ class Station:
             if not any(speed in valid[name] for valid in (self.valid, *self._earlier)):
                 raise Violation("belt", f"{name} came to {speed} m/s, which no good command asked for")
 
+    def settle(self) -> None:
+        """Wait for an answer to every request, after a reset. Raises Violation."""
+        self._wait(self._answered, "an answer to every request after a reset")
+        self.futures.clear()
+
+    def _answered(self) -> bool:
+        """Return whether every request has its answer. Reset again if a late one has begun in the new run.
+
+        DDS keeps no order between services: a request may come after the reset that was sent after it.
+        """
+        if all(future.done() for future in self.futures):
+            return True
+        if self.present().tick:
+            self._reset()
+        return False
+
     def _reset(self) -> None:
         self.ask(Trigger, "pause")
+        before, late = self.present().sim_run_id, not all(future.done() for future in self.futures)
         result = self.ask(srv.ResetSimulation, "reset_simulation").result
         if result.result != result.RESULT_OK:
             raise Violation("no reset", result.error_message)
-        if self.present().tick:
-            raise Violation("no reset", "the tick is not 0")
+        now = self.present()
+        if now.sim_run_id == before or (now.tick and not late):
+            raise Violation("no reset", f"run {now.sim_run_id} after {before}, tick {now.tick}")
 
-    def _require_account(self) -> None:
+    def require_account(self) -> None:
         """Of every command that was sent: it was lost, or it came and was applied, was refused, or waits."""
         told: dict[str, int] = {}
 
         def complete() -> bool:
-            _, values = self.line.diagnostics()
-            told.update({name: int(value) for name, value in values.items() if name.endswith(" commands")})
+            told.update(self._told())
             came, sent = told["received commands"], self._sent
             known = sum(told[f"{name} commands"] for name in ("applied", "refused", "waiting"))
             return came == known and sent <= came + told["lost commands"] <= sent + self.others
@@ -220,6 +257,11 @@ class Station:
             self._wait(complete, "an account of all commands")
         except Violation as error:
             raise Violation("no account", f"{self._sent} sent, {self.others} others, {told}: {error}") from error
+
+    def _told(self) -> dict[str, int]:
+        """Return the numbers of commands in the next diagnostics."""
+        _, values = self.line.diagnostics()
+        return {name: int(value) for name, value in values.items() if name.endswith(" commands")}
 
     def _replay(self) -> None:
         """Every recording that is closed, which is all but the last, and remove it."""

@@ -22,7 +22,7 @@ from fuzz.invariants import Violation
 from mcap.reader import NonSeekingReader, make_reader
 from mcap.records import Attachment, Channel, Message, Metadata, Schema
 
-from conveyor_sim.bag.chunk import Chunk, chunk_at, read_content
+from conveyor_sim.bag.mcap.chunk import Chunk, chunk_at, read_content
 from conveyor_sim.bag.mcap_source import McapSource
 from conveyor_sim.bag.recover import recover
 from conveyor_sim.bag.replay import replay

@@ -22,11 +22,11 @@ from asyncua.ua.ua_binary import nodeid_from_binary, struct_from_binary, struct_
 from fuzz.opcua_requests import SERVICES, Pool, Requests
 from fuzz.violation import Violation
 
+from conveyor_sim.protocols.hosting.server_thread import ServerThread
 from conveyor_sim.protocols.opcua.ownership import REFRESH
 from conveyor_sim.protocols.opcua.server import OpcUaServer
-from conveyor_sim.protocols.server_thread import ServerThread
-from conveyor_sim.protocols.source import TickSource
-from conveyor_sim.protocols.users import new_user
+from conveyor_sim.protocols.server.users import new_user
+from conveyor_sim.protocols.tags.tag_provider import SteppedTagProvider
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 
@@ -62,7 +62,7 @@ class Station:
         self._open = ExitStack()
         folder = self._open.enter_context(tempfile.TemporaryDirectory(prefix="conveyor_sim_fuzz_"))
         self._simulation = Simulation(load_scene(SCENE), threads=1)
-        self._source = TickSource(self._simulation)
+        self._source = SteppedTagProvider(self._simulation)
         users = {role: new_user(role, PASSWORD) for role in ("operator", "viewer")}  # type: ignore[arg-type]
         self._thread = self._open.enter_context(ServerThread())
         history = ["belts/zone1/cmd_*"]

@@ -25,11 +25,11 @@ from conveyor_sim.bag.replay import replay
 from conveyor_sim.columns.counters import CounterColumns
 from conveyor_sim.columns.read_back import ReadBackColumns
 from conveyor_sim.engine.arrays.types import F8
-from conveyor_sim.line.authority import MAY, PEOPLE
-from conveyor_sim.line.inputs import WRITER_KINDS, CommandOutcome, Input
-from conveyor_sim.line.packml import COMMAND_TEXTS, MODE_STATES, Command, State
-from conveyor_sim.line.stop_reason import BY_HAND, COMMANDED, WORKING
-from conveyor_sim.line.time_account import CATEGORIES
+from conveyor_sim.line.commands.authority import MAY, PEOPLE
+from conveyor_sim.line.commands.inputs import WRITER_KINDS, CommandOutcome, Input
+from conveyor_sim.line.machines.packml import COMMAND_TEXTS, MODE_STATES, Command, State
+from conveyor_sim.line.machines.stop_reason import BY_HAND, COMMANDED, WORKING
+from conveyor_sim.line.machines.time_account import CATEGORIES
 from conveyor_sim.scene import Scene, parse_scene
 from conveyor_sim.scene.yaml_lines import Document
 from conveyor_sim.simulation import Simulation
@@ -276,9 +276,8 @@ class Watch:
 
     def after_tick(self, given: list[Input], outcomes: list[CommandOutcome], expected: str | None) -> None:
         """expected: why the first input was to be refused, as it was told before it was given."""
-        sent = [(one.names, one.values, one.operation == "inject") for one in given]
         now = self._sim.bottles()
-        self._devices.check(self._bottles, now, sent)
+        self._devices.check(self._bottles, now, outcomes)
         self._bottles = now
         self._answers(given, outcomes, expected)
         self._hands(given, outcomes)

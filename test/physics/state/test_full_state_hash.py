@@ -10,13 +10,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from line.test_station import LOADED, stationed
+from line.machines.test_station import LOADED, stationed
 from physics.state.test_checkpoint import INTEGRATORS, queue, run
 from scenes import SPRINGS_AND_RINGS, line, scene
 
-from conveyor_sim.physics.state.full_state_hash import LIMITED, MEMORY, OBSERVERS, SCRATCH, full_state_hash
-from conveyor_sim.physics.state.world_arrays import changing_arrays
-from conveyor_sim.physics.state.world_checks import FIXED
+from conveyor_sim.physics.state.full_state_hash import MEMORY, full_state_hash
+from conveyor_sim.physics.state.world_arrays import FIXED, LIMITED, OBSERVERS, SCRATCH, changing_arrays
 from conveyor_sim.scene import Scene
 from conveyor_sim.scene.limits import Limits
 from conveyor_sim.simulation import Simulation
@@ -148,7 +147,7 @@ def test_states_that_look_equal_and_have_other_futures_differ(station: Path) -> 
     stream = next(
         place for place, value in leaves(json.loads(json.dumps(sim._snapshot()))) if place[-1] == "inc" and value
     )
-    device: Any = other._line._by_name()[stream[2]]
+    device: Any = next(device for device in other._line._devices if device.name == stream[2])
     for step in stream[3:-2]:
         device = device[step] if isinstance(device, dict) else getattr(device, step)
     device.random()

@@ -14,12 +14,12 @@ pytest.importorskip("pymodbus", reason="pymodbus is not installed: pip install c
 
 from pymodbus.client import ModbusTcpClient
 
-from conveyor_sim.line.inputs import WriterKind
+from conveyor_sim.line.commands.inputs import WriterKind
+from conveyor_sim.protocols.hosting.server_thread import ServerThread
 from conveyor_sim.protocols.modbus.address_map import modbus_map
 from conveyor_sim.protocols.modbus.server import ModbusServer
-from conveyor_sim.protocols.quotas import Quota
-from conveyor_sim.protocols.server_thread import ServerThread
-from conveyor_sim.protocols.source import TickSource
+from conveyor_sim.protocols.server.quotas import Quota
+from conveyor_sim.protocols.tags.tag_provider import SteppedTagProvider
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.modbus_rows import Row
@@ -43,7 +43,7 @@ class Line:
     """One that is stepped by the test, and served."""
 
     simulation: Simulation
-    source: TickSource
+    source: SteppedTagProvider
     rows: dict[str, Row]
     server: ModbusServer
     client: ModbusTcpClient
@@ -100,7 +100,7 @@ class Line:
 def serving(role: WriterKind | None) -> Iterator[Line]:
     """role: in which clients write; None: they may not."""
     simulation = Simulation(load_scene("config/scenarios/zoned_line.yaml"), threads=1)
-    source = TickSource(simulation)
+    source = SteppedTagProvider(simulation)
     rows = modbus_map(source.about.tags)
     server = ModbusServer(source, rows, role, quota=Quota(idle=LONG))
     with ServerThread() as thread:

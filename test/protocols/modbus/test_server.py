@@ -26,16 +26,16 @@ from protocols.modbus.modbus_line import (
     serving,
 )
 
-from conveyor_sim.bag.messages import Header, line_message
-from conveyor_sim.bag.topics import TOPICS
-from conveyor_sim.bag.typestore import typestore
-from conveyor_sim.line.inputs import DISOWN, OWN
-from conveyor_sim.protocols.face import FaceError
+from conveyor_sim.bag.messages.encode import Header, line_message
+from conveyor_sim.bag.messages.topics import TOPICS
+from conveyor_sim.bag.messages.typestore import typestore
+from conveyor_sim.line.commands.inputs import DISOWN, OWN
+from conveyor_sim.protocols.hosting.server_thread import ServerThread
 from conveyor_sim.protocols.modbus.address_map import HANDSHAKE
-from conveyor_sim.protocols.quotas import QUOTA
-from conveyor_sim.protocols.server_thread import ServerThread
-from conveyor_sim.protocols.source import MOST_WAITING, Control
-from conveyor_sim.protocols.view import View
+from conveyor_sim.protocols.server.interface import ServerError
+from conveyor_sim.protocols.server.quotas import QUOTA
+from conveyor_sim.protocols.tags.line_mirror import LineMirror
+from conveyor_sim.protocols.tags.tag_provider import MOST_WAITING, Control
 
 pytest.importorskip("pymodbus", reason="pymodbus is not installed: pip install conveyor-sim[scada]")
 
@@ -184,7 +184,7 @@ def test_connections_are_bounded_and_come_free_again(line: Line) -> None:
 def test_a_port_that_is_taken_is_said(line: Line) -> None:
     taken = line.server.port
     other = ModbusServer(line.source, list(line.rows.values()), port=taken)
-    with ServerThread() as thread, pytest.raises(FaceError, match=f"modbus: 127.0.0.1:{taken} can't be listened on"):
+    with ServerThread() as thread, pytest.raises(ServerError, match=f"modbus: 127.0.0.1:{taken} can't be listened on"):
         thread.run(other.start())
 
 
@@ -238,7 +238,7 @@ def test_what_is_lost_is_not_read_as_if_it_were_there(line: Line) -> None:
     def hear(topic: str, data: bytes) -> None:
         view.take(topic, typestore().deserialize_cdr(data, TOPICS[topic].type))
 
-    class Source(View):
+    class Source(LineMirror):
         """What is heard of the line, and a way in."""
 
         controls = frozenset[Control]()

@@ -17,8 +17,8 @@ import pytest
 from protocols.waiting import PATIENCE, until
 
 from conveyor_sim.line.run_state import RUNNING, RunState
-from conveyor_sim.protocols.server_thread import ServerThread
-from conveyor_sim.protocols.source import TickSource
+from conveyor_sim.protocols.hosting.server_thread import ServerThread
+from conveyor_sim.protocols.tags.tag_provider import SteppedTagProvider
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 
@@ -216,7 +216,7 @@ class Host:
         self._client.publish(f"spBv1.0/{self._group}/{kind}/{self._node}{device}", data, qos=0, retain=retain)
 
 
-class Stepped(TickSource):
+class Stepped(SteppedTagProvider):
     """A simulation that a test steps, and what the test says of its run."""
 
     run = RunState(RUNNING)

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from datetime import datetime, timezone
 from typing import TYPE_CHECKING
 
-from conveyor_sim.line.inputs import FORCE, Input
+from conveyor_sim.line.commands.inputs import FORCE, Input
 from conveyor_sim.line.run_state import ENDED, PAUSED, RUNNING, RunState
 from conveyor_sim.line.tag import COMMANDS, SIGNALS
 from conveyor_sim.protocols.mqtt import edge_node

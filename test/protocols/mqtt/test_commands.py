@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from conveyor_sim.line.inputs import DISOWN, OWN
+from conveyor_sim.line.commands.inputs import DISOWN, OWN
 from conveyor_sim.protocols.mqtt import link
 from conveyor_sim.protocols.mqtt.line_metrics import number_of
-from conveyor_sim.protocols.source import MOST_WAITING
+from conveyor_sim.protocols.tags.tag_provider import MOST_WAITING
 from test.protocols.mqtt.kit import BOOLEAN, DOUBLE, LONG, SETPOINT, SPEED, Host, Payload, add_metric, properties_of
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ def controlled(serve: Callable[..., Line]) -> Line:
 def test_without_a_role_nobody_commands(serve: Callable[..., Line]) -> None:
     line = serve()
     line.host.set(SETPOINT, 0.1)
-    assert line.refused(1) == "a command given, expected none: the line is served to be read only"
+    assert line.refused(1) == "a command given, expected none: the line is served read-only"
     line.advance()
     assert line.outcomes() == [] and line.node.status().writes == 0
     assert properties_of(line.host.last("DBIRTH").metrics[SETPOINT])["readOnly"] is True

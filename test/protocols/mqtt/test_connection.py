@@ -16,12 +16,13 @@ from typing import TYPE_CHECKING
 import pytest
 from protocols.waiting import until
 
-from conveyor_sim.protocols.face import FaceError, Settings
-from conveyor_sim.protocols.faces import FACES
+from conveyor_sim.protocols.hosting.server_kinds import SERVER_KINDS
+from conveyor_sim.protocols.hosting.serving import Serving
+from conveyor_sim.protocols.hosting.settings import ServerSettings
 from conveyor_sim.protocols.mqtt import link
 from conveyor_sim.protocols.mqtt.broker import PASSWORD, broker_of
-from conveyor_sim.protocols.serving import Serving
-from conveyor_sim.protocols.source import About
+from conveyor_sim.protocols.server.interface import ServerError
+from conveyor_sim.protocols.tags.tag_provider import LineInfo
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 from test.protocols.mqtt.kit import SCENE, SETPOINT, Stepped
@@ -29,7 +30,7 @@ from test.protocols.mqtt.kit import SCENE, SETPOINT, Stepped
 if TYPE_CHECKING:
     from test.protocols.mqtt.kit import Line, Mosquitto
 
-MQTT = next(kind for kind in FACES if kind.name == "mqtt")
+MQTT = next(kind for kind in SERVER_KINDS if kind.name == "mqtt")
 WORD = "open sesame"
 
 
@@ -134,7 +135,7 @@ def test_a_broker_that_closes_on_all_versions_refuses_the_connection() -> None:
         threading.Thread(target=close_all, daemon=True).start()
         url = f"mqtt://127.0.0.1:{server.getsockname()[1]}"
         for _ in range(2):
-            with pytest.raises(FaceError, match="refuses the connection"):
+            with pytest.raises(ServerError, match="refuses the connection"):
                 serving(url)
     assert versions == [5, 4, 5, 4]
 
@@ -144,7 +145,7 @@ def source() -> Stepped:
 
 
 def serving(url: str, **settings: object) -> Serving:
-    return Serving(source(), [(MQTT, url)], Settings(**settings))  # type: ignore[arg-type]
+    return Serving(source(), [(MQTT, url)], ServerSettings(**settings))  # type: ignore[arg-type]
 
 
 @pytest.fixture
@@ -165,14 +166,15 @@ def test_a_password_comes_from_the_environment_or_a_file(
     strict: Mosquitto, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     url = f"mqtt://line@127.0.0.1:{strict.port}/plant/a"
-    with pytest.raises(FaceError, match=r"refuses the connection \(Not authorized\), expected .* takes user line"):
+    with pytest.raises(ServerError, match=r"refuses the connection \(Not authorized\), expected .* takes user line"):
         serving(url)
-    with pytest.raises(FaceError, match="takes clients without a user"):
+    with pytest.raises(ServerError, match="takes clients without a user"):
         serving(strict.url)
     monkeypatch.setenv(PASSWORD, WORD)
     with serving(url) as served:
         assert served.greeting == [
-            f"mqtt://127.0.0.1:{strict.port}/plant/a: whoever the broker lets in can read all, and write nothing"
+            f"mqtt://127.0.0.1:{strict.port}/plant/a: "
+            "clients that the broker admits can read everything and write nothing"
         ]
         until(lambda: "mqtt: connected, 0 written" in served.progress(), "the broker")
     monkeypatch.delenv(PASSWORD)
@@ -215,11 +217,11 @@ def test_by_tls_only_to_a_broker_that_is_known(mosquitto: Callable[..., Mosquitt
         "allow_anonymous true", f"certfile {certificates}/server.pem", f"keyfile {certificates}/server.key"
     )
     url = f"mqtts://127.0.0.1:{broker.port}"
-    with pytest.raises(FaceError, match="certificate verify failed"):
+    with pytest.raises(ServerError, match="certificate verify failed"):
         serving(url)
     with serving(url, mqtt_ca=certificates / "ca.pem") as served:
         assert served.greeting[0].startswith(f"mqtts://127.0.0.1:{broker.port}/zoned_line/zoned_line: ")
-    with pytest.raises(FaceError, match=r"server\.key: .*, expected certificates in PEM"):
+    with pytest.raises(ServerError, match=r"server\.key: .*, expected certificates in PEM"):
         serving(url, mqtt_ca=certificates / "server.key")
 
 
@@ -235,23 +237,23 @@ def test_by_tls_only_to_a_broker_that_is_known(mosquitto: Callable[..., Mosquitt
         ("mqtt://host/a+b", {}, "mqtt: a+b given as a name, expected letters, digits, or any of _ . : -"),
         ("mqtt://host/STATE", {}, "mqtt: STATE given as a name"),
         ("mqtt://jo:sesame@host", {}, "mqtt: a password given in the URL, where all users of this machine see it"),
-        ("mqtt://host", {"mqtt_primary_host": "a/b"}, "mqtt: a/b given as a name"),
-        ("mqtt://host", {"mqtt_ca": Path("ca.pem")}, "--mqtt-ca: given with mqtt://, expected mqtts://"),
-        ("mqtt://host", {"mqtt_password_file": Path("word")}, "--mqtt-password-file: given without a user"),
-        ("mqtt://jo@host", {"mqtt_password_file": Path("/none")}, "/none: no such file, expected a file with the pass"),
+        ("mqtt://host", {"primary_host": "a/b"}, "mqtt: a/b given as a name"),
+        ("mqtt://host", {"authority": Path("ca.pem")}, "--mqtt-ca: given with mqtt://, expected mqtts://"),
+        ("mqtt://host", {"password_file": Path("word")}, "--mqtt-password-file: given without a user"),
+        ("mqtt://jo@host", {"password_file": Path("/none")}, "/none: no such file, expected a file with the pass"),
     ],
 )
 def test_what_can_not_be_is_one_sentence(url: str, settings: dict[str, object], sentence: str) -> None:
-    with pytest.raises(FaceError) as caught:
-        broker_of(url, Settings(**settings))  # type: ignore[arg-type]
+    with pytest.raises(ServerError) as caught:
+        broker_of(url, **settings)  # type: ignore[arg-type]
     assert sentence in str(caught.value) and "sesame" not in str(caught.value)
 
 
 def test_the_group_is_the_place_of_the_line_and_the_node_its_name() -> None:
-    about = About("zoned_line", "hall2/cell1/line7", 0.01, "2026-01-01T00:00:00Z", ())
-    assert broker_of("mqtt://host", Settings()).named(about) == ("hall2:cell1:line7", "zoned_line")
-    assert broker_of("mqtt://host/plant", Settings()).named(about) == ("plant", "zoned_line")
-    assert broker_of("mqtt://host/plant/a", Settings()).named(about) == ("plant", "a")
-    nowhere = About("zoned_line", "", 0.01, "2026-01-01T00:00:00Z", ())
-    assert broker_of("mqtts://host/", Settings()).named(nowhere) == ("zoned_line", "zoned_line")
-    assert broker_of("mqtts://host/", Settings()).port == 8883
+    about = LineInfo("zoned_line", "hall2/cell1/line7", 0.01, "2026-01-01T00:00:00Z", ())
+    assert broker_of("mqtt://host").named(about) == ("hall2:cell1:line7", "zoned_line")
+    assert broker_of("mqtt://host/plant").named(about) == ("plant", "zoned_line")
+    assert broker_of("mqtt://host/plant/a").named(about) == ("plant", "a")
+    nowhere = LineInfo("zoned_line", "", 0.01, "2026-01-01T00:00:00Z", ())
+    assert broker_of("mqtts://host/").named(nowhere) == ("zoned_line", "zoned_line")
+    assert broker_of("mqtts://host/").port == 8883

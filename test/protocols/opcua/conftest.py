@@ -17,11 +17,11 @@ from asyncua import ua
 from asyncua.sync import Client, SyncNode
 
 from conveyor_sim.line.run_state import RUNNING, RunState
-from conveyor_sim.protocols.face import Stamps
+from conveyor_sim.protocols.hosting.server_thread import ServerThread
 from conveyor_sim.protocols.opcua.server import OpcUaServer
-from conveyor_sim.protocols.server_thread import ServerThread
-from conveyor_sim.protocols.source import TickSource
-from conveyor_sim.protocols.users import User, new_user
+from conveyor_sim.protocols.server.interface import Stamps
+from conveyor_sim.protocols.server.users import User, new_user
+from conveyor_sim.protocols.tags.tag_provider import SteppedTagProvider
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 
@@ -37,7 +37,7 @@ PASSWORD = "open sesame"
 ROLES = ("viewer", "operator", "engineer", "controller", "test")
 
 
-class Renewed(TickSource):
+class Renewed(SteppedTagProvider):
     """A simulation that a test steps, and what the test says of its run. Another one may take its place: a reset."""
 
     def __init__(self, simulation: Simulation) -> None:

@@ -17,8 +17,8 @@ from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption,
 from cryptography.x509.oid import NameOID
 from protocols.waiting import alone
 
-from conveyor_sim.protocols.opcua.certificates import TRUSTED, identity
 from conveyor_sim.protocols.opcua.client_certificates import require_usable
+from conveyor_sim.protocols.server.certificates import TRUSTED, identity
 from test.protocols.opcua.conftest import PASSWORD, PATIENCE, refused
 
 if TYPE_CHECKING:

@@ -10,9 +10,9 @@ from asyncua import Client, ua
 from asyncua.ua.ua_binary import struct_from_binary
 from protocols.waiting import alone
 
-from conveyor_sim.protocols.opcua.limits import Limits
-from conveyor_sim.protocols.quotas import Quota, share_of_guests
-from conveyor_sim.protocols.users import Logins
+from conveyor_sim.protocols.opcua.limits import OpcUaLimits
+from conveyor_sim.protocols.server.quotas import Quota, share_of_guests
+from conveyor_sim.protocols.server.users import Logins
 from test.protocols.opcua.conftest import PASSWORD, Line, Serve, refused
 from test.protocols.opcua.limit_clients import (
     TICK,
@@ -27,7 +27,7 @@ from test.protocols.opcua.limit_clients import (
     until,
 )
 
-SMALL = Limits(
+SMALL = OpcUaLimits(
     subscriptions=8,
     subscriptions_per_session=3,
     subscriptions_per_party=5,
@@ -122,7 +122,7 @@ def test_conditions_are_refreshed_once_a_second(small: Line) -> None:
 
 def test_a_subscription_that_costs_too_much_ends_and_others_go_on(serve: Serve) -> None:
     """The costliest of the session, with a notification that says so."""
-    line = serve(limits=Limits(subscription_units_per_second=2000))
+    line = serve(limits=OpcUaLimits(subscription_units_per_second=2000))
 
     async def work(client: Client) -> tuple[Heard, Heard, Heard]:
         async with client_of(line) as other:
@@ -150,7 +150,7 @@ def test_a_subscription_that_costs_too_much_ends_and_others_go_on(serve: Serve) 
 
 def test_values_that_are_sent_again_are_work_like_changes(serve: Serve) -> None:
     """One request transfers to the same session many times: the subscription ends, not the server."""
-    line = serve(limits=Limits(subscription_units_per_second=1000))
+    line = serve(limits=OpcUaLimits(subscription_units_per_second=1000))
 
     async def work(client: Client) -> tuple[list[int], list[int]]:
         heard = Heard()
@@ -201,7 +201,7 @@ def test_a_flood_of_sessions_and_sockets_leaves_room_for_an_operator(serve: Serv
 
 def test_requests_beyond_the_budget_wait_and_hold_up_nobody(serve: Serve) -> None:
     """Seconds of a client's own; another's requests are answered between them."""
-    line = serve(limits=Limits(request_units_per_second=2000))
+    line = serve(limits=OpcUaLimits(request_units_per_second=2000))
 
     async def work(client: Client) -> tuple[int, int]:
         read = ua.ReadParameters(NodesToRead=[ua.ReadValueId(TICK, ua.AttributeIds.Value)] * 100)
@@ -279,7 +279,7 @@ def test_a_message_that_is_sent_again_costs_as_much_as_its_values(serve: Serve) 
 
 def test_an_answer_costs_work_by_its_size_and_structures_most(serve: Serve) -> None:
     """A structure takes far longer to encode than its bytes say."""
-    line = serve(limits=Limits(answer_bytes=100_000))
+    line = serve(limits=OpcUaLimits(answer_bytes=100_000))
     structures = ua.ReadValueId(ua.NodeId(ua.ObjectIds.NodeAttributesMask_EnumValues), ua.AttributeIds.Value)  # 35
 
     async def work(client: Client) -> tuple[int, int, int]:

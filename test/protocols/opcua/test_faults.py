@@ -13,14 +13,14 @@ from asyncua import Client as AsyncClient
 from asyncua import ua
 from protocols.waiting import alone
 
-from conveyor_sim.protocols.face import FaceError
+from conveyor_sim.protocols.hosting.server_thread import ServerThread
 from conveyor_sim.protocols.opcua import session, transport
-from conveyor_sim.protocols.opcua.limits import Limits
+from conveyor_sim.protocols.opcua.limits import OpcUaLimits
 from conveyor_sim.protocols.opcua.processor import CHUNK
 from conveyor_sim.protocols.opcua.server import OpcUaServer
-from conveyor_sim.protocols.quotas import QUOTA
-from conveyor_sim.protocols.server_thread import ServerThread
-from conveyor_sim.protocols.source import MOST_WAITING
+from conveyor_sim.protocols.server.interface import ServerError
+from conveyor_sim.protocols.server.quotas import QUOTA
+from conveyor_sim.protocols.tags.tag_provider import MOST_WAITING
 from test.protocols.opcua.conftest import PASSWORD, PATIENCE
 
 if TYPE_CHECKING:
@@ -163,10 +163,10 @@ def test_subscriptions_of_a_client_that_is_gone_are_not_kept(line: Line, monkeyp
     there = line.client().create_subscription(100, _Deaf())
     there.subscribe_data_change(line.node(SETPOINT))
     alone(come_and_vanish())
-    line.until(lambda: line.server.status().subscriptions == 1)
+    line.until(lambda: line.server.status().monitored_items == 1)
     line.advance(3)
     time.sleep(6.0)  # longer than an unfetched one lives
-    assert line.server.status().subscriptions == 1
+    assert line.server.status().monitored_items == 1
 
 
 class _Deaf:
@@ -220,7 +220,7 @@ def test_a_subscription_can_not_be_faster_than_the_server(line: Line) -> None:
 def test_a_port_that_is_taken_is_said(line: Line, certificates: Path) -> None:
     port = line.server.port
     other = OpcUaServer(line.source, certificates=certificates, port=port)
-    with ServerThread() as thread, pytest.raises(FaceError, match=f"opcua: 127.0.0.1:{port} can't be listened on"):
+    with ServerThread() as thread, pytest.raises(ServerError, match=f"opcua: 127.0.0.1:{port} can't be listened on"):
         thread.run(other.start())
 
 
@@ -238,7 +238,7 @@ def test_a_server_that_is_started_again_is_found_where_it_was(serve: Serve, cert
 
 def test_what_waits_for_a_client_is_bounded(serve: Serve) -> None:
     """The library takes a queue of 0 for one without end; of guests a quarter of all queues is kept free."""
-    line = serve(limits=Limits(queue_size=60, queued=120))
+    line = serve(limits=OpcUaLimits(queue_size=60, queued=120))
     subscription = line.client().create_subscription(60_000, None)
     node = line.node("run/tick")
 

@@ -9,9 +9,9 @@ from asyncua import ua
 from asyncua.sync import Client
 from protocols.waiting import until
 
-from conveyor_sim.protocols.bag_source import BagSource
+from conveyor_sim.protocols.hosting.server_thread import ServerThread
 from conveyor_sim.protocols.opcua.server import OpcUaServer
-from conveyor_sim.protocols.server_thread import ServerThread
+from conveyor_sim.protocols.tags.bag_provider import BagTagProvider
 from conveyor_sim.testing.scenario import Scenario
 from test.protocols.opcua.conftest import PATIENCE, refused
 
@@ -54,7 +54,7 @@ def test_that_of_a_recording_is_its_own_up_to_its_place(tmp_path: Path, certific
             line.command("belts/zone1/cmd_speed", value)
         line.run_for(0.5)
     with (
-        BagSource(tmp_path / "bag", print, paused=True) as source,
+        BagTagProvider(tmp_path / "bag", print, paused=True) as source,
         ServerThread() as thread,
     ):
         server = OpcUaServer(source, stamps="simulated", certificates=certificates, history=["belts/zone1/cmd_speed"])

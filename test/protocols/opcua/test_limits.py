@@ -9,12 +9,12 @@ from typing import Any
 import pytest
 from asyncua import Client, ua
 
-from conveyor_sim.protocols.opcua.limits import PUBLISHED, UNSUPPORTED, Limits
-from conveyor_sim.protocols.quotas import QUOTA
+from conveyor_sim.protocols.opcua.limits import PUBLISHED, UNSUPPORTED, OpcUaLimits
+from conveyor_sim.protocols.server.quotas import QUOTA
 from test.protocols.opcua.conftest import HISTORY, Line, Serve
 from test.protocols.opcua.limit_clients import TICK, Codes, code_of, connected, item, items_of, large_node
 
-SMALL = Limits(
+SMALL = OpcUaLimits(
     nodes_per_read=6,
     nodes_per_write=5,
     nodes_per_browse=4,

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from conveyor_sim.line.packml import STATE_TEXTS
+from conveyor_sim.line.machines.packml import STATE_TEXTS
 from conveyor_sim.protocols.opcua.server import OpcUaServer
 from test.protocols.opcua.conftest import PASSWORD, PATIENCE
 

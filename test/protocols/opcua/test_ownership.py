@@ -19,7 +19,7 @@ from protocols.waiting import alone
 from conveyor_sim.protocols.opcua import refusals
 from conveyor_sim.protocols.opcua.dispatch import REQUESTS, SESSIONLESS
 from conveyor_sim.protocols.opcua.ownership import OwnedSession
-from conveyor_sim.protocols.opcua.session import Session
+from conveyor_sim.protocols.opcua.session import OpcUaSession
 from test.protocols.opcua.conftest import PASSWORD, PATIENCE
 from test.protocols.opcua.test_security import own_certificate
 
@@ -79,7 +79,7 @@ def test_every_method_of_a_session_is_accounted_for() -> None:
     assert CHECKED | {"create_subscription", "create_session", "close_session"} == {
         name for name in vars(OwnedSession) if name in public
     }
-    assert set(vars(Session)) >= REFUSED
+    assert set(vars(OpcUaSession)) >= REFUSED
 
 
 def test_every_service_that_is_answered_is_accounted_for() -> None:

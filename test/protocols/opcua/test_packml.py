@@ -9,7 +9,7 @@ import pytest
 from asyncua import ua
 
 from conveyor_sim.line.alarms.alarm import AlarmState
-from conveyor_sim.line.packml import Command, State
+from conveyor_sim.line.machines.packml import Command, State
 from conveyor_sim.line.tag import number
 from conveyor_sim.protocols.opcua.packml import NAMESPACE, NODESET, _a_second
 from test.protocols.opcua.conftest import refused

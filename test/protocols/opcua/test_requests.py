@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 from asyncua import ua
 
-from conveyor_sim.protocols.source import MOST_WAITING
+from conveyor_sim.protocols.tags.tag_provider import MOST_WAITING
 from test.protocols.opcua.conftest import ROLES, refused
 
 if TYPE_CHECKING:
@@ -198,7 +198,7 @@ def test_calls_that_can_not_be_are_refused(line: Line) -> None:
 
 
 def _own(writer: str, released: tuple[str, ...]) -> object:
-    from conveyor_sim.line.inputs import OWN, Input
+    from conveyor_sim.line.commands.inputs import OWN, Input
 
     return Input("lockstep", writer, "controller", OWN, (), (), released)
 

@@ -19,8 +19,8 @@ from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption,
 from protocols.waiting import alone
 from warm import run
 
-from conveyor_sim.protocols.opcua.certificates import CERTIFICATE, KEY, TRUSTED, CertificateError, identity
-from conveyor_sim.protocols.users import (
+from conveyor_sim.protocols.server.certificates import CERTIFICATE, KEY, TRUSTED, CertificateError, identity
+from conveyor_sim.protocols.server.users import (
     MOST_WRONG,
     PERIOD,
     Logins,
@@ -196,7 +196,7 @@ def test_certificate_and_key_are_made_once_and_are_nobody_elses(tmp_path: Path) 
     assert stat.S_IMODE(folder.stat().st_mode) == 0o700 and stat.S_IMODE((folder / KEY).stat().st_mode) == 0o600
     assert identity(folder) == first and first.application_uri.endswith(":conveyor_sim")
     folder.chmod(0o755)
-    with pytest.raises(CertificateError, match="expected a folder of this user's own that nobody else can read"):
+    with pytest.raises(CertificateError, match="expected a folder that only this user can read"):
         identity(folder)
     folder.chmod(0o700)
     (folder / CERTIFICATE).write_bytes(b"none")
@@ -208,7 +208,7 @@ def test_a_full_disk_leaves_no_part_of_a_certificate(tmp_path: Path) -> None:
     """By a limit of the size of files, which the system keeps as it does that of the disk."""
     code = (
         "import resource, signal, sys; from pathlib import Path; "
-        "from conveyor_sim.protocols.opcua.certificates import identity; "
+        "from conveyor_sim.protocols.server.certificates import identity; "
         "signal.signal(signal.SIGXFSZ, signal.SIG_IGN); resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0)); "
         "identity(Path(sys.argv[1]))"
     )

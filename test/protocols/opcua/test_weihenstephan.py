@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from asyncua import ua
 
-from conveyor_sim.line.weihenstephan import BY_ITSELF, PRODUCTION, STATE_TEXTS, data_points
+from conveyor_sim.line.machines.weihenstephan import BY_ITSELF, PRODUCTION, STATE_TEXTS, data_points
 
 if TYPE_CHECKING:
     from test.protocols.opcua.conftest import Line

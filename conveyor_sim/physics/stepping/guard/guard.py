@@ -6,7 +6,7 @@ from typing import Any
 from conveyor_sim.columns.events import GuardEvent
 from conveyor_sim.engine.arrays.bodies import Bottles, Spin
 from conveyor_sim.engine.arrays.rails import RailContacts
-from conveyor_sim.engine.compiler.compile import entry
+from conveyor_sim.engine.compiler.numba_internals.machine_code import entry
 from conveyor_sim.engine.observers.guard_probe import look
 from conveyor_sim.engine.observers.stored_energy import stored_energy
 from conveyor_sim.physics.accounts.elastic import deepest_overlap

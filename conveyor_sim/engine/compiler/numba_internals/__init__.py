@@ -1,0 +1,1 @@
+"""All contact with internals of numba and llvmlite; see the README of the engine."""

@@ -1,0 +1,1 @@
+"""Operations on a line: inputs, control authority, checks, forced signals, read-back."""

@@ -1,0 +1,53 @@
+"""The devices of a line: which class a part of the scene becomes. What a scene does not name is not there."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from conveyor_sim.line.device import Device
+from conveyor_sim.line.devices.counter import CounterDevice
+from conveyor_sim.line.devices.drive import belt_device
+from conveyor_sim.line.devices.indicator import IndicatorDevice
+from conveyor_sim.line.devices.infeed import InfeedDevice
+from conveyor_sim.line.devices.inspection import InspectionDevice
+from conveyor_sim.line.devices.mover import Mover
+from conveyor_sim.line.devices.outfeed import OutfeedDevice
+from conveyor_sim.line.devices.photo_eye import PhotoEyeDevice
+from conveyor_sim.line.devices.reject import RejectDevice
+from conveyor_sim.line.devices.setup import Setup
+from conveyor_sim.line.devices.spill import SpillDevice
+from conveyor_sim.line.devices.zone import ZoneDevice
+from conveyor_sim.line.machines.sink import SinkDevice
+from conveyor_sim.line.machines.source import SourceDevice
+from conveyor_sim.line.machines.station import StationDevice
+from conveyor_sim.physics.model import Model
+from conveyor_sim.scene.schema import Scene
+
+DEVICES: Mapping[str, Callable[[str, Any, Setup], Device]] = {
+    "belt": belt_device,
+    "gate": Mover,
+    "pusher": Mover,
+    "diverter": Mover,
+    "infeed": InfeedDevice,
+    "outfeed": OutfeedDevice,
+    "source": SourceDevice,
+    "sink": SinkDevice,
+    "station": StationDevice,
+    "inspection": InspectionDevice,
+    "reject": RejectDevice,
+    "spill": SpillDevice,
+    "photo_eye": PhotoEyeDevice,
+    "zone": ZoneDevice,
+    "counter": CounterDevice,
+    "indicator": IndicatorDevice,
+}
+"""By the kind of a part (`DevicePart.KIND`): what makes its device, of its name (`zones/exit`), the part, and Setup."""
+
+
+def build_devices(scene: Scene, model: Model) -> tuple[Device, ...]:
+    """All devices of a scene, in the order in which they act and stand in the process image."""
+    setup = Setup(scene, model)
+    for (field, name), part in scene.devices():
+        device = DEVICES[part.KIND](f"{field}/{name}", part, setup)
+        device.classify(part.KIND)
+        setup.devices[device.name] = device
+    return tuple(setup.devices.values())

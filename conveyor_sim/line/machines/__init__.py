@@ -1,0 +1,1 @@
+"""Machines that follow the PackML state model, their counters and time accounts."""

@@ -1,0 +1,360 @@
+"""What machines that give and take bottles have in common: PackML's states, a rate, failures, planned stops."""
+
+import math
+from collections.abc import Callable, Collection, Sequence
+from types import SimpleNamespace
+
+from conveyor_sim.line.alarms.declaration import Declared, error
+from conveyor_sim.line.device import Device, ScanContext
+from conveyor_sim.line.devices.setup import Setup
+from conveyor_sim.line.machines.failures import Draws, FailureClock, PlannedTimes
+from conveyor_sim.line.machines.packml import (
+    CNTRL_CMD,
+    COMMAND_TEXTS,
+    STATE_TEXTS,
+    Command,
+    State,
+    StateMachine,
+    mode_objection,
+    objection,
+    stops,
+)
+from conveyor_sim.line.machines.stop_reason import (
+    BLOCKED,
+    BY_HAND,
+    COMMANDED,
+    FAULT,
+    FIRST_FAILURE,
+    FIRST_PLANNED,
+    NONE,
+    RUN,
+    STARVED,
+    WORKING,
+    category_of,
+    is_failure,
+    reason_texts,
+)
+from conveyor_sim.line.machines.time_account import CATEGORIES, Category
+from conveyor_sim.line.tag import Tag, choice, count, number, switch
+from conveyor_sim.scene.failures import Times
+from conveyor_sim.scene.parts.machine import PackmlPart
+
+ROUNDING = 1e-9
+"""Of a cycle: sums of rate x tick must not miss the tick they fall on."""
+
+EXECUTE, SUSPENDED, HELD = int(State.EXECUTE), int(State.SUSPENDED), int(State.HELD)
+
+Watcher = Callable[[int, Category, int], None]
+"""Told the tick, where the machine's time goes from then on, and its stop reason."""
+
+
+class MachineDevice(Device):
+    """A machine that works in cycles, one bottle each, and follows the PackML state model. It runs at the start."""
+
+    def __init__(
+        self, name: str, part: PackmlPart, setup: Setup, own: Sequence[Tag], conditional: Collection[State] = ()
+    ) -> None:
+        """own: signals of its kind. conditional: acting states that are left only when it is `ready`."""
+        rate, most = part.rate, part.rate if part.rate_limit is None else part.rate_limit
+        reasons = reason_texts(part)
+        first = State.STARTING if State.STARTING in conditional else State.EXECUTE
+        time = CATEGORIES.index(category_of(first, NONE, NONE, False))
+        super().__init__(
+            name,
+            [
+                switch(f"{name}/running", "status", "It runs, and nobody has stopped it.", 1.0, "state"),
+                *own,
+                choice(f"{name}/state", "status", "State of PackML.", STATE_TEXTS, first, "state"),
+                choice(
+                    f"{name}/category", "status", "Where its time goes.", dict(enumerate(CATEGORIES)), time, "state"
+                ),
+                choice(f"{name}/stop_reason", "status", "Why it stands, or last stood.", reasons, NONE, "state"),
+                switch(f"{name}/fault", "status", "Failed and not repaired, or aborted."),
+                count(f"{name}/failures", "counter", "How often it has failed."),
+                number(f"{name}/cur_rate", "actual", "Rate at which it works.", "1/s", 0.0, most, rate),
+                switch(f"{name}/run", "command", "Runs while on.", 1.0),
+                choice(f"{name}{CNTRL_CMD}", "command", "Command of PackML, as it changes.", COMMAND_TEXTS),
+                number(f"{name}/rate", "setpoint", "Bottles a second.", "1/s", 0.0, most, rate, nominal=rate),
+                switch(f"{name}/stop", "fault", "Stopped from outside while on."),
+            ],
+        )
+        tick = self._tick = setup.scene.tick
+        self._suspend_ticks = self._ticks(part.suspend_after)
+        self._ramp = part.rate * tick / part.ramp_up if part.ramp_up else 0.0
+        self._plans = [PlannedTimes(stop, tick) for stop in part.planned_stops.values()]
+        self._watchers: list[Watcher] = []
+        self.run = True
+        self.rate = rate
+        self.stop = False
+        self.cntrl_cmd = 0
+        self.packml = StateMachine(
+            first,
+            {State[field.upper()]: self._ticks(time) for field, time in part.acting_times},
+            conditional,
+        )
+        self.speed = rate
+        """1/s, at which it works where it ramps up."""
+        self.cycle = 1.0
+        """How much of the cycle is done; from 1 on it wants a bottle."""
+        self.cause = NONE
+        """STARVED or BLOCKED if it waited in the last tick."""
+        self.waited = 0
+        """Ticks for which it has done so without a break."""
+        self.reason = NONE
+        """Why it stands, or last stood."""
+        self.restart = False
+        """It is to be reset and started as soon as it can be."""
+        self.planned = NONE
+        """The planned stop that it stands for."""
+        self.failures = 0
+        self.clocks = SimpleNamespace(
+            **{
+                way: FailureClock(
+                    failure,
+                    *(
+                        self._draws(setup, times, f"failures/{way}/{what}")
+                        for what, times in (("between", failure.between), ("repair", failure.repair))
+                    ),
+                )
+                for way, failure in part.failures.items()
+            }
+        )
+        self._clocks: list[FailureClock] = list(vars(self.clocks).values())
+        self.restored(0)
+
+    @property
+    def alarms(self) -> Sequence[Declared]:
+        """It has failed, or was aborted."""
+        return (error(f"{self.name}/fault", f"{self.name} has failed", f"{self.name}/fault"),)
+
+    @property
+    def state(self) -> int:
+        """State of PackML."""
+        return self.packml.state
+
+    @property
+    def category(self) -> Category:
+        """Where its time goes since the last tick."""
+        return self._category
+
+    def watch(self, watcher: Watcher) -> None:
+        """Call something as a tick ends in which the category or the stop reason has changed."""
+        self._watchers.append(watcher)
+
+    def restored(self, tick: int) -> None:
+        """Derive flags, category and status from the stored attributes."""
+        self._note_failures()
+        self._note_state()
+        self._category: Category = category_of(self.state, self.reason, self.cause, bool(self._failed))
+        self._show()
+
+    def objection(self, name: str, value: float, now: ScanContext) -> str:
+        """Why a command of its own can't be taken now, "" if it can."""
+        command = int(value)
+        if not name.endswith(CNTRL_CMD) or command in (0, self.cntrl_cmd):
+            return ""
+        if wrong := objection(command, self.state):
+            return f"{name}: {wrong}"
+        if not self.run and command in (Command.RESET, Command.START):
+            return f"{name}: {COMMAND_TEXTS[command]} given while {self.name}/run is 0, expected 1 before"
+        if self._failed and command == Command.UNHOLD:
+            return f"{name}: Unhold given while it is not repaired, expected {self.name}/fault to go first"
+        return ""
+
+    def mode_objection(self) -> str:
+        """Why its mode can't change in the present state, "" if it can."""
+        return mode_objection(self.state)
+
+    def stops(self, name: str, value: float) -> bool:
+        """Return True for the PackML commands Stop and Abort."""
+        return stops(name, value)
+
+    def stop_by_hand(self, name: str, value: float) -> None:
+        """Take Stop or Abort; cntrl_cmd stays as who has control gave it."""
+        self._take(int(value), by_hand=True)
+        self._settle_state()
+
+    def command(self, name: str, value: float, now: ScanContext) -> None:
+        """Take run, cntrl_cmd, rate (1/s), or the fault stop."""
+        what = name.rpartition("/")[2]
+        if what == "rate":
+            self.rate = value
+            return
+        if what == "stop":
+            self.failures += value != 0.0 and not self.stop
+            self.stop = value != 0.0
+            self._note_failures()
+        elif what == "run":
+            self._switch(value != 0.0, now.by_hand)
+        elif value != self.cntrl_cmd:
+            self.cntrl_cmd = int(value)
+            self._take(self.cntrl_cmd, now.by_hand)
+        self._settle_state()
+
+    def _switch(self, run: bool, by_hand: bool) -> None:
+        """Stop as the switch `run` goes off; be reset and started as it comes on, unless it was aborted."""
+        before, self.run = self.run, run
+        if before and not run:
+            self.restart = False
+            self._stand(Command.STOP, RUN + BY_HAND * by_hand)
+        elif run and not before:
+            self.restart = self.state not in (State.ABORTING, State.ABORTED, State.CLEARING)
+
+    def _take(self, command: int, by_hand: bool) -> None:
+        """Take a command of PackML, unless what was commanded beside it has led elsewhere."""
+        if command == 0 or not self.packml.takes(command):
+            return
+        if command in (Command.STOP, Command.ABORT, Command.RESET):
+            self.restart, self.planned = False, NONE
+        if command in COMMANDED:
+            self._stand(Command(command), COMMANDED[command] + BY_HAND * by_hand)
+        else:
+            self.packml.take(command)
+
+    def _stand(self, command: Command, reason: int) -> None:
+        """Stop working by a command of PackML, if the state allows it. No command hides that the machine has failed."""
+        if self.packml.takes(command):
+            hidden = is_failure(self.reason) and self.state not in WORKING and reason < STARVED
+            self.reason = self.reason if hidden else reason
+            self.packml.take(command)
+
+    def advance(self, now: ScanContext) -> None:
+        """A tick has passed: fail or be repaired, leave acting states, ramp up. Once a tick, first, if it is busy."""
+        if now.tick == 0:
+            return
+        if self._clocks:
+            self._count_failures()
+        if self._plans:
+            self._follow_plan(now.tick)
+        if self.packml.acts:
+            self.packml.advance(self.ready(now))
+            self._settle_state()
+        if self._ramp and self.packml.state in WORKING:
+            self.speed = min(self.rate, self.speed + self._ramp)
+
+    def ready(self, now: ScanContext) -> bool:
+        """Whether what a conditional state waits for is there."""
+        return True
+
+    def _count_failures(self) -> None:
+        running = self.packml.state == EXECUTE and not self.waited
+        changed = [clock for clock in self._clocks if clock.advance(running)]
+        if changed:
+            self.failures += sum(clock.failed for clock in changed)
+            self._note_failures()
+            self._settle_state()
+
+    def _follow_plan(self, tick: int) -> None:
+        for index, plan in enumerate(self._plans):
+            on, before = plan.on(tick), tick > 1 and plan.on(tick - 1)
+            if on and not before:
+                self.planned = FIRST_PLANNED + index
+                self._stand(Command.STOP, self.planned)
+            elif before and not on and self.planned:
+                self._end_plan(tick)
+            else:
+                continue
+            self._settle_state()
+
+    def _end_plan(self, tick: int) -> None:
+        """A planned stop is over: stand for another one that is on, or be reset and started."""
+        self.planned = next((FIRST_PLANNED + index for index, plan in enumerate(self._plans) if plan.on(tick)), NONE)
+        if not self.planned:
+            self.restart = self.run and self.state in (State.STOPPING, State.STOPPED)
+        elif self.reason >= FIRST_PLANNED:
+            self.reason = self.planned
+
+    def _settle_state(self) -> None:
+        """Do what the machine does by itself in the state that it has come to."""
+        machine = self.packml
+        if machine.state == HELD and not self._failed and is_failure(self.reason):
+            machine.take(Command.UNHOLD)
+        while self.restart and (machine.takes(Command.RESET) or machine.takes(Command.START)):
+            self.restart = not machine.takes(Command.START)
+            machine.take(Command.RESET if machine.takes(Command.RESET) else Command.START)
+        if self._failed:
+            self._stand(Command.HOLD, self._failed)
+        self._note_state()
+
+    def _note_failures(self) -> None:
+        first = (FIRST_FAILURE + index for index, clock in enumerate(self._clocks) if clock.failed)
+        self._failed = FAULT if self.stop else next(first, NONE)
+        """The first reason for which it can't work, NONE if there is none."""
+
+    def _note_state(self) -> None:
+        self._changed = True
+        self._waits = self.state == SUSPENDED and self.reason in (STARVED, BLOCKED)
+        self._works = (self.state in self._working or self._waits) and not self._failed
+        self._busy = bool(self._clocks or self._plans or self._ramp) or self.packml.acts
+        if self.state not in WORKING:
+            self.speed = 0.0 if self._ramp else self.speed
+
+    _working: Collection[int] = (EXECUTE,)
+    """States in which it works on bottles."""
+
+    @property
+    def works(self) -> bool:
+        """Whether it works on bottles, or would if it did not have to wait."""
+        return self._works
+
+    def turn(self, now: ScanContext) -> bool:
+        """Go on with the cycle for the tick that has passed; whether it is done."""
+        if self._works and now.tick > 0:
+            self.cycle += (self.speed if self._ramp else self.rate) * now.length
+        return self._works and self.cycle >= 1.0 - ROUNDING
+
+    def wait(self) -> None:
+        """Stand at the end of the cycle: what is lost by waiting is not made up for."""
+        self.cycle = 1.0
+
+    def goes_on(self) -> bool:
+        """Whether it works on a bottle that it could take or give now: it comes back from Suspended for it."""
+        if self._waits:
+            self.packml.take(Command.UNSUSPEND)
+            self._note_state()
+        return self._works
+
+    def conclude(self, cause: int, now: ScanContext) -> None:
+        """The tick's work is done. cause: STARVED or BLOCKED if it had to wait, NONE if not. Once a tick, last."""
+        if not (cause or self.waited or self._changed):
+            return
+        if cause:
+            self.waited = self.waited + 1 if cause == self.cause else 1
+            if self.waited >= self._suspend_ticks and self.packml.state == EXECUTE:
+                self._stand(Command.SUSPEND, cause)
+                self._note_state()
+        elif self.waited:
+            self.waited = 0
+        if cause != self.cause or self._changed:
+            self.cause = cause
+            shown, failed = (self._category, self._shown[2]), self._shown[3]
+            self._category = category_of(self.state, self.reason, cause, bool(self._failed))
+            self._show()
+            if failed != self._shown[3]:
+                now.alarm(f"{self.name}/fault", self._shown[3])
+            if shown != (self._category, self.reason):
+                for watcher in self._watchers:
+                    watcher(now.tick, self._category, self.reason)
+
+    def _show(self) -> None:
+        """Make its status anew."""
+        self._changed = False
+        fault = bool(self._failed) or self.state == State.ABORTED
+        self._shown = self.state, CATEGORIES.index(self._category), self.reason, fault
+
+    @property
+    def condition(self) -> Sequence[float]:
+        """State, category and stop reason."""
+        return self._shown[:3]
+
+    def status(self) -> Sequence[float]:
+        """State, category, stop_reason, fault, failures and cur_rate (1/s)."""
+        rate = (self.speed if self._ramp else self.rate) if self._works and not self._waits else 0.0
+        return *self._shown, self.failures, rate
+
+    def _ticks(self, seconds: float) -> int:
+        """The first tick at which so much time has passed."""
+        return math.ceil(seconds / self._tick - 1e-9)
+
+    def _draws(self, setup: Setup, times: Times, purpose: str) -> Draws:
+        return Draws(times, setup.random(self.name, purpose), self._tick)

@@ -1,0 +1,58 @@
+"""Sources: machines upstream that give bottles at a rate, and are blocked where there is no room for one."""
+
+from collections.abc import Sequence
+
+from conveyor_sim.line.device import ScanContext
+from conveyor_sim.line.devices.entry import Quality
+from conveyor_sim.line.devices.setup import BAD, Setup
+from conveyor_sim.line.machines.machine import MachineDevice
+from conveyor_sim.line.machines.stop_reason import BLOCKED, NONE
+from conveyor_sim.line.tag import count, seconds, switch
+from conveyor_sim.scene.parts.source import Source
+
+
+class SourceDevice(MachineDevice):
+    """One source while it runs. Blocked: it would run, has a bottle to give, and there is no room for it."""
+
+    def __init__(self, name: str, source: Source, setup: Setup) -> None:
+        signals = [
+            count(f"{name}/produced", "counter", "Bottles given.", adds_to="fed"),
+            switch(f"{name}/blocked", "status", "It would give a bottle, and there is no room.", adds_to="state"),
+            seconds(f"{name}/blocked_time", "counter", "For how long in all it was blocked."),
+        ]
+        super().__init__(name, source, setup, signals)
+        self._position = source.position
+        self._entry = setup.entry(source.bottle, source.direction, source.speed)
+        self.quality = Quality(source, setup.random(name, BAD))
+        self.fed = 0
+        self.blocked_ticks = 0
+
+    def feed(self, now: ScanContext) -> None:
+        """Give the bottle that is due, if there is room."""
+        if self._busy:
+            self.advance(now)
+        cause = NONE
+        if self.turn(now):
+            if not self._entry.has_room(now.state, *self._position):
+                cause = BLOCKED
+                self.blocked_ticks += 1
+                self.wait()
+            elif self.goes_on():
+                self.quality.judge(self._entry.enter(now.state, *self._position), now)
+                self.fed += 1
+                self.cycle -= 1.0
+        self.conclude(cause, now)
+
+    def counts(self) -> tuple[int, int, int]:
+        """Bottles given, and bad ones among them."""
+        return self.fed, self.quality.bad, 0
+
+    def values(self, now: ScanContext) -> Sequence[float]:
+        """As its signals are listed."""
+        blocked = self.cause == BLOCKED
+        return self.works and not blocked, self.fed, blocked, self.blocked_ticks * now.length, *self.status()
+
+    def states(self, now: ScanContext) -> list[float]:
+        """Running, blocked, state, category and stop reason."""
+        blocked = self.cause == BLOCKED
+        return [self.works and not blocked, blocked, *self.condition]

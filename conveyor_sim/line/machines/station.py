@@ -1,0 +1,177 @@
+"""Stations: machines that take a bottle, work on it for a cycle, and give it back elsewhere, the same one."""
+
+import math
+from collections.abc import Sequence
+from types import SimpleNamespace
+
+import numpy as np
+
+from conveyor_sim.line.device import ScanContext
+from conveyor_sim.line.devices.entry import has_room
+from conveyor_sim.line.devices.setup import Setup
+from conveyor_sim.line.machines.stop_reason import BLOCKED, NONE, STARVED
+from conveyor_sim.line.machines.taking import TakingDevice
+from conveyor_sim.line.tag import count, seconds, switch
+from conveyor_sim.scene.parts.station import BAD, Acceptance, Setting, Station
+
+EMPTY = -1
+
+
+class StationDevice(TakingDevice):
+    """One station while it runs. Starved: it is empty and none waits; blocked: it is done and has no room to give."""
+
+    defects: dict[str, int]
+    """By test, how many it has found defective."""
+
+    def __init__(self, name: str, station: Station, setup: Setup) -> None:
+        signals = [
+            count(f"{name}/processed", "counter", "Bottles given back."),
+            count(f"{name}/good", "counter", "Those that no test has found defective."),
+            count(f"{name}/defective", "counter", "Those that a test has."),
+            count(f"{name}/false_accepts", "counter", "Tests passed by what is beyond their limits."),
+            count(f"{name}/false_rejects", "counter", "Tests not passed by what is within their limits."),
+            *(count(f"{name}/defect_{test}", "counter", f"Found defective in {test}.") for test in station.tests),
+            switch(f"{name}/holds", "status", "It has a bottle."),
+            switch(f"{name}/starved", "status", "It would take a bottle, and none is there.", adds_to="state"),
+            switch(f"{name}/blocked", "status", "It would give a bottle, and there is no room.", adds_to="state"),
+            seconds(f"{name}/starved_time", "counter", "For how long in all it was starved."),
+            seconds(f"{name}/blocked_time", "counter", "For how long in all it was blocked."),
+        ]
+        super().__init__(name, station, setup, signals)
+        self._position = station.position
+        speed, direction = station.speed, station.direction
+        self._velocity = speed * math.cos(direction), speed * math.sin(direction)
+        self._radii = setup.model.type_radius.tolist()
+        self._sets = [Work(what, setting, setup.random(name, f"sets/{what}")) for what, setting in station.sets.items()]
+        self._tests = [Look(what, test, setup.random(name, f"tests/{what}")) for what, test in station.tests.items()]
+        named = {f"sets_{work.attribute}": work.random for work in self._sets}
+        self.streams = SimpleNamespace(**named, **{f"tests_{look.attribute}": look.random for look in self._tests})
+        """What settings and tests draw from."""
+        self.holding = EMPTY
+        """Id of the bottle that it has."""
+        self.begun = 0
+        """Tick from which on it works on it."""
+        self.cycle = 0.0
+        self.processed = self.good = 0
+        self.false_accepts = self.false_rejects = 0
+        self.defects = dict.fromkeys(station.tests, 0)
+        self.starved_ticks = 0
+        self.blocked_ticks = 0
+
+    @property
+    def held(self) -> Sequence[int]:
+        """The bottle that it has."""
+        return () if self.holding == EMPTY else (self.holding,)
+
+    def take(self, now: ScanContext) -> None:
+        """Take the bottle that has waited longest, if it has none."""
+        if self._busy:
+            self.advance(now)
+        slot_of = self.queue(now)
+        if self.holding == EMPTY and self.works and self.waiting and self.goes_on():
+            # One that it had to wait for begins its cycle now; any other one when the last was given.
+            late = self.cause == STARVED
+            self.begun, self.cycle = (now.tick, 0.0) if late else (now.tick - 1, self.cycle)
+            first, *others = self.waiting
+            self.holding = now.state.hold(slot_of[first])
+            self.waiting = tuple(others)
+
+    def feed(self, now: ScanContext) -> None:
+        """Work on the bottle that it has, and give it when it is done, if there is room."""
+        cause = NONE
+        if self.holding == EMPTY:
+            if self.works and now.tick > 0:
+                cause = STARVED
+                self.starved_ticks += 1
+        elif now.tick > self.begun and self.turn(now):
+            if not has_room(now.state, *self._position, self._radii[now.state.held[self.holding][0]]):
+                cause = BLOCKED
+                self.blocked_ticks += 1
+                self.wait()
+            elif self.goes_on():
+                self._finish(self.holding, now)
+                now.state.give(self.holding, *self._position, *self._velocity)
+                self.holding = EMPTY
+                self.cycle = 0.0 if self.cause == BLOCKED else min(self.cycle - 1.0, 1.0)
+        self.conclude(cause, now)
+
+    def _finish(self, bottle: int, now: ScanContext) -> None:
+        """Make of a bottle what is to be made of it, and look at it."""
+        self.processed += 1
+        for work in self._sets:
+            if (value := work.value(self.processed)) is not None:
+                now.set_attribute(bottle, work.attribute, value)
+        defective = False
+        for look in self._tests:
+            within = look.within(now.attribute(bottle, look.attribute))
+            passed = look.passes(within)
+            self.false_accepts += passed and not within
+            self.false_rejects += within and not passed
+            self.defects[look.attribute] += not passed
+            defective = defective or not passed
+        if defective:
+            now.set_attribute(bottle, BAD, 1.0)
+        self.good += not defective
+
+    def counts(self) -> tuple[int, int, int]:
+        """Bottles given back, and those that a test has found defective."""
+        return self.processed, self.processed - self.good, 0
+
+    def values(self, now: ScanContext) -> Sequence[float]:
+        """As its signals are listed."""
+        return (
+            self.works,
+            self.processed,
+            self.good,
+            self.processed - self.good,
+            self.false_accepts,
+            self.false_rejects,
+            *self.defects.values(),
+            self.holding != EMPTY,
+            self.cause == STARVED,
+            self.cause == BLOCKED,
+            self.starved_ticks * now.length,
+            self.blocked_ticks * now.length,
+            *self.status(),
+        )
+
+    def states(self, now: ScanContext) -> list[float]:
+        """Running, starved, blocked, state, category and stop reason."""
+        return [self.works, self.cause == STARVED, self.cause == BLOCKED, *self.condition]
+
+
+class Work:
+    """What a station makes of one attribute."""
+
+    def __init__(self, attribute: str, setting: Setting, random: np.random.Generator) -> None:
+        self.attribute, self.random = attribute, random
+        self._setting, self._at = setting, frozenset(setting.at)
+
+    def value(self, number: int) -> float | None:
+        """What the attribute of the bottle of a number (from 1) becomes; None: it stays."""
+        setting = self._setting
+        # Nothing is drawn where it would decide nothing.
+        chosen = setting.every is None or number % setting.every == 0
+        chosen = chosen and (not self._at or number in self._at)
+        if chosen and setting.share < 1.0:
+            chosen = float(self.random.uniform()) < setting.share
+        spread = setting.deviation * float(self.random.standard_normal()) if setting.deviation else 0.0
+        return setting.to + spread if chosen else None
+
+
+class Look:
+    """What a station takes for good in one attribute."""
+
+    def __init__(self, attribute: str, test: Acceptance, random: np.random.Generator) -> None:
+        self.attribute, self.random = attribute, random
+        self._test = test
+
+    def within(self, value: float) -> bool:
+        """Whether a value is within the limits."""
+        test = self._test
+        return (test.low is None or value >= test.low) and (test.high is None or value <= test.high)
+
+    def passes(self, within: bool) -> bool:
+        """Whether what is within the limits, or is not, is taken for good."""
+        wrong = self._test.false_reject if within else self._test.false_accept
+        return within != (wrong > 0.0 and float(self.random.uniform()) < wrong)

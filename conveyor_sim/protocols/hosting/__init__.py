@@ -1,0 +1,1 @@
+"""Hosting of the protocol servers: processes, restarts, settings, progress."""

@@ -1,0 +1,1 @@
+"""Parts common to all protocol servers: interface, users, quotas, budgets, certificates."""

@@ -1,0 +1,153 @@
+"""Certificate and key of the servers: made on first use, in a folder that only this user can read."""
+
+from __future__ import annotations
+
+import os
+import socket
+import stat
+from datetime import datetime, timedelta, timezone
+from ipaddress import ip_address
+from pathlib import Path
+from typing import NamedTuple
+
+from cryptography import x509
+from cryptography.hazmat.primitives import hashes, serialization
+from cryptography.hazmat.primitives.asymmetric import rsa
+from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
+
+from conveyor_sim.errors import ConveyorError
+from conveyor_sim.support.file_lock import locked
+from conveyor_sim.support.files import MB, FileError, read_file, write_file
+
+CERTIFICATE, KEY, TRUSTED = "certificate.der", "key.pem", "trusted"
+"""Names in the folder. TRUSTED: folder of clients' certificates; if it holds any, all others are refused."""
+
+YEARS = 10
+
+_PATIENCE = 30.0
+"""Wall time to wait for another process that makes the certificate, s."""
+
+
+class CertificateError(ConveyorError):
+    """Error: a certificate or key can't be made or read."""
+
+
+class Identity(NamedTuple):
+    """Certificate and private key of the server."""
+
+    certificate: bytes
+    """DER."""
+    key: bytes
+    """PEM."""
+    application_uri: str
+    """Application URI of the certificate."""
+    trusted: frozenset[bytes]
+    """Accepted certificates of clients, DER; empty: all are accepted."""
+
+
+def default_folder() -> Path:
+    """Return `conveyor_sim/opcua` in the folder for data of this user ($XDG_DATA_HOME, else ~/.local/share)."""
+    return Path(os.environ.get("XDG_DATA_HOME") or Path.home() / ".local" / "share") / "conveyor_sim" / "opcua"
+
+
+def identity(folder: Path) -> Identity:
+    """Return the certificate and key in a folder; make them if they are missing. Raises CertificateError."""
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        if (mode := stat.S_IMODE(folder.stat().st_mode)) & 0o077 or folder.stat().st_uid != os.geteuid():
+            raise CertificateError(
+                f"{folder}: mode {mode:o} given, expected a folder that only this user can read (chmod 700)"
+            )
+        (folder / TRUSTED).mkdir(mode=0o700, exist_ok=True)
+        if not (folder / KEY).exists():
+            with locked(folder, _PATIENCE):  # the servers of a line start at the same time
+                if not (folder / KEY).exists():
+                    _make(folder)
+        trusted = frozenset(_der(path) for path in sorted((folder / TRUSTED).iterdir()) if path.is_file())
+    except OSError as error:
+        where = error.filename or folder
+        raise CertificateError(f"{where}: {error.strerror}, expected a folder for certificates") from error
+    certificate = _der(folder / CERTIFICATE)
+    names = x509.load_der_x509_certificate(certificate).extensions
+    try:
+        (uri,) = names.get_extension_for_class(x509.SubjectAlternativeName).value.get_values_for_type(
+            x509.UniformResourceIdentifier
+        )
+    except (x509.ExtensionNotFound, ValueError) as error:
+        raise CertificateError(f"{folder / CERTIFICATE}: names no application, expected one URI of it") from error
+    return Identity(certificate, _read(folder / KEY), uri, trusted)
+
+
+def _make(folder: Path) -> None:
+    key = rsa.generate_private_key(public_exponent=65537, key_size=2048)
+    host = socket.gethostname() or "localhost"
+    name = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, f"conveyor_sim@{host}"[:64])])
+    now = datetime.now(timezone.utc)
+    names: list[x509.GeneralName] = [
+        x509.UniformResourceIdentifier(f"urn:{host}:conveyor_sim"),
+        *(x509.DNSName(known) for known in dict.fromkeys((host, "localhost"))),
+        x509.IPAddress(ip_address("127.0.0.1")),
+    ]
+    # OPC 10000-6, 6.2.2: certificate of an application. asyncua.crypto.cert_gen was considered: its certificates are
+    # those of an authority (CA:TRUE, keyCertSign), which browsers and users should not trust for a server.
+    certificate = (
+        x509.CertificateBuilder()
+        .subject_name(name)
+        .issuer_name(name)
+        .public_key(key.public_key())
+        .serial_number(x509.random_serial_number())
+        .not_valid_before(now - timedelta(days=1))
+        .not_valid_after(now + timedelta(days=365 * YEARS))
+        .add_extension(x509.SubjectAlternativeName(names), critical=False)
+        .add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
+        .add_extension(
+            x509.KeyUsage(
+                digital_signature=True,
+                content_commitment=True,
+                key_encipherment=True,
+                data_encipherment=True,
+                key_agreement=False,
+                key_cert_sign=True,
+                crl_sign=False,
+                encipher_only=False,
+                decipher_only=False,
+            ),
+            critical=True,
+        )
+        .add_extension(
+            x509.ExtendedKeyUsage([ExtendedKeyUsageOID.SERVER_AUTH, ExtendedKeyUsageOID.CLIENT_AUTH]), critical=False
+        )
+        .add_extension(x509.SubjectKeyIdentifier.from_public_key(key.public_key()), critical=False)
+        .sign(key, hashes.SHA256())
+    )
+    pem = key.private_bytes(serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, serialization.NoEncryption())
+    # The key comes last: if it is missing, both are made again.
+    _write(folder / CERTIFICATE, certificate.public_bytes(serialization.Encoding.DER))
+    _write(folder / KEY, pem)
+
+
+def _write(path: Path, content: bytes) -> None:
+    try:
+        write_file(path, content, mode=0o600)
+    except FileError as error:
+        raise CertificateError(f"{path}: {error}, expected a folder for certificates") from error
+
+
+def _read(path: Path) -> bytes:
+    try:
+        return read_file(path, MB)
+    except FileError as error:
+        raise CertificateError(f"{path}: {error}, expected a certificate or key") from error
+
+
+def _der(path: Path) -> bytes:
+    content = _read(path)
+    try:
+        found = (
+            x509.load_pem_x509_certificate(content)
+            if b"-----BEGIN" in content
+            else x509.load_der_x509_certificate(content)
+        )
+    except ValueError as error:
+        raise CertificateError(f"{path}: can't be read, expected a certificate (DER or PEM)") from error
+    return found.public_bytes(serialization.Encoding.DER)

@@ -1,0 +1,162 @@
+"""`ConnectionSlots`: bounded number of connections to a protocol server, and the order in which they make room.
+
+A client needs a place before it can identify itself, so connections without a session never block others. When all
+places are taken, a connection whose login failed makes room, else the connection at the earliest stage. Among several,
+it is the one that was idle for longest.
+Guests have a session and no user. They hold at most three quarters of the places; the rest is for users and for
+connections without a session yet. This also holds for the places of one address. A user is never dropped for a guest.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+RESERVED = 0.25
+"""Share of all places, and of the places of one address, that guests never hold."""
+
+NEW, GREETED, OPENED, GUEST, USER = range(5)
+"""Stages of a connection: nothing valid was received; greeted; channel open or request valid; session without a user;
+session of a user.
+"""
+
+
+@dataclass(frozen=True)
+class Quota:
+    """Places of one protocol server. All are positive integers."""
+
+    connections: int = 64
+    """Connections at once."""
+    connections_per_address: int = 48
+    """Connections from one address. The default leaves a quarter for other addresses; where all clients come from one
+    address, an operator is protected within it in the same way.
+    """
+    connections_per_user: int = 16
+    """Connections of one user."""
+    idle: float = 30.0
+    """Seconds without a request after which a guest may be dropped for another guest, or a user for the same user. A
+    Modbus client that is idle for longer loses its control of the line.
+    """
+
+
+QUOTA = Quota()
+"""Default places."""
+
+
+@dataclass(eq=False)
+class ConnectionSlot:
+    """Place of one connection."""
+
+    address: str
+    end: Callable[[], None]
+    """Closes the connection."""
+    stage: int = NEW
+    user: str = ""
+    active: float = field(default_factory=time.monotonic)
+    """Time of the last request in s, as time.monotonic() has it."""
+    has_failed: bool = False
+    """True if a login failed and none succeeded since."""
+
+    def touch(self, stage: int = NEW) -> None:
+        """Note a request, and the stage that the connection has reached."""
+        self.active, self.stage = time.monotonic(), max(stage, self.stage)
+
+
+def share_of_guests(places: int) -> int:
+    """Return how many of `places` guests may hold."""
+    return max(1, int(places * (1.0 - RESERVED)))
+
+
+class ConnectionSlots:
+    """All connections of one protocol server."""
+
+    def __init__(self, quota: Quota, keeps_active: bool = False) -> None:
+        """Start with all places free. keeps_active: True if guests that are not idle keep their places, too.
+
+        This is for a protocol without users, where a new connection can't be a user's.
+        """
+        self._quota, self._keeps_active = quota, keeps_active
+        self.idle = quota.idle
+        """Seconds without a request after which a connection is idle."""
+        self._taken: set[ConnectionSlot] = set()
+        self.dropped = self.refused = 0
+        """Connections that made room so far, and connections that got no place."""
+
+    def __len__(self) -> int:
+        return len(self._taken)
+
+    def take(self, address: str, end: Callable[[], None]) -> ConnectionSlot | None:
+        """Return a place for a connection from an address; None: all are held by clients that keep theirs."""
+        own = self._of(address)
+        if len(own) >= self._quota.connections_per_address and not self._drop_first(own):
+            self.refused += 1
+            return None
+        if len(self._taken) >= self._quota.connections and not self._drop_first(list(self._taken)):
+            self.refused += 1
+            return None
+        place = ConnectionSlot(address, end)
+        self._taken.add(place)
+        return place
+
+    def admit_guest(self, place: ConnectionSlot) -> bool:
+        """Let a connection go on without a user. Return False if guests hold their share, and none of them is idle."""
+        if place.user:
+            self.leave_user(place)
+        if place.stage == GUEST:
+            return True
+        for those, places in (
+            (self._of(place.address), self._quota.connections_per_address),
+            (list(self._taken), self._quota.connections),
+        ):
+            guests = [one for one in those if one.stage == GUEST]
+            if len(guests) >= share_of_guests(places) and not self._drop_first(self._idle(guests)):
+                self.refused += 1
+                return False
+        place.has_failed = False
+        place.touch(GUEST)
+        return True
+
+    def admit_user(self, place: ConnectionSlot, user: str) -> bool:
+        """Let a connection go on as a user. Return False if that user holds all its places, and none is idle."""
+        same = [one for one in self._taken if one.user == user and one is not place]
+        if len(same) >= self._quota.connections_per_user:
+            idle = self._idle(same)
+            if not idle:
+                self.refused += 1
+                return False
+            self._drop(min(idle, key=lambda one: one.active))
+        place.user, place.has_failed = user, False
+        place.touch(USER)
+        return True
+
+    def leave_user(self, place: ConnectionSlot) -> None:
+        """Note that a connection has no session any more."""
+        place.user, place.stage = "", min(place.stage, OPENED)
+
+    def leave(self, place: ConnectionSlot) -> None:
+        """Note that a connection has ended."""
+        self._taken.discard(place)
+
+    def _of(self, address: str) -> list[ConnectionSlot]:
+        """Return connections from an address; users are not counted against it."""
+        return [one for one in self._taken if one.address == address and one.stage < USER]
+
+    def _idle(self, those: list[ConnectionSlot]) -> list[ConnectionSlot]:
+        before = time.monotonic() - self.idle
+        return [one for one in those if one.active < before]
+
+    def _drop_first(self, those: list[ConnectionSlot]) -> bool:
+        """Drop the connection that comes first in the order of the module. Return False if there are only users."""
+        kept = set(those) - set(self._idle(those)) if self._keeps_active else set()
+        may = (one for one in those if one.stage < GUEST or (one.stage == GUEST and one not in kept))
+        first = min(may, key=lambda one: (not one.has_failed, one.stage, one.active), default=None)
+        if first is None:
+            return False
+        self._drop(first)
+        return True
+
+    def _drop(self, place: ConnectionSlot) -> None:
+        self._taken.discard(place)
+        self.dropped += 1
+        place.end()

@@ -1,0 +1,1 @@
+"""Tags of a line and their providers: a simulated scene, a recording, a mirror built from topics."""

@@ -1,0 +1,99 @@
+"""`serve --lockstep`: a PLC in a process of its own steps the line, and has the bits of the same program in a test."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import numpy as np
+import pytest
+from protocols.served import Served
+from protocols.waiting import PATIENCE
+from testing.soft_plc import BOTTLES, SETPOINT, speed
+
+from conveyor_sim.bag.reader import open_bag
+from conveyor_sim.bag.replay import replay
+from conveyor_sim.control.scan import Inputs
+from conveyor_sim.protocols.server.users import line_of, new_user
+from conveyor_sim.testing.plc import ADDRESS, PASSWORD
+from conveyor_sim.testing.scenario import Scenario
+
+SCENE = "scenarios/zoned_line"
+PLC = Path(__file__).parents[2] / "testing" / "soft_plc.py"
+SCANS = 600
+STATES = {"bottles", "belts", "signals", "counters"}
+
+
+class Twin:
+    """The program of the PLC, in a test."""
+
+    def scan(self, inputs: Inputs) -> Mapping[str, float]:
+        return {SETPOINT: speed(inputs[BOTTLES])}
+
+
+@pytest.fixture(scope="module")
+def expected(tmp_path_factory: pytest.TempPathFactory) -> dict[tuple[str, int], bytes]:
+    """What a line records that has the program inside."""
+    bag = tmp_path_factory.mktemp("inside") / "bag"
+    with Scenario(SCENE, bag=bag) as line:
+        line.attach(Twin())
+        line.run_for(SCANS * line.simulation.scene.tick)
+        assert np.ptp(line.history[SETPOINT]) > 0.0  # it does act
+    return states(bag)
+
+
+def states(bag: Path) -> dict[tuple[str, int], bytes]:
+    """Of a recording: messages by topic and simulated time."""
+    with open_bag(bag) as found:
+        return {(topic, time): data for topic, time, data in found.raw(STATES)}
+
+
+def served(command: Callable[..., Served], folder: Path, face: str, bag: str) -> None:
+    """Have a PLC take a line through all its scans, up to its end."""
+    (folder / "users").write_text(line_of("plc", new_user("controller", "open sesame")))
+    of_face = {
+        "modbus": ("--modbus", "0", "--modbus-role", "controller"),
+        "opcua": ("--opcua", "0", "--opcua-users", "users", "--opcua-certificates", "own"),
+    }[face]
+    seconds = f"{SCANS / 100:g}"
+    line = command(SCENE, "--lockstep", *of_face, "--duration", seconds, "--out", bag)
+    environment = {ADDRESS: line.address, PASSWORD: "open sesame", "SOFT_PLC_FOLDER": str(folder)}
+    plc = [sys.executable, str(PLC), str(SCANS)]
+    subprocess.run(plc, env={**os.environ, **environment}, check=True, timeout=5 * PATIENCE)
+    assert f"served up to {seconds} s; {face} " in line.end()
+    assert "in lockstep: the line stands until a client writes run/target_tick" in line.told
+
+
+@pytest.mark.parametrize("face", ["modbus", "opcua"])
+def test_a_plc_gives_the_bits_of_its_program(
+    command: Callable[..., Served], tmp_path: Path, expected: dict[tuple[str, int], bytes], face: str
+) -> None:
+    library = {"modbus": "pymodbus", "opcua": "asyncua"}[face]
+    pytest.importorskip(library, reason=f"{library} is not installed: pip install conveyor-sim[scada]")
+    served(command, tmp_path, face, "bag")
+    found = states(tmp_path / "bag")
+    assert {topic for topic, _ in found} == STATES
+    assert found == expected
+    report = replay(tmp_path / "bag")
+    assert report.exact and report.difference is None and report.compared["outcomes"] > 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["--modbus", "0"], "--lockstep: no client may advance the line, expected --modbus-role controller, or"),
+        (
+            ["--modbus", "0", "--modbus-role", "controller", "--real-time-factor", "1"],
+            "--real-time-factor: given with --lockstep, expected none: the PLC says when",
+        ),
+    ],
+)
+def test_what_makes_no_lockstep_is_one_sentence(
+    command: Callable[..., Served], arguments: list[str], sentence: str
+) -> None:
+    line = command(SCENE, "--lockstep", *arguments)
+    line.process.wait(timeout=PATIENCE)
+    assert line.process.returncode == 1 and sentence in line.told
