@@ -32,7 +32,7 @@ from conveyor_sim.ros.services import Services
 from conveyor_sim.ros.spinner import Spinner
 from conveyor_sim.run.compilation import Cancelled, Compilation
 from conveyor_sim.run.pacing import RateCap
-from conveyor_sim.run.session import Session
+from conveyor_sim.run.session import RunSession
 from conveyor_sim.run.stepper import Stepper
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
@@ -122,9 +122,9 @@ class SimNode:
 
         scene, threads = self._scene, values.threads or None
 
-        def open_session(runs: int, loaded: Simulation | None) -> Session:
+        def open_session(runs: int, loaded: Simulation | None) -> RunSession:
             simulation = loaded or Simulation(scene, threads)
-            return Session(simulation, sink, bag_folder(values.record, runs), values.frame_id, self._distro)
+            return RunSession(simulation, sink, bag_folder(values.record, runs), values.frame_id, self._distro)
 
         def read_checkpoint(path: Path) -> Simulation:
             return Simulation.load(path, threads, scene, values.checkpoint_folder)

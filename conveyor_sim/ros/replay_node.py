@@ -27,7 +27,7 @@ from conveyor_sim.ros.publishers import message_class, published_hashes, ros_qos
 from conveyor_sim.ros.services import settled
 from conveyor_sim.ros.spinner import Spinner
 from conveyor_sim.run.lockstep import Refused
-from conveyor_sim.run.playback import Message, Playback, Topic
+from conveyor_sim.run.playback import Playback, PlayedMessage, PlayedTopic
 from conveyor_sim.run.player import Player
 from conveyor_sim.support.printable import printable
 
@@ -116,7 +116,7 @@ class ReplayNode:
                 self._wake.notify()
         return future
 
-    def _advertise(self, bag: Bag, topics: Sequence[Topic]) -> dict[str, Publisher]:
+    def _advertise(self, bag: Bag, topics: Sequence[PlayedTopic]) -> dict[str, Publisher]:
         """Create a publisher for each topic whose recorded type is installed. Log a warning for each other topic."""
         publishers = {}
         for topic in topics:
@@ -139,7 +139,7 @@ class ReplayNode:
             raise BagError(f"{bag.path}: no topic of a type that is installed here, expected at least one")
         return publishers
 
-    def _publish(self, message: Message) -> None:
+    def _publish(self, message: PlayedMessage) -> None:
         if publisher := self._publishers.get(message.topic):
             publisher.publish(message.data)
 

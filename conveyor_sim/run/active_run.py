@@ -15,11 +15,11 @@ from conveyor_sim.run.inbox import Inbox
 from conveyor_sim.run.lockstep import Lockstep, Refused
 from conveyor_sim.run.reception import Reception
 from conveyor_sim.run.run_state import Log, SimulationState, run_state_of
-from conveyor_sim.run.session import Session
+from conveyor_sim.run.session import RunSession
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.printable import printable
 
-OpenSession = Callable[[int, "Simulation | None"], Session]
+OpenSession = Callable[[int, "Simulation | None"], RunSession]
 """Opens a run, from the number of runs before it; with a Simulation, if one is passed. Raises ConveyorError."""
 
 
@@ -144,13 +144,13 @@ class ActiveRun:
         for event in self.session.outputs.take_noticed():
             self.guard_events += 1
             self._log.warning(f"guard: {event.text}")
-        self.keep(outcomes)
+        self.store(outcomes)
 
-    def keep(self, outcomes: list[CommandOutcome]) -> None:
+    def store(self, outcomes: list[CommandOutcome]) -> None:
         """Store command results for the next answer in lockstep, if one is expected."""
         in_lockstep = self.advance is not None and self.advance.paced
         if in_lockstep or self.lockstep.owner:
-            self.reception.keep(outcomes)
+            self.reception.store(outcomes)
 
     def show(self) -> None:
         """Publish the state of the run, if it has changed."""
@@ -203,12 +203,12 @@ class ActiveRun:
         """End this run. Return the advance to refuse once the next run is there: the answer names that run."""
         broken_off, self.advance = self.advance, None
         self.lockstep.clear()
-        self.reception.forget_kept()
+        self.reception.forget_stored()
         self.close_recording()
         self.reception.give_up(self.session, reason)
         return broken_off
 
-    def _enter(self, session: Session) -> None:
+    def _enter(self, session: RunSession) -> None:
         self.session = session
         self.reception.begin(session)
         self.failure, self.ended = "", False

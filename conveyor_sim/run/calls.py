@@ -15,7 +15,7 @@ MOST_CALLS = 100
 """Requests that may wait for their answers at once. A reset of a run that is recorded takes 0.1 s."""
 
 
-class Calls:
+class CallQueue:
     """Queue of functions. Any thread may call its methods, but `take` and `wait` are for the stepping thread."""
 
     def __init__(self) -> None:

@@ -29,7 +29,7 @@ LOOK_BACK = 10**9
 """Time that a search for a state covers first, ns."""
 
 
-class Message(NamedTuple):
+class PlayedMessage(NamedTuple):
     """A serialized message to be published."""
 
     topic: str
@@ -37,7 +37,7 @@ class Message(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Topic:
+class PlayedTopic:
     """A topic that is played back. Its name is that in OUTPUTS, or absolute if outside the namespace of the bag."""
 
     name: str
@@ -84,18 +84,18 @@ class Playback:
         self.last_tick = -(-last_ns // self.tick_ns)
         qos = bag.qos
         recorded = [
-            Topic(name, kind, qos[name], bag.type_hash(name))
+            PlayedTopic(name, kind, qos[name], bag.type_hash(name))
             for name, kind in bag.types.items()
             if (name if name.startswith("/") else f"{bag.namespace}/{name}") not in OWN and name != RUN_STATE
             if only is None or name in only
         ]
         known = {topic.name for topic in recorded}
-        made = [Topic(RUN_STATE, encode.RUN_STATE, LATCHED, None)]
+        made = [PlayedTopic(RUN_STATE, encode.RUN_STATE, LATCHED, None)]
         if "outcomes" in known and only is None:
-            made.append(Topic("commands", encode.COMMANDS, EVENTS, None))
-            made += [Topic(speed_command(belt), encode.SPEED, EVENTS, None) for belt in bag.line.belts]
+            made.append(PlayedTopic("commands", encode.COMMANDS, EVENTS, None))
+            made += [PlayedTopic(speed_command(belt), encode.SPEED, EVENTS, None) for belt in bag.line.belts]
         eyes = _photo_eyes(bag.line.signal_names) if "signals" in known and only is None else {}
-        made += [Topic(eye, encode.BOOL, LATCHED, None) for eye in eyes]
+        made += [PlayedTopic(eye, encode.BOOL, LATCHED, None) for eye in eyes]
         self.topics = (*recorded, *(topic for topic in made if topic.name not in known))
         self._recorded = known
         self._made = {topic.name for topic in self.topics} - known
@@ -104,7 +104,7 @@ class Playback:
         self._latched = {topic.name for topic in recorded if topic.latched}
         self._states = {topic.name for topic in recorded if not topic.latched and not topic.event}
         self._cued_ns = 0
-        self._due: list[Message] = []
+        self._due: list[PlayedMessage] = []
         self._stream: Iterator[tuple[str, int, bytes]] = iter(())
         self._next: tuple[str, int, bytes] | None = None
 
@@ -112,7 +112,7 @@ class Playback:
         """Return the simulated time of a tick, ns. Tick 0 is stamped 1, because ROS reads 0 as "not set"."""
         return max(1, tick * self.tick_ns)
 
-    def cue(self, tick: int) -> list[Message]:
+    def cue(self, tick: int) -> list[PlayedMessage]:
         """Go to a tick. Return its latched messages. The next `take` begins with the state at that tick."""
         after_ns = self.stamp_ns(tick - 1) if tick > self.first_tick else -1
         self._cued_ns = self.stamp_ns(tick)
@@ -125,9 +125,9 @@ class Playback:
         self._next = next(self._stream, None)
         header = Header(tick, self._cued_ns, "")
         replaying = encode.run_state_message(RunState(REPLAYING, printable(self._bag.path)), header)
-        return [*latched, Message(RUN_STATE, replaying)]
+        return [*latched, PlayedMessage(RUN_STATE, replaying)]
 
-    def take(self, tick: int) -> Iterator[Message]:
+    def take(self, tick: int) -> Iterator[PlayedMessage]:
         """Yield the remaining messages up to a tick, in the order of recording."""
         due, self._due = self._due, []
         for message in due:
@@ -138,9 +138,9 @@ class Playback:
             self._next = next(self._stream, None)
             if topic in self._latched and stamp <= self._cued_ns:
                 continue
-            yield from self._with_made(Message(topic, data))
+            yield from self._with_made(PlayedMessage(topic, data))
 
-    def _with_made(self, message: Message) -> Iterator[Message]:
+    def _with_made(self, message: PlayedMessage) -> Iterator[PlayedMessage]:
         """Yield the messages made from a message, then the message."""
         if message.topic == "outcomes":
             yield from self._sent(message.data)
@@ -150,10 +150,10 @@ class Playback:
                 blocked = bool(signals.values[column])
                 if self._seen.get(eye) is not blocked:
                     self._seen[eye] = blocked
-                    yield Message(eye, encode.bool_message(blocked, _header(signals)))
+                    yield PlayedMessage(eye, encode.bool_message(blocked, _header(signals)))
         yield message
 
-    def _last_before(self, stop_ns: int, topics: set[str]) -> list[Message]:
+    def _last_before(self, stop_ns: int, topics: set[str]) -> list[PlayedMessage]:
         """Return the last message of each topic before a time, in the order of recording."""
         last: dict[str, tuple[int, int, bytes]] = {}
         span, missing = LOOK_BACK, set(topics)
@@ -164,27 +164,27 @@ class Playback:
                 last[topic] = (stamp, place, data)
             missing -= last.keys()
             stop_ns, span = start_ns, 2 * span
-        return [Message(topic, last[topic][2]) for topic in sorted(last, key=lambda name: last[name][:2])]
+        return [PlayedMessage(topic, last[topic][2]) for topic in sorted(last, key=lambda name: last[name][:2])]
 
-    def _first_after(self, start_ns: int, topics: set[str]) -> list[Message]:
+    def _first_after(self, start_ns: int, topics: set[str]) -> list[PlayedMessage]:
         """Return the first message of each topic from a time on, in the order of recording."""
         first: dict[str, bytes] = {}
         for topic, _, data in self._bag.raw(topics, start_ns) if topics else ():
             first.setdefault(topic, data)
             if len(first) == len(topics):
                 break
-        return [Message(topic, data) for topic, data in first.items()]
+        return [PlayedMessage(topic, data) for topic, data in first.items()]
 
-    def _sent(self, data: bytes) -> Iterator[Message]:
+    def _sent(self, data: bytes) -> Iterator[PlayedMessage]:
         """Yield the command of a command result, if it was sent as one and its topic is not recorded."""
         message = self._bag.decode("outcomes", data)
         outcome: Outcome = to_outcome(message)
         if outcome.operation != SET or outcome.input.by_line:  # it was not sent as a command
             return
         if outcome.source in self._made and outcome.names == (outcome.source,) and len(outcome.values) == 1:
-            yield Message(outcome.source, encode.speed_message(outcome.values[0]))
+            yield PlayedMessage(outcome.source, encode.speed_message(outcome.values[0]))
         elif "commands" in self._made and outcome.source not in self._recorded:
-            yield Message("commands", encode.commands_message(outcome.names, message.values, _header(message)))
+            yield PlayedMessage("commands", encode.commands_message(outcome.names, message.values, _header(message)))
 
 
 def _header(message: Any) -> Header:

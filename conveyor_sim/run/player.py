@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 from conveyor_sim.run.lockstep import Refused
 from conveyor_sim.run.pacing import Pacer
-from conveyor_sim.run.playback import Message, Playback
+from conveyor_sim.run.playback import Playback, PlayedMessage
 
 IDLE = 0.01
 """Time between two beats while no tick is due, s of wall time."""
@@ -25,7 +25,7 @@ class Player:
         *,
         start: float | None,
         paused: bool,
-        publish: Callable[[Message], None],
+        publish: Callable[[PlayedMessage], None],
         beat: Callable[[int, float], None],
     ) -> None:
         """Publish latched messages at once, and the first tick with the first step that is not paused.

@@ -6,13 +6,13 @@ from collections.abc import Callable, Sequence
 
 from conveyor_sim.line.commands.inputs import DISOWN, MODE, OWN, SET, CommandOutcome, Input, arrival
 from conveyor_sim.run.inbox import Inbox, size_of
-from conveyor_sim.run.session import Session
+from conveyor_sim.run.session import RunSession
 
 PERIOD = 1.0
 """Time between two reports of commands turned away, and of refusals not logged, s of wall time."""
 LINES = 10
 """Refusals that are logged singly per PERIOD."""
-KEPT = 1000
+MOST_STORED = 1000
 """Command results that are stored for the next answer in lockstep."""
 
 
@@ -29,34 +29,34 @@ class Reception:
         """Commands refused, at least in part, because their writer had no control authority."""
         self._unmentioned = 0  # repeated refusals since control last changed
         self._handed = self._handed_bytes = 0
-        self._kept: list[CommandOutcome] = []
-        self._dropped = 0  # number of results beyond KEPT
+        self._stored: list[CommandOutcome] = []
+        self._dropped = 0  # number of results beyond MOST_STORED
         self._lines = self._unlogged = 0
         self._since = -PERIOD  # start of the present PERIOD of log lines, s of wall time
         self._reported = -PERIOD
 
-    def hand_over(self, session: Session, given: Input, size: int) -> None:
+    def hand_over(self, session: RunSession, command: Input, size: int) -> None:
         """Queue an input of `size` bytes, which the inbox admitted, for the next tick."""
-        session.simulation.give(given)
+        session.simulation.give(command)
         self._handed += 1
         self._handed_bytes += size
 
-    def refuse(self, session: Session, given: Input, reason: str) -> None:
+    def refuse(self, session: RunSession, command: Input, reason: str) -> None:
         """Refuse an input for which there is no tick. Changes of ownership are dropped, because the run has ended."""
-        if given.operation in (OWN, DISOWN):
+        if command.operation in (OWN, DISOWN):
             return
-        self.refused += given.operation == SET
-        self._log(f"{given.source} refused since {reason}")
-        session.refuse(given, reason)
+        self.refused += command.operation == SET
+        self._log(f"{command.source} refused since {reason}")
+        session.refuse(command, reason)
 
-    def begin(self, session: Session) -> None:
+    def begin(self, session: RunSession) -> None:
         """Begin a run. Inputs that wait in it come from a checkpoint."""
         waiting = session.simulation.line.waiting
-        for given in waiting:
-            if given.operation == SET:
+        for command in waiting:
+            if command.operation == SET:
                 self._inbox.receive()
         self._handed = len(waiting)
-        self._handed_bytes = sum(size_of(given) for given in waiting)
+        self._handed_bytes = sum(size_of(command) for command in waiting)
         self._inbox.occupy(self._handed, self._handed_bytes)
 
     def take_account(self, outcomes: Sequence[CommandOutcome]) -> None:
@@ -70,10 +70,10 @@ class Reception:
             elif outcome.operation == SET and not outcome.input.by_line:
                 self.applied += 1
 
-    def give_up(self, session: Session, reason: str) -> None:
+    def give_up(self, session: RunSession, reason: str) -> None:
         """Refuse the inputs that wait for a tick that will not come. The recording is closed by then."""
-        for given in session.simulation.line.take_waiting():
-            self.refuse(session, given, reason)
+        for command in session.simulation.line.take_waiting():
+            self.refuse(session, command, reason)
         self._release()
 
     def notes(self, tick: int, now: float) -> list[CommandOutcome]:
@@ -86,25 +86,25 @@ class Reception:
             self._warn(note)
         return [arrival(note, tick) for note in notes]
 
-    def keep(self, outcomes: Sequence[CommandOutcome]) -> None:
-        """Store results for the next answer in lockstep, up to KEPT, without changes of ownership."""
+    def store(self, outcomes: Sequence[CommandOutcome]) -> None:
+        """Store results for the next answer in lockstep, up to MOST_STORED, without changes of ownership."""
         outcomes = [outcome for outcome in outcomes if outcome.operation not in (OWN, DISOWN)]
-        room = KEPT - len(self._kept)
-        self._kept += outcomes[:room]
+        room = MOST_STORED - len(self._stored)
+        self._stored += outcomes[:room]
         self._dropped += max(0, len(outcomes) - room)
 
-    def take_kept(self, tick: int) -> tuple[CommandOutcome, ...]:
+    def take_stored(self, tick: int) -> tuple[CommandOutcome, ...]:
         """Return the stored results, with a report of how many more there were."""
-        kept = self._kept
+        stored = self._stored
         if self._dropped:
-            reason = f"{self._dropped} more outcomes were left out, expected at most {KEPT} between two answers"
-            kept.append(arrival(reason, tick))
-        self.forget_kept()
-        return tuple(kept)
+            reason = f"{self._dropped} more outcomes were left out, expected at most {MOST_STORED} between two answers"
+            stored.append(arrival(reason, tick))
+        self.forget_stored()
+        return tuple(stored)
 
-    def forget_kept(self) -> None:
+    def forget_stored(self) -> None:
         """Forget the stored results: the run and its ownership have ended."""
-        self._kept, self._dropped = [], 0
+        self._stored, self._dropped = [], 0
 
     def _release(self) -> None:
         self._inbox.release(self._handed, self._handed_bytes)

@@ -17,7 +17,7 @@ from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.printable import SENTENCE, printable
 
 
-class Session:
+class RunSession:
     """A simulation with its sinks. Only the thread that steps it may use it."""
 
     def __init__(self, simulation: Simulation, sink: Sink, bag: Path | None, frame_id: str, distro: str) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.run.active_run import ActiveRun
-from conveyor_sim.run.calls import Calls
+from conveyor_sim.run.calls import CallQueue
 from conveyor_sim.run.pacing import Pacer
 from conveyor_sim.run.run_state import SimulationState
 
@@ -24,7 +24,7 @@ class StepLoop:
     def __init__(
         self,
         run: ActiveRun,
-        calls: Calls,
+        calls: CallQueue,
         pacer: Pacer,
         beat: Callable[[int, float], None],
         died: Callable[[Exception], None],
@@ -105,4 +105,4 @@ class StepLoop:
                 self._active.session.tell(note)
         except ConveyorError as error:
             self._active.fail(error)
-        self._active.keep(notes)
+        self._active.store(notes)

@@ -16,7 +16,7 @@ from typing import TypeVar
 
 from conveyor_sim.line.commands.inputs import DISOWN, OWN, SET, Input
 from conveyor_sim.run.active_run import ActiveRun, Advance, OpenSession
-from conveyor_sim.run.calls import Calls
+from conveyor_sim.run.calls import CallQueue
 from conveyor_sim.run.inbox import sizes_of
 from conveyor_sim.run.lockstep import LOCKSTEP, LockstepAnswer, LockstepRequest, Refused
 from conveyor_sim.run.pacing import Pacer
@@ -65,7 +65,7 @@ class Stepper:
         )
         self._log = log
         self.pacer = Pacer(real_time_factor, self.simulation.model.tick_ns * 1e-9)
-        self._calls = Calls()
+        self._calls = CallQueue()
         self._loop = StepLoop(self.run, self._calls, self.pacer, beat, died)
         self._thread = threading.Thread(target=self._loop.run, name="stepper", daemon=True)
 
@@ -97,22 +97,22 @@ class Stepper:
         """
         return self._calls.request(function)
 
-    def give(self, given: Input, size: int) -> None:
+    def give(self, command: Input, size: int) -> None:
         """Hand an input of `size` bytes to the simulation, which applies or refuses it as the next tick starts.
 
         The inbox turns it away if the queue has no room.
         """
         inbox, reception = self.run.inbox, self.run.reception
         if reason := inbox.admit(size):
-            inbox.turn_away(given.source, reason)
+            inbox.turn_away(command.source, reason)
             return
 
         def hand_over() -> None:
             if reason := self.run.standstill:  # there is no next tick to refuse it
                 inbox.release(1, size)
-                reception.refuse(self.run.session, given, reason)
+                reception.refuse(self.run.session, command, reason)
             else:
-                reception.hand_over(self.run.session, given, size)
+                reception.hand_over(self.run.session, command, size)
 
         self._calls.put(hand_over)
 
@@ -191,15 +191,15 @@ class Stepper:
         require_fitting(simulation, request)
         answer = lockstep.accept(request, self.run_id, simulation.tick, run.session.last_tick)
         own(simulation, request)
-        for given, size in zip(request.inputs, sizes, strict=True):
-            if given.operation == SET:
+        for command, size in zip(request.inputs, sizes, strict=True):
+            if command.operation == SET:
                 run.inbox.receive()
             run.inbox.occupy(1, size)  # even if the queue is full: the advance empties it
-            run.reception.hand_over(run.session, given, size)
+            run.reception.hand_over(run.session, command, size)
         self.pacer.catch_breath(time.monotonic())
 
         def done() -> None:
-            outcomes = run.reception.take_kept(simulation.tick)
+            outcomes = run.reception.take_stored(simulation.tick)
             answer.set_result(LockstepAnswer.of(simulation, self.run_id, outcomes))
             if request.release and not run.standstill:  # as the next tick begins, if there is to be one
                 disown(simulation)

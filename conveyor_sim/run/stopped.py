@@ -17,5 +17,5 @@ def keep_stopped(simulation: Simulation, folder: Path | None, error: SimulationE
     try:
         simulation.save(path)
     except CheckpointError as failed:
-        return SimulationError(f"{error}; the state before that tick was not kept: {failed}", error.kind)
+        return SimulationError(f"{error}; the state before that tick was not saved: {failed}", error.kind)
     return SimulationError(f"{error}; the state before that tick is in {path}", error.kind)

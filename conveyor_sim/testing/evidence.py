@@ -15,7 +15,7 @@ from conveyor_sim.report.figures import style
 from conveyor_sim.report.figures.data import Frame, Plant
 from conveyor_sim.report.figures.moment import Event, Trace, moment_figure
 from conveyor_sim.report.figures.recording import contact_lines
-from conveyor_sim.testing.history import History, Mark
+from conveyor_sim.testing.history import HistoryMark, ScenarioHistory
 from conveyor_sim.testing.scenario import Scenario
 
 PICTURE = "line.png"
@@ -98,13 +98,13 @@ def traced(scenario: Scenario) -> list[str]:
     return list(names)[:_MOST_ROWS]
 
 
-def came(history: History) -> list[str]:
+def came(history: ScenarioHistory) -> list[str]:
     """Return the names of the alarms that stood at any time, in the order of their first time."""
     columns = {name: history[name] for name in history.names if name.startswith(ALARMS)}
     return sorted((name for name, column in columns.items() if column.any()), key=lambda name: columns[name].argmax())
 
 
-def _words(mark: Mark) -> str:
+def _words(mark: HistoryMark) -> str:
     return mark.name if np.isnan(mark.value) else f"{mark.name} = {mark.value:g}"
 
 

@@ -1,4 +1,4 @@
-"""`History`: every signal, command, fault and alarm at every tick of a scenario, as arrays."""
+"""`ScenarioHistory`: every signal, command, fault and alarm at every tick of a scenario, as arrays."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _MARKED = {MODE: "mode", FORCE: "forced", UNFORCE: "unforced"}
 
 
 @dataclass(frozen=True)
-class Mark:
+class HistoryMark:
     """An input of the test, an operation of a person, or a fault."""
 
     time: float
@@ -36,7 +36,7 @@ class Mark:
     """NaN if the operation takes no value."""
 
 
-class History:
+class ScenarioHistory:
     """Columns by name, with one entry per tick, from the first tick of the scenario or for the last ticks only.
 
     A signal has its value at the tick. A command has the value in force from the tick on, NaN until first given. A
@@ -56,7 +56,7 @@ class History:
         self._now: F8 = np.array([math.nan] * len(image.commands) + [0.0] * len(image.faults))
         self._others = np.empty((len(self._signals), len(self._now)))
         self._given: dict[str, float] = {}
-        self.marks: list[Mark] = []
+        self.marks: list[HistoryMark] = []
         """Faults injected and commands given by the test, in order."""
 
     def __len__(self) -> int:
@@ -114,7 +114,7 @@ class History:
         if what := _MARKED.get(outcome.operation):
             names, values = outcome.names or ("all",), outcome.values or (math.nan,) * max(1, len(outcome.names))
             self.marks += [
-                Mark(self._times[-1], f"{name} {what}", value) for name, value in zip(names, values, strict=True)
+                HistoryMark(self._times[-1], f"{name} {what}", value) for name, value in zip(names, values, strict=True)
             ]
         if outcome.operation not in (SET, INJECT):
             return
@@ -125,7 +125,7 @@ class History:
                 self._given[name] = value
                 self._set(name, value)
             if from_test or outcome.operation == INJECT:
-                self.marks.append(Mark(self._times[-1], name, value))
+                self.marks.append(HistoryMark(self._times[-1], name, value))
 
     def alarms(self, alarms: Mapping[str, float]) -> None:
         """Add the alarms of the last tick, by their full names."""

@@ -1,4 +1,4 @@
-"""`Person`: an operator or an engineer at the line of a scenario, who uses its panel between two ticks."""
+"""`PanelUser`: an operator or an engineer at the line of a scenario, who uses its panel between two ticks."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ NUMBERS = {text.lower(): number for number, text in MODES.items()}
 """Numbers of the modes, by name."""
 
 
-class Person:
+class PanelUser:
     """An operator or engineer. Operations act at the next tick; CommandError is raised if it would refuse them."""
 
     def __init__(self, source: str, kind: WriterKind, give: Callable[[Input], None]) -> None:

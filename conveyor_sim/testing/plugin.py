@@ -155,8 +155,8 @@ def line(request: pytest.FixtureRequest) -> Iterator[Lines]:
     """Make lines under test: `line("accumulation_table")`, `line("my_line.yaml", {"seed": 2})` is a Scenario.
 
     `start="warm.npz"` begins from a checkpoint. The inputs are written as the line runs. If the test fails, a bag, a
-    page and a picture are made from them (option --line-failures). If it passes, they are removed. A test that is
-    killed leaves its inputs.
+    page and a picture are made from them (option --line-failures). If it passes, the inputs are removed. A test that
+    is killed leaves its inputs.
     """
     lines = Lines(_root(request.config) / _name(request.node))
     request.node.stash[_LINES] = lines

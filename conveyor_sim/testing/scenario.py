@@ -27,8 +27,8 @@ from conveyor_sim.support.modbus_rows import Row
 from conveyor_sim.support.printable import SENTENCE, printable
 from conveyor_sim.testing import plc
 from conveyor_sim.testing.conditions import Assertion, Condition, Present, values
-from conveyor_sim.testing.history import History
-from conveyor_sim.testing.person import Person
+from conveyor_sim.testing.history import ScenarioHistory
+from conveyor_sim.testing.person import PanelUser
 from conveyor_sim.testing.plc_server import ServedPlc
 from conveyor_sim.testing.scene_of import scene_of
 
@@ -70,10 +70,10 @@ class Scenario(AbstractContextManager["Scenario"]):
         self.scene = scene_of(scene, overrides)
         self.simulation = Simulation(self.scene) if start is None else Simulation.load(start, scene=self.scene)
         most = None if history is None else max(self._ticks(history), 1)
-        self.history = History(self.simulation.process_image, most)
-        self.operator = Person(TEST, "operator", self._give)
+        self.history = ScenarioHistory(self.simulation.process_image, most)
+        self.operator = PanelUser(TEST, "operator", self._give)
         """Operator at the panel of the line."""
-        self.engineer = Person(TEST, "engineer", self._give)
+        self.engineer = PanelUser(TEST, "engineer", self._give)
         """Engineer, with more rights than the operator (docs/line.md, Who may command)."""
         self.failed: Assertion | None = None
         """The assertion that failed; None if none did."""

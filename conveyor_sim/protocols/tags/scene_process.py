@@ -41,7 +41,7 @@ from conveyor_sim.protocols.tags.tag_provider import MOST_EVENTS, Control
 from conveyor_sim.run.compilation import Cancelled, Compilation
 from conveyor_sim.run.inbox import size_of
 from conveyor_sim.run.lockstep import Refused
-from conveyor_sim.run.session import Session
+from conveyor_sim.run.session import RunSession
 from conveyor_sim.run.stepper import Stepper
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.child_process import pipes_of_child
@@ -212,9 +212,9 @@ class _Process:
     def _new_stepper(self) -> Stepper:
         task, distro = self._task, default_distro()
 
-        def open_session(runs: int, loaded: Simulation | None) -> Session:
+        def open_session(runs: int, loaded: Simulation | None) -> RunSession:
             simulation = loaded or Simulation(task.scene, task.threads)
-            return Session(simulation, self._copies, bag_folder(task.record, task.number + runs), FRAME, distro)
+            return RunSession(simulation, self._copies, bag_folder(task.record, task.number + runs), FRAME, distro)
 
         return Stepper(
             open_session,
