@@ -56,7 +56,7 @@ class ScanCycle:
         self.read: dict[str, None] = {}
         """Names of the signals that were read, in the order of the first reading."""
         # Those of a controller before a checkpoint: one that is attached now and does not have them clears them.
-        self._changes.of({f"{ALARMS}{alarm.id}": 1.0 for alarm in simulation.line.alarms if alarm.is_said})
+        self._changes.of({f"{ALARMS}{alarm.id}": 1.0 for alarm in simulation.line.alarms if alarm.is_reported})
 
     @property
     def attached(self) -> bool:
