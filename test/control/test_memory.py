@@ -66,14 +66,14 @@ def test_what_is_remembered_comes_back(thing: object) -> None:
 
 
 def test_what_can_not_be_held_is_named() -> None:
-    with pytest.raises(ControlError, match=r"Odd\.thing: found a set, expected what a checkpoint can hold"):
+    with pytest.raises(ControlError, match=r"Odd\.thing: found a set, expected a type that a checkpoint can hold"):
         snapshot(Odd({1, 2}))
-    with pytest.raises(ControlError, match=r"Odd\.thing: found a mapping by other than texts"):
+    with pytest.raises(ControlError, match=r"Odd\.thing: found a mapping with other keys than texts"):
         snapshot(Odd({1: 2}))
 
 
 def test_another_controller_is_refused() -> None:
-    with pytest.raises(ControlError, match="found what a Odd remembered, expected that of a Constant"):
+    with pytest.raises(ControlError, match="found the memory of a Odd, expected that of a Constant"):
         restore(Constant({}), snapshot(Odd(1)))
     with pytest.raises(ControlError, match="expected a controller made the same way"):
         restore(Odd(1), snapshot(Odd(Constant({}))))

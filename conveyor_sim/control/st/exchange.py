@@ -19,14 +19,14 @@ class LateError(AnswerError):
 
 
 class EndedError(AnswerError):
-    """The child has closed its end, before or within the answer."""
+    """The child has closed its pipe, before or within the answer."""
 
 
 def exchange(process: subprocess.Popen[bytes], request: bytes, patience: float, most: int) -> bytes:
     """Send a line to the standard input of a child, and return the next line of its standard output.
 
-    patience: s of wall time for request and answer together. most: bytes of the answer. The pipes must be unbuffered.
-    Raises LateError, EndedError, and AnswerError for a wrong answer.
+    patience: wall time for request and answer together, s. most: largest number of bytes in the answer. The pipes must
+    be unbuffered. Raise LateError, EndedError, or AnswerError for a wrong answer.
     """
     assert process.stdin is not None and process.stdout is not None
     inward, outward = process.stdout.fileno(), process.stdin.fileno()
@@ -58,7 +58,7 @@ def exchange(process: subprocess.Popen[bytes], request: bytes, patience: float, 
 
 
 def _written(pipe: int, data: memoryview) -> int:
-    """Return the number of bytes that the pipe took. Raises EndedError."""
+    """Return the number of bytes that the pipe took. Raise EndedError."""
     try:
         return os.write(pipe, data[:_CHUNK])
     except BlockingIOError:
@@ -68,7 +68,7 @@ def _written(pipe: int, data: memoryview) -> int:
 
 
 def _read(pipe: int) -> bytes:
-    """Return what has arrived, at least one byte. Raises EndedError."""
+    """Return the bytes that have arrived, at least one. Raise EndedError."""
     chunk = os.read(pipe, _CHUNK)
     if not chunk:
         raise EndedError("has ended")

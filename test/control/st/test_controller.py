@@ -64,11 +64,11 @@ def test_variables_are_tags_by_pragma_by_name_and_by_word(tmp_path: Path) -> Non
         "main/belts_a_cmd_speed -> belts/a/cmd_speed (by name)",
         "main/full -> alarms/full (by tag)",
         "main/lost: no tag",
-        "machines/m/run: a command that the program does not give",
+        "machines/m/run: a command without a variable",
     ]
     assert plc.left_over == (
         f"{tmp_path / 'program.st'}: no tag for main/lost",
-        f"{tmp_path / 'program.st'}: these commands are not given: machines/m/run",
+        f"{tmp_path / 'program.st'}: no variable for these commands: machines/m/run",
     )
 
 
@@ -397,7 +397,7 @@ def test_units_one_within_the_other_are_bounded(tmp_path: Path) -> None:
     scan(plc, 0)
     plc.restore(json.loads(json.dumps(plc.snapshot())))
     path.write_text(chain("blocks", 2000) + "\nEND_PROGRAM")
-    with pytest.raises(StructuredTextError, match=r":101:16: found 101 types one within the other, expected at most"):
+    with pytest.raises(StructuredTextError, match=r":101:16: found 101 nested types, expected at most"):
         StructuredText(path)
     path.write_text(chain("functions", 99) + "\nEND_PROGRAM")
     plc = StructuredText(path)

@@ -29,7 +29,7 @@ def test_run_has_a_program_control_the_line_and_the_recording_replays(tmp_path: 
         "run", TABLE, "--duration", 2, "--controller", program, "--out", tmp_path / "bag", "--no-pictures"
     )
     assert code == 0, output
-    assert "table.st: these commands are not given: machines/packer/" in output
+    assert "table.st: no variable for these commands: machines/packer/" in output
     code, output = command("replay", tmp_path / "bag")
     assert code == 0, output
     code, output = command("events", tmp_path / "bag")
@@ -82,4 +82,4 @@ def test_a_program_as_a_node_gives_the_bits_that_it_gives_attached(tmp_path: Pat
             plant.run_for(2.0)
             hashes.append(plant.simulation.state_hash())
     assert hashes[0] == hashes[1]
-    assert "table.st: these commands are not given: machines/packer/" in (tmp_path / "log").read_text()
+    assert "table.st: no variable for these commands: machines/packer/" in (tmp_path / "log").read_text()
