@@ -8,7 +8,7 @@ import rclpy
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
-from conveyor_sim.bag.topics import OUTPUTS
+from conveyor_sim.bag.messages.topics import OUTPUTS
 from conveyor_sim.ros.publishers import message_class, ros_qos
 from conveyor_sim.ros.spinner import Spinner
 

@@ -9,7 +9,7 @@ from typing import Any
 from bench.markdown import table as markdown
 from bench.measure import Effort, say
 from bench.rows import Row, Rows, Spread, spread_of
-from conveyor_sim.engine.lists.riding import left_out
+from conveyor_sim.engine.lists.riding import skipped_slots
 from conveyor_sim.scene import Scene, load_scene
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.resources import scene_path
@@ -90,7 +90,7 @@ def _riders(simulation: Simulation) -> int:
     """Bottles that the next step would leave out; on one thread."""
     world = simulation._state.world
     slots = world.bottles.id
-    return int((left_out(world.riding, slots.size) & (slots >= 0)).sum())
+    return int((skipped_slots(world.riding, slots.size) & (slots >= 0)).sum())
 
 
 def tables(rows: Rows) -> str:

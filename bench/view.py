@@ -12,10 +12,10 @@ import numpy as np
 from bench.markdown import table as markdown
 from bench.measure import Effort, say
 from bench.rows import Row, Rows
-from conveyor_sim.bag.messages import Header
+from conveyor_sim.bag.messages.encode import Header
+from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.bag.recorder import Recorder
-from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.columns.bottles import BottleColumns, ContactColumns
 from conveyor_sim.page.one_file import write_page
 from conveyor_sim.page.server import RecordingServer

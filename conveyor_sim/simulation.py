@@ -41,7 +41,7 @@ from conveyor_sim.physics.state.state import FIRST_SLOTS, Held, State
 from conveyor_sim.physics.state.state_hash import COLUMNS, state_hash
 from conveyor_sim.physics.state.world_arrays import changing_arrays
 from conveyor_sim.physics.stepping.tick import Integration
-from conveyor_sim.scene.geometry import RailShape, initial_bottles
+from conveyor_sim.scene.geometry import RailShape
 from conveyor_sim.scene.schema import Scene
 
 LAST_STAMP_NS = 2**31 * 10**9 - 1
@@ -66,7 +66,7 @@ class Simulation:
         self.scene = scene
         self.model = build_model(scene)
         self.tick = 0
-        bottles = list(initial_bottles(scene))
+        bottles = self.model.plant.bottles
         self._state = State(self.model, len(bottles) or FIRST_SLOTS)
         self._integration = Integration(self._state, threads, shorten)
         self._every = {output: scene.every(output) for output in scene.TOPICS}

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from bag.small_line import SMALL_LINE, record
 from click.testing import CliRunner, Result
+from facts import missing
 from warm import run
 
 from conveyor_sim.bag.reader import open_bag
@@ -135,14 +136,14 @@ def test_recover_and_replay_a_bag_that_was_cut(command: Command, tmp_path: Path)
     assert "nothing to do" in command("recover", "bag").output
     replayed = command("replay", "bag")
     assert replayed.exit_code == 0, replayed.output
-    assert "equal bit for bit up to tick 60 (0.60 s)" in replayed.output
+    assert missing(replayed.output, ["equal", "bit for bit", "tick 60", "0.60 s"]) == []
     file = tmp_path / "bag" / "bag_0.mcap"
     file.write_bytes(file.read_bytes()[:-50])
     assert_refused(command("replay", "bag"), "conveyor-sim recover")
     recovered = command("recover", "bag")
     assert recovered.exit_code == 0, recovered.output
     assert "repaired, with" in recovered.output
-    assert "the damaged original is kept as " in recovered.output
+    assert missing(recovered.output, ["damaged original", "bag_0.mcap.damaged"]) == []
     assert command("replay", "bag").exit_code == 0
 
 

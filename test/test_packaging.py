@@ -1,4 +1,4 @@
-"""What holds the package together: its resources, versions and dependencies, both ways of installing, the set-up."""
+"""Packaging: resources, versions and dependencies, both ways of installing, the set-up."""
 
 import ast
 import importlib.metadata
@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from facts import missing, stating
 
 import conveyor_sim
 from conveyor_sim.errors import SceneError
@@ -57,7 +58,7 @@ def test_a_file_where_the_user_stands_wins(tmp_path: Path, monkeypatch: pytest.M
 
 @pytest.mark.parametrize("name", ["no_such_scene", "elsewhere/two_bottles.yaml"])
 def test_an_unknown_scene_is_refused_with_the_names_there_are(name: str) -> None:
-    with pytest.raises(SceneError, match=rf"{name}: no such scene file; .*accumulation_table, .*two_bottles"):
+    with pytest.raises(SceneError, match=stating(name, "no such scene file", "accumulation_table", "two_bottles")):
         scene_path(name)
 
 
@@ -240,7 +241,7 @@ def test_set_up_in_a_folder_that_cannot_work_says_so_first(empty_machine: Path, 
         shutil.move(empty_machine / name, checkout / name)
     result = run("sh", "tools/set_up.sh", "jazzy", cwd=checkout, PATH=str(empty_machine / "bin"), CC="", CXX="")
     assert (result.returncode, result.stdout, result.stderr.count("\n")) == (1, "", 1)
-    assert "in the path of the checkout, expected a folder without" in result.stderr
+    assert missing(result.stderr, ["path of the checkout", "expected", "without"]) == []
     assert not (checkout / ".venv").exists()
 
 
@@ -265,4 +266,5 @@ def test_messages_are_built_where_no_path_has_a_space(name: str, tmp_path: Path)
 
 def test_set_up_for_an_unknown_distribution_names_the_known_ones(empty_machine: Path) -> None:
     (empty_machine / "bin" / "python3").symlink_to(base_python())
-    assert set_up(empty_machine, "humble").stderr == "DISTRO=humble: expected jazzy or kilted.\n"
+    (error,) = set_up(empty_machine, "humble").stderr.splitlines()
+    assert missing(error, ["DISTRO=humble", "jazzy", "kilted"]) == []

@@ -1,4 +1,4 @@
-"""The engine's arrays with bottles wherever a test wants them, even inside each other."""
+"""The engine's arrays with bottles at any positions, overlapping ones included."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from scenes import NO_FLOOR, RADIUS, bottle, contact, scene
 
 from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import kernel
-from conveyor_sim.engine.contact.path import forget_path
+from conveyor_sim.engine.contact.path import reset_path
 from conveyor_sim.engine.forces import bottle_forces, pack_all, pair_phase
 from conveyor_sim.engine.integrators import INTEGRATORS, START
 from conveyor_sim.engine.lists.riding import step_all
@@ -23,17 +23,17 @@ from conveyor_sim.scene import Scene
 F8 = NDArray[np.float64]
 
 STIFFNESS = 1000.0
-"""N/m, of glass on steel in `rail_scene`."""
+"""Stiffness of glass on steel in `rail_scene`, N/m."""
 
 FAR = 90.0
-"""m: a bottle at (FAR, FAR) is near nothing."""
+"""m: a bottle at (FAR, FAR) has no neighbours."""
 
 ALONE = workers(1)[0]
-"""A thread by itself."""
+"""The only worker of a group of one."""
 
 
 def callable_part(function: Any) -> Any:
-    """A part of kernels as a kernel of its own, to be called from Python."""
+    """Return a part of kernels as a kernel, to be called from Python."""
     return kernel(function.py_func)
 
 
@@ -49,7 +49,7 @@ def evaluate(world: World, dt: float = 1e-5) -> None:
 
 @kernel
 def _evaluate(world: World, worker: Worker, dt: float) -> None:
-    forget_path(world.path, world.moving, worker)
+    reset_path(world.path, world.moving, worker)
     step_all(world.riding, world.bottles, worker)
     pack_all(world, worker)
     pair_phase(world, worker, dt, 0.0)
@@ -61,7 +61,7 @@ def _evaluate(world: World, worker: Worker, dt: float) -> None:
 def state_of(
     scene: Scene, points: Any, velocities: Any = None, spins: Any = None, kinds: Any = None, lists: bool = True
 ) -> State:
-    """A State with bottles at points (n, 2), in slots 0 to n - 1; those of the scene are left out."""
+    """Return a State with bottles at points (n, 2), in slots 0 to n - 1; those of the scene are removed."""
     points = np.asarray(points, float)
     velocities = np.zeros_like(points) if velocities is None else np.asarray(velocities, float)
     spins = np.zeros(len(points)) if spins is None else spins
@@ -75,14 +75,14 @@ def state_of(
 
 
 def rail_scene(rails: dict[str, Any], **fields: Any) -> Scene:
-    """Rails of STIFFNESS alone; one bottle, so that bottles don't touch each other."""
+    """Return a scene of rails of STIFFNESS alone, with one bottle, so that bottles don't touch each other."""
     return scene(
         contacts=[contact(STIFFNESS, "steel")], rails=rails, bottles=[bottle(FAR, FAR)], **{**NO_FLOOR, **fields}
     )
 
 
 def rail_forces(rails: dict[str, Any], points: Any) -> F8:
-    """Force (n, 2), N, of the rails on bottles at rest at points (n, 2)."""
+    """Return the force (n, 2), N, of the rails on bottles at rest at points (n, 2)."""
     points = np.asarray(points, float)
     state = state_of(rail_scene(rails), points)
     evaluate(state.world)
@@ -90,21 +90,21 @@ def rail_forces(rails: dict[str, Any], points: Any) -> F8:
 
 
 def push(nearest: Any, points: Any, radius: float = RADIUS) -> F8:
-    """k (R - d) away from the nearest point, (n, 2): what one contact gives; 0 beyond R."""
+    """Return k (R - d) away from the nearest point, (n, 2), the force of one contact; 0 beyond R."""
     away = np.asarray(points, float) - nearest
     distance = np.hypot(*away.T)
     return (STIFFNESS * np.maximum(radius - distance, 0.0) / distance)[:, None] * away
 
 
 def nearest_on_segment(start: Any, end: Any, points: Any) -> F8:
-    """Nearest point (n, 2) of a segment."""
+    """Return the nearest point (n, 2) of a segment."""
     start, along = np.asarray(start, float), np.asarray(end, float) - np.asarray(start, float)
     share = np.clip((np.asarray(points) - start) @ along / (along @ along), 0.0, 1.0)
     return np.asarray(start + share[:, None] * along)
 
 
 def nearest_on_arc(centre: Any, radius: float, start: float, span: float, points: Any) -> F8:
-    """Nearest point (n, 2) of an arc."""
+    """Return the nearest point (n, 2) of an arc."""
     centre = np.asarray(centre, float)
     seen = np.asarray(points) - centre
     angle = np.mod(np.arctan2(seen[:, 1], seen[:, 0]) - start, 2.0 * np.pi)
@@ -116,6 +116,6 @@ def nearest_on_arc(centre: Any, radius: float, start: float, span: float, points
 
 
 def nearest_of(candidates: list[F8], points: Any) -> F8:
-    """The nearest of several candidates (n, 2) each."""
+    """Return the nearest of several candidates (n, 2) each."""
     distance = np.array([np.hypot(*(np.asarray(points) - one).T) for one in candidates])
     return np.asarray(np.choose(np.argmin(distance, axis=0)[:, None], candidates))

@@ -25,7 +25,7 @@ def pages() -> Iterator[tuple[Path, str]]:
     rules = importlib.import_module("import_rules")
     yield rules.PAGE, rules.page(rules.PAGE.read_text(encoding="utf-8"))
     with_parts = importlib.import_module("page_parts").with_parts
-    for package, name in (("bag", "ros"), ("line", "line")):
+    for package, name in (("bag.messages", "ros"), ("line", "line")):
         tables, page = importlib.import_module(f"conveyor_sim.{package}.reference").tables(), DOCS / f"{name}.md"
         yield page, with_parts(page, page.read_text(encoding="utf-8"), tables)
     accuracy, promises, stability = (importlib.import_module(name) for name in ("accuracy", "promises", "stability"))

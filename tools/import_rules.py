@@ -23,7 +23,7 @@ RULES: Mapping[str, str] = {
     "line": "columns engine errors physics scene support | numpy",
     "simulation": "columns engine line physics scene | numpy",
     "__init__": "scene simulation",
-    "bag": "columns errors line scene simulation support | lz4 mcap numpy rosbags ruamel zstandard",
+    "bag": "columns errors line scene simulation support | lz4 mcap numpy rosbags ruamel yaml zstandard",
     "page": "bag columns errors scene simulation support | numpy",
     "run": "bag columns control engine errors line physics scene simulation support | click numpy",
     "report": "bag columns errors line page physics run scene simulation support | click matplotlib numpy rich",
@@ -43,14 +43,16 @@ RULES: Mapping[str, str] = {
 WITHIN: Mapping[str, Mapping[str, str]] = {
     "physics": {
         "sources_hash": "",
+        "plant": "",
         "laws": "",
         "timestep": "laws",
-        "effects": "laws timestep",
-        "model": "effects laws sources_hash timestep",
+        "effects": "laws plant timestep",
+        "model": "effects laws plant sources_hash timestep",
         "state": "model",
         "accounts": "model state",
         "stepping": "accounts model state",
     },
+    "bag": {"mcap": "", "messages": "", "": "mcap messages"},
     "line": {
         "tag": "",
         "process_image": "tag",

@@ -1,1 +1,1 @@
-"""What accuracy costs in time: integrators, steps and stiffness compared on a user's own scene."""
+"""Accuracy studies: error against run time of integrators, steps and stiffness on a user's scene."""

@@ -1,4 +1,4 @@
-"""What a study wants of whoever shows its progress."""
+"""Interface of the progress display of a study."""
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager

@@ -23,14 +23,15 @@ STEPS = {
 """Time steps of methods whose step is fixed, in those of the preset `standard`."""
 
 ERRORS = {1e-3: 2.0, 1e-4: 1.0, 1e-5: 0.5, 1e-6: 0.25}
-"""Of dormand_prince: the error of a step (m/s), and the longest one. Peaks are sampled at steps: a small error with
-long steps would miss them."""
+"""Settings of dormand_prince: error per step (m/s) and longest step. Peaks are sampled at steps, so a small error with
+long steps would miss them.
+"""
 
 STIFFNESS = (1.0 / 4.0, 1.0 / 16.0, 1.0 / 64.0)
 
 
 def preset_setting(scene: Scene, preset: Preset, stiffness: float = 1.0) -> Setting:
-    """The steps of a preset with leapfrog, at a factor on every stiffness."""
+    """Return the steps of a preset with leapfrog, with every stiffness multiplied by `stiffness`."""
     overrides = {**parse_overrides(scene.overrides_text), "accuracy": {**_NOTHING, "preset": preset}}
     if stiffness != 1.0:
         overrides["contacts"] = scaled_contacts(scene, stiffness)
@@ -39,7 +40,7 @@ def preset_setting(scene: Scene, preset: Preset, stiffness: float = 1.0) -> Sett
 
 
 def standard_steps(scene: Scene) -> int:
-    """Steps a tick of the preset `standard` with leapfrog."""
+    """Return the steps per tick of the preset `standard` with leapfrog."""
     return preset_setting(scene, "standard").per_tick
 
 
@@ -47,7 +48,7 @@ _NOTHING = {**explicit("leapfrog", 1), "per_tick": None}
 
 
 def own_setting(scene: Scene) -> Setting:
-    """What the scene itself says."""
+    """Return the setting of the scene itself."""
     model = build_model(scene)
     error = model.settings.error if model.integrator == "dormand_prince" else None
     return Setting(model.integrator, model.steps_per_tick, error=error)
@@ -65,14 +66,17 @@ def forbidden(scene: Scene, **fields: Any) -> dict[str, str]:
 
 
 def compared(scene: Scene) -> list[str]:
-    """The integrators that can run the scene, without semi_implicit_euler where leapfrog gives the same bits."""
+    """Return the integrators that can run the scene, without semi_implicit_euler where leapfrog gives the same bits."""
     banned = forbidden(scene)
     same = not any(isinstance(belt, CurvedBelt) for belt in scene.belts.values())
     return [name for name in INTEGRATORS if name not in banned and not (same and name == "semi_implicit_euler")]
 
 
 def candidates(scene: Scene) -> list[Setting]:
-    """The scene's own setting, the presets, every integrator at several steps about the standard's; softer contacts."""
+    """Return the settings to compare.
+
+    These are the scene's setting, the presets, every integrator at several steps around the standard, softer contacts.
+    """
     standard = standard_steps(scene)
     found = [own_setting(scene), *(preset_setting(scene, preset) for preset in PRESETS)]
     for integrator in compared(scene):
@@ -84,9 +88,9 @@ def candidates(scene: Scene) -> list[Setting]:
 
 
 def softer(scene: Scene) -> list[Setting]:
-    """The preset `standard` at the scene's own stiffness and at lower ones.
+    """Return the preset `standard` at the scene's stiffness and at lower ones.
 
-    Softer contacts last longer, so that they take fewer steps, as far as the scene's other bounds let them.
+    Softer contacts last longer, so they need fewer steps, within the other bounds of the scene.
     """
     return [preset_setting(scene, "standard", factor) for factor in (1.0, *STIFFNESS)]
 

@@ -1,4 +1,4 @@
-"""How long a study may take, in processor time, and what is left of it."""
+"""Budget of processor time of a study."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ PROCESSORS = 2
 
 @dataclass(frozen=True)
 class Effort:
-    """How much a study does."""
+    """Extent of a study."""
 
     budget: float
     """s of processor time on PROCESSORS processors together, idle ones included and compiling left out."""
@@ -23,7 +23,7 @@ class Effort:
     """s of processor time after which no further setting is measured; long runs get what is left."""
 
     def long_runs(self, measured: float) -> float:
-        """s of processor time for long runs, when measuring took so many on one processor."""
+        """Return the processor time for long runs, s, if measuring took `measured` seconds on one processor."""
         return max(0.0, self.budget - PROCESSORS * measured)
 
 

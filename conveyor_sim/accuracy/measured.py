@@ -1,4 +1,4 @@
-"""What is measured on the short horizon, kept in the study's folder: an interrupted study does not measure it again."""
+"""Measurements on the short horizon, stored in the study's folder for interrupted studies."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Measured:
     compiling: float
     """s of processor time that compiling took."""
     left_out: bool = False
-    """Whether the budget left anything out that a larger one would measure."""
+    """True if the budget excluded something that a larger one would measure."""
 
 
 def measured_once(
@@ -67,11 +67,11 @@ def measured_once(
     preliminary: Callable[[Measured], None],
     compiles: Callable[[], None],
 ) -> Measured:
-    """What the folder holds of this scene; measured and kept there if it holds nothing, or less than the effort allows.
+    """Return the stored measurements of this scene; measure if there are none, or fewer than the effort allows.
 
-    tolerance: relative error that decides which settings are measured first; `preliminary` is called with what came of
-    them, `compiles` as soon as something has to be compiled. Raises ConveyorError if the folder has a study of another
-    scene or version, or can't be written or read; NoContact if nothing touches anything in the scene.
+    tolerance: relative error that decides which settings are measured first. `preliminary` is called with their
+    results, `compiles` as soon as kernels have to be compiled. Raise ConveyorError if the folder has a study of another
+    scene or version, or can't be written or read; NoContact if nothing touches in the scene.
     """
     check_origin(folder, scene)
     file = folder / MEASURED
@@ -95,7 +95,7 @@ def _measure(
     meter: Meter,
     preliminary: Callable[[Measured], None],
 ) -> Measured:
-    """What decides the answer first: impacts of a few settings, resting load, the other settings, closed forms."""
+    """Measure in order of importance: impacts of a few settings, resting load, other settings, closed forms."""
     banned = forbidden(scene)
     precision = WorkPrecision(scene)
     with bars(f"{scene.name}: states to start from", "s") as bar:
@@ -151,7 +151,7 @@ def _measure(
 
 
 def first_settings(scene: Scene, tolerance: float) -> list[Setting]:
-    """What a preliminary answer is made of: the setting predicted to do, the scene's own, and the presets."""
+    """Return the settings of a preliminary answer: the predicted one, that of the scene, and the presets."""
     predicted = forecast(scene, tolerance).point
     found = [] if predicted is None else [predicted.setting]
     return list(dict.fromkeys([*found, own_setting(scene), *(preset_setting(scene, preset) for preset in PRESETS)]))
@@ -163,7 +163,7 @@ def cheapest_first(settings: Sequence[Setting]) -> list[Setting]:
 
 
 def _reference(scene: Scene, precision: WorkPrecision, work: float, bars: Bars) -> Reference:
-    """What errors in impacts are measured against, over horizons of so much work (bottle steps)."""
+    """Compute the reference of impact errors, over horizons of `work` bottle steps."""
     with bars(f"{scene.name}: horizons", "starts") as bar:
         precision.find_horizons(bar.update, work)
     with bars(f"{scene.name}: reference", "runs") as bar:

@@ -1,4 +1,4 @@
-"""What an accuracy study finds out, as plain rows: what its tables, pictures, CSV and JSON are made of."""
+"""Results of an accuracy study as plain rows, from which tables, figures, CSV and JSON are built."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ class Order:
     """Error of one integrator in a closed form, against the number of steps."""
 
     case: str
-    """What happens, such as `head on, clamped dashpot`."""
+    """Name of the case, such as `head on, clamped dashpot`."""
     quantity: str
-    """What is compared, such as `speed of rebound`."""
+    """Compared quantity, such as `speed of rebound`."""
     integrator: str
     steps: tuple[int, ...]
     """Steps in the time that the case lasts."""
@@ -33,25 +33,25 @@ class Order:
 
 @dataclass(frozen=True)
 class Rest:
-    """What errors in resting load are measured from, or why there are none."""
+    """Reference of errors in resting load, or the reason why there is none."""
 
     reason: str
-    """When the scene settled, or why no settled state was found."""
+    """Time of settling, or the reason why no settled state was reached."""
     setting: Setting | None
-    """Of the reference; None without a settled state."""
+    """Setting of the reference; None without a settled state."""
     doubt: float | None
     """Relative difference of the reference from that of twice the step; None where no contact stayed closed."""
     window: float
     """s, over which forces are averaged."""
     contacts: int
-    """That stayed closed in the reference."""
+    """Number of contacts that stayed closed in the reference."""
     force: float
     """N, their mean forces' RMS."""
 
 
 @dataclass(frozen=True)
 class Horizon:
-    """How long trajectories from one state can be compared: until a nudge has doubled."""
+    """Comparison horizon: time from one state until a nudge has doubled."""
 
     start: float
     """s, simulated time of the state."""
@@ -69,7 +69,7 @@ class Horizon:
 
 @dataclass(frozen=True)
 class Errors:
-    """Of one setting against the reference, over all horizons."""
+    """Errors of one setting against the reference, over all horizons."""
 
     position_rms: float
     """m, over bottles and ticks."""
@@ -122,7 +122,7 @@ class Point:
 
 @dataclass(frozen=True)
 class Reference:
-    """What errors are measured against, and how exact it is itself."""
+    """Reference of errors, with its uncertainty."""
 
     setting: Setting
     doubt: Errors
@@ -187,7 +187,7 @@ class StiffnessRow:
 
     @property
     def deep(self) -> bool:
-        """Whether overlaps are so large that spacing, counts and sensor edges are wrong by about as much."""
+        """Return True if overlaps are large enough to falsify spacing, counts and sensor edges by a similar amount."""
         return self.overlap is not None and self.overlap > DEEP
 
 
@@ -211,7 +211,7 @@ class Answer:
     sentence: str
     """All of this in words."""
     accepted: bool
-    """Whether the ensembles found it equivalent to the reference in every observable."""
+    """True if the ensembles are equivalent to the reference in every observable."""
     doubts: tuple[str, ...]
     """Sentences: what is not certain."""
     resting: float | None = None
@@ -220,14 +220,14 @@ class Answer:
 
 @dataclass(frozen=True)
 class Study:
-    """All that was found out about a scene: what tables, pictures and files are made of."""
+    """Result of a study of a scene, from which tables, figures and files are built."""
 
     scene: str
     """Its name."""
     source: str
     """Its file, as given."""
     machine: str
-    """What the costs were measured on."""
+    """Machine on which costs were measured."""
     tick: float
     """s"""
     tolerance: float
@@ -241,7 +241,7 @@ class Study:
     samples: tuple[Sample, ...]
     comparisons: tuple[Comparison, ...]
     ensemble_reference: Setting | None
-    """What `comparisons` compare with; None if there were no ensembles."""
+    """Reference setting of `comparisons`; None without ensembles."""
     stiffness: tuple[StiffnessRow, ...]
     skipped: tuple[str, ...]
     """Sentences: what was left out, and why."""

@@ -1,4 +1,4 @@
-"""What a user sees of a study, in order: a predicted answer, a preliminary one, the answer; and on Ctrl-C the best."""
+"""Session of a study: a predicted answer, a preliminary one, the final one; on Ctrl-C the best so far."""
 
 from __future__ import annotations
 

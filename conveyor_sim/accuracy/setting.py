@@ -37,9 +37,9 @@ class Setting:
 
 
 def with_setting(scene: Scene, setting: Setting, **fields: Any) -> Scene:
-    """The scene with a setting, and with other fields (as in a scene file) laid over it.
+    """Return the scene with a setting, and with other fields (as in a scene file) as overrides.
 
-    Raises SceneError if the scene can't be simulated so.
+    Raise SceneError if the scene can't be simulated with them.
     """
     overrides: dict[str, Any] = dict(parse_overrides(scene.overrides_text))
     overrides = _merged(overrides, fields)

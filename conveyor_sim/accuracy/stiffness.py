@@ -11,11 +11,11 @@ from conveyor_sim.scene.contacts import Contact
 
 
 def scaled_contacts(scene: Scene, factor: float) -> list[dict[str, Any]]:
-    """The scene's contacts, as in a scene file, with every stiffness times `factor`.
+    """Return the scene's contacts, as in a scene file, with every stiffness times `factor`.
 
-    A linear contact of stiffness f k rebounds as before with a dashpot of sqrt(f) c, of the same c / (2 sqrt(k m));
-    a Hertz contact, f^(2/5) times as short at any speed, with f^(2/5) c; each law of damping declares its power. A
-    restitution that is given stays. The paper's outlook: a lower equivalent stiffness.
+    A linear contact of stiffness f k rebounds as before with a dashpot of sqrt(f) c, of the same c / (2 sqrt(k m)).
+    A Hertz contact, f^(2/5) times as short at any speed, needs f^(2/5) c; each damping law declares its power. A
+    specified restitution stays. The paper's outlook: a lower equivalent stiffness.
     """
     return [_scaled(contact, factor) for contact in scene.contacts]
 

@@ -25,10 +25,10 @@ from conveyor_sim.scene import Scene
 from conveyor_sim.statistics.intervals import mean_and_variance
 
 EXACT = 0.1
-"""Of the answer's error: what the setting that its long runs are compared with keeps on the short horizon."""
+"""Fraction of the answer's error that the reference of long runs meets on the short horizon."""
 
 OTHERS_SHARE = 0.2
-"""Of the budget for long runs: for those of the scene's own setting and of softer contacts, which decide no answer."""
+"""Share of the budget for long runs of the scene's setting and of softer contacts, which decide no answer."""
 
 
 FIRST_RUNS = 20.0
@@ -36,7 +36,7 @@ FIRST_RUNS = 20.0
 
 
 def study_folder(scene: Scene, root: Path = Path("runs")) -> Path:
-    """A folder for the study of a scene; a scene that was changed since gets another one."""
+    """Return the folder of a scene's study; a changed scene has another one."""
     return root / f"accuracy_{scene.name}_{fingerprint(scene)}"
 
 
@@ -114,11 +114,11 @@ def _answer(measured: Measured, comparisons: Sequence[Comparison], tolerance: fl
 def _long_runs(
     scene: Scene, measured: Measured, folder: Path, tolerance: float, effort: Effort, bars: Bars
 ) -> tuple[list[Sample], list[Comparison], Setting | None]:
-    """Runs over seeds of what may be the answer, of the scene's own setting and of softer contacts; and of a reference.
+    """Run long runs over seeds: of the likely answer, the scene's setting, softer contacts, and a reference.
 
-    Where they find the answer different from the reference, the next dearer setting is tried. The budget goes to what
-    is undecided of the answer, but for a share of the others. Where it would not do for a comparison, by what settings
-    cost when they were measured, no run is begun.
+    If they show a significant difference of the answer from the reference, the next more expensive setting is tried.
+    The budget goes to undecided observables of the answer, except a share for the others. If measured costs show that
+    the budget does not suffice for a comparison, no run is started.
     """
     failed = {point.setting for point in measured.points if point.failure}
     found = _answer(measured, [], tolerance)
@@ -159,9 +159,9 @@ def _long_runs(
 def affordable(
     settings: Sequence[Setting], expected: Mapping[Setting, float], budget: float, runs: int = 1
 ) -> list[Setting]:
-    """Settings, in their order, of which so many runs each fit a budget (s of processor time), or at least FIRST_RUNS.
+    """Return the settings, in order, whose runs fit a budget (s of processor time), with at least FIRST_RUNS runs each.
 
-    Empty if the first does not fit; what a run is expected to take (s) is 0 where it is not known.
+    The result is empty if the first doesn't fit. The expected time of a run (s) is 0 if unknown.
     """
     kept, spent = [], 0.0
     for setting in settings:
@@ -173,7 +173,7 @@ def affordable(
 
 
 def _expected(scene: Scene, points: Sequence[Point]) -> dict[Setting, float]:
-    """s of processor time of a long run, by what settings cost when they were measured."""
+    """Return the expected processor time of a long run, s, from the measured costs of settings."""
     return {point.setting: point.cost.median * scene.duration for point in points if point.cost is not None}
 
 
@@ -194,7 +194,7 @@ def _made_so_far(
 
 
 def _long_reference(points: Sequence[Point], found: Answer) -> Setting | None:
-    """The cheapest setting that is exact enough to compare with, else the most exact one; None: nothing is exacter."""
+    """Return the cheapest sufficiently accurate setting, else the most accurate; None if none is more accurate."""
     error = max(found.error, found.resting or 0.0)
     exact = eligible(points, EXACT * error)
     exacter = [point for point in eligible(points, error) if point.setting != found.setting]
@@ -203,7 +203,7 @@ def _long_reference(points: Sequence[Point], found: Answer) -> Setting | None:
 
 
 def _stiffness_rows(scene: Scene, points: Sequence[Point], samples: Sequence[Sample]) -> list[StiffnessRow]:
-    """What a lower stiffness changes, from the scene's own down; factors without runs are left out."""
+    """Return the changes by a lower stiffness, from the scene's stiffness down; factors without runs are left out."""
     by_setting = {point.setting: point for point in points}
     settings = softer(scene)
     base = by_setting.get(settings[0])

@@ -16,7 +16,7 @@ from conveyor_sim.simulation import Simulation
 
 @dataclass(frozen=True)
 class Frame:
-    """What is kept of one tick."""
+    """Recorded state at one tick."""
 
     time: float
     """s, simulated."""
@@ -38,9 +38,9 @@ class Trajectory:
 
 
 def variant(scene: Scene, setting: Setting, **fields: Any) -> Simulation:
-    """A scene with a setting and other fields, on one thread; unless they say otherwise, peaks add up, none is output.
+    """Build a simulation with a setting and other fields, on one thread; by default without outputs, with total peaks.
 
-    Raises SceneError if the scene can't be simulated so.
+    Raise SceneError if the scene can't be simulated with them.
     """
     outputs = {**dict.fromkeys(scene.TOPICS, 0), **fields.pop("outputs", {})}
     effects = {"peaks": "on", **fields.pop("effects", {})}

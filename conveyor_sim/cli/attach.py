@@ -32,7 +32,7 @@ def attach(scene: str, url: str, tags: Path, user: str, period: float, **of_scen
     """Have the PLC at URL control SCENE in real time.
 
     URL is that of the PLC's server: opc.tcp://host:port or modbus://host:port. The line writes its signals there, and
-    reads what the PLC commands. The PLC is not waited for: the lag is told. Ctrl-C ends it.
+    reads what the PLC commands. The simulation does not wait for the PLC; the lag is reported. Ctrl-C ends it.
     """
     with collected_later():
         from conveyor_sim.protocols.attach.free_running import of_plc

@@ -30,10 +30,10 @@ from conveyor_sim.support.signals import HandledOnce
 
 
 class _Group(click.Group):
-    """Turns errors meant for the user into one sentence and exit code 1, and Ctrl-C into one line and 130."""
+    """Command group: user errors end in one sentence and exit code 1, Ctrl-C in one line and exit code 130."""
 
     def make_context(self, *args: Any, **kwargs: Any) -> click.Context:
-        """Click itself would end with "Aborted!" and 1 here, where it reads the arguments."""
+        """Read the arguments; without this, click would end a Ctrl-C with "Aborted!" and exit code 1."""
         with one_line():
             return super().make_context(*args, **kwargs)
 
@@ -45,7 +45,7 @@ class _Group(click.Group):
             raise click.ClickException(printable_lines(error)) from error
         except OSError as error:
             if error.errno == errno.EPIPE:
-                raise  # whoever read the output has gone: click ends without a word
+                raise  # the reader of the output has ended: click ends silently
             where = f"{error.filename}: " if error.filename else ""
             raise click.ClickException(printable_lines(f"{where}{error.strerror or error}")) from error
 
@@ -57,7 +57,7 @@ def main(context: click.Context) -> None:
     """Bottles on industrial conveyors, simulated by force."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")  # names of files may be bytes that are no text
+            stream.reconfigure(errors="backslashreplace")  # file names may be bytes that are not text
     context.with_resource(HandledOnce([signal.SIGINT], signal.default_int_handler))
 
 

@@ -1,4 +1,4 @@
-"""What commands print, and options that several have."""
+"""Output of commands, and options that several commands share."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ class Number(click.FloatRange):
 
 
 def say(sentence: str) -> None:
-    """What is happening, beside the results."""
+    """Print progress to the standard error, apart from the results."""
     click.echo(sentence, err=True)
 
 
 def show(content: RenderableType) -> None:
-    """Prints to the terminal; brackets in names and paths mean nothing."""
+    """Print to the terminal; brackets in names and paths are not markup."""
     Console(markup=False, highlight=False).print(content)

@@ -55,8 +55,8 @@ def replay(
     for option, is_given in given.items():
         if is_given:
             raise ConveyorError(f"{option}: given without --publish, expected both or neither")
+    from conveyor_sim.bag.messages.topics import TOPICS
     from conveyor_sim.bag.replay import replay as replay_bag
-    from conveyor_sim.bag.topics import TOPICS
 
     with ProgressBar(f"replay {bag}", 0.0) as bar:
         report = replay_bag(bag, bar.update)

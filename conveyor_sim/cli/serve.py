@@ -26,9 +26,9 @@ if TYPE_CHECKING:
     Source = SceneTagProvider | BagTagProvider | NodeSource
 
 LOOK = 1.0
-"""s of wall time between two looks at how it goes, on a terminal."""
+"""Wall time between two updates of the progress on a terminal, s."""
 PLAIN_LOOK = 10.0
-"""The same where lines stay."""
+"""Wall time between two progress lines where output is not a terminal, s."""
 
 IN_LOCKSTEP = "in lockstep: the line stands until a client writes run/target_tick"
 
@@ -104,7 +104,7 @@ _WHERE = {
 @click.option("--real-time-factor", type=Number(0.0, 1e6), default=1.0, help="0: as fast as possible.")
 @click.option("--lockstep", is_flag=True, help="Of SCENE: it waits for each scan of a PLC that is a client.")
 @click.option("--loop", is_flag=True, help="Of BAG: begin anew at its end.")
-@click.option("--duration", type=float, help="Of SCENE: simulated time in s, instead of its own.")
+@click.option("--duration", type=float, help="Of SCENE: simulated time in s, instead of the scene's.")
 @click.option(
     "--out",
     "--record",
@@ -171,7 +171,7 @@ def serve(what: str | None, node: str | None, bind: str, stamps: Stamps, **given
 
 
 def tell_end(summary: str, bags: Sequence[Path]) -> None:
-    """What was served, and where it is recorded. Raises BagError if a recording is not whole: the disk was full, ..."""
+    """Print the summary and the paths of recordings. Raise BagError if one is not intact, as on a full disk."""
     from conveyor_sim.bag.reader import open_bag
 
     whole: list[str] = []
@@ -188,8 +188,8 @@ def tell_end(summary: str, bags: Sequence[Path]) -> None:
 
 
 def _is_bag(what: str) -> bool:
+    from conveyor_sim.bag.mcap.storage import other_storage
     from conveyor_sim.bag.reader import SUFFIXES
-    from conveyor_sim.bag.storage import other_storage
 
     return Path(what).is_dir() or Path(what).suffix in SUFFIXES or bool(other_storage(Path(what)))
 
@@ -198,8 +198,8 @@ def _require_lockstep(settings: ServerSettings) -> None:
     _require_not_given("--lockstep", ("real_time_factor",), "none: the PLC says when")
     if settings.modbus_role != "controller" and settings.users is None:
         raise ConveyorError(
-            "--lockstep: nobody may say how far the line goes, expected --modbus-role controller, or --users with "
-            "a controller"
+            "--lockstep: no client may advance the line, expected --modbus-role controller, or --users with a "
+            "controller"
         )
 
 
@@ -223,9 +223,9 @@ def scene_source(
     outside_tables: bool,
     lockstep: bool = False,
 ) -> Iterator[SceneTagProvider]:
-    """A scene, paused, once its tags are known. lockstep: whether clients say how far it goes.
+    """Yield a paused scene once its tags are known. lockstep: clients advance it.
 
-    What goes wrong before its first tick leaves no recording.
+    A failure before its first tick leaves no recording.
     """
     from conveyor_sim.bag.folder import require_recordable
     from conveyor_sim.bag.recorder import run_folder
@@ -263,7 +263,7 @@ def _bag(path: Path, console: Console, speed: float, loop: bool) -> BagTagProvid
 
 @contextmanager
 def _node(namespace: str, console: Console, drawn: bool) -> Iterator[NodeSource]:
-    """A node's line, once its tags are known. drawn: whether a page shows it."""
+    """Yield the line of a node once its tags are known. drawn: True if a page shows it."""
     try:
         from conveyor_sim.ros.node_source import NodeSource
     except ImportError as error:

@@ -42,7 +42,7 @@ def sweep(
 ) -> None:
     """Run a scene at many points and seeds, as STUDY (YAML) says.
 
-    Each finished run is kept in a file of its own; the same command goes on after a Ctrl-C, a crash or a full disk.
+    Each finished run is stored in a separate file; the same command goes on after a Ctrl-C, a crash or a full disk.
     At the end all runs are in one Parquet file, and `conveyor-sim study` draws them.
     """
     if find_spec("scipy") is None:
@@ -64,7 +64,7 @@ def sweep(
 
 
 def engine_of(processes: int | None, dask: str | None) -> Callable[[], Engine]:
-    """What makes the engine that options ask for. Raises ConveyorError for options that do not go together."""
+    """Return a function that builds the engine of these options. Raise ConveyorError for contradictory options."""
     if dask is None:
         from conveyor_sim.support.worker_pool import WorkerPool
 
@@ -80,9 +80,9 @@ def engine_of(processes: int | None, dask: str | None) -> Callable[[], Engine]:
 
 @contextmanager
 def shown_runs(setup: Setup, folder: Path, engine: Callable[[], Engine]) -> Iterator[tuple[Runs, Display]]:
-    """What makes the runs of a study and what shows how far they are; after a Ctrl-C it says how to go on.
+    """Yield the runs of a study and their progress display; after a Ctrl-C print how to continue.
 
-    Raises StudyError as `Runs`.
+    Raise StudyError as `Runs`.
     """
     from conveyor_sim.studies.display import Display
     from conveyor_sim.studies.runs import Runs
@@ -126,7 +126,7 @@ def _alone(setup: Setup, given: tuple[str, ...], seed: int, warm_up: float | Non
     if warm_up is None and setup.study.warm_up == MSER:
         raise ConveyorError("--warm-up: missing, expected the seconds that the study has found, as its results say")
     if warm_up is not None and setup.study.warm_up != MSER:
-        raise ConveyorError(f"--warm-up: {warm_up:g} given, expected none: the study has a warm_up of its own")
+        raise ConveyorError(f"--warm-up: {warm_up:g} given, expected none: the study states a warm_up")
     setup = setup if warm_up is None else setup.with_warm_up(warm_up)
     job = job_of(setup, given, seed)
     row = run_alone(setup, job, record)

@@ -15,7 +15,7 @@ from conveyor_sim.errors import ConveyorError
 @click.option(
     "--html", type=click.Path(path_type=Path), help="Write the page and what it shows to this one file, and end."
 )
-@click.option("--last", type=float, help="With --html: only so many s at the end.")
+@click.option("--last", type=float, help="With --html: only the last seconds of the recording.")
 @click.option("--port", type=click.IntRange(0, 65535), help="Without --html: serve the page here (default: any).")
 def view(bag: Path, other: Path | None, html: Path | None, last: float | None, port: int | None) -> None:
     """Show the line in BAG on a page: play it, scrub, look at machines, alarms, forces and trends.

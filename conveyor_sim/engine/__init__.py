@@ -1,1 +1,1 @@
-"""The engine: compiled kernels over arrays. It imports numpy and numba and knows nothing else of the project."""
+"""Compiled kernels over arrays. The engine imports numpy, numba and llvmlite, and nothing of the project."""

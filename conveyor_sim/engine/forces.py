@@ -1,7 +1,7 @@
-"""One evaluation of all forces: a function of positions, velocities and springs, whatever integrator asks.
+"""One evaluation of all forces: a function of positions, velocities and springs, for any integrator.
 
-Two phases, with a barrier between: `pair_phase` reads every bottle and writes pairs, `bottle_forces` reads pairs and
-writes bottles, some at a time. Sums run in a fixed order (pairs by partner, segments, arcs, base).
+There are two phases with a barrier between them: `pair_phase` reads every bottle and writes pairs, `bottle_forces`
+reads pairs and writes bottles, block by block. Sums run in a fixed order (pairs by partner, segments, arcs, base).
 """
 
 from typing import Any
@@ -16,7 +16,7 @@ from conveyor_sim.engine.observers.ledger_parts import (
     clear_belt_powers,
     find_base_parts,
     find_pair_parts,
-    keep_load,
+    store_load,
     sum_pair_parts,
 )
 from conveyor_sim.engine.rails.rails import add_rail_forces, count_rail_contacts
@@ -28,7 +28,7 @@ from conveyor_sim.engine.threads.workers import BLOCK, share, wait_for_all
 
 @part
 def pack_all(world: World, worker: Worker) -> None:
-    """Pack this worker's bottles; all are packed on return."""
+    """Pack this worker's bottles; on return all are packed."""
     begin, stop = share(worker, world.bottles.x.size)
     pack(world.bottles, begin, stop)
     wait_for_all(worker)
@@ -36,10 +36,10 @@ def pack_all(world: World, worker: Worker) -> None:
 
 @part
 def pair_phase(world: World, worker: Worker, dt: float, spring_dt: float) -> None:
-    """Find what this worker's share of the pairs exerts; all pairs are done on return.
+    """Compute the forces of this worker's share of the pairs; on return all pairs are done.
 
-    All bottles must be packed. dt: s, of the step, for the implicit solver. spring_dt: s, of slip by which the
-    tangential springs are drawn out, or by `World.path` if there is one; 0: what they are then is not kept.
+    All bottles must be packed. dt: s, of the step, for the implicit solver. spring_dt: s, time of slip by which the
+    tangential springs are elongated, or by `World.path` if there is one; 0: the elongations are not stored.
     """
     _count_closed(world, worker, dt)
     pair_forces(world, worker, spring_dt)
@@ -49,7 +49,7 @@ def pair_phase(world: World, worker: Worker, dt: float, spring_dt: float) -> Non
 
 @part
 def bottle_forces(world: World, worker: Worker, dt: float, spring_dt: float, first: int, end: int) -> None:
-    """Fill `world.load` (N) and `world.spin.moment` (N m) of bottles first to end (eq. 22), but of those that ride.
+    """Fill `world.load` (N) and `world.spin.moment` (N m) of bottles first to end (eq. 22), except those that ride.
 
     First to end is a block (`riding.py`).
     """
@@ -59,12 +59,12 @@ def bottle_forces(world: World, worker: Worker, dt: float, spring_dt: float, fir
         begin, stop = stepped_run(world.riding, first, end, run)
         sum_pair_forces(world.pairs, world.slots, world.load, _moments(world.spin), begin, stop)
         sum_pair_parts(world.pairs, world.slots, world.ledger, begin, stop)
-    # What lists by unit have is stepped, all of it.
-    add_rail_forces(world, worker.found, first, end, spring_dt)
+    # All bottles in lists by unit are stepped.
+    add_rail_forces(world, worker.rail_contacts, first, end, spring_dt)
     check_footing(world.bottles, world.belts, world.surface, world.footing, world.ring, first, end)
     for run in range(stepped_runs(world.riding, first)):
         begin, stop = stepped_run(world.riding, first, end, run)
-        keep_load(world.load, world.spin, world.ledger, begin, stop)
+        store_load(world.load, world.spin, world.ledger, begin, stop)
         add_base_friction(world, world.spin, world.load, world.implicit, dt, begin, stop)
     add_straddling_friction(world, world.spin, world.load, _belt_power(world.ledger), lag, first, end)
     add_static_friction(world.bottles, world.load, world.footing, world.static_friction, lag, True, first, end)
@@ -103,11 +103,11 @@ def _count_closed(world: World, worker: Worker, dt: float) -> None:
         for run in range(stepped_runs(world.riding, first)):
             left, right = stepped_run(world.riding, first, end, run)
             sum_slots(world.slots, _touch(world), left, right, implicit.closed)
-        count_rail_contacts(world, worker.found, first, end, implicit.closed)
+        count_rail_contacts(world, worker.rail_contacts, first, end, implicit.closed)
         for run in range(stepped_runs(world.riding, first)):
             left, right = stepped_run(world.riding, first, end, run)
             for i in range(left, right):
-                # The base is a contact too.
+                # The base is a contact, too.
                 implicit.closed[i] += 1.0
                 implicit.compliance[i] = world.settings.ahead * dt * implicit.mobility[i] * implicit.closed[i]
     wait_for_all(worker)

@@ -1,7 +1,7 @@
-"""The World with fewer groups, for what Python calls: one kernel does then for all Worlds that differ in the rest.
+"""Views of the World with fewer groups, for kernels that Python calls: one kernel serves Worlds that differ elsewhere.
 
-The lists need nothing that only forces need, and who only looks at contacts needs neither. What kernels call needs no
-view: it is compiled for what it reads (`compiler/reads.py`).
+Lists need no arrays that only forces need, and a list of contacts needs neither kind. Kernels and parts that kernels
+call need no view, because they are compiled for the members that they read (`compiler/reads.py`).
 """
 
 from conveyor_sim.engine.arrays.world import World
@@ -26,17 +26,17 @@ NOT_FOR_ENERGY = NOT_FOR_CONTACTS - {"static_friction"} | {
 
 
 def lists_of(world: World) -> World:
-    """The World for `rebuild`, and for a look at the overlaps; from Python."""
+    """Return the World for `rebuild` and for `probe_overlaps`."""
     return _fewer(world, NOT_FOR_LISTS)
 
 
 def contacts_of(world: World) -> World:
-    """The World for a list of contacts; from Python."""
+    """Return the World for a list of contacts."""
     return _fewer(world, NOT_FOR_CONTACTS)
 
 
 def energy_of(world: World) -> World:
-    """The World for the energy that it stores; from Python."""
+    """Return the World for its stored energy."""
     return _fewer(world, NOT_FOR_ENERGY)
 
 

@@ -7,9 +7,9 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from conveyor_sim.bag.messages import to_image
+from conveyor_sim.bag.messages.encode import to_image
+from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.bag.reader import Bag
-from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.page.block import SECONDS, block_ticks, pack
 from conveyor_sim.page.content import DRAWN, VARIABLES, Collector
 from conveyor_sim.page.head import head
@@ -33,7 +33,7 @@ class Detail:
     """s: how much of what happened is read at a time."""
 
 
-class Recording:
+class PageRecording:
     """What the page is given of an open bag. Raises SceneError if its scene can't be read by this version."""
 
     def __init__(self, bag: Bag, detail: Detail) -> None:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from conveyor_sim.bag.topics import TOPICS
+from conveyor_sim.bag.messages.topics import TOPICS
 
 TOPICS_READ = ("events", "alarm_states", "readback", "counters", "rail_wear", "run_state")
 """Those that it is made of."""

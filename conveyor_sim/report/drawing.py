@@ -3,27 +3,19 @@
 from __future__ import annotations
 
 import os
-import pickle
 import signal
 import subprocess
-import sys
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, suppress
 from importlib.util import find_spec
+from multiprocessing import Pipe
 from pathlib import Path
 
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.report.figures.files import PNG_AND_SVG, Picture, write
+from conveyor_sim.support.child_process import start_python
 
-CODE = """
-import sys
-sys.path[:] = {path!r}
-from conveyor_sim.support.garbage import collected_later
-with collected_later():
-    from conveyor_sim.report.figures.aside import child, get_ready
-    get_ready()
-child()
-"""
+PROCESS = "conveyor_sim.report.figures.aside"
 
 
 class Drawing(AbstractContextManager["Drawing"]):
@@ -39,14 +31,10 @@ class Drawing(AbstractContextManager["Drawing"]):
         """Have all loaded that drawing needs, which takes about a second of a core, if that was not done before."""
         if self._process is not None or find_spec("matplotlib") is None:
             return
-        # A session of its own: Ctrl-C at the terminal is this process's affair.
-        self._process = subprocess.Popen(
-            [sys.executable, "-c", CODE.format(path=sys.path)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            start_new_session=True,
-            env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},  # it forks, which goes well without threads
-        )
+        self._pipe, its_pipe = Pipe()
+        with its_pipe:
+            # It forks, which goes well without threads.
+            self._process = start_python(PROCESS, its_pipe, environment={"OPENBLAS_NUM_THREADS": "1"})
 
     def begin(
         self,
@@ -58,10 +46,8 @@ class Drawing(AbstractContextManager["Drawing"]):
         """Have a recording read and drawn (as `plot.plot_bag` would) while this process does something else."""
         self.get_ready()
         if self._process is not None:
-            assert self._process.stdin is not None
-            with suppress(BrokenPipeError):  # it has ended, so there will be no answer
-                pickle.dump((bag, times, bottles, suffixes), self._process.stdin)
-                self._process.stdin.flush()
+            with suppress(OSError):  # it has ended, so there will be no answer
+                self._pipe.send((bag, times, bottles, suffixes))
 
     def pictures(self, folder: Path) -> list[Path]:
         """Wait for the pictures and write them, each whole or not at all; returns the files.
@@ -70,10 +56,9 @@ class Drawing(AbstractContextManager["Drawing"]):
         """
         if self._process is None:
             return []
-        assert self._process.stdout is not None
         try:
-            drawn: dict[str, Picture] | str = pickle.load(self._process.stdout)
-        except (EOFError, pickle.UnpicklingError):
+            drawn: dict[str, Picture] | str = self._pipe.recv()
+        except (EOFError, OSError):
             raise ConveyorError("the process that draws has ended early") from None
         if isinstance(drawn, str):
             raise ConveyorError(drawn)
@@ -84,5 +69,5 @@ class Drawing(AbstractContextManager["Drawing"]):
         if self._process is not None:
             with suppress(ProcessLookupError):
                 os.killpg(self._process.pid, signal.SIGKILL)
-            with suppress(BrokenPipeError), self._process:
-                pass
+            self._process.wait()
+            self._pipe.close()

@@ -14,8 +14,8 @@ from rich.box import SIMPLE
 from rich.console import RenderableType
 from rich.table import Table
 
+from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.bag.reader import mcap_files, open_bag
-from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.columns.events import Kind
 from conveyor_sim.errors import BagError, ConveyorError
 from conveyor_sim.support.files import FileError, write_file

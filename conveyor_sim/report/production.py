@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conveyor_sim.bag.forced import forced_signals
+from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.bag.reader import Bag, Frame, open_bag
-from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.columns.counters import CounterColumns
 from conveyor_sim.errors import BagError
 from conveyor_sim.report.alarm_figures import AlarmTally

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.bag.messages import to_image
+from conveyor_sim.bag.messages.encode import to_image
+from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.bag.reader import Bag, open_bag
 from conveyor_sim.bag.recorded_scene import recorded_scene
-from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.columns.bottles import BottleColumns
 from conveyor_sim.columns.itinerary import Itinerary
 from conveyor_sim.columns.ledger import Ledger
@@ -23,6 +23,7 @@ from conveyor_sim.line.tag import Adds
 from conveyor_sim.physics.model import Model, build_model
 from conveyor_sim.physics.model.remedies import StepLimit, step_limit
 from conveyor_sim.physics.model.step_choice import choose_steps
+from conveyor_sim.physics.plant import Plant
 from conveyor_sim.report.alarm_figures import AlarmTally
 from conveyor_sim.report.load_history import LoadHistory
 from conveyor_sim.report.summary import BeltFlow, Energy, Loop, Summary
@@ -198,7 +199,7 @@ def _step_limit(line: Any) -> StepLimit | None:
     """Return the step limit of a recorded scene; None if this version would choose another number of steps."""
     try:
         scene = parse_scene(line.scene_text, line.scene_name, parse_overrides(line.overrides))
-        choice = choose_steps(scene)
+        choice = choose_steps(Plant.of(scene))
     except SceneError:
         return None
     same = (scene.accuracy.integrator, choice.steps) == (line.integrator, line.steps_per_tick)

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
 
-from conveyor_sim.bag.topics import TOPICS
+from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.ros.clock import to_time
 from conveyor_sim.ros.publishers import ros_qos
 

@@ -24,9 +24,9 @@ from conveyor_msgs.msg import Line
 from rclpy.context import Context
 from rclpy.serialization import deserialize_message
 
-from conveyor_sim.bag.messages import LINE, Header, line_message
-from conveyor_sim.bag.topics import TOPICS
-from conveyor_sim.bag.typestore import default_distro
+from conveyor_sim.bag.messages.encode import LINE, Header, line_message
+from conveyor_sim.bag.messages.topics import TOPICS
+from conveyor_sim.bag.messages.typestore import default_distro
 from conveyor_sim.control.scan import ControlError, Inputs
 from conveyor_sim.errors import CommandError
 from conveyor_sim.line.commands.inputs import DECLARE, CommandOutcome

@@ -13,8 +13,8 @@ from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 from std_msgs.msg import Float64
 
-from conveyor_sim.bag.qos import Qos
-from conveyor_sim.bag.topics import CMD_SPEED, TOPICS
+from conveyor_sim.bag.messages.qos import Qos
+from conveyor_sim.bag.messages.topics import CMD_SPEED, TOPICS
 from conveyor_sim.line.commands.inputs import SET, Input
 from conveyor_sim.line.process_image import speed_command
 from conveyor_sim.ros.direct import Aside, take_message

@@ -16,7 +16,7 @@ from conveyor_msgs.msg import Commands, Line, Signals
 from conveyor_msgs.srv import Lockstep
 from rclpy.node import Node
 
-from conveyor_sim.bag.topics import TOPICS
+from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.control.recorded import RecordedVariables
 from conveyor_sim.control.scan import (
     ALARMS,

@@ -9,7 +9,7 @@ from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.node import Node
 
-from conveyor_sim.bag.topics import TOPICS
+from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.ros.clock import to_time
 from conveyor_sim.ros.graph_watch import GraphWatch
 from conveyor_sim.ros.observer import TICK, WALL

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import os
 import socket
 import tempfile
@@ -12,6 +11,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from conveyor_sim.errors import ConveyorError
+from conveyor_sim.support.file_lock import lock
 from conveyor_sim.support.resources import config_dir
 
 # Above 101 the UDP ports of a domain meet Linux's ephemeral ones; 0 is everybody's default.
@@ -84,11 +84,11 @@ def _profile_variable() -> str:
 @contextmanager
 def _free_domain() -> Iterator[int]:
     for domain in _DOMAINS:
-        lock = Path(tempfile.gettempdir()) / f"conveyor_sim_domain_{domain}_{os.getuid()}.lock"
-        with lock.open("w") as handle:
+        path = Path(tempfile.gettempdir()) / f"conveyor_sim_domain_{domain}_{os.getuid()}.lock"
+        with path.open("w") as handle:
             try:
-                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError:
+                lock(handle)
+            except BlockingIOError:
                 continue
             if _ports_free(domain):
                 yield domain

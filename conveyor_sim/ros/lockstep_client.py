@@ -9,7 +9,7 @@ from typing import Any
 from conveyor_msgs.srv import Lockstep
 from rclpy.node import Node
 
-from conveyor_sim.bag.qos import ANSWERS
+from conveyor_sim.bag.messages.qos import ANSWERS
 from conveyor_sim.ros.direct import Aside, WaitSet, send_request, take_response
 from conveyor_sim.ros.publishers import ros_qos
 

@@ -15,7 +15,7 @@ from conveyor_msgs.srv import Lockstep
 from rclpy.node import Node
 from rclpy.service import Service
 
-from conveyor_sim.bag.qos import ANSWERS
+from conveyor_sim.bag.messages.qos import ANSWERS
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.commands.inputs import CommandOutcome
 from conveyor_sim.ros.clock import to_time

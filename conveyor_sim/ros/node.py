@@ -13,8 +13,8 @@ from rclpy.context import Context
 from rclpy.parameter import Parameter
 
 from conveyor_sim.bag.folder import bag_folder, require_recordable
-from conveyor_sim.bag.topics import OUTPUTS, photo_eye_topics
-from conveyor_sim.bag.typestore import default_distro
+from conveyor_sim.bag.messages.topics import OUTPUTS, photo_eye_topics
+from conveyor_sim.bag.messages.typestore import default_distro
 from conveyor_sim.report.explain.choices import setting_line
 from conveyor_sim.ros import parameters
 from conveyor_sim.ros.checkpoint_services import CheckpointServices

@@ -15,7 +15,7 @@ from rclpy.context import Context
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
-from conveyor_sim.bag.topics import TOPICS
+from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.columns.events import Event
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.commands.inputs import Input

@@ -10,7 +10,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.executors import SingleThreadedExecutor
 from rosgraph_msgs.msg import Clock
 
-from conveyor_sim.bag.topics import TOPICS
+from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.ros.context import new_node, start_ros
 from conveyor_sim.ros.publishers import ros_qos
 

@@ -13,9 +13,9 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
-from conveyor_sim.bag.qos import Qos
-from conveyor_sim.bag.topics import Topic
-from conveyor_sim.bag.typestore import type_hash
+from conveyor_sim.bag.messages.qos import Qos
+from conveyor_sim.bag.messages.topics import Topic
+from conveyor_sim.bag.messages.typestore import type_hash
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.run.pacing import RateCap
 

@@ -8,7 +8,7 @@ from conveyor_msgs.msg import Variables as Message
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 
-from conveyor_sim.bag.topics import TOPICS
+from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.ros.clock import to_time
 from conveyor_sim.ros.publishers import ros_qos
 

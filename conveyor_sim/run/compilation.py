@@ -11,18 +11,18 @@ import gc
 import os
 import pickle
 import subprocess
-import sys
 import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from typing import BinaryIO
+from multiprocessing import Pipe
 
 from conveyor_sim.engine.compiler.compile import ENGINE_HASH, KERNELS
 from conveyor_sim.engine.compiler.kernel_folder import NotCached, cached_only
 from conveyor_sim.physics.model import Model, build_model
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
+from conveyor_sim.support.child_process import die_with_parent, pipes_of_child, start_python
 from conveyor_sim.support.garbage import collected_later
 
 BASE_SECONDS, EFFECT_SECONDS = 3.0, 0.75
@@ -30,8 +30,6 @@ BASE_SECONDS, EFFECT_SECONDS = 3.0, 0.75
 
 # As it ends, Python looks through all objects for garbage: numba's are so many that it takes half a second.
 atexit.register(gc.freeze)
-
-CODE = "import sys; sys.path[:] = {path!r}; from conveyor_sim.run.compilation import child; child()"
 
 
 def compile_kernels(scene: Scene) -> None:
@@ -127,56 +125,39 @@ class Compilation:
 
     def _compile_aside(self) -> None:
         """Have the kernels compiled; what goes wrong in that is found again by compiling in this process."""
-        with self._lock:
-            if self._cancelled:
-                return
+        pipe, its_pipe = Pipe()
+        with pipe:
+            with its_pipe, self._lock:
+                if self._cancelled:
+                    return
+                try:
+                    self._process = process = start_python(__name__, its_pipe)
+                except OSError:
+                    return
             try:
-                # A session of its own: Ctrl-C at the terminal is this process's affair.
-                self._process = subprocess.Popen(
-                    [sys.executable, "-c", CODE.format(path=sys.path)],
-                    stdin=subprocess.PIPE,
-                    stdout=subprocess.PIPE,
-                    start_new_session=True,
-                )
-            except OSError:
-                return
-        # It may end at any time, even before it has read what to do or in the midst of a kernel that it sends.
-        with suppress(BrokenPipeError, EOFError, pickle.UnpicklingError), self._process as process:
-            assert process.stdin is not None and process.stdout is not None
-            try:
-                pickle.dump((ENGINE_HASH, KERNELS.path, pickle.dumps(self._scene)), process.stdin)
-                process.stdin.flush()
-                while True:
-                    name, content = pickle.load(process.stdout)
-                    KERNELS.received[name] = content
+                # It may end at any time, even before it has read the task or while it sends a kernel.
+                with suppress(EOFError, OSError):
+                    pipe.send((ENGINE_HASH, KERNELS.path, pickle.dumps(self._scene)))
+                    while True:
+                        name, content = pipe.recv()
+                        KERNELS.received[name] = content
             finally:
                 process.kill()
+                process.wait()
 
 
-def child() -> None:
-    """Compile for the parent: the scene comes on the standard input; kernels that can't be cached go back."""
-    task, answers = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # whatever else is printed
+def main() -> None:
+    """Compile for the parent: a scene comes through the pipe; kernels that can't be cached go back."""
+    die_with_parent()
+    (pipe,) = pipes_of_child()
     try:
-        engine, folder, scene = pickle.load(task)
-    except EOFError:  # the parent was interrupted before it could say
+        engine, folder, scene = pipe.recv()
+    except EOFError:  # the parent was interrupted before it sent the task
         return
     if engine != ENGINE_HASH:  # the sources have changed in between
         return
-    threading.Thread(target=_end_with_parent, args=(task,), daemon=True).start()
-
-    def send(name: str, content: bytes) -> None:
-        pickle.dump((name, content), answers)
-        answers.flush()
-
     KERNELS.use(folder)
-    KERNELS.send = send
-    with suppress(Exception):  # the parent finds it, too
+    KERNELS.send = lambda name, content: pipe.send((name, content))
+    with suppress(Exception):  # the parent finds the same error when it compiles itself
         compile_kernels(pickle.loads(scene))
-    os._exit(0)  # without waiting for what nobody needs any more
-
-
-def _end_with_parent(task: BinaryIO) -> None:
-    """The input ends when the parent closes it or dies."""
-    task.read()
-    os._exit(1)
+    os._exit(0)  # skip freeing memory

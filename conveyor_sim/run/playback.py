@@ -6,9 +6,9 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from conveyor_sim.bag import messages, topics
-from conveyor_sim.bag.messages import Header, Outcome, to_outcome
-from conveyor_sim.bag.qos import EVENTS, LATCHED, Qos
+from conveyor_sim.bag.messages import encode, topics
+from conveyor_sim.bag.messages.encode import Header, Outcome, to_outcome
+from conveyor_sim.bag.messages.qos import EVENTS, LATCHED, Qos
 from conveyor_sim.bag.reader import Bag
 from conveyor_sim.errors import BagError
 from conveyor_sim.line.commands.inputs import SET
@@ -90,12 +90,12 @@ class Playback:
             if only is None or name in only
         ]
         known = {topic.name for topic in recorded}
-        made = [Topic(RUN_STATE, messages.RUN_STATE, LATCHED, None)]
+        made = [Topic(RUN_STATE, encode.RUN_STATE, LATCHED, None)]
         if "outcomes" in known and only is None:
-            made.append(Topic("commands", messages.COMMANDS, EVENTS, None))
-            made += [Topic(speed_command(belt), messages.SPEED, EVENTS, None) for belt in bag.line.belts]
+            made.append(Topic("commands", encode.COMMANDS, EVENTS, None))
+            made += [Topic(speed_command(belt), encode.SPEED, EVENTS, None) for belt in bag.line.belts]
         eyes = _photo_eyes(bag.line.signal_names) if "signals" in known and only is None else {}
-        made += [Topic(eye, messages.BOOL, LATCHED, None) for eye in eyes]
+        made += [Topic(eye, encode.BOOL, LATCHED, None) for eye in eyes]
         self.topics = (*recorded, *(topic for topic in made if topic.name not in known))
         self._recorded = known
         self._made = {topic.name for topic in self.topics} - known
@@ -124,7 +124,7 @@ class Playback:
         self._stream = self._bag.raw(self._recorded, after_ns + 1)
         self._next = next(self._stream, None)
         header = Header(tick, self._cued_ns, "")
-        replaying = messages.run_state_message(RunState(REPLAYING, printable(self._bag.path)), header)
+        replaying = encode.run_state_message(RunState(REPLAYING, printable(self._bag.path)), header)
         return [*latched, Message(RUN_STATE, replaying)]
 
     def take(self, tick: int) -> Iterator[Message]:
@@ -150,7 +150,7 @@ class Playback:
                 blocked = bool(signals.values[column])
                 if self._seen.get(eye) is not blocked:
                     self._seen[eye] = blocked
-                    yield Message(eye, messages.bool_message(blocked, _header(signals)))
+                    yield Message(eye, encode.bool_message(blocked, _header(signals)))
         yield message
 
     def _last_before(self, stop_ns: int, topics: set[str]) -> list[Message]:
@@ -182,9 +182,9 @@ class Playback:
         if outcome.operation != SET or outcome.input.by_line:  # nobody sent it as a command
             return
         if outcome.source in self._made and outcome.names == (outcome.source,) and len(outcome.values) == 1:
-            yield Message(outcome.source, messages.speed_message(outcome.values[0]))
+            yield Message(outcome.source, encode.speed_message(outcome.values[0]))
         elif "commands" in self._made and outcome.source not in self._recorded:
-            yield Message("commands", messages.commands_message(outcome.names, message.values, _header(message)))
+            yield Message("commands", encode.commands_message(outcome.names, message.values, _header(message)))
 
 
 def _header(message: Any) -> Header:

@@ -33,6 +33,9 @@ def job_of(setup: Setup, given: Sequence[str], seed: int) -> Job:
 
 
 def run_alone(setup: Setup, job: Job, bag: Path | None) -> Row:
-    """The same bits as in the study, in this process. bag: folder to record to. Raises whatever fails in it."""
+    """Repeat one run of a study, with the same bits, in this process.
+
+    bag: folder to record to. Raise any exception of the run.
+    """
     start = None if setup.study.warm_start is None else warm_start(Work(setup, job))
     return simulate(Work(setup, job, start), bag)

@@ -36,7 +36,7 @@ def check_study(setup: Setup, first: Point | None = None) -> None:
 
 
 def units_of(setup: Setup, scene: Scene) -> dict[str, str]:
-    """The unit of each metric. scene: of any run. Raises StudyError for a metric that its line has not."""
+    """Return the unit of each metric. scene: of any run. Raise StudyError for a metric that the line doesn't have."""
     simulation = Simulation(scene, threads=1)
     units, problems = {}, []
     for name, metric in setup.kept.items():
@@ -52,7 +52,7 @@ def units_of(setup: Setup, scene: Scene) -> dict[str, str]:
 
 
 def parameter_units(setup: Setup, scene: Scene) -> dict[str, str]:
-    """The unit of each parameter: the one given, or that of the field in a scene; "" where it has none."""
+    """Return the unit of each parameter: as stated in the study, or that of its scene field; "" without one."""
     units = {}
     for name, parameter in setup.study.parameters.items():
         units[name] = parameter.unit or ("" if parameter.field is None else _unit_at(scene, steps_of(parameter.field)))
@@ -76,7 +76,7 @@ def _unit_at(scene: Scene, path: Path) -> str:
 
 
 def _problems(setup: Setup, point: Point) -> Iterator[Problem]:
-    """The first thing that is wrong with the line of a point."""
+    """Yield the first problem of the line of a point."""
     path: Path = ("function",) if setup.function else ("scene",)
     try:
         scene = scene_of(setup, point, setup.study.seeds.first)
@@ -87,12 +87,12 @@ def _problems(setup: Setup, point: Point) -> Iterator[Problem]:
         controller_of(setup, point)
     except ConveyorError as error:
         yield Problem(path, str(error).splitlines()[0])
-    except Exception as error:  # of a function of whoever wrote the study
+    except Exception as error:  # raised by a function of the study
         yield Problem(path, f"{type(error).__name__}: {error}")
 
 
 def _at_parameter(setup: Setup, point: Point, found: Problem) -> Problem:
-    """What is wrong with a point, at the parameter without which it would not be."""
+    """Assign the problem of a point to the parameter that causes it."""
     for name, parameter in setup.study.parameters.items():
         what = "field" if parameter.field is not None else "controller"
         given = getattr(parameter, what)

@@ -1,4 +1,4 @@
-"""What a study names in Python: functions in files or modules, found from the folder of the study."""
+"""Python code of a study: functions in files or modules, located relative to the study's folder."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ PYTHON = ".py"
 
 
 def located(reference: str, folder: Path) -> str:
-    """A reference (`file.py:name`, `module:name`, `program.st`) with its file, if it names one, from a folder."""
+    """Return a reference (`file.py:name`, `module:name`, `program.st`) with the path of its file, if it names one."""
     where, colon, name = reference.rpartition(":") if PYTHON in reference or ":" in reference else (reference, "", "")
     is_file = where.endswith(PYTHON) or not colon
     return f"{folder / where}{colon}{name}" if is_file else reference
 
 
 def file_of(reference: str) -> Path | None:
-    """The file that decides what a located reference is; None of a module that is not there."""
+    """Return the file that defines a located reference; None for a module that doesn't exist."""
     where, colon, _ = reference.rpartition(":")
     if not colon or where.endswith(PYTHON):
         return Path(where if colon else reference)
@@ -41,8 +41,9 @@ def file_of(reference: str) -> Path | None:
 
 
 def files_of(reference: str) -> list[Path]:
-    """The files that decide what a located reference is: its own, and those of the modules that it imports, but for
-    installed packages and this one. Modules are found as far as they are on the path by now.
+    """Return the files that define a located reference: its file, and those of the modules that it imports.
+
+    Installed packages and this package are excluded. Modules are searched on the present path.
     """
     first = file_of(reference)
     module = "" if first is None or reference.startswith(str(first)) else reference.partition(":")[0]
@@ -57,8 +58,9 @@ def files_of(reference: str) -> list[Path]:
 
 
 def function(reference: str, arguments: Mapping[str, Any] | None = None) -> Any:
-    """The function (or class) that a located reference names. Raises StudyError if there is none, or if it does not
-    take the arguments.
+    """Return the function or class of a located reference.
+
+    Raise StudyError if it doesn't exist, or if it doesn't accept the arguments.
     """
     where, colon, name = reference.rpartition(":")
     if not (colon and where and name):
@@ -76,7 +78,7 @@ def function(reference: str, arguments: Mapping[str, Any] | None = None) -> Any:
 
 
 def digest_of(file: Path) -> str:
-    """A hash of what a file holds; "" if it can't be read."""
+    """Return a hash of a file's contents; "" if it can't be read."""
     try:
         return blake2b(file.read_bytes(), digest_size=8).hexdigest()
     except OSError:
@@ -85,7 +87,7 @@ def digest_of(file: Path) -> str:
 
 _INSTALLED = {"site-packages", "dist-packages"}
 _ELSEWHERE = (Path(sysconfig.get_path("stdlib")), Path(__file__).parent.parent)
-"""Where modules lie whose versions are looked at otherwise."""
+"""Folders of modules whose versions are checked by other means."""
 
 
 def _imported(file: Path, module: str) -> Iterator[tuple[Path, str]]:
@@ -108,7 +110,7 @@ def _imported(file: Path, module: str) -> Iterator[tuple[Path, str]]:
 
 
 def _origin(module: str) -> Path | None:
-    """The file of a module; None of one that is not there, installed, or of this package."""
+    """Return the file of a module; None if it doesn't exist, is installed, or belongs to this package."""
     place: Path | None = None
     parts = module.split(".")
     for count in range(1, len(parts) + 1):  # from the outside, for what finds an inner one imports the outer ones
@@ -138,7 +140,7 @@ def _module(where: str) -> ModuleType:
 
 @lru_cache(maxsize=16)
 def _from_file(path: Path, _changed: int) -> ModuleType:
-    """Executed once a process: a study calls its functions many times."""
+    """Execute a file once per process, because a study calls its functions many times."""
     name = f"conveyor_study_{path.stem}_{blake2b(str(path).encode(), digest_size=4).hexdigest()}"
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None and spec.loader is not None  # for a name that ends in .py there is a loader

@@ -23,9 +23,9 @@ LOCAL = "local"
 PATIENCE = 60.0
 """s of wall time that a scheduler may be away, or without workers."""
 LOOK = 1.0
-"""s between two looks whether the scheduler is still there."""
+"""Time between two checks of the scheduler, s."""
 AHEAD = 4
-"""Runs that are handed out for each worker: what is finished is kept, whatever becomes of the others."""
+"""Runs submitted ahead per worker; each is stored as soon as it is finished."""
 _GONE = (CancelledError, CommClosedError, TimeoutError, OSError)
 
 
@@ -62,7 +62,7 @@ class DaskEngine(AbstractContextManager["DaskEngine"]):
             raise
 
     def each(self, function: Callable[[T], R], tasks: Iterable[T]) -> Iterator[tuple[T, R | DiedError]]:
-        """As `Engine.each`. Raises StudyError if the scheduler stays away, or its workers can't run the function."""
+        """Run tasks as `Engine.each`. Raise StudyError if the scheduler is silent or the workers lack the function."""
         todo = list(tasks)[::-1]
         pending: dict[Any, T] = {}
         done: SimpleQueue[Any] = SimpleQueue()
@@ -96,8 +96,10 @@ class DaskEngine(AbstractContextManager["DaskEngine"]):
         self._close()
 
     def _result(self, future: Any) -> Any:
-        """Of a task that is done. Raises one of _GONE, or StudyError: functions keep to themselves what fails in a run,
-        so that anything else is of a worker that has not what it needs.
+        """Return the result of a finished task.
+
+        Raise one of _GONE, or StudyError: functions report failures of runs as results, so any other exception
+        means that a worker lacks a file or package.
         """
         try:
             return future.result(timeout=PATIENCE)

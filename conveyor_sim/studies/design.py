@@ -1,4 +1,4 @@
-"""Which points a study looks at: each is a value for every parameter."""
+"""Experimental designs: the points of a study, each with one value per parameter."""
 
 from __future__ import annotations
 
@@ -19,8 +19,9 @@ Point = dict[str, Any]
 
 
 def points_of(study: Study) -> list[Point]:
-    """The points in their order, equal for equal studies. Raises StudyError where a package is missing, and for an
-    optimisation, whose points follow from what came of others.
+    """Return the points in order, equal for equal studies.
+
+    Raise StudyError if a package is missing, and for an optimisation, whose points depend on earlier results.
     """
     if study.optimise is not None:
         raise StudyError(f"{study.name}: optimise given, expected conveyor-sim optimise for this study")
@@ -35,7 +36,7 @@ def points_of(study: Study) -> list[Point]:
 
 
 def value_at(parameter: Parameter, share: float) -> float | int:
-    """The value of a range that has a share of it below, from 0 to 1."""
+    """Return the value of a range at a cumulative share from 0 to 1."""
     low, high = float(parameter.low or 0.0), float(parameter.high or 0.0)
     if parameter.whole:  # each whole number has an equal part of the range
         return min(int(high), math.ceil(low) + math.floor(share * (math.floor(high) - math.ceil(low) + 1)))
@@ -65,7 +66,7 @@ def names_of(study: Study) -> list[str]:
 
 
 def saltelli(names: Sequence[str], base: int, seed: int) -> NDArray[np.float64]:
-    """base x (parameters + 2) points, as SALib's analysis of first and total indices takes them (Saltelli 2010)."""
+    """Return base x (parameters + 2) points for SALib's analysis of first-order and total indices (Saltelli 2010)."""
     if find_spec("SALib") is None:
         raise StudyError("design: saltelli: SALib is not installed, expected it (pip install 'conveyor_sim[studies]')")
     from SALib.sample import sobol

@@ -1,4 +1,4 @@
-"""What is shown while a study runs: how far it is, and its table as it grows."""
+"""Progress display of a running study: remaining time, and its table as it grows."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Display(AbstractContextManager["Display"]):
             self._stack = stack.pop_all()
 
     def update(self, done: int, total: int, left: float | None, row: Row | None) -> None:
-        """As `Runs.run` calls it."""
+        """Update the display; called by `Runs.run`."""
         if row is not None:
             self._rows.append(row)
         if self._bar is not None:
@@ -55,7 +55,7 @@ class Display(AbstractContextManager["Display"]):
 
 
 def in_words(seconds: float) -> str:
-    """A time to wait: "40 s", "12 min", "3.5 h"."""
+    """Return a duration as text: "40 s", "12 min", "3.5 h"."""
     if seconds < 90.0:
         return f"{seconds:.0f} s"
     return f"{seconds / 60.0:.0f} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"

@@ -20,7 +20,7 @@ from conveyor_sim.studies.row import Row
 from conveyor_sim.studies.table import with_unit
 
 MOST_LEVELS = 40
-"""Of a parameter; with more its points lie anywhere, and none is run at the same value as another."""
+"""Most levels of a parameter. With more, its points are scattered, and hardly any two share a value."""
 
 
 def main_effects(results: Results) -> list[list[list[Response]]]:
@@ -29,7 +29,7 @@ def main_effects(results: Results) -> list[list[list[Response]]]:
 
 
 def interactions(results: Results, metric: str) -> list[list[list[Response]]]:
-    """A row a pair of parameters: the metric over the first one, a line for each level of the other, and vice versa."""
+    """Return one row per pair of parameters: the metric over each of them, with a line per level of the other."""
     panels = []
     for pair in combinations(_levelled(results), 2):
         panels.append([_lines(results, metric, *pair), _lines(results, metric, *pair[::-1])])
@@ -37,7 +37,7 @@ def interactions(results: Results, metric: str) -> list[list[list[Response]]]:
 
 
 def maps(results: Results) -> dict[str, Map]:
-    """Of a study with two parameters that have levels: each metric over both."""
+    """Return each metric over both parameters, for a study of two parameters with levels."""
     if len(results.parameters) != 2 or len(_levelled(results)) != 2:
         return {}
     one, other = results.parameters
@@ -55,11 +55,11 @@ def maps(results: Results) -> dict[str, Map]:
 
 
 def response(results: Results, parameter: str, metric: str, rows: Sequence[Row] | None = None) -> Response:
-    """A metric over the levels of a parameter.
+    """Return a metric over the levels of a parameter.
 
-    All points have the same seeds, so runs of one seed go together: its mean over the points at a level is one value,
-    and the interval rests on as many as there are seeds. A seed that a point at the level lacks, as it was run less
-    often or a run failed, is left out there: its mean would be of other points than that of the others.
+    All points have the same seeds, so runs are grouped by seed: the mean over the points at a level is one value per
+    seed, and the interval rests on the number of seeds. A seed that a point at the level lacks, because it has fewer
+    runs or a run failed, is left out there: its mean would cover other points than those of the other seeds.
     """
     rows = results.rows if rows is None else rows
     title, across = titled(results, metric), titled(results, parameter)
@@ -115,7 +115,7 @@ def indices(results: Results) -> list[Indices]:
 
 
 def titled(results: Results, name: str) -> str:
-    """A metric or a parameter with its unit."""
+    """Return a metric or a parameter with its unit."""
     return with_unit(name, {**results.parameters, **results.units}[name])
 
 
@@ -127,8 +127,9 @@ def levels_of(rows: Iterable[Row], parameter: str) -> list[Any]:
 
 
 def _levelled(results: Results) -> list[str]:
-    """The parameters at whose values several points were run, or that have few; none of a Saltelli sample, whose points
-    share values by how it is made.
+    """Return the parameters with several points per value, or with few values.
+
+    A Saltelli sample has none: its points share values by construction.
     """
     if parse_overrides(results.study).get("design") == "saltelli":
         return []

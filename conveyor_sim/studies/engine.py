@@ -1,4 +1,4 @@
-"""What makes runs: processes of this machine, or those of Dask."""
+"""Engines that run tasks: processes of this machine, or Dask workers."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ class Engine(Protocol):
     processes: int
     """Runs at a time, as far as it is known."""
     is_here: bool
-    """Whether all of it is this machine, with its files."""
+    """True if all workers are on this machine, with its files."""
 
     def each(self, function: Callable[[T], R], tasks: Iterable[T]) -> Iterator[tuple[T, R | DiedError]]:
-        """Each task with what the function makes of it, as they are finished, in whatever order."""
+        """Yield each task with the result of `function`, in order of completion."""
 
     def __enter__(self) -> Engine: ...
     def __exit__(

@@ -1,4 +1,4 @@
-"""What looks at a run from the end of its warm-up on, and has a number at its end."""
+"""Gauges: observers that compute one metric each, from the end of a run's warm-up to its end."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ SCUFFING_INTERVAL = 0.1
 
 
 class Gauge(Protocol):
-    """Of one run."""
+    """Metric of one run."""
 
     def after_tick(self) -> None:
-        """A tick has ended."""
+        """Observe the tick that has just ended."""
 
     def value(self) -> float:
         """At the end; NaN: there is none."""
@@ -38,11 +38,11 @@ class Averaged(Gauge, Protocol):
 
     @property
     def series(self) -> np.ndarray:
-        """What it is the mean of (n,), at even times."""
+        """Return the series (n,), at even times, whose mean is the value."""
 
 
 def half_width(gauge: Averaged) -> float | None:
-    """Of the 95 % interval of its number, by batch means; None: the run is too short for one."""
+    """Return the half-width of the value's 95 % interval by batch means; None if the run is too short."""
     found = batch_means(gauge.series)
     return None if found is None else found.interval.half_width
 
@@ -59,7 +59,7 @@ class Counted:
         """Counters need no looking at."""
 
     def value(self) -> float:
-        """As it is now."""
+        """Return the present value."""
         return float(getattr(_counters(self._simulation), self._column)[self._row])
 
 
@@ -102,7 +102,7 @@ class Stops:
         self._simulation, self._machines, self._stops = simulation, {machine} if machine else {*self._running}, 0
 
     def after_tick(self) -> None:
-        """What has happened in it."""
+        """Observe the events of the tick."""
         for event in self._simulation.happened:
             machine, _, which = event.name.rpartition("/")
             if event.kind == "machine_state" and which == "category" and machine in self._machines:
@@ -110,7 +110,7 @@ class Stops:
                 self._running[machine] = event.text == "running"
 
     def value(self) -> float:
-        """How many so far."""
+        """Return the count so far."""
         return float(self._stops)
 
 
@@ -128,7 +128,7 @@ class PeakForce:
         self._began = self._began or self._simulation.due("bottles")
 
     def value(self) -> float:
-        """N"""
+        """Return the largest force, N."""
         return self._force
 
 
@@ -149,7 +149,7 @@ class Scuffing:
             self._look()
 
     def value(self) -> float:
-        """J"""
+        """Return the work, J."""
         self._look()
         if self._left:
             return math.fsum(self._left.values()) / len(self._left)
@@ -190,7 +190,7 @@ class OfTag:
         return np.array(self._values)
 
     def value(self) -> float:
-        """What is taken of them."""
+        """Return the statistic of the observed values."""
         if self._take in ("maximum", "minimum"):
             return max(self._values) if self._take == "maximum" else min(self._values)
         return self._values[-1] - (self._first if self._take == "change" else 0.0)
@@ -246,7 +246,7 @@ class OfFunction:
         self._look()
 
     def value(self) -> float:
-        """As it says. Raises StudyError for what is no number."""
+        """Return the function's value. Raise StudyError if it isn't a number."""
         found = self._made(self._simulation) if self._watch is None else self._watch.value()
         try:
             return float(found)
@@ -255,7 +255,7 @@ class OfFunction:
 
 
 def share_of(text: str) -> tuple[float, str]:
-    """A share from 0 to 1, and the tag behind it. Raises StudyError."""
+    """Return a share from 0 to 1 and the tag that follows it. Raise StudyError for other text."""
     first, _, tag = text.partition(" ")
     try:
         share = float(first)

@@ -1,8 +1,7 @@
-"""The folder of a study: each finished run in a file of its own, so that none is ever lost."""
+"""Folder of a study: one file per finished run, so that no finished run is lost."""
 
 from __future__ import annotations
 
-import fcntl
 import hashlib
 import shutil
 from collections.abc import Callable, Iterator, Mapping
@@ -28,6 +27,7 @@ from conveyor_sim.studies.run_file import (
 from conveyor_sim.studies.setup import Setup
 from conveyor_sim.studies.study import Study
 from conveyor_sim.studies.units_file import UNITS, Units, read_units
+from conveyor_sim.support.file_lock import lock
 from conveyor_sim.support.files import MB, FileError, read_file, write_file
 from conveyor_sim.support.sealed_json import Kept, sealed
 
@@ -64,11 +64,9 @@ class Journal(AbstractContextManager["Journal"]):
             (folder / RUNS).mkdir(parents=True, exist_ok=True)
             self._lock = open(folder / ".lock", "ab")  # noqa: SIM115 (closed by __exit__)
             try:
-                fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                lock(self._lock)
             except BlockingIOError:
                 raise StudyError(f"{folder}: another process works on this study, expected it to end first") from None
-            except OSError:
-                pass  # a file system without locks
             try:
                 self._read()
             except BaseException:
@@ -83,7 +81,7 @@ class Journal(AbstractContextManager["Journal"]):
         self._lock.close()
 
     def row_of(self, job: Job) -> Row | None:
-        """What came of a run before; None if it is to be made. Raises StudyError if it was made of other values."""
+        """Return the stored row of a run; None if it has to run. Raise StudyError if it ran with other values."""
         row = self.rows.get(job.key)
         if row is not None and dict(row.parameters) != dict(job.parameters):
             raise StudyError(
@@ -101,7 +99,7 @@ class Journal(AbstractContextManager["Journal"]):
         self.rows[row.key] = row
 
     def start_of(self, seed: int) -> Path:
-        """Where the warm start of a seed is kept, once it is there: one for each set of effects that metrics force."""
+        """Return the path of the warm start of a seed: one for each set of effects that metrics force."""
         forced = "".join(f"_{effect}" for effect in sorted(self._setup.needs({}).get("effects", {})))
         return self.folder / STARTS / f"seed_{seed}{forced}.npz"
 
@@ -132,7 +130,7 @@ class Journal(AbstractContextManager["Journal"]):
         self._write(start.with_suffix(".json"), sealed({**mark, MADE_WITH: self._made_with}))
 
     def pilot_of(self, job: Job) -> Pilot | None:
-        """What a pilot run has shown before; None if it is to be made."""
+        """Return the stored result of a pilot run; None if it has to run."""
         file = self.folder / _pilot(job)
         try:
             found = self._own(file, finite=False)
@@ -154,7 +152,7 @@ class Journal(AbstractContextManager["Journal"]):
 
     @property
     def has_units(self) -> bool:
-        """Whether those are kept that belong to the metrics of today."""
+        """Return True if the stored units belong to the present metrics."""
         file = self.folder / UNITS
         try:
             found = read_units(file, origin_of(self._setup), True)
@@ -270,7 +268,7 @@ class Journal(AbstractContextManager["Journal"]):
         )
 
     def _other_fields(self) -> list[str]:
-        """Of the study, those that decide a run and are others than where its runs were made."""
+        """Return the study fields that decide a run and differ from those of the stored runs."""
         with suppress(FileError, ValueError, SceneError, StudyError):
             text = read_origin(self.folder).text or read_file(self.folder / SOURCE, MB).decode()
             before = Study.model_validate(parse_overrides(text))

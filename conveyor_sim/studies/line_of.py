@@ -23,7 +23,7 @@ _STEP = re.compile(r"([A-Za-z]\w*)|\[(\d+)\]")
 
 
 def scene_of(setup: Setup, parameters: Mapping[str, Any], seed: int) -> Scene:
-    """The scene of a run. Raises SceneError or StudyError for one that can't be, or whatever the function raises."""
+    """Return the scene of a run. Raise SceneError or StudyError if invalid, or any exception of a study function."""
     study = setup.study
     text, name, overrides = setup.text, setup.name, setup.overrides
     if setup.function:
@@ -44,12 +44,12 @@ def scene_of(setup: Setup, parameters: Mapping[str, Any], seed: int) -> Scene:
 
 
 def steps_of(path: str) -> Path:
-    """The parts of a path such as `contacts[0].friction`."""
+    """Return the parts of a path such as `contacts[0].friction`."""
     return tuple(name or int(index) for name, index in _STEP.findall(path))
 
 
 def controller_of(setup: Setup, parameters: Mapping[str, Any]) -> Controller | None:
-    """The controller of a run, new; None for a study without one. Raises ConveyorError for one that can't be."""
+    """Return a new controller for a run; None for a study without one. Raise ConveyorError if it can't be built."""
     if not setup.controller:
         return None
     try:
@@ -72,7 +72,7 @@ def _data(text: str) -> dict[str, Any]:
 
 
 def _with_field(base: dict[str, Any], changes: dict[str, Any], path: str, value: Any) -> dict[str, Any]:
-    """The changes with one more. A list is laid over as a whole, so what it has beside comes along."""
+    """Return the overrides with one more. A list is overridden as a unit, so its other entries are copied."""
     steps: list[Any] = list(steps_of(path))
     _require_named(merged(base, changes), steps, path)
     first_index = next((place for place, step in enumerate(steps) if isinstance(step, int)), len(steps))

@@ -102,7 +102,7 @@ def _metric_problems(study: Study, folder: Path) -> list[Problem]:
 
 
 def _metric(what: str, folder: Path) -> str:
-    """As it is said, with the file of a function located."""
+    """Return a metric's text with the file of a function located."""
     return located(what, folder) if ":" in what.partition(" ")[0] else what
 
 

@@ -1,4 +1,4 @@
-"""What can be kept of a run, by the words that a study says it in."""
+"""Metrics of a run, by their names in a study."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class _Word:
     unit: str
     make: Callable[[Simulation, str], Gauge]
     of: str
-    """What may or must follow: "" nothing, "[device]", "[machine]", "tag"."""
+    """Argument that may or must follow: "" none, "[device]", "[machine]", "tag"."""
     needs: Needs = lambda _data: {}
     series: Callable[[Simulation, str], Gauge] | None = None
 
@@ -93,7 +93,7 @@ WORDS: Mapping[str, _Word] = {
     ),
     "failures": _Word("failures of the bottleneck, or of a machine", "1", _counter("failures"), "[machine]"),
     "stops": _Word(
-        "how often machines, or one of them, have stopped running, for whatever reason", "1", gauges.Stops, "[machine]"
+        "number of stops of all machines, or of one machine, for any reason", "1", gauges.Stops, "[machine]"
     ),
     "peak_force": _Word(
         "largest normal contact force", "N", lambda simulation, _of: gauges.PeakForce(simulation), "", _peaks
@@ -123,7 +123,7 @@ WORDS: Mapping[str, _Word] = {
 
 
 def metric_of(what: str) -> Metric:
-    """The metric that a text says: a word of WORDS with what it is of, or a function. Raises StudyError."""
+    """Return the metric of a text: a word of WORDS with its argument, or a function. Raise StudyError."""
     first, _, rest = what.strip().partition(" ")
     rest = rest.strip()
     if ":" in first and not rest:

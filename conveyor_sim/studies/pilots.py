@@ -69,10 +69,10 @@ def find_warm_up(
 
 
 def pilot(work: Work) -> Pilot | tuple[Status, str]:
-    """A run without a warm-up, each metric that settles taken of each part of it as if it were a run."""
+    """Run without a warm-up, with each metric that settles evaluated for each part of the run separately."""
     try:
         return _pilot(work)
-    except Exception as error:  # of the functions and controllers of whoever wrote the study, too
+    except Exception as error:  # functions and controllers of the study included
         return failure_of(error)
 
 
@@ -102,7 +102,7 @@ def _pilot(work: Work) -> Pilot:
 
 
 def _warm_up(pilots: Sequence[Pilot], metric: str, what: str) -> float:
-    """s of a metric of a point, by its mean series over the seeds."""
+    """Return the warm-up of a metric at a point, s, from its mean series over the seeds."""
     part = pilots[0].part
     found = warm_up(np.array([made.series[metric] for made in pilots]))
     if found is None:

@@ -41,7 +41,7 @@ class Results:
     study: str
     """Text of its file."""
     path: str
-    """Of its file, as the study was run."""
+    """Path of the study file as it was run."""
     units: Mapping[str, str]
     """By metric."""
     parameters: Mapping[str, str]
@@ -55,43 +55,43 @@ class Results:
 
     @property
     def name(self) -> str:
-        """Of the study."""
+        """Return the name of the study."""
         return str(parse_overrides(self.study).get("name", ""))
 
     @property
     def until(self) -> Until | None:
-        """When a point has been run often enough; None: the number of seeds is given."""
+        """Return the stopping rule of points; None: the number of seeds is fixed."""
         seeds = parse_overrides(self.study).get("seeds")
         return Seeds.model_validate(seeds).until if isinstance(seeds, dict) else None
 
     def unit(self, metric: str) -> str:
-        """As it stands behind a number: "" for what has no dimension."""
+        """Return a metric's unit as written behind a number: "" if dimensionless."""
         return "" if self.units[metric] == "1" else self.units[metric]
 
     def command(self, row: Row) -> str:
-        """What makes a run again, alone."""
+        """Return the shell command that repeats one run."""
         return run_command(self.path, row, self.warm_up)
 
     @property
     def one_run_each(self) -> bool:
-        """Whether no point has been run with two seeds."""
+        """Return True if no point ran with two seeds."""
         return len({row.point for row in self.rows}) == len(self.rows)
 
 
 def run_command(path: str, row: Row, warm_up: float | None = None) -> str:
-    """What makes a run of a study file again, alone. warm_up: s, if pilot runs have found it."""
+    """Return the shell command that repeats one run of a study file. warm_up: s, if it comes from pilot runs."""
     given = [f"--set {name}={shlex.quote(text_of(value))}" for name, value in row.parameters.items()]
     found = [] if warm_up is None else [f"--warm-up {warm_up!r}"]
     return " ".join(["conveyor-sim sweep", shlex.quote(path), *given, f"--seed {row.seed}", *found])
 
 
 def text_of(value: Any) -> str:
-    """A value of a parameter, as YAML reads it."""
+    """Return the value of a parameter as YAML text."""
     return json.dumps(value)
 
 
 def read_results(path: Path) -> Results:
-    """Of the folder of a study, finished or not, or of its Parquet file alone. Raises StudyError."""
+    """Read the folder of a study, finished or not, or its Parquet file alone. Raise StudyError if that fails."""
     if path.is_file():
         return _of_parquet(path)
     try:

@@ -10,8 +10,8 @@ BAGS = "bags"
 """Folder of recordings, below that of their study."""
 
 Status = Literal["finished", "failed", "lost"]
-"""lost: by no fault of its own: its process died, twice, or had no room to record it, or another version; the next time
-that the study runs it is tried again.
+"""A run is `lost` if its process died twice, had another version, or could not store the result. The next time that the
+study runs, a lost run is repeated.
 """
 
 
@@ -43,7 +43,7 @@ class Pilot:
 
 @dataclass(frozen=True)
 class Row:
-    """What came of a run."""
+    """Result of a run."""
 
     point: int
     seed: int
@@ -82,5 +82,5 @@ def point_text(parameters: Mapping[str, Any]) -> str:
 
 
 def number(value: Any) -> str:
-    """A value of a parameter, short."""
+    """Return the value of a parameter as short text."""
     return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -38,13 +38,13 @@ class Work:
     setup: Setup
     job: Job
     start: Path | bytes | None = field(default=None, repr=False)
-    """Of a study with `warm_start`: the checkpoint, or the file that holds it."""
+    """Checkpoint of the warm start, or its file, in a study with `warm_start`."""
     folder: Path | None = None
-    """Of the study, for recordings; None: none are made."""
+    """Folder of the study, for recordings; None: no recordings."""
 
 
 def make_row(work: Work) -> Row:
-    """Make a run. Whatever fails in it is in its row."""
+    """Make a run and return its row; a failure is recorded in the row."""
     job, clock = work.job, _Clock()
     row = Row(job.point, job.seed, dict(job.parameters), "failed", asked=work.setup.asked)
     try:
@@ -56,7 +56,7 @@ def make_row(work: Work) -> Row:
     bag = place.parent / f".{uuid.uuid4().hex}" / place.name  # aside until it is whole
     try:
         row = simulate(work, bag if wanted == "all" else None, clock)
-    except Exception as error:  # of the functions and controllers of whoever wrote the study, too
+    except Exception as error:  # functions and controllers of the study included
         status, said = failure_of(error)
         row = replace(row, status=status, error=said)
     row = replace(row, wall=clock.wall, cpu=clock.cpu)
@@ -74,7 +74,7 @@ def make_row(work: Work) -> Row:
 
 
 def failure_of(error: Exception) -> tuple[Status, str]:
-    """What an error makes of a run, and the sentence that says it."""
+    """Return the status of a failed run, and a sentence about the exception."""
     lost = isinstance(error, (BagError, MemoryError, OSError))  # of this machine: another time it may be made
     return "lost" if lost else "failed", _sentence(error)
 
@@ -85,9 +85,9 @@ def bag_name(job: Job) -> str:
 
 
 def warm_start(work: Work) -> bytes:
-    """A checkpoint of the line as it is at the end of the warm start, for runs with the seed of the job.
+    """Return a checkpoint at the end of the warm start, for runs with the seed of the job.
 
-    Raises whatever fails in it.
+    Raise any exception of the run.
     """
     study, job = work.setup.study, work.job
     work.setup.require_same_versions()
@@ -104,7 +104,7 @@ def warm_start(work: Work) -> bytes:
 
 
 def simulate(work: Work, bag: Path | None, clock: _Clock | None = None) -> Row:
-    """One run, recorded to a folder if one is given. Raises whatever fails in it, with a whole recording."""
+    """Simulate one run, recorded to `bag` unless None. Raise any exception of the run, after closing the recording."""
     study, job = work.setup.study, work.job
     scene = scene_of(work.setup, job.parameters, job.seed)
     controller = controller_of(work.setup, job.parameters)
@@ -158,7 +158,7 @@ def simulate(work: Work, bag: Path | None, clock: _Clock | None = None) -> Row:
 
 
 def begun(scene: Scene, start: Path | bytes | None) -> Simulation:
-    """A line at the start of a run, or as its warm start left it."""
+    """Return a simulation at the start of a run, or at the end of its warm start."""
     if start is None:
         return Simulation(scene, threads=1)
     if isinstance(start, Path):
@@ -219,12 +219,12 @@ class _Clock:
 
     @property
     def wall(self) -> float:
-        """s"""
+        """Return the wall time, s."""
         return time.perf_counter() - self._wall
 
     @property
     def cpu(self) -> float:
-        """s"""
+        """Return the processor time, s."""
         return time.thread_time() - self._cpu
 
     @contextmanager

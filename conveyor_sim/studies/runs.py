@@ -36,9 +36,10 @@ class Runs(AbstractContextManager["Runs"]):
     def __init__(
         self, setup: Setup, folder: Path, engine: Engine | None = None, say: Callable[[str], object] = lambda _: None
     ) -> None:
-        """engine: None is a process for each core that this one may use. say: is told of what takes long.
+        """Open the runs of a study.
 
-        Raises StudyError as `Journal`.
+        engine: None: one process per core that this process may use. say: prints progress of long operations.
+        Raise StudyError as `Journal`.
         """
         self._setup, self._say = setup, say
         self.folder = folder
@@ -116,7 +117,7 @@ class Runs(AbstractContextManager["Runs"]):
                 if kind in kinds:
                     continue
                 Compilation(scene, self._say).run()
-            except Exception:  # the run says it, in a row of its own
+            except Exception:  # the row of the run reports it
                 continue
             if not kinds:
                 units = units_of(self._setup, scene)
@@ -144,7 +145,7 @@ def _warmed(work: Work) -> bytes | str:
         return warm_start(work)
     except ConveyorError as error:
         return str(error)
-    except Exception as error:  # of whoever wrote the study
+    except Exception as error:  # raised by a function of the study
         return f"{type(error).__name__}: {error}"
 
 

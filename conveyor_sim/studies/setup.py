@@ -1,4 +1,4 @@
-"""All that the runs of a study have in common, as it goes to the processes that make them."""
+"""Common part of all runs of a study, as sent to the worker processes."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ class Setup:
 
     study: Study
     path: str
-    """Of its file."""
+    """Path of the study file."""
     source: str
     """Text of its file."""
     text: str
-    """Of the scene, as `overrides`; "" where a function returns it."""
+    """Text of the scene, like `overrides`; "" if a function returns the scene."""
     name: str
     overrides: str
     function: str
@@ -37,7 +37,7 @@ class Setup:
     code: Mapping[str, str] = field(default_factory=dict)
     """By file, a hash of what it held when the study was read."""
     made_by: tuple[str, ...] = ()
-    """Those of `code` that make the line and its controller."""
+    """Files of `code` that define the line and its controller."""
     asked: Mapping[str, str] = field(default_factory=dict)
     """By metric, what it is: as the study says it, with the hashes of its files if it is a function."""
     versions: tuple[str, str] = field(default_factory=version_hashes)
@@ -49,18 +49,18 @@ class Setup:
         return {name: metric_of(what) for name, what in self.metrics.items()}
 
     def needs(self, data: Mapping[str, Any]) -> dict[str, Any]:
-        """What is laid over a scene (as plain data) so that all metrics can be looked at."""
+        """Return the overrides of a scene (as plain data) that the metrics require."""
         changes: dict[str, Any] = {}
         for metric in self.kept.values():
             changes = merged(changes, metric.needs(data))
         return changes
 
     def with_warm_up(self, seconds: float) -> Setup:
-        """The same, with a warm-up that was found."""
+        """Return a copy with a warm-up from pilot runs."""
         return replace(self, study=self.study.model_copy(update={"warm_up": seconds}))
 
     def require_same_versions(self) -> None:
-        """Raises StudyError in a process whose package or code is another: no other gives the same bits."""
+        """Raise StudyError in a process with another version of package or code, whose bits would differ."""
         here = version_hashes()
         if self.versions != here:
             engine, sources = self.versions

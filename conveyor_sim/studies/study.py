@@ -39,7 +39,7 @@ HALF_WIDTH = "_half_width"
 """Behind the name of a metric: the column beside it that says how well the run alone knows it."""
 
 MOST_RUNS = 1_000_000
-"""Of a study: each is a file."""
+"""Most runs of a study; each is one file."""
 
 RESERVED = ("point", "seed", "status", "error", "simulated", "dt", "wall", "cpu", "bag")
 """Columns that every table of runs has."""
@@ -72,7 +72,7 @@ class Parameter(Part):
     whole: Flag = quantity("Whether values of the range are whole numbers.", default=False)
 
     def problems(self, path: tuple[str, ...]) -> Iterator[Problem]:
-        """What is wrong with it by itself."""
+        """Yield the problems of this part by itself."""
         given = [name for name in ("field", "controller", "argument") if getattr(self, name) is not None]
         if len(given) != 1:
             said = listed(given) if given else "nothing"
@@ -92,7 +92,7 @@ class Parameter(Part):
 
 
 class Until(Part):
-    """When a point has been run often enough."""
+    """Stopping rule: ends the runs of a point at a given interval width."""
 
     metric: Text = quantity("Name of the metric.")
     half_width: Positive = quantity("Half width of the confidence interval of its mean, in its unit.")
@@ -112,7 +112,7 @@ class Seeds(Part):
     most: Count = quantity("Runs of a point at most, with `until`.", "1", default=200)
 
     def problems(self, path: tuple[str, ...]) -> Iterator[Problem]:
-        """What is wrong with it by itself."""
+        """Yield the problems of this part by itself."""
         if (self.count is None) == (self.until is None):
             yield Problem(path, "expected either count or until")
         if self.until is not None and self.most < self.batch:
@@ -188,7 +188,7 @@ class Study(Part):
         default=0.0,
     )
     warm_start: Positive | None = quantity(
-        "For so long the line is run once a seed, with the controller as `settings` have it; every run begins there. "
+        "Duration of a run made once per seed, with the controller as in `settings`. Every run begins at its end. "
         "For studies in which only the controller varies.",
         "s",
         default=None,
@@ -224,7 +224,7 @@ class Study(Part):
     )
 
     def problems(self) -> Iterator[Problem]:
-        """Everything that is wrong with a study whose fields are each valid by themselves."""
+        """Yield all problems of a study whose fields are valid one by one."""
         if (self.scene is None) == (self.function is None):
             yield Problem((), "expected either scene or function")
         for name, parameter in self.parameters.items():
@@ -253,7 +253,7 @@ class Study(Part):
             yield Problem(("seeds", "until", "metric"), text)
 
     def _design_problems(self) -> Iterator[Problem]:
-        """What is wrong with the points of a design."""
+        """Yield the problems of the points of a design."""
         yield from self._given_twice()
         for name, parameter in self.parameters.items():
             path = ("parameters", name, "values")
@@ -272,7 +272,7 @@ class Study(Part):
                 yield Problem(("points",), f"{self.points} given, expected none: a {self.design} has them by values")
 
     def _point_count(self) -> int:
-        """How many there are, in numbers alone."""
+        """Return the number of points, without building them."""
         if self.optimise is not None:
             return self.optimise.trials
         lengths = [len(parameter.values or ()) for parameter in self.parameters.values()]
@@ -295,7 +295,7 @@ class Study(Part):
                     yield Problem(path, f"{shown(found[place])} given twice, expected each value once")
 
     def _optimise_problems(self, wanted: Optimise) -> Iterator[Problem]:
-        """What is wrong with an optimisation."""
+        """Yield the problems of an optimisation."""
         yield from self._given_twice()
         for name in ("design", "points"):
             if name in self.model_fields_set:

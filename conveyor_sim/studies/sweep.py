@@ -16,7 +16,7 @@ from conveyor_sim.studies.study import Seeds, Until
 
 
 def study_folder(setup: Setup) -> Path:
-    """Where a study is kept by default."""
+    """Return the default folder of a study."""
     return Path("runs") / f"study_{setup.study.name}_{fingerprint(setup)}"
 
 
@@ -40,7 +40,7 @@ def sweep(runs: Runs, setup: Setup, progress: Progress = lambda *_: None) -> lis
 
 
 def jobs_at_least(points: Sequence[Point], seeds: Seeds) -> int:
-    """Runs that there will be for sure."""
+    """Return the least number of runs."""
     return len(points) * (seeds.count if seeds.count is not None else seeds.batch)
 
 
@@ -53,7 +53,7 @@ def _batches(seeds: Seeds) -> Iterator[range]:
 
 
 def _enough(rows: Sequence[Row], until: Until | None) -> bool:
-    """Whether the mean of a metric is known well enough."""
+    """Return True if the interval of the mean is narrow enough."""
     if until is None or not rows:
         return False
     values = [row.metrics[until.metric] for row in rows if row.status == "finished"]

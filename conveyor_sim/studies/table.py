@@ -1,4 +1,4 @@
-"""What a study has found so far, as a table: a line a point, the mean of each metric with its confidence interval."""
+"""Table of a study so far: one line per point, with the mean and confidence interval of each metric."""
 
 from __future__ import annotations
 
@@ -42,12 +42,15 @@ def points_table(
 
 
 def with_unit(name: str, unit: str) -> str:
-    """As the head of a column or the label of an axis."""
+    """Return a name with its unit, as column header or axis label."""
     return name if unit in ("", "1") else f"{name} ({unit})"
 
 
 def _mean(rows: Sequence[Row], metric: str) -> str:
-    """Of runs of a point, with the half width of its interval: over the seeds, or of a single run by batch means."""
+    """Return the mean over the runs of a point with the half-width of its interval.
+
+    The interval is over the seeds, or by batch means for a single run.
+    """
     known = [row.metrics[metric] for row in rows if math.isfinite(row.metrics[metric])]
     if not known:
         return "-"

@@ -1,4 +1,4 @@
-"""Which points of a study are the best, and which can't be told from them: in sentences."""
+"""Best points of a study, and those that don't differ significantly from them, in sentences."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from conveyor_sim.studies.results import Results
 from conveyor_sim.studies.row import Row, point_text
 
 MOST = 100
-"""Points that are compared, each with each."""
+"""Most points that are compared pairwise."""
 LISTED = 3
 
 
 def verdicts(results: Results) -> Iterator[str]:
-    """For each metric, by pairs of runs with the same seed, corrected for being so many comparisons.
+    """Yield one sentence per metric and side: the best point, and those that don't differ significantly from it.
 
-    Of a study with one run a point, instead: which metrics that run alone has no interval for. Of one whose seeds go on
-    until an interval is narrow, before that: where it is not. What can't be compared is said.
+    Points are compared by pairs of runs with the same seed, corrected for multiple comparisons. With one run per point,
+    yield instead the metrics without an interval. With `seeds: until`, first yield points with wider intervals.
     """
     if results.one_run_each:
         yield from _of_single_runs(results)
@@ -47,17 +47,17 @@ def verdicts(results: Results) -> Iterator[str]:
             yield f"{metric}: points are not compared, as there are runs without it at {_points(lacking)}"
             continue
         if not any(pair.told for pair in compare_paired(values)):
-            yield f"{metric}: no point can be told from another with {len(seeds)} seeds"
+            yield f"{metric}: no two points differ significantly with {len(seeds)} seeds"
             continue
         sides = {word: best(values, highest=word == "highest") for word in ("lowest", "highest")}
         for word, (top, *others) in sides.items():
             like = _points([rows[place][0] for place in others])
-            rest = f"; not told from it with {len(seeds)} seeds: {like}" if others else ""
+            rest = f"; no significant difference with {len(seeds)} seeds: {like}" if others else ""
             yield f"{metric}: {word} at {point_text(rows[top][0].parameters)}{rest}"
 
 
 def wider_than_wanted(results: Results) -> Iterator[str]:
-    """The points that `seeds: until` leaves with an interval that is wider than it says, as `most` came before."""
+    """Yield the points whose intervals are wider than `seeds: until` requires, because `most` was reached."""
     until = results.until
     if until is None or until.metric not in results.units:
         return
@@ -100,6 +100,6 @@ def _by_point(results: Results) -> dict[int, dict[int, Row]]:
 
 
 def _points(rows: Sequence[Row]) -> str:
-    """Some of them, and how many more there are."""
+    """Return the names of some points, and the number of further ones."""
     more = f" and {len(rows) - LISTED} more points" if len(rows) > LISTED else ""
     return "; ".join(point_text(row.parameters) for row in rows[:LISTED]) + more

@@ -1,1 +1,1 @@
-"""What every package may use: files from outside, foreign text, signals, progress, the machine and its resources."""
+"""Helpers for all packages: files, child processes, signals, progress."""

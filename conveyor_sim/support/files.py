@@ -1,8 +1,8 @@
-"""Files that somebody names: read up to a limit, written in one go, and kept in a folder where that is asked for.
+"""Files with paths from users: read up to a limit, written atomically, and confined to a folder on request.
 
-A path may lead to a pipe that nobody writes to, to a device without end, or out of the folder by a link. So a path is
-opened without access first (O_PATH), which has no effect on anything; what was opened is checked, and that is read.
-Nobody can put another file in its place in between.
+A path may lead to a pipe without a writer, to a device without end, or by a link out of the folder. So a path is first
+opened without access (O_PATH), which has no side effects. The opened file is checked and then read, so it can't be
+replaced in between.
 """
 
 import os
@@ -29,15 +29,15 @@ Objection = Callable[[BinaryIO], str]
 
 
 class FileError(Exception):
-    """Why a file can't be read or written, in words that follow its path: "is a folder"."""
+    """Error: a file can't be read or written. The text follows its path: "is a folder"."""
 
 
 class OutsideError(FileError):
-    """It lies outside the folder that it has to be in."""
+    """Error: a file lies outside its folder."""
 
 
 def read_file(path: Path, most: int, folder: Path | None = None) -> bytes:
-    """The content of a regular file of at most `most` bytes. Never waits for another process.
+    """Return the content of a regular file of at most `most` bytes. Never waits for another process.
 
     folder: where relative paths start, and which no path may leave, by `..` or by a link; None: anywhere.
     Raises FileError.
@@ -65,12 +65,18 @@ def read_file(path: Path, most: int, folder: Path | None = None) -> bytes:
     return content
 
 
-def write_file(path: Path, content: bytes, folder: Path | None = None, objection: Objection | None = None) -> None:
-    """Write a file in one go: it is complete and on the disk, or what was there before is untouched.
+def write_file(
+    path: Path,
+    content: bytes,
+    folder: Path | None = None,
+    objection: Objection | None = None,
+    mode: int = 0o666,
+) -> None:
+    """Write a file atomically: it is complete and on the disk, or the previous file is untouched.
 
-    A link of that name is replaced, not followed. folder: as for `read_file`; it is made if it is not there.
-    objection: checks a file of that name, or the file that a link of that name leads to; None: any file is replaced.
-    Raises FileError.
+    A link of that name is replaced, not followed. folder: as for `read_file`; it is made if it is missing.
+    objection: checks a file of that name, or the target of a link of that name; None: any file is replaced.
+    mode: permissions, which the umask reduces. Raises FileError.
     """
     try:
         if folder is not None:
@@ -81,7 +87,7 @@ def write_file(path: Path, content: bytes, folder: Path | None = None, objection
         parent = os.open(place.parent, os.O_PATH | os.O_DIRECTORY | os.O_CLOEXEC)
         try:
             _require_below(parent, folder)
-            _replace(parent, place.name, content, objection)
+            _replace(parent, place.name, content, objection, mode)
         finally:
             os.close(parent)
     except (OSError, ValueError) as error:
@@ -89,16 +95,16 @@ def write_file(path: Path, content: bytes, folder: Path | None = None, objection
 
 
 def in_mb(size: int) -> str:
-    """A size in bytes for a message."""
+    """Return a size in bytes for a message."""
     return f"{size / MB:.3g} MB" if size < 1000 * MB else f"{size / MB:.0f} MB"
 
 
-def _replace(parent: int, name: str, content: bytes, objection: Objection | None) -> None:
+def _replace(parent: int, name: str, content: bytes, objection: Objection | None, mode: int) -> None:
     _is_there(parent, name, objection)  # a refusal costs no write
     unfinished = f".{uuid4().hex}.unfinished"
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
     try:
-        with open(os.open(unfinished, flags, 0o666, dir_fd=parent), "wb") as stream:
+        with open(os.open(unfinished, flags, mode, dir_fd=parent), "wb") as stream:
             stream.write(content)
             stream.flush()
             os.fsync(stream.fileno())
@@ -148,7 +154,7 @@ def _is_there(parent: int, name: str, objection: Objection | None) -> bool:
 
 
 def _in_folder(path: Path, folder: Path | None) -> Path:
-    """A path as it is opened; FileError for one that leads out of the folder by its words alone."""
+    """Return the path to open. Raise OutsideError if its text leads out of the folder."""
     if folder is None:
         return path
     place = Path(os.path.normpath(os.path.join(os.path.abspath(folder), path)))
@@ -158,7 +164,7 @@ def _in_folder(path: Path, folder: Path | None) -> Path:
 
 
 def _require_below(opened: int, folder: Path | None) -> None:
-    """FileError for what turns out to lie elsewhere, links followed."""
+    """Raise OutsideError if an open file lies outside the folder, links followed."""
     if folder is not None and not Path(os.readlink(_of(opened))).is_relative_to(os.path.realpath(folder)):
         raise OutsideError(f"leads out of the folder {folder}")
 

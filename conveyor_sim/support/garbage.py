@@ -1,4 +1,4 @@
-"""When Python looks for garbage."""
+"""Control of Python's garbage collection."""
 
 from __future__ import annotations
 
@@ -9,8 +9,10 @@ from contextlib import contextmanager
 
 @contextmanager
 def collected_later() -> Iterator[None]:
-    """Around what makes very many objects that stay, such as imports: to look through them for garbage, again and again
-    as they become more, takes an eighth of the time. They are not looked through later either.
+    """Collect no garbage within the context, and never look through its objects later.
+
+    This is for code that makes very many permanent objects, such as imports. Repeated collection would take an eighth
+    of the time.
     """
     before = gc.isenabled()
     gc.disable()

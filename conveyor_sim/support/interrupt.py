@@ -1,6 +1,6 @@
-"""Ctrl-C ends a command with one line and the status that a shell gives it, never with a traceback.
+"""Ctrl-C ends a command with one line and the exit status of shells, never with a traceback.
 
-Imported before anything heavy, so that it holds while that is imported.
+Import this before anything heavy, so that it also holds during those imports.
 """
 
 from __future__ import annotations
@@ -16,14 +16,16 @@ from types import FrameType
 from conveyor_sim.support.garbage import collected_later
 
 STATUS = 130
-"""128 and the number of SIGINT, as shells have it."""
+"""Exit status of shells: 128 plus the number of SIGINT."""
 AGAIN = 0.05
-"""s of wall time after which an interrupt that was lost comes again."""
+"""Wall time after which a lost interrupt is repeated, s."""
 
 
 @contextmanager
 def while_importing() -> Iterator[None]:
-    """End at once on Ctrl-C: nothing is under way yet, and modules half imported may swallow a KeyboardInterrupt."""
+    """End at once on Ctrl-C: there is nothing to clean up yet, and half-imported modules may swallow a
+    KeyboardInterrupt.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield  # signals are only the main thread's to handle
         return

@@ -1,14 +1,14 @@
-"""Runs a command that ends with the process that started it, however that ends; `child_process.Process` starts it as
+"""Start of a command that ends with the process that started it. `child_process.Process` runs it as follows.
 
     python -I -S lifeline.py DESCRIPTOR PATIENCE COMMAND...
 
-It becomes the command, as the leader of a session of its own. A watcher stays behind in the command's process group.
-The other end of the pipe DESCRIPTOR is the parent's alone: when it is closed, by the parent or by its death, the
-watcher interrupts the group as Ctrl-C would, so that a recording is completed, and kills what is left after PATIENCE
-seconds. When the command ends, so does whatever it left in its group. The kernel's own signal at the parent's death
-goes by the thread that started the command, and reaches none of the command's children.
+The process becomes the command, as the leader of a separate session. A watcher stays behind in the command's process
+group. Only the parent holds the other end of the pipe DESCRIPTOR. When that is closed, by the parent or by its death,
+the watcher interrupts the group as Ctrl-C would, so that a recording is completed. It kills the rest of the group after
+PATIENCE seconds. When the command ends, the watcher ends the rest of the group as well. The kernel's own signal at the
+parent's death depends on the thread that started the command, and reaches none of the command's children.
 
-A program of its own, of the standard library only: it is there in 20 ms, before any of ROS is loaded.
+A separate program that imports only the standard library starts in 20 ms, before any part of ROS is loaded.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import signal
 import sys
 import time
 
-LOOK = 0.2  # s of wall time between two looks at whether the command still runs
+LOOK = 0.2  # wall time between two checks of the command, s
 
 
 def watch(lifeline: int, patience: float, leader: int) -> None:
@@ -38,7 +38,7 @@ def watch(lifeline: int, patience: float, leader: int) -> None:
 
 
 def runs(leader: int) -> bool:
-    """Whether the leader of this process's group is there: nobody else gets its number while the group has members."""
+    """Return True if the leader of this process's group runs. Its ID is not reused while the group has members."""
     try:
         os.kill(leader, 0)
     except ProcessLookupError:
@@ -47,7 +47,7 @@ def runs(leader: int) -> bool:
 
 
 def main() -> None:
-    """Never returns."""
+    """Become the command. This never returns."""
     lifeline, patience, command = int(sys.argv[1]), float(sys.argv[2]), sys.argv[3:]
     for number in (signal.SIGINT, signal.SIGPIPE, signal.SIGXFSZ):  # which Python handles or ignores
         signal.signal(number, signal.SIG_DFL)

@@ -1,4 +1,4 @@
-"""What something was measured on."""
+"""Description of this machine, for measurements."""
 
 from __future__ import annotations
 

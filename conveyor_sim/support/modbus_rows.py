@@ -29,8 +29,9 @@ Table = Literal["coil", "discrete input", "input register", "holding register"]
 Type = Literal["bool", "uint16", "uint32", "int32", "float32", "float64"]
 
 WordOrder = Literal["big", "little"]
-"""Of a value of several words. big: the highest word first (ABCD); little: the lowest first (CDAB). Within a word the
-high byte comes first, always."""
+"""Order of the words of a value. big: the highest word first (ABCD); little: the lowest first (CDAB). Within a word the
+high byte always comes first.
+"""
 
 Access = Literal["read", "read and write"]
 
@@ -41,7 +42,7 @@ MOST_ADDRESSES = 65536
 """In each table."""
 
 GONE = "gone"
-"""What stands in place of the description of a tag that the line no longer has: its address is not given to another."""
+"""Description of a tag that the line no longer has. No other tag gets its address."""
 
 _MOST_BYTES = 16 * MB
 TABLES: tuple[Table, ...] = get_args(Table)
@@ -62,17 +63,17 @@ _MOST_FLOAT32 = float(np.finfo(np.float32).max)
 
 @dataclass(frozen=True)
 class Row:
-    """Where one tag is; a line of the CSV file, in the order of its columns."""
+    """Address of one tag: a line of the CSV file, in the order of its columns."""
 
     name: str
-    """Of the tag."""
+    """Name of the tag."""
     table: Table
     address: int
-    """Of its first word or bit, from 0."""
+    """Address of its first word or bit, from 0."""
     type: Type
     word_order: WordOrder
     unit: str
-    """As the tag has it: there is no scaling."""
+    """Unit of the tag; values are not scaled."""
     access: Access
     low: float
     """Range of the tag."""
@@ -81,12 +82,12 @@ class Row:
 
     @property
     def words(self) -> int:
-        """How many addresses it takes."""
+        """Number of its addresses."""
         return WORDS[self.type]
 
     @property
     def addresses(self) -> range:
-        """Those that it takes, in its table."""
+        """Its addresses in its table."""
         return range(self.address, self.address + self.words)
 
 
@@ -94,9 +95,9 @@ _COLUMNS = tuple(field.name for field in fields(Row))
 
 
 def encode(row: Row, value: float) -> list[int]:
-    """A value as the words of a row, or as one bit; what the type can't hold becomes the nearest that it can.
+    """Return a value as the words of a row, or as one bit, clipped to the range of the type.
 
-    A whole number that is NaN or infinite becomes 0.
+    NaN and infinity as an integer are 0.
     """
     if row.type == "bool":
         return [int(value != 0.0)]
@@ -110,10 +111,10 @@ def encode(row: Row, value: float) -> list[int]:
 
 
 def decode(row: Row, words: Sequence[int]) -> float:
-    """The value of a row's words, (words,), each 0 to 65535, or of its bit.
+    """Return the value of a row's words, (words,), each 0 to 65535, or of its bit.
 
-    A float32 is read as the shortest number that it stands for: 0.1, not 0.10000000149. One that is a limit of the row,
-    rounded to 32 bits, is read as that limit.
+    A float32 is read as the shortest decimal number of its bits: 0.1, not 0.10000000149. A limit of the row that was
+    rounded to 32 bits is read as that limit.
     """
     if row.type == "bool":
         return float(bool(words[0]))
@@ -129,7 +130,7 @@ def _shortest(value: float) -> float:
 
 
 def to_csv(rows: Iterable[Row]) -> str:
-    """The map as a file."""
+    """Return the map as text in CSV."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(_COLUMNS)
@@ -143,7 +144,7 @@ def _shown(value: str | int | float) -> str:
 
 
 def read_map(path: Path) -> list[Row]:
-    """A map that was kept. Raises MapError."""
+    """Return the map in a file. Raises MapError."""
     try:
         text = read_file(path, _MOST_BYTES).decode("utf-8-sig")
     except FileError as error:

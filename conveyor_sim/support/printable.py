@@ -1,15 +1,16 @@
-"""Foreign text (names, paths, ids that somebody else chose) made fit to be repeated in logs, answers and tables."""
+"""Foreign text (names, paths, IDs) made safe for logs, answers and tables."""
 
 MOST = 200
-"""Characters of one foreign text that are repeated."""
+"""Largest number of characters of one foreign text."""
 SENTENCE = 10 * MOST
-"""Characters of a sentence that holds some of them."""
+"""Largest number of characters of a sentence with foreign texts."""
 
 
 def printable(text: object, most: int = MOST) -> str:
-    """`text` on one line: what does not print as an escape (`\\n`, `\\x1b`, `\\u202e`), cut at `most` characters.
+    """Return `text` on one line, with escapes (`\\n`, `\\x1b`, `\\u202e`) for unprintable characters, cut at `most`
+    characters.
 
-    What is printable already stays as it is, so doing it twice changes nothing.
+    Printable text is unchanged, so a second call changes nothing.
     """
     # Cut before it is escaped, too: a text of megabytes is not walked through.
     given = str(text)[: most + 1]
@@ -18,7 +19,7 @@ def printable(text: object, most: int = MOST) -> str:
 
 
 def printable_lines(text: object, most: int = SENTENCE) -> str:
-    """The same for text that may have several lines, each of at most `most` characters."""
+    """Return text of several lines with each line printable and of at most `most` characters."""
     return "\n".join(printable(line, most) for line in str(text).split("\n"))
 
 

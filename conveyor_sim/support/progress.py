@@ -1,4 +1,4 @@
-"""Shows how far a run is: a bar on a terminal, a plain line now and then elsewhere."""
+"""Progress of a run: a bar on a terminal, plain lines elsewhere."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from rich.progress import BarColumn, Progress, Task, TaskProgressColumn, TextCol
 from rich.text import Text
 
 PLAIN_SHARE = 0.1
-"""Where there is no terminal: a line whenever this share of the whole has been done."""
+"""Share of the total after which another line is printed if there is no terminal."""
 
 SILENCE = 2.0
-"""s of wall time without a word after which people wonder."""
+"""Wall time without output after which `told_if_long` prints its sentence, s."""
 
 
 @contextmanager
 def told_if_long(sentence: str) -> Iterator[None]:
-    """Say the sentence if what is inside takes longer than SILENCE."""
+    """Print a sentence if the context takes longer than SILENCE."""
     timer = threading.Timer(SILENCE, print, (sentence,), {"file": sys.stderr, "flush": True})
     timer.start()
     try:
@@ -32,16 +32,16 @@ def told_if_long(sentence: str) -> Iterator[None]:
 
 
 class _StageLeft(TimeRemainingColumn):
-    """A guess from what is done; nothing where the caller gives the time left."""
+    """Column with the estimated time left, empty where the caller states it."""
 
     def render(self, task: Task) -> Text:
         return super().render(task) if task.fields["left"] is None else Text()
 
 
 class ProgressBar(AbstractContextManager["ProgressBar"]):
-    """Progress in simulated time, with the real-time factor so far. `total` in s, simulated.
+    """Progress in simulated time, with the real-time factor so far.
 
-    `counted`: what is counted instead of time, such as `rounds`.
+    `total`: simulated time, s. `counted`: unit that is counted instead of time, such as `rounds`.
     """
 
     def __init__(self, what: str, total: float, console: Console | None = None, counted: str = "") -> None:
@@ -66,9 +66,9 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
             self._bar.start()
 
     def update(self, done: float, total: float | None = None, left: float | None = None) -> None:
-        """`done`: simulated time so far, s; `total`: the whole, where it was not known at first.
+        """Show the progress. `done`: simulated time so far, s; `total`: replaces the total.
 
-        `left`: s of wall time to go at most, where the caller knows better than a guess from what is done.
+        `left`: upper bound of the wall time left, s, if the caller knows one.
         """
         self._left = left
         if self._start is None:  # building and compiling come before the first tick and would look like slowness

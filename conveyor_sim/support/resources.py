@@ -1,4 +1,4 @@
-"""Where the files that ship beside the code are: the scenes (config/) and the message definitions (msg_defs/)."""
+"""Folders of the files that ship beside the code: scenes (config/) and message definitions (msg_defs/)."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from conveyor_sim.errors import ConveyorError, SceneError
 
 @lru_cache(maxsize=1)
 def share_dir() -> Path:
-    """The folder that holds config/ and msg_defs/: the checkout, or share/conveyor_sim of the prefix of an
-    installation (pip puts it in the environment's prefix, colcon in the package's).
+    """Return the folder that holds config/ and msg_defs/.
 
-    Raises ConveyorError if neither is there.
+    It is the checkout, or share/conveyor_sim below the prefix of an installation: the environment's for pip, the
+    package's for colcon. Raises ConveyorError if neither is there.
     """
     for parent in Path(__file__).resolve().parents:
         for candidate in (parent, parent / "share" / "conveyor_sim"):
@@ -27,20 +27,20 @@ def share_dir() -> Path:
 
 
 def config_dir() -> Path:
-    """The folder of the scenes that ship with conveyor_sim."""
+    """Return the folder of the scenes that ship with conveyor_sim."""
     return share_dir() / "config"
 
 
 def msg_defs_dir() -> Path:
-    """The folder whose msg/ and srv/ define the package conveyor_msgs."""
+    """Return the folder whose msg/ and srv/ define the package conveyor_msgs."""
     return share_dir() / "msg_defs"
 
 
 def scene_path(name_or_path: str | Path) -> Path:
-    """The scene file meant by a path, or by the name of a shipped scene ("paper_plant", "scenarios/zoned_line"), with
-    or without `.yaml` or `config/`.
+    """Return the scene file of a path, or of the name of a shipped scene ("paper_plant", "scenarios/zoned_line").
 
-    A file where the caller stands wins over a shipped one. Raises SceneError if there is neither.
+    `.yaml` and `config/` may be left out. A file relative to the working directory has priority over a shipped one.
+    Raises SceneError if there is neither.
     """
     try:
         path = Path(name_or_path).expanduser()

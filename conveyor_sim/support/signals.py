@@ -1,4 +1,4 @@
-"""Signals that ask a process to end: the first is handled, a second one ends it, whatever hangs."""
+"""Signals that request the end of a process: the first is handled, the second ends it even if it hangs."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import Any
 Handler = Callable[[int, FrameType | None], Any]
 
 SA_RESETHAND = 0x80000000
-"""Flag of sigaction(2): the kernel itself puts the default action back as it delivers the signal."""
+"""Flag of sigaction(2): the kernel restores the default action when it delivers the signal."""
 
 
 class _Action(ctypes.Structure):
@@ -28,15 +28,15 @@ class _Action(ctypes.Structure):
 
 
 class HandledOnce(AbstractContextManager["HandledOnce"]):
-    """Calls a handler for the first of some signals; the next one, of whatever number, has its default action.
+    """Handler for the first of some signals; the next one, of any of them, has its default action.
 
-    That ends the process by that signal: 128 + its number is the exit status that a shell shows. Python runs handlers
-    only between two instructions of its main thread, and one that hangs in C never gets there; so a second signal of
-    the same number is left to the kernel. For the main thread: does nothing in others.
+    That ends the process by that signal: the exit status that a shell shows is 128 plus its number. Python runs
+    handlers only between two instructions of its main thread, so never while that hangs in C. The kernel handles a
+    second signal of the same number. In other threads than the main one, this does nothing.
     """
 
     def __init__(self, numbers: Iterable[int], handler: Handler) -> None:
-        """The handlers of before are back when the context ends."""
+        """Set the handler until the context ends."""
         self._handler = handler
         self._before: dict[int, tuple[Any, bool]] = {}
         if threading.current_thread() is threading.main_thread():
@@ -59,7 +59,7 @@ class HandledOnce(AbstractContextManager["HandledOnce"]):
 
 @contextmanager
 def held_back() -> Iterator[None]:
-    """Ctrl-C waits until what is inside is done and is raised then; a second one ends the process at once."""
+    """Delay Ctrl-C to the end of the context, where it is raised; a second one ends the process at once."""
     struck = False
 
     def note(_number: int, _frame: FrameType | None) -> None:

@@ -1,4 +1,4 @@
-"""Ctrl-C, SIGTERM and a closed terminal as something to wait for.
+"""Ctrl-C, SIGTERM and a closed terminal as a request that a thread waits for.
 
 A KeyboardInterrupt would be lost wherever Python ignores exceptions.
 """
@@ -16,10 +16,10 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class StopRequest(AbstractContextManager["StopRequest"]):
-    """A signal, or a call of request(), whichever comes first; nothing is interrupted half done.
+    """Request to stop, by a signal or a call of request(). No operation is interrupted.
 
-    A second signal ends the process, whatever hangs. For the main thread; signals are handled as before once the
-    context ends.
+    A second signal ends the process even if it hangs. For the main thread. At the end of the context the previous
+    handlers are restored.
     """
 
     def __init__(self) -> None:
@@ -31,15 +31,15 @@ class StopRequest(AbstractContextManager["StopRequest"]):
 
     @property
     def requested(self) -> bool:
-        """Whether there was a request."""
+        """True if there was a request."""
         return self.wait(0.0)
 
     def request(self) -> None:
-        """From any thread."""
+        """Request the stop. May be called by any thread."""
         self._writer.send(b"\0")
 
     def wait(self, seconds: float | None = None) -> bool:
-        """Until there was a request, or so long (None: for ever), s of wall time; whether there was one."""
+        """Wait up to `seconds` of wall time (None: for ever) for a request. Return True if one came."""
         return bool(select.select([self._reader], [], [], seconds)[0])
 
     def __exit__(self, *_: object) -> None:

@@ -1,10 +1,9 @@
-"""Processes that work off tasks and end with this one; one of them that dies takes no other task along."""
+"""Pool of processes that end with this one; the death of one affects no other task."""
 
 from __future__ import annotations
 
 import os
 import signal
-import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -14,6 +13,8 @@ from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from typing import TypeVar
 
+from conveyor_sim.support.child_process import end_with
+
 T = TypeVar("T")
 R = TypeVar("R")
 
@@ -21,38 +22,38 @@ DIED = "the process that ran it ended without a word, twice: killed, or out of m
 
 
 class DiedError(Exception):
-    """The processes that were given a task have ended without a word, twice."""
+    """Error: two processes in a row ended without a result for a task."""
 
     def __init__(self) -> None:
         super().__init__(DIED)
 
 
 def free_cores() -> int:
-    """Cores that this process may use."""
+    """Return the number of cores that this process may use."""
     return len(os.sched_getaffinity(0))
 
 
 class WorkerPool(AbstractContextManager["WorkerPool"]):
-    """Processes of this machine. They are spawned: a program that is a file needs its `if __name__ == "__main__"`.
+    """Processes of this machine. They are spawned: a program in a file needs its `if __name__ == "__main__"`.
 
     Leaving the context by an exception, such as a Ctrl-C, or ending this process in any way ends them at once, in the
-    middle of what they are at.
+    middle of their tasks.
     """
 
     is_here = True
-    """All of it is this machine, with its files."""
+    """True: all processes run on this machine, with its files."""
 
     def __init__(self, processes: int | None = None) -> None:
-        """processes: None is one for each core that this process may use."""
+        """Prepare the pool. processes: None: one for each core that this process may use."""
         self.processes = free_cores() if processes is None else max(1, processes)
         self._pool: ProcessPoolExecutor | None = None
         self._lifeline: tuple[Connection, Connection] | None = None
 
     def each(self, function: Callable[[T], R], tasks: Iterable[T]) -> Iterator[tuple[T, R | DiedError]]:
-        """Each task with what the function makes of it, as they are finished.
+        """Yield each task with the function's result, in the order of completion.
 
-        Raises what the function raises. A task whose process, or another beside it, has died is tried once more by
-        itself, to find out which it was.
+        Raises what the function raises. If a process dies, each task in progress is repeated alone once, to find out
+        which one killed it.
         """
         todo = deque(tasks)
         pending: dict[Future[R], T] = {}
@@ -105,12 +106,6 @@ class WorkerPool(AbstractContextManager["WorkerPool"]):
 
 
 def _begin(lifeline: Connection) -> None:
-    """Start of a process: Ctrl-C is its parent's affair, and it ends with its parent, or when asked to."""
+    """Prepare a worker: it ignores Ctrl-C, and ends with its parent or on request."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with, args=(lifeline,), daemon=True).start()
-
-
-def _end_with(lifeline: Connection) -> None:
-    """Wait until the other end, which only the parent holds, is closed, by the parent or by its death."""
-    lifeline.poll(None)
-    os._exit(1)
+    end_with(lifeline)

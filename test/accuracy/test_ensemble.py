@@ -1,4 +1,4 @@
-"""Long runs over processes: the same whoever makes them, and none is lost or repeated when something is killed."""
+"""Long runs over processes: equal results from any process, and no run lost or repeated after a kill."""
 
 import os
 import signal
@@ -12,6 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from facts import stating
 from scenes import RADIUS, base, belt, bottle, contact, scene, segment
 
 import conveyor_sim
@@ -50,7 +51,7 @@ run_until_decided(load_scene(scene), [candidate], reference, 0.5, 1e9, Path(fold
 
 
 def silent(done: int, total: int, left: float | None) -> None:
-    """Nobody is told."""
+    """Ignore the progress."""
 
 
 def filling(**fields: object) -> Scene:
@@ -103,7 +104,7 @@ def children_of(pid: int) -> set[int]:
 
 
 def workers_of(pid: int) -> set[int]:
-    """Of them, those that a pool has started."""
+    """Return the child processes that a pool started."""
     found = set()
     for child in children_of(pid):
         try:
@@ -136,7 +137,7 @@ def study(it: Scene, folder: Path, per_tick: tuple[int, int]) -> Iterator[subpro
 
 
 def test_samples_are_those_of_runs_made_one_by_one(tmp_path: Path) -> None:
-    """Whatever the number of processes, and in the order wanted."""
+    """The samples do not depend on the number of processes, and come in the requested order."""
     it, wanted = filling(), runs_of(FINE, COARSE, seeds=3)
     told: list[tuple[int, int, float | None]] = []
     made = []
@@ -286,7 +287,7 @@ def test_only_what_is_open_is_run_again(tmp_path: Path) -> None:
 
 
 def test_the_reference_must_run(tmp_path: Path) -> None:
-    with pytest.raises(ConveyorError, match="the reference, semi_implicit_euler 10000001, failed with seed 0"):
+    with pytest.raises(ConveyorError, match=stating("reference", "semi_implicit_euler 10000001", "failed", "seed 0")):
         run_until_decided(filling(), [FINE], IMPOSSIBLE, 0.1, 1.0, tmp_path, silent, 1)
 
 

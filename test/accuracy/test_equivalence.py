@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from facts import stating
 
 from conveyor_sim.accuracy.measure.equivalence import CONFIDENCE, ERROR_RATE, LOOKS, compare, decide
 from conveyor_sim.accuracy.results import Comparison, Sample
@@ -138,7 +139,7 @@ def two_settings(count: int, difference: float) -> list[Sample]:
 
 
 def test_the_first_look_that_decides_stands() -> None:
-    """More runs, of whatever values, do not change it."""
+    """More runs, with any values, do not change it."""
     first = decide(two_settings(16, 0.0), [CHEAP], REFERENCE, TOLERANCE)
     assert [(row.runs, row.verdict) for row in first] == [(8, "equivalent")]
     later = [replace(sample, values={"0": 9.0}) if sample.seed >= 8 else sample for sample in two_settings(64, 0.0)]
@@ -161,7 +162,7 @@ def test_settings_that_failed_are_not_judged() -> None:
     failed = replace(samples[-1], values={}, failure="unstable")
     assert decide([*samples[:-1], failed], [CHEAP], REFERENCE, TOLERANCE) == []
     broken = replace(samples[2], values={}, failure="unstable")
-    with pytest.raises(ConveyorError, match=r"semi_implicit_euler 400, failed with seed 2: unstable"):
+    with pytest.raises(ConveyorError, match=stating("semi_implicit_euler 400", "failed", "seed 2", "unstable")):
         decide([broken, *samples[3:]], [CHEAP], REFERENCE, TOLERANCE)
 
 

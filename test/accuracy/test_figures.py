@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from accuracy.studies import BLOWN, CHOSEN, OWN, RULES, errors, failed, point, study
+from facts import missing
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -25,6 +26,12 @@ from conveyor_sim.accuracy.results import Point, Study
 from conveyor_sim.report.figures import style
 
 VERDICTS = ("equivalent", "different", "undecided")
+
+
+@pytest.fixture
+def ax() -> Iterator[Axes]:
+    with style.look():
+        yield style.new_figure(6.0, 6.0).subplots()
 
 
 @pytest.fixture(autouse=True)
@@ -187,7 +194,8 @@ def test_the_axis_above_is_the_inverse_of_the_cost(figures: dict[str, Figure]) -
 def test_the_references_doubt_is_a_floor(figures: dict[str, Figure]) -> None:
     of = study()
     texts = [text.get_text() for text in figures["pareto"].axes[0].texts]
-    assert "below: the reference itself is only sure to 0.0034 %" in texts
+    (below,) = (text for text in texts if text.startswith("below"))
+    assert missing(below, ["reference", "0.0034 %"]) == []
     sure = replace(of, reference=replace(of.reference, doubt=errors(0.0)))
     assert not any(text.get_text().startswith("below") for text in pareto_figure(sure).axes[0].texts)
 
@@ -282,7 +290,8 @@ def test_an_interval_without_ends_is_said_in_words() -> None:
     of = study()
     row = replace(of.comparisons[0], low=-math.inf, high=math.inf, verdict="undecided")
     (ax,) = accuracy_figures(replace(of, comparisons=(row,)))["ensembles"].axes
-    assert [text.get_text() for text in ax.texts] == ["too few runs to decide"]
+    (text,) = ax.texts
+    assert missing(text.get_text(), ["too few runs"]) == []
 
 
 def test_peak_force_stands_beside_the_square_root_of_the_stiffness(figures: dict[str, Figure]) -> None:

@@ -1,10 +1,11 @@
-"""What is predicted of settings before anything runs."""
+"""Predictions for settings before anything runs."""
 
 from __future__ import annotations
 
 import math
 
 import pytest
+from facts import missing
 from scenes import NO_FLOOR, base, belt, bottle, contact, scene, segment
 
 from conveyor_sim.accuracy.candidates import candidates
@@ -48,14 +49,16 @@ def test_where_nothing_is_predicted_to_do_the_best_is_named() -> None:
     assert 1e-9 < known.best < 0.01
     answer = predicted(known)
     assert answer.title == PREDICTED
-    assert answer.lines[0].startswith("Forces: nothing tried is predicted to be good to 1e-7 %; the best to 0.")
+    assert missing(answer.lines[0], ["Forces", "nothing", "predicted", "1e-7 %", "best"]) == []
 
 
 def test_each_line_says_that_nothing_has_run() -> None:
     forces, throughput, cost, setting = predicted(forecast(line(), 0.01)).lines
-    assert forces.startswith("Forces: should be good to 0.") and forces.endswith("(asked: 1 %).")
-    assert throughput == "Throughput: not known, nothing has run."
-    assert "should take about" in cost and "with 2 bottles, by a rule of thumb" in cost
+    assert forces.startswith("Forces: ")
+    assert missing(forces, ["should", "1 %"]) == []
+    assert throughput.startswith("Throughput: not known")
+    assert missing(throughput, ["nothing has run"]) == []
+    assert missing(cost, ["Cost", "should", "2 bottles", "rule of thumb"]) == []
     assert setting.startswith("Setting: accuracy: {integrator: ")
     assert setting.endswith("(don't rely on it before it is measured)")
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from facts import missing
 from scenes import arc, base, belt, bottle, contact, scene, segment
 
 from conveyor_sim.accuracy.measure.resting import Loads, RestingLoad, difference, loads_from, mean_loads, resting_error
@@ -141,12 +142,12 @@ def test_a_scene_that_never_settles_says_so() -> None:
     empty = RestingLoad(queue(bottles=[bottle(-4.0, 0.0)], duration=2.0))
     empty.settle(silent)
     assert not empty.settled
-    assert empty.reason == "no contact stayed closed for 1 s in 4 s"
+    assert missing(empty.reason, ["no contact", "1 s", "4 s"]) == []
     feed = {"bottle": "bottle", "position": [-2.0, 0.0], "direction": 0.0, "speed": 1.0, "rate": 0.6}
     growing = RestingLoad(queue(bottles=[], infeeds={"more": feed}, belts={"belt": belt(1.0)}))
     growing.settle(silent)
     assert not growing.settled
-    assert growing.reason == "the forces that last were still changing at 8 s"
+    assert missing(growing.reason, ["forces", "changing", "8 s"]) == []
     with pytest.raises(ValueError, match="no settled state"):
         growing.make_reference(silent)
 

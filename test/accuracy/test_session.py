@@ -1,4 +1,4 @@
-"""What somebody who waits sees, in order, and what Ctrl-C answers at any moment."""
+"""Answers that a user sees while a study runs, in order, and the answer after Ctrl-C at any moment."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 from accuracy.test_study import ONE_RUN, SCENE, silent
 from click.testing import CliRunner
+from facts import missing
 
 from conveyor_sim.accuracy.candidates import own_setting, preset_setting
 from conveyor_sim.accuracy.effort import DEFAULT, THOROUGH, Effort
@@ -80,7 +81,8 @@ def test_predicted_first_then_preliminary_then_the_answer(made: Made) -> None:
     assert made.setting == study.answer.setting
     early = answers[answers.index(PRELIMINARY) + 1 : answers.index(ANSWER)]
     assert early[0].startswith("Forces: good to 0.")
-    assert early[1] == "Throughput: not known, no long run was made."
+    assert early[1].startswith("Throughput: not known")
+    assert missing(early[1], ["no long run"]) == []
     assert early[-1].startswith("Not known yet: ")
 
 
@@ -90,12 +92,11 @@ def test_a_line_on_which_nothing_touches_is_not_searched(tmp_path: Path) -> None
     assert it.run(tmp_path, ONE_RUN, silent) is None
     forces, throughput, cost, setting, otherwise = answers[answers.index(ANSWER) + 1 :]
     assert PRELIMINARY not in answers
-    assert forces == (
-        "Forces: there are none to be wrong: no bottle touched another one or a rail in the 0.3 s of the scene."
-    )
+    assert forces.startswith("Forces: ")
+    assert missing(forces, ["none", "no bottle touched", "rail", "0.3 s"]) == []
     assert throughput.startswith("Throughput: bottles only ride, so the friction of belts alone decides it")
     assert "by a rule of thumb" in cost
-    assert "the preset draft: the cheapest within every bound of stability" in setting
+    assert missing(setting, ["preset draft", "cheapest", "bound of stability"]) == []
     assert otherwise.startswith("If they do touch one day (a stop, a jam, other commands), draft is predicted")
     assert it.setting is not None
     assert not (tmp_path / "measured.json").exists()
@@ -106,7 +107,8 @@ def test_where_nothing_can_touch_nothing_runs(tmp_path: Path) -> None:
     it, answers = session(alone)
     it.predict(tmp_path, ONE_RUN)
     assert it.run(tmp_path / "none", ONE_RUN, silent) is None
-    assert answers[:2] == [ANSWER, "Forces: there are none to be wrong: nothing in the scene can touch."]
+    assert answers[0] == ANSWER
+    assert missing(answers[1], ["Forces", "none", "nothing in the scene can touch"]) == []
     assert not any(line.startswith("If they do touch") for line in answers)
     assert not (tmp_path / "none").exists()
 
@@ -116,8 +118,10 @@ def test_the_command_answers_on_such_a_line_and_applies_it(tmp_path: Path, monke
     Path("alone.yaml").write_text("\n".join(SCENE.splitlines()[:-2]) + "\n")
     result = CliRunner().invoke(main, ["accuracy", "alone.yaml", "--out", "out", "--apply"])
     assert result.exit_code == 0, result.output
-    assert "Forces: there are none to be wrong" in result.output
-    assert result.output.splitlines()[-1] == "scene with the setting: out/alone.yaml"
+    lines = result.output.splitlines()
+    (forces,) = (line for line in lines if line.startswith("Forces: "))
+    assert missing(forces, ["none", "nothing in the scene can touch"]) == []
+    assert lines[-1].endswith(": out/alone.yaml")
     draft = preset_setting(load_scene(Path("alone.yaml")), "draft")
     assert own_setting(load_scene(Path("out/alone.yaml"))) == draft
 
@@ -127,8 +131,7 @@ def test_how_long_it_takes_is_said_at_first(effort: Effort, minutes: int, tmp_pa
     said: list[str] = []
     Session(scene_of(SCENE), 0.01, lambda line: None, said.append).predict(tmp_path, effort)
     assert len(said) == 1
-    assert "a preliminary answer within a minute" in said[0]
-    assert f"the answer within {minutes}, compiling left out" in said[0]
+    assert missing(said[0], ["preliminary answer", "a minute", str(minutes), "compiling"]) == []
 
 
 def interrupted(folder: Path, ready: Callable[[str], bool]) -> tuple[int, list[str], str]:
@@ -155,7 +158,7 @@ def interrupted(folder: Path, ready: Callable[[str], bool]) -> tuple[int, list[s
 def test_ctrl_c_before_anything_is_measured_answers_what_is_predicted(tmp_path: Path, made: Made) -> None:
     status, answers, errors = interrupted(tmp_path, lambda said: PREDICTED in said)
     assert (status, errors.splitlines()[-1]) == (130, "interrupted")
-    assert "the answer within 50, compiling left out" in errors  # --thorough
+    assert missing(errors, ["answer", "50", "compiling"]) == []  # --thorough
     assert PRELIMINARY not in answers
     assert answers[0] == PREDICTED
     assert [line.partition(":")[0] for line in answers[-4:]] == ["Forces", "Throughput", "Cost", "Setting"]
@@ -183,5 +186,5 @@ def test_ctrl_c_in_long_runs_answers_with_those_made(tmp_path: Path, made: Made)
     assert (status, errors.splitlines()[-1]) == (130, "interrupted")
     best = answers[answers.index(f"Interrupted; the best answer so far. {UNFINISHED}") + 1 :]
     assert [line.partition(":")[0] for line in best] == ["Forces", "Throughput", "Cost", "Setting", "Not known yet"]
-    assert "were finished, the same command makes the others" in best[-1]
+    assert missing(best[-1], ["finished", "same command"]) == []
     assert ANSWER not in answers

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import pytest
 from accuracy.studies import BLOWN, CHOSEN, OWN, REFERENCE, failed, study
+from facts import missing
 from rich.console import Console
 
 from conveyor_sim.accuracy.report.block import Block, Column
@@ -161,12 +162,11 @@ def test_both_errors_stand_beside_their_predictions() -> None:
     numbers = (point.predicted, point.errors.peak_force, point.predicted_resting, point.resting)
     assert chosen[2:] == (*(digits(100.0 * number) for number in numbers), digits(point.beyond))
     assert "settled at 22 s" in both.notes[0]
-    assert "at twice the step it is another by 9e-5 %" in both.notes[0]
+    assert missing(both.notes[0], ["twice the step", "9e-5 %"]) == []
     assert of.rest is not None
     moving = replace(of, rest=replace(of.rest, setting=None, reason="the forces that last were still changing at 9 s"))
-    assert block(moving, "Impacts and resting load").notes == (
-        "Resting load: the forces that last were still changing at 9 s.",
-    )
+    (note,) = block(moving, "Impacts and resting load").notes
+    assert missing(note, ["Resting load", "the forces that last were still changing at 9 s"]) == []
 
 
 def test_a_method_without_a_prediction_has_a_dash() -> None:
@@ -186,13 +186,14 @@ def test_orders_stand_in_groups_with_what_was_expected() -> None:
     assert orders.groups[0][0] == "head on, clamped dashpot: speed of rebound"
     assert set(column(orders, "expected")) == {"1", "2", "2.5", "4", "5", "-"}
     assert set(column(orders, "steps")) == {"20 .. 640"}
-    assert orders.notes == ("Errors are RMS over 64 phases of entry into a step.",)
+    (note,) = orders.notes
+    assert missing(note, ["errors", "RMS", "64 phases"]) == []
 
 
 def test_horizons_tell_what_was_not_seen_and_the_references_doubt() -> None:
     horizons = block(study(), "How long")
     assert column(horizons, "a nudge\ndoubles in, s") == ["0.37", "0.18", "not seen"]
-    assert "in doubt by 0.0034 % in peak force" in horizons.notes[0]
+    assert missing(horizons.notes[0], ["0.0034 %", "peak force"]) == []
 
 
 def test_long_runs_tell_difference_verdict_and_resolution() -> None:
@@ -239,9 +240,8 @@ def test_the_answer_is_last_with_its_doubts() -> None:
 
 def test_a_study_that_found_nothing_has_an_answer_alone() -> None:
     assert [block.title for block in blocks(nothing())] == ["Answer"]
-    assert blocks(nothing())[0].notes[-1] == (
-        "No setting that was tried keeps 1 % in impacts and in resting load within every bound of stability."
-    )
+    facts = ["No setting", "1 %", "impacts", "resting load", "bound of stability"]
+    assert missing(blocks(nothing())[0].notes[-1], facts) == []
     assert "### Answer" in markdown(nothing())
 
 

@@ -4,10 +4,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from conveyor_sim.bag.messages.topics import OUTPUTS
+from conveyor_sim.bag.messages.typestore import typestore
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recorder import Recorder
-from conveyor_sim.bag.topics import OUTPUTS
-from conveyor_sim.bag.typestore import typestore
 
 Edit = Callable[[str, Any], None]
 

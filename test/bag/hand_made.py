@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from conveyor_sim.bag.messages import Header
+from conveyor_sim.bag.messages.encode import Header
 from conveyor_sim.columns.bottles import BottleColumns, ContactColumns
 
 HEADER = Header(tick=1234, stamp_ns=12_340_000_007, frame_id="hall")

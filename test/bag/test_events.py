@@ -11,11 +11,11 @@ from bag.editing import edited
 from bag.small_line import SMALL_LINE
 from rosbags.highlevel import AnyReader
 
+from conveyor_sim.bag.messages.topics import OUTPUTS
 from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.bag.replay import replay
-from conveyor_sim.bag.topics import OUTPUTS
 from conveyor_sim.columns.events import Event, event_columns
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation

@@ -15,12 +15,12 @@ from mcap.writer import IndexType, Writer
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as StockWriter
 
-from conveyor_sim.bag.metadata import FILE_NAME, read_metadata
+from conveyor_sim.bag.mcap.metadata import FILE_NAME, read_metadata
+from conveyor_sim.bag.messages.typestore import definition, typestore
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.bag.recover import recover
 from conveyor_sim.bag.replay import replay
-from conveyor_sim.bag.typestore import definition, typestore
 from conveyor_sim.errors import BagError
 from conveyor_sim.scene import Scene
 

@@ -10,7 +10,7 @@ from mcap.reader import make_reader
 from mcap.records import Metadata
 from rosbags.highlevel import AnyReader
 
-from conveyor_sim.bag.line_copy import NAME, LineCopy, read_line_copy
+from conveyor_sim.bag.mcap.line_copy import NAME, LineCopy, read_line_copy
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recover import recover
 from conveyor_sim.bag.replay import replay

@@ -7,9 +7,9 @@ import pytest
 from bag.hand_made import HEADER, bottles
 from bag.ros_decode import assert_same, deserialize
 
-from conveyor_sim.bag.markers import ADD, DELETEALL, LINE_STRIP, TRIANGLE_LIST, bottles_markers, plant_markers
-from conveyor_sim.bag.messages import MARKERS
-from conveyor_sim.bag.typestore import typestore
+from conveyor_sim.bag.messages.encode import MARKERS
+from conveyor_sim.bag.messages.markers import ADD, DELETEALL, LINE_STRIP, TRIANGLE_LIST, bottles_markers, plant_markers
+from conveyor_sim.bag.messages.typestore import typestore
 from conveyor_sim.scene import Scene, belt_shapes, rail_shapes
 from conveyor_sim.scene.geometry import RailShape, SegmentPiece
 from conveyor_sim.scene.parts.device_part import Mark

@@ -1,23 +1,24 @@
-"""MCAP files as mcap's own writer writes them."""
+"""MCAP files of recordings, read back by the `mcap` library."""
 
 from __future__ import annotations
 
+from collections import Counter
 from io import BytesIO
-from pathlib import Path
 
 import numpy as np
 import pytest
-from mcap.reader import make_reader
-from mcap.writer import CompressionType, Writer
+from mcap.reader import NonSeekingReader, make_reader
 
-from conveyor_sim.bag import mcap_writer
-from conveyor_sim.bag.mcap_writer import CHUNK_SIZE, McapWriter
+from conveyor_sim.bag.mcap.index import sealed
+from conveyor_sim.bag.mcap.writer import McapFileWriter, Schema
 
 TOPICS = ("/bottles", "/signals", "/never")
+SCHEMA = Schema("std_msgs/msg/String", "ros2msg", b"string data")
+CHUNK_SIZE = 1 << 20
 
 
 def messages(count: int) -> list[tuple[int, int, bytes, int]]:
-    """Channel, log time, content and sequence; times go back now and then, contents are large and small."""
+    """Return channel, log time, content and sequence; times go back now and then, contents are large and small."""
     random = np.random.default_rng(11)
     return [
         (int(random.integers(1, 3)), int(random.integers(0, 10**12)), random.bytes(int(random.integers(0, 40_000))), n)
@@ -25,68 +26,72 @@ def messages(count: int) -> list[tuple[int, int, bytes, int]]:
     ]
 
 
-def by_mcap(count: int, flush_every: int) -> bytes:
+def written(count: int, flush_every: int) -> bytes:
     stream = BytesIO()
-    writer = Writer(stream, compression=CompressionType.ZSTD, enable_data_crcs=True)
-    writer.start(profile="ros2", library="conveyor_sim test")
-    schemas = [writer.register_schema(name, "ros2msg", b"text of " + name.encode()) for name in ("a", "b")]
-    channels = [writer.register_channel(topic, "cdr", schemas[0], {"hash": topic}) for topic in TOPICS]
-    assert channels == [1, 2, 3]
+    file = McapFileWriter(stream, "bag_0.mcap", "jazzy")
+    assert [file.add_topic(topic, SCHEMA, "cdr", {"hash": topic}) for topic in TOPICS] == [1, 2, 3]
     for number, (channel, time, data, sequence) in enumerate(messages(count)):
-        writer.add_message(channel, time, data, time + 1, sequence)
+        file.add_message(channel, data, time, time + 1, sequence)
         if number % flush_every == flush_every - 1:
-            writer.flush()
-    writer.add_attachment(5, 6, "start.npz", "application/octet-stream", b"1234")
-    writer.flush()
-    writer.add_metadata("rosbag2", {"text": "one"})
-    writer.finish()
-    return stream.getvalue()
-
-
-def by_us(count: int, flush_every: int) -> bytes:
-    stream = BytesIO()
-    writer = McapWriter(stream, "ros2", "conveyor_sim test")
-    schemas = [writer.register_schema(name, "ros2msg", b"text of " + name.encode()) for name in ("a", "b")]
-    channels = [writer.register_channel(topic, "cdr", schemas[0], {"hash": topic}) for topic in TOPICS]
-    assert channels == [1, 2, 3]
-    for number, (channel, time, data, sequence) in enumerate(messages(count)):
-        writer.add_message(channel, time, data, time + 1, sequence)
-        if number % flush_every == flush_every - 1:
-            writer.flush()
-    writer.add_attachment("start.npz", "application/octet-stream", b"1234", log_time=6, create_time=5)
-    writer.flush()
-    writer.add_metadata("rosbag2", {"text": "one"})
-    writer.finish()
+            file.flush()
+    file.add_attachment("start.npz", "application/octet-stream", b"1234", log_time=6, create_time=5)
+    file.finish()
     return stream.getvalue()
 
 
 @pytest.mark.parametrize(("count", "flush_every"), [(0, 1), (1, 1), (7, 2), (300, 1000), (300, 7)])
-def test_at_the_same_level_the_file_is_that_of_mcap_to_the_byte(
-    monkeypatch: pytest.MonkeyPatch, count: int, flush_every: int
-) -> None:
-    monkeypatch.setattr(mcap_writer, "LEVEL", 3)
-    assert by_us(count, flush_every) == by_mcap(count, flush_every)
-
-
-def test_mcap_reads_it_back(tmp_path: Path) -> None:
-    reader = make_reader(BytesIO(by_us(300, 1000)), validate_crcs=True)
+def test_mcap_reads_it_back(count: int, flush_every: int) -> None:
+    data = written(count, flush_every)
+    reader = make_reader(BytesIO(data), validate_crcs=True)
     read = sorted(
-        (message.sequence, message.channel_id, message.log_time, message.data)
+        (message.sequence, message.channel_id, message.log_time, message.publish_time, message.data)
         for _, _, message in reader.iter_messages()
     )
-    assert read == [(sequence, channel, time, data) for channel, time, data, sequence in messages(300)]
+    assert read == [(sequence, channel, time, time + 1, data) for channel, time, data, sequence in messages(count)]
+    assert [(one.name, one.data, one.log_time, one.create_time) for one in reader.iter_attachments()] == [
+        ("start.npz", b"1234", 6, 5)
+    ]
     summary = reader.get_summary()
     assert summary is not None and summary.statistics is not None
-    assert summary.statistics.chunk_count == len(summary.chunk_indexes) > 2
+    assert [channel.topic for channel in summary.channels.values()] == list(TOPICS)
+    assert [schema.name for schema in summary.schemas.values()] == [SCHEMA.name]
+    assert summary.statistics.chunk_count == len(summary.chunk_indexes)
     assert all(chunk.uncompressed_size < CHUNK_SIZE + 50_000 for chunk in summary.chunk_indexes)
+    if flush_every == 1000:
+        assert len(summary.chunk_indexes) > 2
 
 
-def test_times_are_those_of_all_messages_so_far() -> None:
-    writer = McapWriter(BytesIO(), "ros2", "conveyor_sim test")
-    channel = writer.register_channel("/a", "cdr", writer.register_schema("a", "ros2msg", b""), {})
-    assert writer.times == (0, 0)
-    writer.add_message(channel, 50, b"x", 50, 0)
-    assert writer.times == (50, 50)
-    writer.flush()
-    writer.add_message(channel, 20, b"x", 20, 1)
-    assert (writer.times, writer.counts.total()) == ((20, 50), 2)
+@pytest.mark.parametrize("count", [0, 300])
+def test_checksums_cover_every_byte(count: int) -> None:
+    data = written(count, 7)
+    assert sealed(data)
+    stream = BytesIO(data)
+    assert sum(1 for _ in NonSeekingReader(stream, validate_crcs=True).iter_messages()) == count
+
+
+def test_a_flushed_file_is_readable_without_its_end() -> None:
+    stream = BytesIO()
+    file = McapFileWriter(stream, "bag_0.mcap", "jazzy")
+    channel = file.add_topic("/a", SCHEMA, "cdr", {})
+    for time in range(5):
+        file.add_message(channel, b"x", time, time)
+        file.flush()
+        read = NonSeekingReader(BytesIO(stream.getvalue())).iter_messages(log_time_order=False)
+        assert [next(read)[2].log_time for _ in range(time + 1)] == list(range(time + 1))
+
+
+def test_times_and_counts_are_those_of_all_ros_messages_so_far() -> None:
+    file = McapFileWriter(BytesIO(), "bag_0.mcap", "jazzy")
+    channel, foreign = file.add_topic("/a", SCHEMA, "cdr", {}), file.add_foreign("/b", None, "json", {})
+
+    def state() -> tuple[int, int, int, dict[str, int]]:
+        counts = Counter({topic.name: topic.message_count for topic in file.topics})
+        return file.info.start_ns, file.info.end_ns, file.info.message_count, dict(counts)
+
+    assert state() == (0, 0, 0, {"/a": 0})
+    file.add_message(foreign, b"{}", 10, 10)
+    file.add_message(channel, b"x", 50, 50)
+    assert state() == (50, 50, 1, {"/a": 1})
+    file.flush()
+    file.add_message(channel, b"x", 20, 20, 1)
+    assert state() == (20, 50, 2, {"/a": 2})

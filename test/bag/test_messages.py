@@ -9,9 +9,9 @@ import pytest
 from bag.hand_made import HEADER, bottles, contacts
 from bag.ros_decode import assert_same, deserialize
 
-from conveyor_sim.bag import messages
-from conveyor_sim.bag.topics import TOPICS
-from conveyor_sim.bag.typestore import typestore
+from conveyor_sim.bag.messages import encode
+from conveyor_sim.bag.messages.topics import TOPICS
+from conveyor_sim.bag.messages.typestore import typestore
 from conveyor_sim.columns.bottles import BeltColumns, BottleColumns
 from conveyor_sim.columns.damage import DamageColumns, DamageEvent, RailWearColumns
 from conveyor_sim.columns.events import Event, event_columns
@@ -44,7 +44,7 @@ CASES: dict[str, tuple[str, Callable[[], bytes]]] = {
     "belts": (TOPICS["belts"].type, lambda: TOPICS["belts"].pack(BeltColumns(np.arange(2.0), np.arange(2.0)), HEADER)),
     "signals": (TOPICS["signals"].type, lambda: TOPICS["signals"].pack(IMAGE, HEADER)),
     "ledger": (TOPICS["ledger"].type, lambda: TOPICS["ledger"].pack(LEDGER, HEADER)),
-    "bool": (messages.BOOL, lambda: messages.bool_message(True, HEADER)),
+    "bool": (encode.BOOL, lambda: encode.bool_message(True, HEADER)),
     "damage": (TOPICS["damage"].type, lambda: TOPICS["damage"].pack(BORNE, HEADER)),
     "rail wear": (TOPICS["rail_wear"].type, lambda: TOPICS["rail_wear"].pack(WEAR, HEADER)),
     "damage event": (
@@ -130,7 +130,7 @@ def test_columns_of_another_type_or_layout_are_converted() -> None:
 
 def test_line_holds_all_that_a_replay_needs(scene: Scene) -> None:
     simulation = Simulation(scene)
-    data = messages.line_message(simulation, "run-1", HEADER)
+    data = encode.line_message(simulation, "run-1", HEADER)
     line: Any = typestore().deserialize_cdr(data, TOPICS["line"].type)
     assert_same(deserialize(TOPICS["line"].type, data), line)
     assert (line.run_id, line.scene_name, line.seed) == ("run-1", "small_line", 7)

@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 from ruamel.yaml import YAML
 
-from conveyor_sim.bag.metadata import FILE_NAME, is_stated_in, read_metadata, to_yaml, write_metadata
-from conveyor_sim.bag.qos import LATCHED
+from conveyor_sim.bag.mcap.metadata import FILE_NAME, is_stated_in, read_metadata, to_yaml, write_metadata
+from conveyor_sim.bag.messages.qos import LATCHED
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.errors import BagError

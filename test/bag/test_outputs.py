@@ -5,11 +5,11 @@ from pathlib import Path
 
 from bag.small_line import COMMANDS, SMALL_LINE, record
 
-from conveyor_sim.bag.messages import BOOL
+from conveyor_sim.bag.messages.encode import BOOL
+from conveyor_sim.bag.messages.topics import OUTPUTS, photo_eye_topics
+from conveyor_sim.bag.messages.typestore import typestore
 from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.bag.reader import open_bag
-from conveyor_sim.bag.topics import OUTPUTS, photo_eye_topics
-from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.scene import Scene, load_scene
 from conveyor_sim.simulation import Simulation
 

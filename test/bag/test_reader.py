@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from bag.small_line import COMMANDS
 
+from conveyor_sim.bag.messages.topics import OUTPUTS
 from conveyor_sim.bag.reader import open_bag
-from conveyor_sim.bag.topics import OUTPUTS
 from conveyor_sim.errors import BagError
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation

@@ -18,11 +18,11 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from ruamel.yaml import YAML
 
 from conveyor_sim.bag.folder import make_folder
+from conveyor_sim.bag.messages.topics import OUTPUTS
+from conveyor_sim.bag.messages.typestore import type_hash
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recorder import Recorder, new_run_folder, run_folder
 from conveyor_sim.bag.recover import recover
-from conveyor_sim.bag.topics import OUTPUTS
-from conveyor_sim.bag.typestore import type_hash
 from conveyor_sim.errors import BagError
 from conveyor_sim.scene import Scene
 

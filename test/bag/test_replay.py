@@ -12,13 +12,13 @@ from physics.test_force_limits import press
 from rosbags.rosbag2 import StoragePlugin, Writer
 from scenes import NO_OUTPUTS
 
-from conveyor_sim.bag.messages import Header
+from conveyor_sim.bag.messages.encode import Header
+from conveyor_sim.bag.messages.topics import TOPICS
+from conveyor_sim.bag.messages.typestore import typestore
 from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.bag.replay import replay
-from conveyor_sim.bag.topics import TOPICS
-from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.errors import BagError, SceneError
 from conveyor_sim.line.devices.zone import ZoneDevice
 from conveyor_sim.line.run_state import STOPPED, RunState

@@ -13,10 +13,10 @@ import zstandard
 from click.testing import CliRunner
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 
+from conveyor_sim.bag.messages.typestore import typestore
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recover import recover
 from conveyor_sim.bag.replay import replay
-from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.cli import main
 from conveyor_sim.errors import BagError
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from conveyor_sim.bag.topics import OUTPUTS
-from conveyor_sim.bag.typestore import DISTROS, definition, type_hash, typestore
+from conveyor_sim.bag.messages.topics import OUTPUTS
+from conveyor_sim.bag.messages.typestore import DISTROS, definition, type_hash, typestore
 from conveyor_sim.errors import ConveyorError
 
 TYPES = sorted({output.type for output in OUTPUTS.values()})

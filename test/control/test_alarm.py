@@ -1,10 +1,11 @@
-"""What controllers declare of their alarms."""
+"""Declarations of alarms by controllers."""
 
 import json
 from typing import Any
 
 import pytest
 from control.test_jam import alarm
+from facts import stating
 
 from conveyor_sim.control import Alarm, Constant, ControlError, priority, together
 from conveyor_sim.control.jam import JamClearing
@@ -44,13 +45,13 @@ def test_one_that_declares_nothing() -> None:
 def test_what_is_no_declaration(wrong: Any) -> None:
     controller = Declares()
     controller.declared_alarms = wrong
-    with pytest.raises(ControlError, match=r"Declares.declared_alarms: .* given, expected a list or tuple of Alarm"):
+    with pytest.raises(ControlError, match=stating("Declares.declared_alarms", "list or tuple of Alarm")):
         declared_alarms(controller)
 
 
 def test_several_together_declare_what_each_does() -> None:
     assert declared_alarms(together(Declares(A), Constant({}), Declares(B))) == (A, B)
-    with pytest.raises(ControlError, match=r"_Together\.declared_alarms: a declared twice, expected once"):
+    with pytest.raises(ControlError, match=stating("_Together.declared_alarms", "a declared twice")):
         declared_alarms(together(Declares(A), Declares(A)))
     other = Alarm("a", "of the second")
     assert declared_alarms(priority(Declares(A), Declares(other, B))) == (A, B)

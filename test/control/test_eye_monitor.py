@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import pytest
 from control.scans import LENGTH, Beam, Scans, edges_of
+from facts import stating
 
 from conveyor_sim.control import ControlError
 from conveyor_sim.control.eye_monitor import EyeMonitor
@@ -127,5 +128,5 @@ def test_without_a_next_eye_none_is_looked_for() -> None:
 
 
 def test_the_distance_to_the_next_eye_is_needed() -> None:
-    with pytest.raises(ControlError, match="next_after: 0 m given, expected the distance to next, above 0"):
+    with pytest.raises(ControlError, match=stating("next_after", "0 m", "distance", "above 0")):
         EyeMonitor("here", "belt", DIAMETER, next_eye="next")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 from control.scans import Scans
+from facts import stating
 
 from conveyor_sim.control import ControlError
 from conveyor_sim.control.jam import JamAlarm, JamClearing
@@ -92,5 +93,5 @@ def test_help_ends_what_it_could_not_clear(clearing: Scans) -> None:
 
 
 def test_speeds_of_the_wrong_sign_are_refused() -> None:
-    with pytest.raises(ControlError, match=r"back_speed, jog_speed: 0.1 and 0.1 given, expected below 0 and above 0"):
+    with pytest.raises(ControlError, match=stating("back_speed, jog_speed", "0.1 and 0.1", "below 0", "above 0")):
         JamClearing(alarm(), back_speed=0.1)

@@ -9,6 +9,7 @@ from itertools import accumulate
 
 import pytest
 from control.scans import LENGTH, Beam, Scans, edges_of
+from facts import stating
 
 from conveyor_sim.control import ControlError
 from conveyor_sim.control.reject import TrackedReject
@@ -90,5 +91,5 @@ def test_what_was_found_before_the_first_scan_is_not_tracked() -> None:
 
 
 def test_a_stroke_of_nothing_is_refused() -> None:
-    with pytest.raises(ControlError, match="stroke: 0 given, expected more than 0"):
+    with pytest.raises(ControlError, match=stating("stroke", "0", "more than 0")):
         TrackedReject("belt", "machines/look/bad", SEEN, FIRE, 1.0, 0.0, 1000.0)

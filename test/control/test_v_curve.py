@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 from control.scans import Scans
+from facts import stating
 
 from conveyor_sim.control import ControlError
 from conveyor_sim.control.level import Count, Eyes
@@ -72,10 +73,10 @@ def test_two_back_up_eyes_tell_short_at_level_and_over() -> None:
 @pytest.mark.parametrize("margin", [0.0, 0.5])
 def test_a_margin_that_would_stop_a_machine_is_refused(margin: float) -> None:
     machines = (neighbour(LABELLER, "one"), neighbour(PACKER, "two"))
-    with pytest.raises(ControlError, match=f"margin: {margin:g} given, expected more than 0 and less than 0.5"):
+    with pytest.raises(ControlError, match=stating("margin", f"{margin:g}", "more than 0", "less than 0.5")):
         VCurve(FILLER, 10.0, margin, downstream=machines)
 
 
 def test_levels_in_the_wrong_order_are_refused() -> None:
-    with pytest.raises(ControlError, match="low, target, high: 2, 1 and 3 given"):
+    with pytest.raises(ControlError, match=stating("low, target, high", "2, 1 and 3")):
         Neighbour(LABELLER, Count("zones/one/bottles"), 2, 1, 3)

@@ -1,4 +1,4 @@
-"""Ways through a tick, and when on them a circle crosses a segment: against samples and closed forms."""
+"""Paths through a tick, and when a circle on one of them crosses a segment: against samples and closed forms."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from worlds import callable_part
 
-from conveyor_sim.engine.arrays.beams import LightBeams, Ways
+from conveyor_sim.engine.arrays.beams import BottleMotion, LightBeams
 from conveyor_sim.engine.sensors.beams import BLOCKED, CHANGES, CHORDS, FREE, block_beams
 from conveyor_sim.engine.sensors.beams import cubic as cubic_part
 from conveyor_sim.engine.sensors.beams import within_reach as within_reach_part
@@ -18,12 +18,12 @@ F8 = NDArray[np.float64]
 
 
 def distance(along: F8, aside: F8, length: F8 | float) -> F8:
-    """From points to a segment."""
+    """Return distances of points from a segment."""
     return np.hypot(along - np.clip(along, 0.0, length), aside)
 
 
 def test_a_chord_is_within_reach_from_where_to_where() -> None:
-    """Random chords and segments, some along it, some that stand: the bounds, and a sample of points between."""
+    """Random chords and segments, some collinear, some without motion: the bounds, and a sample of points between."""
     rng = np.random.default_rng(5)
     k = 4000
     along, aside = rng.uniform(-1.5, 2.5, (2, k)), rng.uniform(-1.5, 1.5, (2, k))
@@ -47,7 +47,7 @@ def test_a_chord_is_within_reach_from_where_to_where() -> None:
 
 
 def test_a_way_is_the_cubic_through_its_control_points() -> None:
-    """Exact for constant and for evenly changing acceleration; what stands stays to the last bit."""
+    """The cubic is exact for constant and for linear acceleration; a point at rest stays constant to the last bit."""
     h, shares = 0.01, np.arange(CHORDS + 1) / CHORDS
     for c in ([0.1, 0.5, 3.0, -40.0], [0.3, -0.2, 1.0, 70.0], [0.7, 0.0, 0.0, 0.0]):
         begin, end = c[0], float(np.polyval(c[::-1], h))
@@ -58,19 +58,19 @@ def test_a_way_is_the_cubic_through_its_control_points() -> None:
 
 
 LENGTH = 0.01
-"""s, of a tick."""
+"""Duration of a tick, s."""
 ENDS = np.array([[[-0.1, 0.0], [0.1, 0.02]], [[0.05, -0.1], [0.05, 0.1]], [[0.19, 0.19], [0.2, 0.2]]])
-"""m, of three beams."""
+"""Ends of three beams, m."""
 
 
 def blocked(start: F8, end: F8, radius: F8, ids: NDArray[np.int64], room: int) -> tuple[list[F8], list[int]]:
-    """Spans and state of each beam; start, end: x, y, vx, vy by slot."""
+    """Return spans and state of each beam; start, end: x, y, vx, vy by slot."""
     low, high, way = ENDS.min(axis=1), ENDS.max(axis=1), ENDS[:, 1] - ENDS[:, 0]
     length = np.hypot(*way.T)[:, None]
     line = np.hstack((ENDS[:, 0], low, high, way / length, length))
     near, spans = np.empty((2, room), np.int64), np.empty((len(ENDS), room, 2))
     beams = LightBeams(line, near, spans, np.empty(len(ENDS), np.int64), np.empty(len(ENDS), np.int64))
-    while short := block_beams(Ways(start, *end, radius, ids), LENGTH, beams):
+    while short := block_beams(BottleMotion(start, *end, radius, ids), LENGTH, beams):
         if short == 1:
             beams = beams._replace(near=np.empty((2, 2 * beams.near.shape[1]), np.int64))
         else:
@@ -79,7 +79,7 @@ def blocked(start: F8, end: F8, radius: F8, ids: NDArray[np.int64], room: int) -
 
 
 def test_a_beam_is_blocked_while_any_way_is_within_reach_of_it() -> None:
-    """Random ways, some that stand, some of nobody: spans against samples of the cubics, state against spans."""
+    """Random paths, some without motion, some of free slots: spans against samples, state against spans."""
     rng = np.random.default_rng(11)
     slots, seen = 12, [0, 0, 0]
     shares = np.linspace(0.0, 1.0, 401)[:, None]
@@ -91,7 +91,7 @@ def test_a_beam_is_blocked_while_any_way_is_within_reach_of_it() -> None:
         x, y = x0 + 0.5 * LENGTH * (vx0 + vx), y0 + LENGTH * vy0
         radius, ids = rng.uniform(0.01, 0.05, slots), np.where(rng.random(slots) < 0.5, np.arange(slots), -1)
         spans, state = blocked(np.stack((x0, y0, vx0, vy0)), np.stack((x, y, vx, vy)), radius, ids, room=1)
-        # Constant acceleration: the cubic is the parabola.
+        # With constant acceleration the cubic is a parabola.
         time = shares * LENGTH
         way_x, way_y = x0 + time * (vx0 + 0.5 * time * (vx - vx0) / LENGTH), y0 + time * vy0
         for beam, (begin, end) in enumerate(ENDS):
@@ -102,7 +102,7 @@ def test_a_beam_is_blocked_while_any_way_is_within_reach_of_it() -> None:
             inside = np.zeros(len(shares), dtype=bool)
             for first, last in spans[beam]:
                 inside |= (first <= time[:, 0]) & (time[:, 0] <= last)
-            slack = 1e-6  # m, by which eight chords leave such ways
+            slack = 1e-6  # m, largest deviation of eight chords from such paths
             assert inside[((beyond < -slack) & (ids >= 0)).any(axis=1)].all()
             assert not inside[((beyond > slack) | (ids < 0)).all(axis=1)].any()
             whole = spans[beam].shape[0] == 1 and spans[beam].tolist() == [[0.0, LENGTH]]

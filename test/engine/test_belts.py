@@ -1,4 +1,4 @@
-"""Which belt carries: the last listed one under the axis, else the floor; looked up and within the skin."""
+"""The belt that carries a bottle: the last listed one under the axis, else the floor; by search and within the skin."""
 
 import math
 from typing import Any
@@ -43,7 +43,7 @@ def plant(belts: dict[str, Any] | None = None) -> Scene:
 
 
 def expected_carriers(points: np.ndarray, belts: dict[str, Any]) -> np.ndarray:
-    """Equations (11)-(15) and the sector about the centre, angles modulo a turn; -1 for the floor."""
+    """Return carriers by equations (11)-(15) and the sector about the centre, angles modulo a turn; -1: floor."""
     found = np.full(len(points), -1)
     for index, shape in enumerate(belts.values()):
         if shape["kind"] == "straight":
@@ -76,7 +76,7 @@ def test_the_last_listed_belt_under_the_axis_carries() -> None:
 
 
 def test_it_is_found_anew_wherever_a_bottle_moves_within_the_skin() -> None:
-    """Lists stay as they are until a bottle has moved by half the skin; until then they must hold."""
+    """Lists are constant until a bottle has moved by half the skin; until then they must hold."""
     points = RANDOM.uniform(-1.2, 1.2, (4000, 2))
     state = state_of(plant(), points)
     for _ in range(5):
@@ -89,14 +89,14 @@ def test_it_is_found_anew_wherever_a_bottle_moves_within_the_skin() -> None:
 @pytest.mark.parametrize("start", [0.0, 3.0, -3.1, 9.0])
 @pytest.mark.parametrize("span", [0.5, math.pi, 4.0, 2.0 * math.pi])
 def test_a_sector_wherever_it_starts(start: float, span: float) -> None:
-    """Across +-pi, beyond half a turn, a full turn."""
+    """Sectors across +-pi, beyond half a turn, and a full turn."""
     belts = {"one": curved((0.3, -0.2), 0.2, 0.4, start, span), "far": belt(0.0, (5.0, 5.0), 1.0, 1.0)}
     points = RANDOM.uniform(-0.6, 1.2, (1500, 2))
     np.testing.assert_array_equal(carriers(state_of(plant(belts), points), 1500), expected_carriers(points, belts))
 
 
 def test_two_points_and_a_side_give_the_same_sector_as_its_angles() -> None:
-    """Positive speed runs from `from` to `to` where the centre lies on the left."""
+    """Positive speed runs from `from` to `to` if the centre lies on the left."""
     centre, inner, start, span = np.array([0.3, -0.2]), 0.5, 2.6, 1.4
     ends = [centre + inner * np.array([math.cos(a), math.sin(a)]) for a in (start, start + span)]
     common = {"kind": "curved", "inner_radius": inner, "width": 0.2, "material": "chain"}
@@ -116,7 +116,7 @@ def test_edges_belong_to_a_belt() -> None:
 
 
 def test_surface_velocities() -> None:
-    """Uniform on a straight belt, Omega x (r - C) on a curved one, the speed at the centre line; the floor rests."""
+    """Velocities are uniform on a straight belt and Omega x (r - C) on a curved one; the floor rests."""
     belts = {"one": belt(0.3, (1.0, 2.0), 2.0, 1.0, angle=0.7), "bend": curved((0.2, -0.1), 0.4, 0.2, 1.0, 3.0, -0.6)}
     sim = Simulation(plant(belts))
     sim.advance()

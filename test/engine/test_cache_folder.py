@@ -1,4 +1,4 @@
-"""The folder of compiled kernels: no other user can have put anything there."""
+"""Folder of compiled kernels: no other user can add a file to it."""
 
 import os
 import pickle
@@ -26,7 +26,7 @@ print(contact_force(law, np.uint64(0), None, 0.01, None, 0.002, 1.0, 0.0, 1.0, N
 
 
 class Intrusion:
-    """Unpickled, it leaves a trace."""
+    """Leaves a trace when it is unpickled."""
 
     def __init__(self, trace: Path) -> None:
         self._trace = trace
@@ -41,7 +41,7 @@ def mode(folder: Path) -> int:
 
 @pytest.fixture
 def base(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Folder of the caches of all programs."""
+    """Return the folder of the caches of all programs."""
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "caches"))
     return tmp_path / "caches"
 
@@ -131,7 +131,7 @@ def force(folder: Path, **environment: str) -> subprocess.CompletedProcess[str]:
 
 @pytest.fixture(scope="module")
 def filled(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Folder of caches with one kernel."""
+    """Return a folder of caches with one kernel."""
     folder = tmp_path_factory.mktemp("filled")
     force(folder)
     assert list(folder.rglob("*.kernel"))
@@ -173,7 +173,7 @@ def test_damage_in_every_file_is_compiled_away(filled: Path) -> None:
         path.write_bytes(content)
     damaged = force(filled)
     assert damaged.stdout == "-3.0\n"
-    assert damaged.stderr.count(" cached kernel not used, for it is damaged; compiling it again\n") == len(files)
+    assert damaged.stderr.count(" cached kernel not used because it is damaged; compiling it again\n") == len(files)
     again = force(filled)
     assert again.stdout == "-3.0\n"
     assert "not used" not in again.stderr

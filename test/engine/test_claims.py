@@ -1,4 +1,4 @@
-"""Of processes that want a kernel at the same time, one compiles it."""
+"""Claims: if several processes need a kernel at the same time, one compiles it."""
 
 import signal
 import subprocess
@@ -15,7 +15,7 @@ from conveyor_sim.engine.compiler.kernel_folder import KernelFolder
 from conveyor_sim.engine.compiler.numba_internals.dispatcher import kernel_dispatcher
 from conveyor_sim.engine.compiler.numba_internals.kernel_cache import KernelCache
 
-# It says when it waits: before the second look, for the first comes before it reads.
+# Prints "waits" before the second look, because the first look comes before it reads.
 WANTING = """
 import sys
 from pathlib import Path
@@ -57,7 +57,7 @@ sys.stdin.read()
 
 @pytest.fixture
 def start(tmp_path: Path) -> Iterator[Callable[..., "subprocess.Popen[str]"]]:
-    """Starts a program of those above."""
+    """Yield a function that starts one of the programs above."""
     processes = []
 
     def started(program: str, *arguments: str) -> "subprocess.Popen[str]":
@@ -75,7 +75,7 @@ def start(tmp_path: Path) -> Iterator[Callable[..., "subprocess.Popen[str]"]]:
 
 @pytest.fixture
 def kernel(tmp_path: Path, start: Callable[..., "subprocess.Popen[str]"]) -> Path:
-    """The file that the program makes."""
+    """Return the file that the program makes."""
     (tmp_path / "kernels").mkdir()
     assert start(WANTING, str(tmp_path / "kernels")).communicate()[0] == "0 loaded, 1 compiled\n"
     (found,) = (tmp_path / "kernels").glob("*.kernel")

@@ -1,4 +1,4 @@
-"""Compiled kernels: kept on disk, and never served to sources that have changed."""
+"""Compiled kernels are cached on disk, and never used for sources that have changed."""
 
 import os
 import shutil
@@ -52,14 +52,14 @@ print(len(said))
 
 @pytest.fixture
 def copied(tmp_path: Path) -> Path:
-    """A folder with a copy of the package, to edit."""
+    """Return a folder with a copy of the package, to edit."""
     source = Path(conveyor_sim.__file__).parent
     shutil.copytree(source, tmp_path / "conveyor_sim", ignore=shutil.ignore_patterns("__pycache__"))
     return tmp_path
 
 
 def python(folder: Path, code: str, **variables: str) -> list[str]:
-    """Output of a new interpreter that imports from a folder, with its cache there unless said otherwise."""
+    """Return the output of a new interpreter that imports from a folder and has its cache there by default."""
     kept = {key: value for key, value in os.environ.items() if key not in ("XDG_CACHE_HOME", "NUMBA_CACHE_DIR")}
     environment = {
         **kept,
@@ -74,7 +74,7 @@ def python(folder: Path, code: str, **variables: str) -> list[str]:
 
 
 def test_an_edit_in_a_helper_reaches_its_callers(copied: Path) -> None:
-    """The cache of `contact.py` would hold, by numba's own rule, when only `friction.py` changes."""
+    """Numba's own rule would use the cache of `contact.py` if only `friction.py` changes."""
     assert python(copied, FORCE) == ["-3.0", "0", "1"]
     assert python(copied, FORCE) == ["-3.0", "1", "0"]
     friction = copied / "conveyor_sim" / "engine" / "contact" / "friction.py"
@@ -87,16 +87,16 @@ def test_an_edit_in_a_helper_reaches_its_callers(copied: Path) -> None:
 
 
 def hash_of(folder: Path) -> str:
-    """Of the engine's sources in a folder, with what is kept of it left as it is."""
+    """Return the hash of the engine's sources in a folder; the cached hash stays."""
     return python(folder, "from conveyor_sim.engine.compiler.compile import ENGINE_HASH as h; print(h)")[0]
 
 
 def test_a_better_comment_throws_no_kernels_away(copied: Path) -> None:
-    """The hash is over what the sources do: comments, docstrings and layout are nothing to it."""
+    """The hash is over the syntax of sources, without comments, docstrings and layout."""
     friction, before = copied / "conveyor_sim" / "engine" / "contact" / "friction.py", hash_of(copied)
     text = friction.read_text()
     friction.write_text(
-        text.replace("Two curves p", "Two better curves p", 1).replace("\n\n\n", "\n\n\n# Better.\n", 1)
+        text.replace("two curves p", "two better curves p", 1).replace("\n\n\n", "\n\n\n# Better.\n", 1)
     )
     assert len(friction.read_text()) == len(text) + len("better ") + len("# Better.\n")
     assert hash_of(copied) == before
@@ -117,7 +117,7 @@ def test_a_kept_hash_that_is_damaged_is_found_again(copied: Path) -> None:
 
 
 def test_a_second_process_compiles_nothing(copied: Path) -> None:
-    """And the first has a process of its own compile for it."""
+    """The first process has another process compile for it."""
     for said in (1, 0):
         hits, misses, sentences = (int(number) for number in python(copied, RUN))
         assert hits >= 3

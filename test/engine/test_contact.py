@@ -1,4 +1,4 @@
-"""The force in one contact: each law by itself, and how they add up."""
+"""Force in one contact: each law by itself, and their sums."""
 
 import math
 from typing import Any
@@ -22,7 +22,7 @@ LINE = Curves(np.array([0, 2], np.uint32), np.array([0.0, 0.01]), np.array([0.0,
 
 
 def law(**columns: float) -> ContactLaw:
-    """Entry 1 of two has the coefficients; no column for the rest."""
+    """Return a law with coefficients in entry 1 of two, without columns for other laws."""
     flat: dict[str, Any] = dict.fromkeys(ContactLaw._fields)
     for name, value in columns.items():
         flat[name] = np.array([-1.0, value]) if name != "curve" else np.array([-1, value], np.int32)
@@ -40,32 +40,32 @@ def force(
 
 
 def test_the_linear_spring_alone() -> None:
-    """N = k delta (23), in the share that the contact has; nothing along the tangent."""
+    """N = k delta (23), times the share of the contact; nothing along the tangent."""
     assert force(0.002, closing=0.5, slip=1.0) == (K * 0.002, 0.0)
     assert force(0.002, share=0.25) == (K * 0.002 * 0.25, 0.0)
 
 
 def test_hertz() -> None:
-    """N = k_h delta^1.5, the power from square roots alone."""
+    """N = k_h delta^1.5, with the power from square roots alone."""
     for overlap in (1e-9, 1e-4, 0.002):
         assert force(overlap, 0.5, 1.0, hertz=K_HERTZ) == (pytest.approx(K_HERTZ * overlap**1.5, rel=1e-15), 0.0)
 
 
 def test_a_table_that_is_a_line_is_the_linear_spring() -> None:
-    """The same law by another way, damping and friction included."""
+    """A table with the points of a line gives the same force, damping and friction included."""
     for overlap in (0.0, 0.002, 0.03):
         expected = force(overlap, 0.5, 0.3, stiffness=K, damping_normal=C, friction=MU)
         assert force(overlap, 0.5, 0.3, curves=LINE, curve=0, damping_normal=C, friction=MU) == pytest.approx(expected)
 
 
 def test_elastic_laws_of_other_pairs_add_nothing() -> None:
-    """A pair has one elastic law; of the others it has 0, or -1 for a table."""
+    """A pair has one elastic law; the columns of the others hold 0, or -1 for a table."""
     mixed = force(0.002, stiffness=K, hertz=0.0, curve=-1, curves=LINE)
     assert mixed == force(0.002)
 
 
 def test_paper_damping_is_isotropic_and_not_clamped() -> None:
-    """-c v* (22): also against the slip, and it pulls at the end of a rebound."""
+    """-c v* (22) acts against the slip, too, and pulls at the end of a rebound."""
     paper = {"stiffness": K, "damping_paper": C}
     assert force(0.002, 0.5, -0.4, **paper) == (pytest.approx(K * 0.002 + C * 0.5), pytest.approx(C * 0.4))
     assert force(0.0001, -0.5, **paper)[0] == pytest.approx(K * 0.0001 - C * 0.5)
@@ -73,7 +73,7 @@ def test_paper_damping_is_isotropic_and_not_clamped() -> None:
 
 
 def test_normal_damping() -> None:
-    """N = k delta + c v_n, and none along the tangent."""
+    """N = k delta + c v_n, and no force along the tangent."""
     assert force(0.002, 0.5, -0.4, stiffness=K, damping_normal=C) == (pytest.approx(K * 0.002 + C * 0.5), 0.0)
 
 
@@ -85,7 +85,7 @@ def test_tsuji_damping() -> None:
 
 @pytest.mark.parametrize("elastic", [{"stiffness": K}, {"hertz": K_HERTZ}])
 def test_onset_damping(elastic: dict[str, float]) -> None:
-    """N = N_elastic (1 + lambda v_n) (Hunt and Crossley 1975): it starts at nothing, with any elastic law."""
+    """N = N_elastic (1 + lambda v_n) (Hunt and Crossley 1975): it starts at zero, with any elastic law."""
     bare = force(0.002, **elastic)[0]
     assert force(0.002, 0.5, -0.4, damping_onset=0.8, **elastic) == (pytest.approx(bare * (1.0 + 0.8 * 0.5)), 0.0)
     assert force(1e-12, 0.5, damping_onset=0.8, **elastic)[0] < 1e-7
@@ -93,7 +93,7 @@ def test_onset_damping(elastic: dict[str, float]) -> None:
 
 @pytest.mark.parametrize("damping", ["damping_normal", "damping_tsuji", "damping_onset"])
 def test_damping_that_never_pulls(damping: str) -> None:
-    """All but the paper's: the total normal force is clamped at 0, friction with it."""
+    """For all laws but the paper's, the total normal force is clamped at 0, and friction with it."""
     assert force(1e-5, -80.0, 0.3, stiffness=K, friction=MU, **{damping: C}) == (0.0, 0.0)
 
 
@@ -110,7 +110,7 @@ def test_friction_acts_against_the_slip_with_the_damped_normal_force(slip: float
 
 
 def test_a_contact_that_pulls_has_no_friction() -> None:
-    """Coulomb's law takes the clamped normal force; the paper's damping goes on along the tangent."""
+    """Coulomb's law uses the clamped normal force; the paper's damping continues along the tangent."""
     normal, tangential = force(0.0001, -0.5, 0.3, stiffness=K, friction=MU, damping_paper=C)
     assert normal < 0.0
     assert tangential == pytest.approx(-C * 0.3)
@@ -125,7 +125,7 @@ def test_both_dampings_in_one_table() -> None:
 
 
 def test_a_share_scales_the_whole_law() -> None:
-    """Two pieces in line that halve one contact push as one, whatever the law."""
+    """Two collinear pieces that halve one contact push as one, for any law."""
     columns = {"hertz": K_HERTZ, "damping_tsuji": C, "friction": MU, "tangential_stiffness": 400.0}
     whole = force(0.002, 0.5, 1e-3, spring=1e-4, **columns)
     half = force(0.002, 0.5, 1e-3, 0.5, spring=1e-4, **columns)
@@ -133,7 +133,7 @@ def test_a_share_scales_the_whole_law() -> None:
 
 
 def test_implicit_friction_takes_the_slip_after_the_step() -> None:
-    """T dt/m_t is what the slip loses: s + b v_lim p(s) = s_0 with mu N p(s) = -T."""
+    """T dt/m_t is the loss of slip: s + b v_lim p(s) = s_0 with mu N p(s) = -T."""
     compliance, slip = 5e-4, 0.6 * LIMIT
     normal, tangential = force(0.002, 0.5, slip, implicit=(compliance, 0.0), stiffness=K, friction=MU, damping_normal=C)
     after = slip + compliance * tangential
@@ -142,7 +142,7 @@ def test_implicit_friction_takes_the_slip_after_the_step() -> None:
 
 
 def test_implicit_friction_of_a_small_ease_is_the_explicit_one() -> None:
-    """Up to b = at_once friction takes the slip as it is; beyond, it looks ahead by what b is more."""
+    """Up to b = at_once friction uses the present slip; beyond, it looks ahead by the excess of b."""
     slip = 0.6 * LIMIT
     columns = {"stiffness": K, "friction": MU}
     normal, explicit = force(0.002, 0.0, slip, **columns)
@@ -153,7 +153,7 @@ def test_implicit_friction_of_a_small_ease_is_the_explicit_one() -> None:
 
 
 def test_the_tangential_spring_holds_up_to_coulombs_limit() -> None:
-    """T = -(k_t xi + c_t s), mu N at most in size; a pair without one keeps the friction curve."""
+    """T = -(k_t xi + c_t s), at most mu N in size; a pair without a spring uses the friction curve."""
     spring = {"stiffness": K, "friction": MU, "tangential_stiffness": 4000.0, "tangential_damping": 6.0}
     assert force(0.002, slip=0.01, spring=2e-4, **spring)[1] == pytest.approx(-(4000.0 * 2e-4 + 6.0 * 0.01))
     assert force(0.002, slip=0.0, spring=-2e-4, **spring)[1] == pytest.approx(4000.0 * 2e-4)
@@ -164,7 +164,7 @@ def test_the_tangential_spring_holds_up_to_coulombs_limit() -> None:
 
 
 def test_the_spring_goes_with_the_slip_and_no_further_than_it_can_hold() -> None:
-    """xi + dt s; cut to mu N/k_t while the contact slides, forgotten without a normal force."""
+    """The elongation is xi + dt s, cut to mu N/k_t while the contact slides, and reset without a normal force."""
     spring = law(friction=MU, tangential_stiffness=4000.0)
     assert spring_after(spring, 1, 1e-4, 0.002, 0.02, 1e-3, 10.0, 1.0) == pytest.approx(1e-4 + 0.02 * 1e-3)
     for sign in (-1.0, 1.0):
@@ -180,7 +180,7 @@ MINDLIN = {"hertz": K_HERTZ, "friction": MU, "tangential_stiffness": 0.0, "tange
 
 
 def test_mindlins_spring_stiffens_with_the_overlap() -> None:
-    """k_t = 0.8 dN/d delta, for 1.5 x 0.8 = 1.2; a pair of the scene that has none keeps the friction curve."""
+    """k_t = 0.8 dN/d delta, for 1.5 x 0.8 = 1.2; a pair of the scene without it uses the friction curve."""
     for overlap in (0.0005, 0.002):
         normal = K_HERTZ * overlap**1.5
         assert force(overlap, spring=1e-5, **MINDLIN)[1] == pytest.approx(-0.8 * 1.5 * normal / overlap * 1e-5)
@@ -190,12 +190,12 @@ def test_mindlins_spring_stiffens_with_the_overlap() -> None:
 
 
 def test_a_spring_that_stiffens_keeps_its_force_and_one_that_softens_its_elongation() -> None:
-    """So it never gains energy by itself, and is slack where a contact begins."""
+    """So a spring never gains energy by itself, and is without load when a contact begins."""
     given, xi = law(**MINDLIN), 1e-5
     depth, before, after = 0.0020, 0.0019, 0.0021
     stiffer = carried(given, 1, xi, depth, depth - before, 0.0)
     assert stiffer * math.sqrt(depth) == pytest.approx(xi * math.sqrt(before))
-    # The force goes on by the mean stiffness times the way.
+    # The force grows by the mean stiffness times the displacement.
     way = 3e-6
     force_after = (carried(given, 1, xi, depth, depth - before, way) + way) * math.sqrt(depth)
     mean = 0.5 * (math.sqrt(before) + math.sqrt(depth))
@@ -217,7 +217,7 @@ EVERYTHING = {
 
 @pytest.mark.parametrize("overlap", [0.0, -0.0, -1e-300, -0.004])
 def test_apart_there_is_no_force_at_all(overlap: float) -> None:
-    """Exactly 0 from every law, whatever the velocities: loops add it up for all listed pairs."""
+    """Every law gives exactly 0, at any velocities, because loops add it up for all listed pairs."""
     for closing in (-3.0, 0.0, 3.0):
         for slip in (-3.0, 0.0, 1e-3):
             assert force(overlap, closing, slip, **EVERYTHING, spring=0.01, implicit=(1e-3, 0.5)) == (0.0, 0.0)
@@ -233,7 +233,7 @@ def test_what_is_not_a_number_stays_visible() -> None:
 
 @pytest.mark.parametrize("share", [0.2, 0.5, 1.0])
 def test_a_share_of_a_contact_slides_at_mu_times_what_it_presses_with(share: float) -> None:
-    """What a long slip leaves of the spring holds mu N of that share, no less."""
+    """After a long slip the spring holds mu N of that share."""
     given = {"stiffness": K, "friction": MU, "tangential_stiffness": 4000.0}
     normal = force(0.002, share=share, **given)[0]
     held = spring_after(law(**given), 1, 0.0, 0.002, 1.0, 1.0, normal, share)

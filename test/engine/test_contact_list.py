@@ -1,4 +1,4 @@
-"""The list of contacts: what it says is what acts."""
+"""The list of contacts agrees with the forces that act."""
 
 import math
 
@@ -11,8 +11,8 @@ from conveyor_sim.simulation import Simulation
 
 
 def test_listed_forces_sum_up_to_the_forces_that_act() -> None:
-    """Per bottle: contacts plus base friction is the load of the force evaluation; moments likewise."""
-    # Leapfrog asks belts for their velocity at mid-step; here it is computed for the positions that there are.
+    """Per bottle, contacts plus base friction are the load of the force evaluation; moments likewise."""
+    # Leapfrog uses the belt's velocity at mid-step; here it is computed for the present positions.
     sim = simulation(**line(accuracy={"per_tick": 50, "integrator": "semi_implicit_euler"}))
     sim.command(["belts/end/cmd_speed", "belts/feeder/cmd_speed"], [0.05, 0.8])
     met = {0: 0, 1: 0}
@@ -63,7 +63,7 @@ def assert_listed_forces_act(sim: Simulation) -> None:
 
 
 def test_newtons_third_law_in_the_sums() -> None:
-    """Contacts among bottles alone: the loads of all bottles add up to nothing."""
+    """With contacts among bottles alone, the loads of all bottles add up to zero."""
     rng = np.random.default_rng(1)
     fields = {"contacts": [contact(5000.0, damping=("paper", 1.0), friction=0.3)], "floor": "none"}
     count = 200
@@ -86,7 +86,7 @@ def test_newtons_third_law_in_the_sums() -> None:
 
 
 def test_a_contact_of_two_bottles() -> None:
-    """Entry by entry: the point in the middle of the overlap, the normal from a to b, N = k delta, T."""
+    """Entries: the point in the middle of the overlap, the normal from a to b, N = k delta, T."""
     gap = np.array([0.6, 0.8]) * (2.0 * RADIUS - 0.004)
     fields = {"contacts": [contact(5000.0, friction=0.3)], "floor": "none"}
     state = state_of(
@@ -104,12 +104,12 @@ def test_a_contact_of_two_bottles() -> None:
     np.testing.assert_allclose([found.nx[0], found.ny[0]], [0.6, 0.8])
     assert found.overlap[0] == pytest.approx(0.004)
     assert found.normal_force[0] == pytest.approx(20.0)
-    # b moves along t = (-0.8, 0.6) and takes a with it.
+    # b moves along t = (-0.8, 0.6) and drags a along.
     assert found.tangential_force[0] == pytest.approx(0.3 * 20.0)
 
 
 def test_a_contact_of_a_bottle_and_a_rail() -> None:
-    """b is the rail's index; the point is the rail's nearest; T on the bottle against its slip along (-ny, nx)."""
+    """b is the rail's index; the point is the rail's nearest; T on the bottle opposes its slip along (-ny, nx)."""
     fields = {
         "contacts": [contact(5000.0, "steel", friction=0.3)],
         "floor": "none",
@@ -122,12 +122,12 @@ def test_a_contact_of_a_bottle_and_a_rail() -> None:
     assert (found.kind.tolist(), found.a.tolist(), found.b.tolist()) == ([1], [0], [1])
     np.testing.assert_allclose([found.x[0], found.y[0], found.nx[0], found.ny[0]], [0.3, -1.0, 0.0, -1.0], atol=1e-12)
     assert found.normal_force[0] == pytest.approx(10.0)
-    # The tangent is (1, 0): friction holds the bottle back.
+    # The tangent is (1, 0): friction retards the bottle.
     assert found.tangential_force[0] == pytest.approx(-3.0)
 
 
 def test_more_contacts_than_the_first_room() -> None:
-    """The list is as long as it must be, in the order of pairs, and reading it changes nothing."""
+    """The list is as long as necessary, in the order of pairs, and reading it changes nothing."""
     fields = {"contacts": [contact(5000.0, friction=0.3)], "floor": "none"}
     origin = {"type": "bottle", "origin": [0.0, 0.0], "rows": 12, "columns": 12, "pitch": 2.0 * RADIUS - 5e-10}
     sim = Simulation(scene(bottles=[{"grid": origin}], **fields))

@@ -19,30 +19,30 @@ def curve_force(curves: Curves, c: int, overlap: float) -> float:
 
 
 def test_between_its_points_it_is_linear() -> None:
-    """As numpy interpolates, the points themselves included."""
+    """The table agrees with numpy's interpolation, points included."""
     for overlap in np.concatenate([np.linspace(0.0, 0.005, 101), OVERLAP[1:4]]):
         expected = np.interp(overlap, OVERLAP[:4], FORCE[:4])
         assert curve_force(CURVES, 0, float(overlap)) == pytest.approx(expected, rel=1e-14, abs=1e-15)
 
 
 def test_beyond_the_last_point_its_slope_goes_on() -> None:
-    """Into an overlap that nobody measured, 20 kN/m here."""
+    """The last slope, 20 kN/m here, continues beyond the table."""
     assert curve_force(CURVES, 0, 0.008) == pytest.approx(70.0 + 20e3 * 0.003)
 
 
 def test_each_curve_for_itself() -> None:
-    """The second table starts where the first one ends."""
+    """The second table starts at the end of the first one."""
     for overlap in (0.0005, 0.004, 0.1):
         assert curve_force(CURVES, 1, overlap) == pytest.approx(5e3 * overlap)
 
 
 def test_without_a_curve_or_a_contact_there_is_no_force() -> None:
-    """Exactly 0, as a sum of laws needs."""
+    """The result is exactly 0, as a sum of laws requires."""
     assert curve_force(CURVES, -1, 0.003) == 0.0
     assert curve_force(CURVES, 0, 0.0) == 0.0
     assert curve_force(CURVES, 0, -0.003) == 0.0
 
 
 def test_an_overlap_that_is_not_a_number_stays_visible() -> None:
-    """NaN in, NaN out."""
+    """NaN stays NaN."""
     assert np.isnan(curve_force(CURVES, 0, float("nan")))

@@ -1,4 +1,4 @@
-"""The reference integrator: against SciPy's, against closed forms, and where force jumps or is not a number."""
+"""The reference integrator: against SciPy's, against closed forms, with jumps of the force and with NaN."""
 
 from __future__ import annotations
 
@@ -40,9 +40,9 @@ F8 = NDArray[np.float64]
 Gap = Callable[[F8], float]
 
 CONTACT_TIME = 0.002
-"""s, undamped."""
+"""Duration of an undamped contact, s."""
 SPEED = 0.7
-"""m/s, of approach."""
+"""Speed of approach, m/s."""
 ZETA = 0.3
 STIFFNESS = stiffness_for(CONTACT_TIME, MASS / 2.0)
 DASHPOT = 2.0 * ZETA * math.sqrt(STIFFNESS * MASS / 2.0)
@@ -52,16 +52,16 @@ LAWS: dict[str, dict[str, Any]] = {
     "clamped_dashpot": {"stiffness": STIFFNESS, "damping": {"law": "normal", "coefficient": DASHPOT}},
     "Hertz": {"hertz_stiffness": 40.0 * STIFFNESS},
 }
-"""By material."""
+"""Contacts by material."""
 OTHERS: list[dict[str, Any]] = [
     {"table": [[1e-3, 1.0], [2e-3, 4.0]]},
     {"hertz_stiffness": 1e5, "damping": {"law": "normal", "restitution": 0.5}},
     {"stiffness": 1e3, "damping": {"law": "onset", "restitution": 0.5, "speed": SPEED}, "friction": 0.1},
     {"hertz_stiffness": 1e5, "damping": {"law": "viscoelastic", "restitution": 0.5, "speed": SPEED}},
 ]
-"""Of materials that never meet: with them it is the set of effects of `every_law`, that is of its kernels."""
+"""Contacts of materials that never meet. With them the set of effects, and so of kernels, is that of `every_law`."""
 _ROOT = math.sqrt(1.0 - ZETA**2)
-# Clamped, the force ends at tan(wd t) = 2 zeta sqrt(1 - zeta^2) / (2 zeta^2 - 1): test/physics/test_head_on.py.
+# A clamped force ends at tan(wd t) = 2 zeta sqrt(1 - zeta^2) / (2 zeta^2 - 1): test/physics/test_head_on.py.
 _ANGLE = math.atan2(2.0 * ZETA * _ROOT, 2.0 * ZETA**2 - 1.0)
 RESTITUTION = {
     "undamped": 1.0,
@@ -72,13 +72,13 @@ RESTITUTION = {
 
 
 class Line:
-    """The forces of a scene as SciPy wants them: y holds x, y, theta, vx, vy, omega of all bottles, one by one."""
+    """Forces of a scene for SciPy: y holds x, y, theta, vx, vy, omega of all bottles, one after the other."""
 
     def __init__(self, sim: Simulation) -> None:
         self.state, self.start = sim._state, columns(sim.bottles())
 
     def __call__(self, _time: float, y: F8) -> F8:
-        """dy/dt, by the engine's forces."""
+        """Return dy/dt, by the engine's forces."""
         world, n = self.state.world, y.size // 6
         _, _, _, vx, vy, omega = y.reshape(6, n)
         for column, values in zip(("x", "y", "theta", "vx", "vy", "omega"), y.reshape(6, n), strict=True):
@@ -91,7 +91,7 @@ class Line:
         return np.concatenate([vx, vy, omega, world.load.fx[:n] * inverse, world.load.fy[:n] * inverse, turn])
 
     def end(self, time: float, method: str, gaps: list[Gap], rtol: float, longest: float) -> F8:
-        """The state after `time` (s). Where a gap (m) changes sign the force jumps: integration begins anew there."""
+        """Return the state after `time` (s). The force jumps where a gap (m) changes sign: integration restarts."""
         now, y = 0.0, self.start
         events = [_event(gap) for gap in gaps]
         while now < time:
@@ -101,7 +101,7 @@ class Line:
             assert found.success, found.message
             now, y = float(found.t[-1]), found.y[:, -1]
             if now < time:
-                # A little beyond the sign change, or it would be found again.
+                # Slightly beyond the sign change, otherwise it would be detected again.
                 y = y + 1e-12 * self(now, y)
                 now += 1e-12
         return y
@@ -116,22 +116,22 @@ def _event(gap: Gap) -> Any:
 
 
 def columns(bottles: Any) -> F8:
-    """The state of all bottles as SciPy wants it."""
+    """Return the state of all bottles in SciPy's form."""
     return np.concatenate([bottles.x, bottles.y, bottles.theta, bottles.vx, bottles.vy, bottles.omega])
 
 
 def apart(count: int, i: int, j: int) -> Gap:
-    """Gap between two of `count` bottles, m."""
+    """Return a function for the gap between two of `count` bottles, m."""
     return lambda y: math.hypot(y[j] - y[i], y[count + j] - y[count + i]) - 2.0 * RADIUS
 
 
 def beyond(index: int, place: float) -> Gap:
-    """How far the coordinate at an index is beyond a place, m."""
+    """Return a function for the distance of a coordinate beyond a place, m."""
     return lambda y: float(y[index] - place)
 
 
 def oblique() -> tuple[Scene, list[Gap]]:
-    """Two bottles obliquely: the paper's dashpot, friction that slides and sticks, spin."""
+    """Return an oblique impact of two bottles: the paper's dashpot, friction that slides and sticks, spin."""
     given = scene(
         tick=0.025,
         accuracy={"integrator": "dormand_prince", "per_tick": 100, "error": 1e-12},
@@ -143,7 +143,7 @@ def oblique() -> tuple[Scene, list[Gap]]:
 
 
 def three_and_a_rail() -> tuple[Scene, list[Gap]]:
-    """Three bottles in a bent row before a rail, Hertz with a clamped dashpot; the last one runs into them."""
+    """Return three bottles in a bent row before a rail, Hertz with a clamped dashpot; the last one runs into them."""
     law: dict[str, Any] = {"damping": ("normal", 5.0), "friction": 0.2}
     given = scene(
         tick=0.04,
@@ -161,13 +161,13 @@ def three_and_a_rail() -> tuple[Scene, list[Gap]]:
 
 
 def across_belts() -> tuple[Scene, list[Gap]]:
-    """A bottle slides from one belt, at an angle, onto a faster one, on which it nearly comes to rest; stiffly."""
+    """Return a bottle that slides from one belt, at an angle, onto a faster one, on which it nearly comes to rest."""
     given = scene(
         tick=0.1,
         accuracy={"integrator": "dormand_prince", "per_tick": 100, "error": 1e-12},
         slip_limit=1e-3,
         base=base(0.4),
-        # Alone a bottle does not turn.
+        # A single bottle does not turn.
         effects={"rotation": "on"},
         belts={"slow": belt(0.1, (-1.0, -1.0), 1.0, 2.0), "fast": belt(0.3, (0.0, -1.0), 1.0, 2.0)},
         bottles=[bottle(-0.01, 0.0, 0.35, 0.05, spin=1.0)],
@@ -180,7 +180,7 @@ def across_belts() -> tuple[Scene, list[Gap]]:
     [(oblique, "DOP853", 1e-12), (three_and_a_rail, "DOP853", 1e-12), (across_belts, "Radau", 1e-11)],
 )
 def test_agrees_with_scipy(case: Callable[[], tuple[Scene, list[Gap]]], method: str, rtol: float) -> None:
-    """Positions and velocities to 1e-9, through contacts that open and close, v_lim and the edge of a belt."""
+    """Positions and velocities agree to 1e-9, through contacts that open and close, v_lim and the edge of a belt."""
     given, gaps = case()
     sim, line = Simulation(given, threads=1), Line(Simulation(given, threads=1))
     sim.advance()
@@ -190,7 +190,7 @@ def test_agrees_with_scipy(case: Callable[[], tuple[Scene, list[Gap]]], method: 
 
 
 def pair(law: str) -> State:
-    """Two bottles of one law; all laws are in every scene, so one kernel does for all."""
+    """Return two bottles of one law. All laws are in every scene, so they share one kernel."""
     names, others = list(LAWS), cycle(OTHERS)
     given = scene(
         effects={"peaks": "on", "rotation": "on", "unequal_radii": "on"},
@@ -206,7 +206,7 @@ def pair(law: str) -> State:
 
 
 def impact(state: State, allowed: float, entry: float = 0.3, steps: int = 20) -> World:
-    """The pair head on, after the impact: first touch after `entry` of a step, `steps` of them in CONTACT_TIME."""
+    """Return the pair after a head-on impact, with first touch after `entry` of a step, `steps` per CONTACT_TIME."""
     dt = CONTACT_TIME / steps
     state.world = state.world._replace(settings=state.world.settings._replace(error=allowed))
     world = state.world
@@ -221,13 +221,13 @@ def impact(state: State, allowed: float, entry: float = 0.3, steps: int = 20) ->
 
 
 def rebound_error(world: World, law: str) -> float:
-    """Error in the speed at which two bottles part, m/s."""
+    """Return the error in the speed at which two bottles part, m/s."""
     return float(world.bottles.vx[1] - world.bottles.vx[0]) - RESTITUTION[law] * SPEED
 
 
 @pytest.mark.parametrize("law", LAWS)
 def test_the_error_of_an_impact_is_proportional_to_the_error_allowed(law: str) -> None:
-    """Whatever sets in at first touch; RMS over 256 phases of entry it is 3 to 12 times as large."""
+    """For any start at first touch, the RMS error over 256 phases of entry is 3 to 12 times the permitted one."""
     state, allowed = pair(law), [1e-6, 1e-7, 1e-8, 1e-9]
     errors = [rms([rebound_error(impact(state, error, entry), law) for entry in phases(256)]) for error in allowed]
     assert -order(allowed, errors) == pytest.approx(1.0, abs=0.15)
@@ -235,12 +235,12 @@ def test_the_error_of_an_impact_is_proportional_to_the_error_allowed(law: str) -
 
 
 def test_the_jump_of_a_dashpot_is_passed_however_little_error_is_allowed() -> None:
-    """Substeps end at a billionth of a step, by when a jump of the force costs next to nothing."""
+    """Substeps end at a billionth of a step, at which a jump of the force costs next to nothing."""
     assert abs(rebound_error(impact(pair("dashpot"), 1e-300), "dashpot")) < 1e-11
 
 
 def test_no_substep_is_longer_than_a_step_whatever_error_is_allowed() -> None:
-    """A contact of four steps is seen, and the pair without its error control is good for 2 % of the speed."""
+    """A contact of four steps is resolved; without error control the pair is accurate to 2 % of the speed."""
     state = pair("undamped")
     for entry in phases(16):
         assert abs(rebound_error(impact(state, 1e6, entry, steps=4), "undamped")) < 0.02 * SPEED
@@ -248,7 +248,7 @@ def test_no_substep_is_longer_than_a_step_whatever_error_is_allowed() -> None:
 
 @pytest.mark.parametrize("law", LAWS)
 def test_impulses_are_the_momentum_gained_and_peaks_are_met_between_substeps(law: str) -> None:
-    """The peak: of an undamped contact of 20 substeps or more."""
+    """The peak is that of an undamped contact of 20 substeps or more."""
     world = impact(pair(law), 1e-6)
     vx, impulse = world.bottles.vx[:2], world.peaks.impulse[:2]
     np.testing.assert_allclose(impulse, [MASS * (SPEED - vx[0]), MASS * vx[1]], rtol=1e-12)
@@ -258,7 +258,7 @@ def test_impulses_are_the_momentum_gained_and_peaks_are_met_between_substeps(law
 
 
 def test_what_is_not_a_number_ends_the_tick_and_is_found() -> None:
-    """A force that is not a number makes an error that no substep is short enough for."""
+    """A force that is NaN causes an error for which no substep is short enough."""
     given, _ = across_belts()
     sim = Simulation(given, threads=1)
     sim._state.world.bottles.vx[0] = math.nan

@@ -22,7 +22,7 @@ CURVES = [None, 1]
 
 
 def reference(slip: float, atan: Any) -> float:
-    """p(s) of a slip s >= 0, as the paper has it."""
+    """Return p(s) of a slip s >= 0, as in the paper."""
     if atan:
         return 2.0 / math.pi * math.atan(math.pi * slip / LIMIT)
     return 2.0 * slip / LIMIT - slip**2 / LIMIT**2 if slip < LIMIT else 1.0
@@ -30,7 +30,7 @@ def reference(slip: float, atan: Any) -> float:
 
 @pytest.mark.parametrize("atan", CURVES)
 def test_the_curves(atan: Any) -> None:
-    """p(0) = 0, p(s) as printed (8), 1 far beyond v_lim; the same from the quotient p/s and from the signed share."""
+    """p(0) = 0, p(s) as printed (8), 1 far beyond v_lim; the quotient p/s and the signed share agree."""
     for slip in [0.0, *np.linspace(1e-9, 2.0 * LIMIT, 101), 0.5, 30.0]:
         expected = reference(float(slip), atan)
         assert slip * regularisation(float(slip), LIMIT, atan) == pytest.approx(expected, rel=1e-14, abs=1e-16)
@@ -40,7 +40,7 @@ def test_the_curves(atan: Any) -> None:
 
 @pytest.mark.parametrize("atan", CURVES)
 def test_at_rest_the_slope_is_two_over_the_limit(atan: Any) -> None:
-    """The quotient at rest, and next to it, is 2/v_lim: nothing is divided by a slip of 0."""
+    """The quotient at rest, and next to it, is 2/v_lim: there is no division by a slip of 0."""
     for slip in (0.0, 1e-300, 1e-30, 1e-12):
         assert regularisation(slip, LIMIT, atan) == pytest.approx(2.0 / LIMIT, rel=1e-9)
 
@@ -69,14 +69,14 @@ def test_the_implicit_slip_solves_its_equation(atan: Any, b: float) -> None:
     for before in LIMIT * np.concatenate([np.logspace(-6, 4, 31), (1.0 + b) * np.array([0.5, 0.99, 1.0, 1.01, 2.0])]):
         root = brentq(lambda s, s_0=before: s + b * LIMIT * reference(s, atan) - s_0, 0.0, before, xtol=1e-30)
         after = implicit_slip(float(before), b, LIMIT, atan)
-        # Where s is the small rest of a large s_0, its own digits are lost in s_0 before it is known.
+        # If s is the small rest of a large s_0, its own digits are lost in s_0.
         assert after == pytest.approx(root, rel=1e-11, abs=4e-16 * before)
         assert implicit_share(float(before), b, LIMIT, atan) == pytest.approx(reference(root, atan), rel=1e-11)
 
 
 @pytest.mark.parametrize("atan", CURVES)
 def test_the_implicit_forms_agree(atan: Any) -> None:
-    """Slip, share and quotient are one solution; odd in the slip; at rest there is a quotient, 2/(v_lim (1 + 2 b))."""
+    """Slip, share and quotient are one solution, odd in the slip; at rest the quotient is 2/(v_lim (1 + 2 b))."""
     for before in (1e-12, 1e-4, 0.011, 0.3):
         for b in (1e-3, 0.4, 20.0):
             share = implicit_share(before, b, LIMIT, atan)
@@ -91,7 +91,7 @@ def test_the_implicit_forms_agree(atan: Any) -> None:
 
 @pytest.mark.parametrize("atan", CURVES)
 def test_without_a_step_the_implicit_form_is_the_explicit_one(atan: Any) -> None:
-    """b = 0: nothing happens within the step."""
+    """With b = 0 nothing happens within the step."""
     for slip in (0.0, 1e-5, 0.004, 0.01, 0.4):
         assert implicit_slip(slip, 0.0, LIMIT, atan) == pytest.approx(slip, rel=1e-14)
         assert implicit_share(slip, 0.0, LIMIT, atan) == pytest.approx(friction_share(slip, LIMIT, atan), rel=1e-11)
@@ -99,7 +99,7 @@ def test_without_a_step_the_implicit_form_is_the_explicit_one(atan: Any) -> None
 
 @pytest.mark.parametrize("atan", CURVES)
 def test_an_implicit_step_never_turns_the_slip_round(atan: Any) -> None:
-    """Whatever the step, 0 <= s <= s_0; the explicit one chatters beyond b = 1."""
+    """At any step size 0 <= s <= s_0; the explicit one oscillates beyond b = 1."""
     for before in LIMIT * np.logspace(-8, 8, 33):
         for b in np.logspace(-8, 8, 33):
             assert 0.0 <= implicit_slip(float(before), float(b), LIMIT, atan) <= before

@@ -1,4 +1,4 @@
-"""Integrators, one step and many, on forces whose motion is known."""
+"""Integrators, in one step and many, on forces with known motion."""
 
 import math
 
@@ -16,7 +16,7 @@ DEPTH = 0.01
 
 
 def squeezed(integrator: str, speed: float = 0.0, **accuracy: float) -> State:
-    """Two bottles pressed into each other, with the paper's damping; they spin alike, so their rims slip."""
+    """Return two bottles pressed into each other, with the paper's damping and equal spins, so their rims slip."""
     given = scene(
         accuracy={"integrator": integrator, **accuracy},
         **every_law([contact(K, damping=("paper", C))]),
@@ -29,7 +29,7 @@ def squeezed(integrator: str, speed: float = 0.0, **accuracy: float) -> State:
 
 
 def closed_form(t: float) -> tuple[float, float]:
-    """Overlap and its rate after t, in contact all along: m_r x'' = -k x - c x' from x = DEPTH, x' = 0."""
+    """Return overlap and its rate after t, in contact throughout: m_r x'' = -k x - c x' from x = DEPTH, x' = 0."""
     m_r = MASS / 2.0
     w, zeta = math.sqrt(K / m_r), C / (2.0 * math.sqrt(K * m_r))
     wd = w * math.sqrt(1.0 - zeta**2)
@@ -42,7 +42,7 @@ def closed_form(t: float) -> tuple[float, float]:
     ("integrator", "expected"), [("semi_implicit_euler", 1.0), ("velocity_verlet", 2.0), ("rk4", 4.0)]
 )
 def test_order_within_a_lasting_damped_contact(integrator: str, expected: float) -> None:
-    """No jump: velocity Verlet is second order in velocity-dependent forces too, semi-implicit Euler first."""
+    """Without a jump velocity Verlet is second order in velocity-dependent forces, too, semi-implicit Euler first."""
     end = 0.2 * math.pi * math.sqrt(MASS / 2.0 / K)
     numbers = [16, 32, 64, 128]
     errors = []
@@ -58,7 +58,7 @@ def test_order_within_a_lasting_damped_contact(integrator: str, expected: float)
 
 
 def test_error_within_a_lasting_damped_contact_falls_with_that_allowed() -> None:
-    """Dormand and Prince, without a jump: order 5 in substeps that are as the fourth root of the error allowed."""
+    """Dormand and Prince without a jump: order 5 in substeps, which scale with the fourth root of the error."""
     end = 0.2 * math.pi * math.sqrt(MASS / 2.0 / K)
     allowed = [1e-5, 1e-6, 1e-7, 1e-8, 1e-9]
     errors = []
@@ -74,7 +74,7 @@ def test_error_within_a_lasting_damped_contact_falls_with_that_allowed() -> None
 
 @pytest.mark.parametrize("integrator", list(INTEGRATORS))
 def test_one_step_in_free_flight(integrator: str) -> None:
-    """r += v dt, theta += omega dt, exactly; free slots stay where they are."""
+    """r += v dt, theta += omega dt, exactly; free slots stay unchanged."""
     state = squeezed(integrator)
     bottles, spin = state.world.bottles, state.world.spin
     bottles.x[1], bottles.vx[1], bottles.vy[1] = 5.0, 0.25, -0.5
@@ -88,8 +88,8 @@ def test_one_step_in_free_flight(integrator: str) -> None:
 
 @pytest.mark.parametrize("integrator", list(INTEGRATORS))
 def test_resuming_within_a_tick_leaves_no_trace(integrator: str) -> None:
-    """A stale list interrupts wherever bottles have moved, between stages too; RESUME gives the bits of a whole run."""
-    # So little that substeps are refused in between.
+    """A stale list interrupts at any moved bottle, between stages, too; RESUME gives the bits of a complete run."""
+    # So small that some substeps are rejected.
     accuracy = {"error": 1e-12} if integrator == "dormand_prince" else {}
     whole, parts = squeezed(integrator, 1.0, **accuracy), squeezed(integrator, 1.0, **accuracy)
     steps, dt = 40, 1e-4
@@ -113,7 +113,7 @@ def test_resuming_within_a_tick_leaves_no_trace(integrator: str) -> None:
 
 @pytest.mark.parametrize("integrator", list(INTEGRATORS))
 def test_a_bottle_at_rest_comes_to_rest(integrator: str) -> None:
-    """Speeds that decay for ever end at zero rather than at denormal numbers."""
+    """Decaying speeds end at zero instead of denormal numbers."""
     state = squeezed(integrator)
     bottles = state.world.bottles
     bottles.x[1] = 5.0
@@ -125,7 +125,7 @@ def test_a_bottle_at_rest_comes_to_rest(integrator: str) -> None:
 
 
 def test_what_is_not_a_number_does_not_come_to_rest() -> None:
-    """Tiny speeds are set to 0; a NaN must survive that, or nobody would find it."""
+    """Tiny speeds are set to 0; NaN must survive that, or it would not be detected."""
     sim = simulation(contacts=[contact(K)], bottles=[bottle(0.0, 0.0), bottle(1.0, 0.0)])
     sim._state.world.bottles.vx[1] = np.nan
     with pytest.raises(SimulationError, match="bottle 1 has no finite position or velocity"):

@@ -1,4 +1,4 @@
-"""Files of compiled kernels: whatever is wrong with one, it is compiled again."""
+"""Files of compiled kernels: a faulty file is compiled again."""
 
 import os
 import pickle
@@ -17,26 +17,26 @@ from conveyor_sim.engine.compiler.numba_internals.kernel_cache import KernelCach
 
 
 def twice(x: float) -> float:
-    """What is compiled."""
+    """Return twice the number; this function is compiled."""
     return 2.0 * x
 
 
 def compiled(folder: Path | None) -> Any:
-    """The function as a process finds it that has not used it yet."""
+    """Return the function as in a process that has not used it yet."""
     function = numba.njit(twice)
     function._cache = KernelCache(twice, {}, KernelFolder(folder, ""))
     return function
 
 
 def counts(function: Any) -> tuple[int, int]:
-    """Calls it; how many kernels were loaded, and how many compiled."""
+    """Call it, and return how many kernels were loaded and how many compiled."""
     assert function(1.5) == 3.0
     return sum(function.stats.cache_hits.values()), sum(function.stats.cache_misses.values())
 
 
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
-    """The kernel's file."""
+    """Return the kernel's file."""
     assert counts(compiled(tmp_path)) == (0, 1)
     (found,) = tmp_path.glob("*.kernel")
     assert counts(compiled(tmp_path)) == (1, 0)
@@ -101,7 +101,7 @@ def test_a_damaged_file_is_compiled_again(
     file.write_bytes(damage(file.read_bytes()))
     assert counts(compiled(file.parent)) == (0, 1)
     (line,) = caplog.messages
-    assert line.startswith(f"{file}: cached kernel not used, for it ")
+    assert line.startswith(f"{file}: cached kernel not used because it ")
     assert counts(compiled(file.parent)) == (1, 0)
     assert len(caplog.messages) == 1
 
@@ -120,7 +120,7 @@ def test_a_file_that_another_could_have_put_is_compiled_again(
             "folder": lambda: file.mkdir(),
         }[kind]()
     assert counts(compiled(file.parent)) == (0, 1)
-    assert caplog.messages[0].startswith(f"{file}: cached kernel not used, for ")
+    assert caplog.messages[0].startswith(f"{file}: cached kernel not used because ")
     assert counts(compiled(file.parent)) == ((0, 1) if kind == "folder" else (1, 0))
 
 
@@ -161,7 +161,7 @@ def test_what_is_not_cached_is_not_compiled_where_that_is_not_wanted(file: Path)
 
 @relies_on("core/runtime/nrt.py: _Runtime.initialize", "core/caching.py: _Cache")
 def test_a_process_that_loads_a_kernel_needs_no_compiler_and_can_compile_another(tmp_path: Path) -> None:
-    """A start that finds all kernels does without numba's tables of what it can compile."""
+    """A start that loads all kernels does not need numba's tables of compilable functions."""
     program = tmp_path / "loading.py"
     program.write_text(LOADING)
     command = [sys.executable, str(program), str(tmp_path / "kernels")]

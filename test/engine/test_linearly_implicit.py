@@ -19,7 +19,7 @@ LAWS: dict[str, Any] = {"damping": ("normal", 0.1), "friction": 0.1}
 
 
 def test_a_spring_in_contact_keeps_its_energy() -> None:
-    """The midpoint rule keeps a quadratic energy, if the tangent is the spring's and the system is solved."""
+    """The midpoint rule conserves a quadratic energy if the tangent is the spring's and the system is solved."""
     stiffness, depth, steps = 5000.0, 0.01, 30
     given = scene(
         **every_law([contact(stiffness)]),
@@ -40,7 +40,7 @@ def test_a_spring_in_contact_keeps_its_energy() -> None:
 
 
 def packing(ratio: float, stiffness: float = 1e5) -> Simulation:
-    """48 bottles, hexagonally packed, that a belt presses onto a wall; steps of `ratio` times the explicit limit."""
+    """Return 48 hexagonally packed bottles, pressed onto a wall by a belt; steps: `ratio` times the explicit limit."""
     rows, columns, pitch = 6, 8, 0.131
     height, length = (rows - 1) * pitch * math.sqrt(3.0) / 2.0, columns * pitch + 0.2
     side = RADIUS + 0.0005
@@ -71,7 +71,7 @@ def packing(ratio: float, stiffness: float = 1e5) -> Simulation:
 
 @pytest.mark.parametrize("ratio", [5.0, 20.0])
 def test_a_packing_rests_at_steps_far_beyond_the_explicit_limit(ratio: float) -> None:
-    """The wall carries mu m g a bottle, less what the sides take by friction; nothing ever goes fast."""
+    """The wall carries mu m g per bottle minus the friction of the sides; speeds stay small."""
     sim = packing(ratio)
     fastest = 0.0
     while sim.time < 2.0:
@@ -84,12 +84,12 @@ def test_a_packing_rests_at_steps_far_beyond_the_explicit_limit(ratio: float) ->
     wall = (contacts.kind == 1) & (contacts.nx > 0.9)
     sides = (contacts.kind == 1) & (np.abs(contacts.ny) > 0.9)
     carried = contacts.normal_force[wall].sum() + np.abs(contacts.tangential_force[sides]).sum()
-    # The rest is in motion still: bottles creep along each other below v_lim.
+    # The rest is still in motion: bottles creep along each other below v_lim.
     assert carried == pytest.approx(48 * MU * MASS * G, rel=0.05)
 
 
 def test_base_friction_does_not_chatter_at_ten_times_its_explicit_limit() -> None:
-    """A bottle set down on a belt is taken along: its slip falls to rest and never turns round."""
+    """A bottle set down on a belt is carried along: its slip falls to rest and never reverses."""
     limit = 0.01 / (MU * G)
     tick = round(10.0 * limit, 6)
     given = {
@@ -110,13 +110,13 @@ def test_base_friction_does_not_chatter_at_ten_times_its_explicit_limit() -> Non
         sim.advance()
         slips.append(0.5 - float(sim.bottles().vx[0]))
     rises = [later - earlier for earlier, later in pairwise(slips)]
-    assert max(rises) < 1e-9  # m/s: what the solver leaves
+    assert max(rises) < 1e-9  # m/s: residual of the solver
     assert min(slips) > -1e-9
     assert slips[-1] < 1e-6
 
 
 def test_momentum_of_a_closed_system() -> None:
-    """However early the solver stops: contact forces are equal and opposite."""
+    """Momentum is conserved however early the solver stops, because contact forces are equal and opposite."""
     rng = np.random.default_rng(4)
     places = [(0.14 * i + 0.005 * rng.random(), 0.14 * j + 0.005 * rng.random()) for i in range(5) for j in range(5)]
     speeds = rng.normal(0.0, 0.5, (25, 2))

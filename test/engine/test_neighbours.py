@@ -1,4 +1,4 @@
-"""Verlet lists: nobody who touches is missing, until a bottle has moved by half the skin."""
+"""Verlet lists contain all touching pairs until a bottle has moved by half the skin."""
 
 import math
 from itertools import pairwise
@@ -21,7 +21,7 @@ RADII = np.array([RADIUS, 0.03, 0.11])
 
 
 def bottles_only() -> State:
-    """Three sizes, room for many; the two bottles that call for contacts are far away and not added."""
+    """Return bottles of three sizes, with room for many; two bottles that make contacts possible are far away."""
     fields = {
         "bottle_types": {f"type{n}": kind(radius) for n, radius in enumerate(RADII)},
         "contacts": [contact(1000.0)],
@@ -32,7 +32,7 @@ def bottles_only() -> State:
 
 
 def crowd(count: int, size: float, centre: tuple[float, float] = (0.0, 0.0)) -> tuple[State, np.ndarray, np.ndarray]:
-    """Bottles anywhere in a box, overlapping as it comes."""
+    """Return bottles at random positions in a box, overlapping or not."""
     state = bottles_only()
     points = RANDOM.uniform(-size, size, (count, 2)) + centre
     kinds = RANDOM.integers(0, 3, count)
@@ -50,7 +50,7 @@ def listed(state: State) -> set[tuple[int, int]]:
 
 
 def within(points: np.ndarray, radii: np.ndarray, margin: float) -> set[tuple[int, int]]:
-    """Brute force: all pairs nearer than R_i + R_j + margin."""
+    """Return all pairs nearer than R_i + R_j + margin, by brute force."""
     i, j = np.triu_indices(len(points), 1)
     near = np.hypot(*(points[i] - points[j]).T) < radii[i] + radii[j] + margin
     return set(zip(i[near].tolist(), j[near].tolist(), strict=True))
@@ -68,7 +68,7 @@ def test_the_pair_list_holds_all_pairs_within_the_skin_and_no_others(
 
 
 def test_pairs_are_sorted_by_slot_whatever_the_cells() -> None:
-    """The order of summation, hence the bits, must not depend on when the list was made."""
+    """The order of summation, hence the bits, must not depend on the time of a rebuild."""
     state, _, _ = crowd(300, 0.8)
     pairs = state.world.pairs
     assert pairs is not None
@@ -78,7 +78,7 @@ def test_pairs_are_sorted_by_slot_whatever_the_cells() -> None:
 
 
 def test_touching_pairs_are_listed_until_someone_has_moved_by_half_the_skin() -> None:
-    """Worst case: both move towards each other."""
+    """In the worst case both move towards each other."""
     state, points, radii = crowd(300, 1.0)
     reach = 0.5 * state.model.settings.skin
     for _ in range(20):
@@ -103,7 +103,7 @@ def test_a_removed_bottle_leaves_the_lists() -> None:
 
 
 def test_each_pair_has_the_constants_of_its_types() -> None:
-    """Columns beside the list, by the types of both, whichever comes first."""
+    """Columns beside the list hold the constants of both types, in either order."""
     stiffness = {("a", "a"): 1.0, ("a", "b"): 2.0, ("b", "b"): 3.0}
     fields = {
         "bottle_types": {"a": kind(material="a"), "b": kind(material="b")},
@@ -121,7 +121,7 @@ def test_each_pair_has_the_constants_of_its_types() -> None:
 
 
 def test_a_list_too_short_is_told_and_grown() -> None:
-    """`rebuild` says how many entries each list needs, and stays stale until they fit."""
+    """`rebuild` returns the entries that each list needs, and the lists stay stale until they fit."""
     state, points, radii = crowd(40, 0.1)
     state.world = state.world._replace(pairs=empty_pairs(state.model, 8))
     needed = rebuild(lists_of(state.world))
@@ -133,7 +133,7 @@ def test_a_list_too_short_is_told_and_grown() -> None:
 
 
 def plant() -> tuple[State, np.ndarray, list[np.ndarray], list[np.ndarray]]:
-    """Random rails; the true distance of each bottle from each straight piece and each arc."""
+    """Return random rails, with the true distance of each bottle from each straight piece and each arc."""
     corners = np.cumsum(RANDOM.normal(0.0, 0.15, (60, 2)), axis=0)
     rails = {"walk": polyline(corners)}
     straight = list(pairwise(corners))
@@ -160,7 +160,7 @@ def plant() -> tuple[State, np.ndarray, list[np.ndarray], list[np.ndarray]]:
 
 
 def test_rails_within_reach_are_listed_in_order() -> None:
-    """All within R + skin/2, so that they are there while the bottle moves by skin/2."""
+    """All rails within R + skin/2 are listed, because the bottle may move by skin/2."""
     state, points, to_straight, to_bends = plant()
     reach = RADIUS + 0.5 * state.model.settings.skin
     for near, apart in ((state.world.near_segments, to_straight), (state.world.near_arcs, to_bends)):

@@ -1,4 +1,4 @@
-"""What kernels get beside numba's own passes: groups by address, absent members pruned, parts for what they read."""
+"""Extensions of numba's compiler: groups by address, pruned absent members, parts compiled for their reads."""
 
 import copy
 import pickle
@@ -69,7 +69,7 @@ def test_parts_reach_the_arrays_of_a_group() -> None:
 
 
 def test_a_copy_of_a_group_has_arrays_of_its_own() -> None:
-    """Though the group that was copied has been laid out."""
+    """The copied group has been laid out before."""
     outer = Outer(Inner(np.array([1.0, 2.0]), 10.0), np.zeros(2))
     add_all(outer)
     for copied in (copy.deepcopy(outer), pickle.loads(pickle.dumps(outer)), outer._replace(sums=outer.sums.copy())):
@@ -79,7 +79,7 @@ def test_a_copy_of_a_group_has_arrays_of_its_own() -> None:
 
 
 def test_a_group_that_many_threads_take_first_at_once_is_laid_out_once() -> None:
-    """Else one of them could have the address of what another has thrown away."""
+    """Otherwise one of them could have the address of a layout that another has discarded."""
     for _ in range(200):
         outer = Outer(Inner(np.array([1.0]), 1.0), np.zeros(1))
         with ThreadPoolExecutor(4) as threads:
@@ -87,7 +87,7 @@ def test_a_group_that_many_threads_take_first_at_once_is_laid_out_once() -> None
 
 
 def test_arrays_of_any_shape_and_order_are_laid_out() -> None:
-    """Rows, columns, every other one, none."""
+    """Rows, columns, every other entry, and none."""
 
     @kernel
     def corner(outer: Any) -> float:
@@ -109,7 +109,7 @@ def test_what_can_not_be_laid_out_is_refused() -> None:
 
 
 def test_a_member_that_is_absent_is_pruned() -> None:
-    """Else numba could not compile what the branch does with it."""
+    """Otherwise numba could not compile the branch."""
     outer = Outer(Inner(None, 3.0), np.zeros(2))
     assert add_all(outer) == 3.0
     assert outer.sums.tolist() == [1.5, 1.5]
@@ -117,7 +117,7 @@ def test_a_member_that_is_absent_is_pruned() -> None:
 
 @relies_on("core/untyped_passes.py: DeadBranchPrune.run_pass", "core/analysis.py: rewrite_semantic_constants")
 def test_a_member_of_a_member_is_pruned() -> None:
-    """The group itself is an argument, its members are not."""
+    """The group is an argument, its members are not."""
 
     @kernel
     def first(outer: Any) -> float:
@@ -131,7 +131,7 @@ def test_a_member_of_a_member_is_pruned() -> None:
 
 
 def test_an_absent_member_among_several_taken_at_once_is_pruned() -> None:
-    """Python puts more than three into a tuple, and takes them out again."""
+    """Python puts more than three values into a tuple, and takes them out again."""
 
     @kernel
     def first(outer: Any) -> float:
@@ -145,7 +145,7 @@ def test_an_absent_member_among_several_taken_at_once_is_pruned() -> None:
 
 
 def test_a_group_without_some_members() -> None:
-    """What is left out is `None` for whatever takes the view, which is made and laid out once."""
+    """A member that is left out is None in the view, which is made and laid out once."""
 
     @kernel
     def first(outer: Any) -> float:
@@ -163,7 +163,7 @@ def test_a_group_without_some_members() -> None:
 
 @relies_on("core/base.py: BaseContext.cast", "core/imputils.py: lower_cast")
 def test_a_part_is_compiled_once_for_all_groups_that_differ_in_what_it_does_not_read() -> None:
-    """Through what it calls, and through names of its own; members of other kinds, and members that are not there."""
+    """This holds through callees and local names, for members of other types, and for absent members."""
 
     @part
     def size(inner: Any) -> int:
@@ -198,7 +198,7 @@ def test_a_part_is_compiled_once_for_all_groups_that_differ_in_what_it_does_not_
     "core/typing/templates.py: AbstractTemplate",
 )
 def test_a_column_is_indexed_as_an_array_is() -> None:
-    """From the end too, by numbers of any width, with what is stored made the column's kind."""
+    """From the end, too, by numbers of any width; stored values get the column's type."""
 
     @kernel
     def move(outer: Any) -> Any:
@@ -215,7 +215,7 @@ def test_a_column_is_indexed_as_an_array_is() -> None:
 
 
 def test_what_is_only_to_be_read_is_not_written() -> None:
-    """As numba has it for arrays."""
+    """Numba refuses it, as for arrays."""
     sums = np.zeros(3)
     sums.flags.writeable = False
     with pytest.raises(numba.TypingError):
@@ -225,7 +225,7 @@ def test_what_is_only_to_be_read_is_not_written() -> None:
 
 @relies_on("core/datamodel/packer.py: ArgPacker.from_arguments", "core/codegen.py: CodeLibrary.create_ir_module")
 def test_a_kernel_calls_another_by_its_address() -> None:
-    """With what it was given itself, not with the copies that it works on."""
+    """The callee gets the caller's original arguments, not its copies."""
 
     @kernel
     def swap(outer: Any) -> float:
@@ -245,7 +245,7 @@ def test_a_kernel_calls_another_by_its_address() -> None:
 
 
 def test_a_part_is_linked_whoever_calls_it_first() -> None:
-    """LLVM drops the first call, in a branch that is never taken, before all parts are put together."""
+    """LLVM drops the first call, in a branch that is never taken, before all parts are linked."""
 
     @part
     def twice(x: float) -> float:
@@ -270,7 +270,7 @@ def test_a_part_is_linked_whoever_calls_it_first() -> None:
 
 
 def test_a_wrong_member_is_refused() -> None:
-    """As numba refuses any attribute that is not there."""
+    """Numba refuses it, as any missing attribute."""
 
     @kernel
     def wrong(outer: Any) -> float:

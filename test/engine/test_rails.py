@@ -1,4 +1,4 @@
-"""Rails: nearest point of the piece, end points included; pieces that join push once; no ghost past an end."""
+"""Rails: nearest point of the piece, end points included; joined pieces push once; no contact beyond an end."""
 
 import math
 from itertools import pairwise
@@ -27,11 +27,11 @@ keep_deepest = callable_part(keep_deepest_part)
 
 RANDOM = np.random.default_rng(20240229)
 ROUNDING = 1e-9
-"""N: of forces of up to 65 N whose overlap is a difference of coordinates of some metres."""
+"""Rounding error, N, of forces of up to 65 N whose overlap is a difference of coordinates of some metres."""
 
 
 def around(low: tuple[float, float], high: tuple[float, float], count: int = 3000) -> np.ndarray:
-    """Points all over a box."""
+    """Return points all over a box."""
     return RANDOM.uniform(low, high, (count, 2))
 
 
@@ -43,7 +43,7 @@ def test_a_segment_pushes_from_its_nearest_point() -> None:
 
 
 def test_there_is_no_ghost_past_an_end() -> None:
-    """On the infinite line through a segment, beyond its end by more than R: the paper's distance would push."""
+    """On the infinite line through a segment, beyond its end by more than R, the paper's distance would push."""
     beyond = np.array([[1.0 + RADIUS + 1e-12, 0.0], [1.2, 0.01], [-RADIUS - 1e-12, 1e-9], [1.0 + RADIUS, 0.03]])
     assert not rail_forces({"rail": segment((0.0, 0.0), (1.0, 0.0))}, beyond).any()
     around_arc = np.array([[0.5 * math.cos(a), 0.5 * math.sin(a)] for a in (-0.14, 1.14, 3.0)])
@@ -54,7 +54,7 @@ def test_there_is_no_ghost_past_an_end() -> None:
 @pytest.mark.parametrize("span", [0.4, math.pi, 4.0, 2.0 * math.pi - 0.3, 2.0 * math.pi])
 @pytest.mark.parametrize("radius", [0.05, 0.5])
 def test_an_arc_pushes_from_its_nearest_point(start: float, span: float, radius: float) -> None:
-    """From inside and outside, spans across +-pi, over half a turn and full; tighter than the bottle, too."""
+    """From inside and outside, with spans across +-pi, over half a turn and full; radii below the bottle's, too."""
     centre = (0.2, -0.1)
     reach = radius + 1.5 * RADIUS
     points = around((centre[0] - reach, centre[1] - reach), (centre[0] + reach, centre[1] + reach))
@@ -65,7 +65,7 @@ def test_an_arc_pushes_from_its_nearest_point(start: float, span: float, radius:
 
 
 def touches_twice(centre: tuple[float, float], radius: float, start: float, span: float, points: np.ndarray) -> Any:
-    """Whether a bottle at a point touches an open arc at more than one nearest place: at a tip, and elsewhere."""
+    """Return True if a bottle at a point touches an open arc at a tip and at another nearest place."""
     places = []
     for angle, inward in ((start, 1.0), (start + span, -1.0)):
         away = np.array(centre) + radius * np.array([math.cos(angle), math.sin(angle)]) - points
@@ -80,7 +80,7 @@ def touches_twice(centre: tuple[float, float], radius: float, start: float, span
 @pytest.mark.parametrize("half", [0.4, 1.2, math.pi / 2, 2.5, 3.1])
 @pytest.mark.parametrize("radius", [0.03, 0.05, 0.2])
 def test_a_bottle_in_the_mouth_of_an_arc_is_pushed_straight_out(half: float, radius: float) -> None:
-    """It is symmetric about the middle of the mouth, and both tips push, by the shortest way out if they can."""
+    """The mouth is symmetric about its middle, and both tips push, by the shortest way out if they can."""
     rails = {"c": arc((0.3, 0.1), radius, math.pi - half, 2.0 * half)}
     away = np.linspace(0.001, RADIUS, 200) + max(0.0, radius * math.cos(math.pi - half))
     forces = rail_forces(rails, np.column_stack([0.3 + away, np.full(away.size, 0.1)]))
@@ -101,9 +101,9 @@ def test_a_bottle_in_the_mouth_of_an_arc_is_pushed_straight_out(half: float, rad
 
 @pytest.mark.parametrize(("opening", "most"), [((0.2, 0.75), 0.05), ((0.75, 3.1), 0.25)])
 def test_many_pieces_at_once_push_sideways_by_no_more(opening: tuple[float, float], most: float) -> None:
-    """A polyline along a C, on whose axis of symmetry a bottle is pushed along it but for so much of its deepest push.
+    """A polyline along a C pushes a bottle on its axis of symmetry along it, except for a share of its deepest push.
 
-    Three or more pieces share their push by sweeps in their order, which may end early where they face each other.
+    Three or more pieces share their push by sweeps in their order, which may end early if they face each other.
     """
     random = np.random.default_rng(3)
     points = np.column_stack([np.linspace(-0.3, 0.3, 120), np.zeros(120)])
@@ -115,7 +115,7 @@ def test_many_pieces_at_once_push_sideways_by_no_more(opening: tuple[float, floa
         sides = [np.hypot(*(nearest_on_segment(*ends, points) - points).T) for ends in pairwise(corners)]
         nearest = np.min(sides, axis=0)
         overlap = np.maximum(RADIUS - nearest, 0.0)
-        held = overlap < 0.75 * RADIUS  # the guard stops what is deeper
+        held = overlap < 0.75 * RADIUS  # the guard stops deeper overlaps
         assert (np.abs(forces[held, 1]) <= most * STIFFNESS * overlap[held] + ROUNDING).all()
 
 
@@ -127,11 +127,11 @@ def test_wider_mouths_and_joined_ends_leave_an_arc_whole() -> None:
               "b": segment((0.0, 0.05), (-1.0, 0.05))}  # fmt: skip
     for rails, pieces in (({"a": wide}, 1), ({"a": narrow}, 2), ({"a": closed}, 1), (fillet, 3)):
         model = build_model(rail_scene(rails))
-        assert sum(len(shape.pieces) for shape in model.rail_shapes) == pieces
+        assert sum(len(shape.pieces) for shape in model.plant.rails) == pieces
 
 
 def test_collinear_pieces_push_as_one_segment() -> None:
-    """However a straight rail is cut up, and whichever way its pieces are listed."""
+    """The result does not depend on the cuts of a straight rail or the order of its pieces."""
     start, end = np.array([-0.4, -0.2]), np.array([0.5, 0.3])
     points = around((-0.6, -0.4), (0.7, 0.5))
     whole = rail_forces({"rail": segment(tuple(start), tuple(end))}, points)
@@ -147,7 +147,7 @@ def test_collinear_pieces_push_as_one_segment() -> None:
 
 
 def test_a_rail_given_twice_pushes_once() -> None:
-    """In any direction: rounding makes the cosine between its normals a little less than 1, or not."""
+    """Rounding makes the cosine between its normals slightly less than 1, or not, by direction."""
     points = around((-0.5, -0.5), (0.5, 0.5), 300)
     for angle in np.linspace(0.0, 2.0 * math.pi, 40):
         way = 0.4 * np.array([math.cos(angle), math.sin(angle)])
@@ -158,7 +158,7 @@ def test_a_rail_given_twice_pushes_once() -> None:
 
 @pytest.mark.parametrize("turn", [0.02, 0.5, math.pi / 2, 2.5])
 def test_a_convex_corner_pushes_once(turn: float) -> None:
-    """Outside of a corner the force is that of the nearest point of both pieces, through the fan at the corner too."""
+    """Outside of a corner the force is that of the nearest point of both pieces, also in the fan at the corner."""
     first, corner, last = (-1.0, 0.0), (0.0, 0.0), (math.cos(turn), -math.sin(turn))
     points = around((-0.3, -0.3), (0.3, 0.3))
     # Above both lines, or between their normals at the corner.
@@ -181,12 +181,12 @@ def test_a_concave_right_angle_is_two_walls() -> None:
 
 @pytest.mark.parametrize("inside", [0.2, 0.5, 1.0, 1.5])
 def test_an_acute_wedge_is_two_walls(inside: float) -> None:
-    """Between walls at an angle of less than 90 degrees each pushes as if alone."""
+    """Walls at an angle of less than 90 degrees push independently."""
     wall_a, wall_b = (1.0, 0.0), (math.cos(inside), math.sin(inside))
     along = RANDOM.uniform(0.05, 0.9, 2000)
     within = RANDOM.uniform(0.05, 0.95, 2000) * inside
     points = np.column_stack([along * np.cos(within), along * np.sin(within)])
-    # Both nearest points on the pieces, none at the tip.
+    # Both nearest points are on the pieces, none at the tip.
     expected = sum(push(nearest_on_segment((0, 0), wall, points), points) for wall in (wall_a, wall_b))
     forces = rail_forces({"wedge": polyline([wall_a, (0, 0), wall_b])}, points)
     np.testing.assert_allclose(forces, expected, atol=ROUNDING)
@@ -194,10 +194,10 @@ def test_an_acute_wedge_is_two_walls(inside: float) -> None:
 
 @pytest.mark.parametrize("turn", [1e-6, 1e-3, 0.03, 0.2, 1.0, 1.5])
 def test_a_shallow_concave_corner_neither_jumps_nor_pushes_twice(turn: float) -> None:
-    """Sliding 5 mm deep along one wall, then along the other, which rises by `turn`: (x, h), then its mirror image.
+    """A bottle slides 5 mm deep along a wall, then along another that rises by `turn`: (x, h), then its mirror image.
 
     The push grows from k delta to that of the shortest way out in the corner, k delta / cos(turn / 2), and no faster
-    than k per metre of the way. Rounding of the cosine between the walls is divided by its distance from 1.
+    than k per metre. Rounding of the cosine between the walls is divided by its distance from 1.
     """
     rounding = 1e-9 + 4e-16 / turn**2
     depth, count = 0.005, 4000
@@ -214,7 +214,7 @@ def test_a_shallow_concave_corner_neither_jumps_nor_pushes_twice(turn: float) ->
 
 
 def shortest_way_out(normals: np.ndarray, overlaps: np.ndarray) -> np.ndarray:
-    """The shortest d with n . d >= overlap for all: over all pairs of active walls, by trial."""
+    """Return the shortest d with n . d >= overlap for all, by trial over all pairs of active walls."""
     best = None
     count = len(overlaps)
     for a in range(count):
@@ -228,7 +228,7 @@ def shortest_way_out(normals: np.ndarray, overlaps: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("turns", [(0.5, 0.5), (0.2, 0.9), (0.05, 0.02), (0.4, 0.3, 0.5)])
 def test_several_pieces_at_once_push_by_the_shortest_way_out(turns: tuple[float, ...]) -> None:
-    """A concave chain of short pieces, so short that a bottle touches up to four of them."""
+    """A concave chain of pieces so short that a bottle touches up to four of them."""
     heading = -sum(turns) / 2.0 + np.concatenate([[0.0], np.cumsum(turns)])
     pieces = np.column_stack([np.cos(heading), np.sin(heading)]) * 0.02
     pieces[[0, -1]] *= 20.0
@@ -248,13 +248,13 @@ def test_several_pieces_at_once_push_by_the_shortest_way_out(turns: tuple[float,
                 depth.append(overlap)
         most = max(most, len(depth))
         expected = shortest_way_out(np.array(touching), np.array(depth)) if touching else np.zeros(2)
-        # Projected Gauss-Seidel is cut off after 64 sweeps.
+        # Projected Gauss-Seidel ends after 64 sweeps.
         np.testing.assert_allclose(force / STIFFNESS, expected, atol=1e-6 if len(depth) > 2 else 1e-9)
     assert most >= 2
 
 
 def test_an_arc_and_a_segment_that_join_smoothly_push_as_one() -> None:
-    """A stadium's half: straight, half circle, straight; from inside and outside the nearest point of all pushes."""
+    """A stadium's half (straight, half circle, straight) pushes from its nearest point, from inside and outside."""
     rails = {
         "top": segment((-1.0, 0.3), (0.0, 0.3)),
         "bend": arc((0.0, 0.0), 0.3, -math.pi / 2, math.pi),
@@ -277,7 +277,7 @@ def test_an_arc_and_a_segment_that_join_smoothly_push_as_one() -> None:
 
 @pytest.mark.parametrize("arms", [3, 5])
 def test_pieces_that_meet_at_a_point_push_once_from_it(arms: int) -> None:
-    """A star: where the nearest point of the star is its middle or one arm alone, the push is that of one contact."""
+    """If the nearest point of a star is its middle or on one arm alone, the push is that of one contact."""
     angles = 0.3 + np.array([0.0, 0.5, 1.0, 1.4, 1.7])[:arms]
     tips = np.column_stack([np.cos(angles), np.sin(angles)])
     points = around((-0.2, -0.2), (0.2, 0.2))
@@ -289,7 +289,7 @@ def test_pieces_that_meet_at_a_point_push_once_from_it(arms: int) -> None:
 
 @pytest.mark.parametrize("stem", [(0.0, -1.0), (0.4, -1.0)])
 def test_a_rail_is_smooth_opposite_a_t_junction(stem: tuple[float, float]) -> None:
-    """A stem that ends on a rail from below is not felt from above (at overlaps of less than half the radius)."""
+    """A stem that ends on a rail from below has no effect above (at overlaps of less than half the radius)."""
     rails = {"through": segment((-1.0, 0.0), (1.0, 0.0)), "stem": segment((0.0, 0.0), stem)}
     points = around((-0.2, 0.51 * RADIUS), (0.2, 0.1))
     expected = push(nearest_on_segment((-1, 0), (1, 0), points), points)
@@ -297,7 +297,7 @@ def test_a_rail_is_smooth_opposite_a_t_junction(stem: tuple[float, float]) -> No
 
 
 def test_a_stem_is_a_wall_at_a_t_junction() -> None:
-    """From the stem's side both push, as in a corner."""
+    """On the stem's side both push, as in a corner."""
     rails = {"through": segment((-1.0, 0.0), (1.0, 0.0)), "stem": segment((0.0, 0.0), (0.0, -1.0))}
     points = around((0.005, -0.1), (0.1, -0.005))
     walls = [nearest_on_segment((-1, 0), (1, 0), points), nearest_on_segment((0, 0), (0, -1), points)]
@@ -314,7 +314,7 @@ def test_a_stem_that_ends_on_an_arc_is_not_felt_from_the_other_side() -> None:
 
 
 def test_a_centre_exactly_on_a_rail_is_pushed_off() -> None:
-    """Anywhere on it: on the piece, a joint, a free end; on an arc, its ends, its centre: finite, and k R at most."""
+    """On the piece, a joint, a free end, an arc, its ends or its centre, the push is finite, and at most k R."""
     rails = {
         "line": polyline([(0.0, 0.0), (1.0, 0.0), (2.0, 0.0), (3.0, 1.0)]),
         "bend": arc((5.0, 0.0), 0.05, 0.0, 1.5 * math.pi),
@@ -328,8 +328,8 @@ def test_a_centre_exactly_on_a_rail_is_pushed_off() -> None:
 
 
 def test_more_contacts_than_there_is_room_for_keep_the_deepest() -> None:
-    """Given in any order, the shallowest are the ones left out."""
-    found = ALONE.found
+    """In any order of contacts, the shallowest are left out."""
+    found = ALONE.rail_contacts
     overlaps = np.random.default_rng(1).permutation(np.arange(1.0, MOST_CONTACTS + 9.0))
     count = 0
     for overlap in overlaps:

@@ -1,6 +1,6 @@
-"""What functions read of groups: by names of their own, through what they call, and in whole where it is not known."""
+"""Members of groups that functions read: by local names, through callees, and entirely in doubt."""
 
-# What is here is read, never run.
+# These functions are parsed, never run.
 from __future__ import annotations
 
 from typing import Any
@@ -104,7 +104,7 @@ EXPECTED = [
 
 
 def paths(text: str) -> set[Path]:
-    """`a.b.*` with what leads there: `a`, `a.b`."""
+    """Return `a.b.*` with the paths above it: `a`, `a.b`."""
     names = [tuple(one.split(".")) for one in text.split()]
     return {one[:n] for one in names for n in range(1, len(one) + 1) if one[n - 1] != ALL or n == len(one)}
 
@@ -115,7 +115,7 @@ def test_what_a_function_reads(function: Any, expected: str) -> None:
 
 
 def test_what_a_text_reads() -> None:
-    """Of two arguments, one through a part that it is given."""
+    """Two arguments, one through a part that the text calls."""
     function = written("def function(pairs, columns):\n    return size_of(columns.a) + pairs.used[0]", size_of=size)
     assert [one - {()} for one in function.reads] == [paths("used.*"), paths("a.x.size.*")]
 

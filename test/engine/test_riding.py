@@ -1,4 +1,4 @@
-"""Bottles that ride are not stepped, and nothing else differs: no bit of what can be observed, whatever wakes them."""
+"""Riding bottles are not stepped. Nothing else differs: no bit of any observation, and none after they wake."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from scenes import COMMON, RADIUS, base, belt, bottle, contact, kind, scene, seg
 
 from conveyor_sim.engine.arrays.riding import Riding
 from conveyor_sim.engine.compiler.compile import kernel
-from conveyor_sim.engine.lists.riding import LEAST, STEPPED, _plan, left_out
+from conveyor_sim.engine.lists.riding import LEAST, STEPPED, _plan, skipped_slots
 from conveyor_sim.engine.threads.workers import UNIT
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.scene import Scene, parse_scene
@@ -22,7 +22,7 @@ from conveyor_sim.simulation import Simulation
 SPEED = 0.5
 ROWS, COLUMNS, PITCH = 2, 6, 0.2
 ROW = {"grid": {"type": "bottle", "origin": [0.0, 0.0], "rows": ROWS, "columns": COLUMNS, "pitch": PITCH}}
-"""A dozen bottles that touch nobody, in slots side by side."""
+"""A dozen bottles without contacts, in adjacent slots."""
 
 Act = Callable[[Simulation], None]
 
@@ -33,10 +33,9 @@ TABLE = {"kind": "curved", "centre": [0.0, 5.0], "inner_radius": 0.5, "width": 2
 
 
 def plant(*bottles: dict[str, Any], **more: Any) -> Scene:
-    """A belt with the dozen and one behind it; a rail, a gate that is open, a source and a sink out of their way.
+    """Return a belt with the dozen and one behind it; a rail, an open gate, a source and a sink out of their way.
 
-    All have one of everything, and all that can be added up in every step: as SPRINGS_AND_RINGS, whose kernels they
-    have.
+    All have one of everything, so that the scenes share their kernels.
     """
     steel = {"material": "steel", "max_speed": 1.0, "acceleration": 10.0}
     given: dict[str, Any] = {
@@ -69,18 +68,18 @@ def plant(*bottles: dict[str, Any], **more: Any) -> Scene:
 
 
 def stepped(given: Scene, **more: Any) -> Simulation:
-    """The same scene with nobody riding."""
+    """Return the same scene without riding."""
     return Simulation(parse_scene(given.source_text, "stepped", {"effects": {"riding": "off"}}), threads=1, **more)
 
 
 def riders(sim: Simulation) -> set[int]:
-    """Ids of the bottles that the last step of the last tick left out; on one thread."""
+    """Return the ids of the bottles that the last step of the last tick skipped; on one thread."""
     world = sim._state.world
-    return set(world.bottles.id[left_out(world.riding, world.bottles.id.size)].tolist()) - {-1}
+    return set(world.bottles.id[skipped_slots(world.riding, world.bottles.id.size)].tolist()) - {-1}
 
 
 def everything(sim: Simulation) -> list[bytes]:
-    """All that can be observed, bit for bit."""
+    """Return everything that can be observed, bit for bit."""
     columns = [*vars(sim.bottles()).values(), *vars(sim.contacts()).values(), *vars(sim.belts()).values()]
     for asked in (sim.damage(), sim.rail_wear()):
         columns += [] if asked is None else list(vars(asked).values())
@@ -89,7 +88,10 @@ def everything(sim: Simulation) -> list[bytes]:
 
 
 def run(given: Scene, ticks: int, act: Act = lambda sim: None, **more: Any) -> tuple[Simulation, list[set[int]]]:
-    """Both ways, compared at every tick; the riding one at its end, and who rode at each tick. act: before a tick."""
+    """Run with and without riding, and compare at every tick. act: called before a tick.
+
+    Return the riding run at its end, and the riding bottles at each tick.
+    """
     riding, plain = Simulation(given, threads=1, **more), stepped(given, **more)
     assert riding.model.has("riding")
     assert plain._state.world.riding is None
@@ -105,17 +107,17 @@ def run(given: Scene, ticks: int, act: Act = lambda sim: None, **more: Any) -> t
 
 
 def by(rode: list[set[int]], tick: int) -> int:
-    """How many rode at once in the last ticks before one: where lists were just made anew nobody does."""
+    """Return the number of bottles that rode at once in the last ticks before one; right after a rebuild none does."""
     return max(map(len, rode[max(0, tick - 5) : tick]))
 
 
 def at(tick: int, act: Act) -> Act:
-    """Something done from outside before one tick."""
+    """Return an action before one tick."""
     return lambda sim: act(sim) if sim.tick == tick else None
 
 
 def test_who_is_as_fast_as_its_belt_rides_until_something_comes() -> None:
-    """Set down at rest they slide at first, and then all ride; the first ones get to the sink, which takes two."""
+    """Set down at rest they slide at first, and then all ride; the first ones reach the sink, which removes two."""
     sim, rode = run(plant(machines={}), 150)
     assert by(rode, 6) == 0
     assert by(rode, 150) == ROWS * COLUMNS
@@ -128,9 +130,9 @@ def test_who_is_as_fast_as_its_belt_rides_until_something_comes() -> None:
     [("leapfrog", "explicit"), ("semi_implicit_euler", "explicit"), ("velocity_verlet", "implicit")],
 )
 def test_a_whole_line_is_the_same_to_the_bit(integrator: str, solver: str) -> None:
-    """With bottles that come and go, a transfer to a slower belt, a stop at which they queue up, and a gate.
+    """Bottles come and go, pass to a slower belt, queue at a stop, and meet a gate.
 
-    Work of belts, peaks, scuffing, tipping: what is added up in every step goes on while bottles ride.
+    Work of belts, peaks, scuffing and tipping, which every step adds up, continue while bottles ride.
     """
 
     def act(sim: Simulation) -> None:
@@ -153,12 +155,12 @@ RIDE = 60
 
 
 def meets(sim: Simulation) -> bool:
-    """Whether anything touches anything."""
+    """Return True if anything touches anything."""
     return sim.contacts().kind.size > 0
 
 
 def test_woken_by_a_bottle_that_runs_into_them() -> None:
-    """Thrown across the belt, it comes within reach of one row after the other."""
+    """A bottle thrown across the belt comes within reach of one row after the other."""
 
     def throw(sim: Simulation) -> None:
         with sim.editing() as (bottles, slots):
@@ -178,7 +180,7 @@ def test_woken_by_a_rail_in_their_way() -> None:
 
 
 def test_woken_by_the_edge_of_their_belt() -> None:
-    """On the next one they are sped up, and ride again once the spin is gone that the edge gave them."""
+    """On the next belt they accelerate, and ride again once the spin from the edge is gone."""
     belts = {"main": belt(SPEED, (-1.0, -1.0), 4.0, 2.0), "next": belt(0.7, (3.0, -1.0), 4.0, 2.0), "table": TABLE}
     sim, rode = run(plant(belts=belts, rails={"stop": segment((6.9, -1.0), (6.9, 1.0))}, machines={}), 720)
     assert sim.bottles().x.min() > 3.0
@@ -198,7 +200,7 @@ def test_woken_by_a_belt_that_changes_its_speed() -> None:
 
 
 def test_woken_by_a_fault() -> None:
-    """The drive trips, and the belt stops at its ramp."""
+    """The drive trips, and the belt stops on its ramp."""
     sim, rode = run(plant(machines={}), RIDE + 150, at(RIDE, lambda sim: sim.inject("belts/main/trip", 1.0)))
     assert by(rode, RIDE) == by(rode, RIDE + 150) == ROWS * COLUMNS
     assert not rode[RIDE]
@@ -212,12 +214,12 @@ def test_woken_by_a_gate_that_closes_before_them() -> None:
     sim, rode = run(plant(machines={}), RIDE + 250, at(RIDE, close))
     assert by(rode, RIDE) == ROWS * COLUMNS
     assert meets(sim)
-    # Wherever the gate may be nobody rides, long before it is there.
+    # No bottle rides near any position of the gate, long before it is there.
     assert by(rode, RIDE + 250) == 0
 
 
 def test_woken_by_bottles_that_are_put_down_beside_them_and_taken_away() -> None:
-    """By a source that is faster than the belt, so that its bottles come within reach of those before; by a sink."""
+    """A source faster than the belt puts bottles within reach of earlier ones; a sink removes some."""
     machines = {
         "source": {"kind": "source", "bottle": "bottle", "position": [-0.7, 0.0], "direction": 0.0, "speed": 1.0,
                    "rate": 3.0},
@@ -242,7 +244,7 @@ def test_woken_by_an_edit_from_outside() -> None:
 
 
 def test_woken_by_a_restored_checkpoint(tmp_path: Path) -> None:
-    """Nobody rides in the first step of a tick, whether it was saved before or not."""
+    """No bottle rides in the first step of a tick, with or without a checkpoint before it."""
     given = plant()
     sim, rode = run(given, RIDE)
     assert by(rode, RIDE) >= LEAST
@@ -251,7 +253,7 @@ def test_woken_by_a_restored_checkpoint(tmp_path: Path) -> None:
         loaded = Simulation.load(tmp_path / "riding", threads=threads)
         straight = stepped(given)
         straight.advance(RIDE)
-        everything(straight)  # what is reported once
+        everything(straight)  # observed once
         for _ in range(60):
             loaded.advance()
             straight.advance()
@@ -285,7 +287,7 @@ def test_nobody_rides_on_a_belt_that_turns() -> None:
 
 
 def test_the_division_into_calls_and_threads_leaves_no_trace() -> None:
-    """More bottles than a block has, on one and on two threads, whose blocks are not the same."""
+    """More bottles than a block has, on one and on two threads, whose blocks differ."""
     crowd = {"grid": {"type": "bottle", "origin": [-3.0, -3.0], "rows": 30, "columns": 30, "pitch": 0.15}}
     far = {**TABLE, "centre": [0.0, 9.0]}
     given = plant(
@@ -311,7 +313,7 @@ def test_the_division_into_calls_and_threads_leaves_no_trace() -> None:
 
 
 def test_lists_made_anew_at_any_moment_leave_no_trace() -> None:
-    """A stale list makes the integrator stop after a step, and go on in another call."""
+    """A stale list makes the integrator stop after a step, and continue in another call."""
 
     def spoil(sim: Simulation) -> None:
         if sim.tick % 3 == 0:
@@ -337,16 +339,16 @@ def test_runs_are_all_who_do_not_ride_and_leave_out_only_many_at_once() -> None:
                 steps[begin:stop] = True
             assert not steps[:first].any()
             assert not steps[end:].any()
-            left_out = ~steps[first:end]
-            assert riding.rides[first:end][left_out].all()
-            lengths = runs_of(left_out)
+            skipped_slots = ~steps[first:end]
+            assert riding.rides[first:end][skipped_slots].all()
+            lengths = runs_of(skipped_slots)
             assert all(length >= LEAST for length in lengths)
-            # Whoever rides and is stepped has too few beside it.
-            assert all(length < LEAST for length in runs_of((riding.rides[first:end] != 0) & ~left_out))
+            # A rider that is stepped has too few adjacent ones.
+            assert all(length < LEAST for length in runs_of((riding.rides[first:end] != 0) & ~skipped_slots))
 
 
 def empty(slots: int) -> Riding:
-    """Room for so many bottles."""
+    """Return room for `slots` bottles."""
     return Riding(
         vx=np.zeros(slots),
         vy=np.zeros(slots),
@@ -360,12 +362,12 @@ def empty(slots: int) -> Riding:
 
 
 def runs_of(flags: Any) -> list[int]:
-    """Lengths of the runs of those that are set."""
+    """Return the lengths of the runs of set flags."""
     padded = np.concatenate([[False], flags, [False]]).astype(int)
     edges = np.flatnonzero(np.diff(padded))
     return (edges[1::2] - edges[::2]).tolist()  # type: ignore[no-any-return]
 
 
 def test_a_bottle_beside_the_row_is_within_its_reach() -> None:
-    """The dozen are so far apart that nobody is in anybody's list: else the tests above say little."""
+    """The dozen are too far apart for each other's lists; otherwise the tests above would show little."""
     assert PITCH - 2.0 * RADIUS > 0.2 * RADIUS

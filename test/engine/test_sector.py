@@ -7,7 +7,7 @@ import pytest
 from worlds import callable_part
 
 from conveyor_sim.engine.support.sector import span_distance as span_distance_part
-from conveyor_sim.physics.model.plant import reach_code
+from conveyor_sim.physics.model.plant_arrays import reach_code
 
 span_distance = callable_part(span_distance_part)
 
@@ -31,7 +31,7 @@ def test_its_sign_is_that_of_the_angle_modulo_a_turn(start: float, span: float) 
 
 @pytest.mark.parametrize("span", SPANS)
 def test_its_size_is_at_most_the_distance_to_an_edge(span: float) -> None:
-    """So that what is certain within a margin is certain."""
+    """So a belt that is certain within a margin is certain."""
     start = 2.0
     points = RANDOM.uniform(-1.0, 1.0, (500, 2))
     to_edges = []

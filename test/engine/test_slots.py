@@ -1,4 +1,4 @@
-"""Forces by pair, summed by bottle through slots: what a loop over all pairs gives, however many neighbours."""
+"""Forces by pair, summed by bottle through slots: equal to a loop over all pairs, for any number of neighbours."""
 
 import math
 
@@ -11,11 +11,11 @@ from conveyor_sim.physics.state import State
 
 STIFFNESS = 5000.0
 BIG, SMALL = 0.2, 0.01
-"""m: a big bottle has room for over sixty small ones around it."""
+"""Radii, m: a big bottle has room for over sixty small ones around it."""
 
 
 def around_a_big_one() -> tuple[State, np.ndarray, np.ndarray]:
-    """Two big bottles among small ones that overlap them and each other."""
+    """Return two big bottles among small ones that overlap them and each other."""
     random = np.random.default_rng(5)
     angle = np.linspace(0.0, 2.0 * math.pi, 80, endpoint=False)
     ring = (BIG + 0.9 * SMALL) * np.column_stack([np.cos(angle), np.sin(angle)]) + random.normal(0.0, 0.001, (80, 2))
@@ -28,7 +28,7 @@ def around_a_big_one() -> tuple[State, np.ndarray, np.ndarray]:
 
 
 def test_a_bottle_with_more_neighbours_than_slots() -> None:
-    """Force (N) on each bottle: all pairs, k delta along the line of centres."""
+    """The force (N) on each bottle is the sum over all pairs, k delta along the line of centres."""
     state, points, radius = around_a_big_one()
     evaluate(state.world)
     slots = state.world.slots
@@ -44,7 +44,7 @@ def test_a_bottle_with_more_neighbours_than_slots() -> None:
 
 
 def test_every_pair_is_in_one_slot_of_each_partner() -> None:
-    """By entry: the first of a pair at p, the second at P + p, all in order of the partner."""
+    """The first of a pair has its entry at p, the second at P + p, all in order of the partner."""
     state, _, _ = around_a_big_one()
     pairs, slots = state.world.pairs, state.world.slots
     assert pairs is not None

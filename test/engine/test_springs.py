@@ -1,4 +1,4 @@
-"""Tangential springs are state: they outlive rebuilds and longer lists, and go with their bottle."""
+"""Tangential springs are state: they survive rebuilds and longer lists, and leave with their bottle."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ DT = 2e-5
 
 
 def pressed() -> State:
-    """Twelve bottles squeezed in a corner of straight rails and an arc, sliding and spinning."""
+    """Return twelve bottles squeezed in a corner of straight rails and an arc, sliding and spinning."""
     points = [(0.062 + 0.125 * column, 0.063 + 0.126 * row) for row in range(3) for column in range(4)]
     given = scene(
         contacts=[contact(5000.0, **SPRING), contact(8000.0, "steel", **SPRING)],
@@ -36,7 +36,7 @@ def run(state: State, steps: int) -> None:
 
 
 def elongations(state: State) -> dict[tuple[str, int, int], float]:
-    """All springs that are not slack, m, by what they tie together."""
+    """Return the elongations of all loaded springs, m, by their ends."""
     world, found = state.world, {}
     assert world.pairs is not None
     assert world.pairs.spring is not None
@@ -62,7 +62,7 @@ def test_a_rebuilt_list_keeps_the_springs() -> None:
 
 
 def test_a_rebuild_at_any_time_leaves_no_trace() -> None:
-    """Not even in the bits; nor do lists that turn out too short, or room for more bottles."""
+    """Not a bit differs; nor do lists that are too short, or room for more bottles, change anything."""
     plain, disturbed = pressed(), pressed()
     run(plain, 300)
     for n in range(10):
@@ -80,7 +80,7 @@ def test_a_rebuild_at_any_time_leaves_no_trace() -> None:
 
 
 def test_a_list_that_has_to_grow_keeps_the_springs() -> None:
-    """Bottles come near: the lists that a rebuild finds too short are lengthened, and nothing is forgotten."""
+    """Bottles approach: lists that are too short for a rebuild are lengthened, and no spring is lost."""
     state = pressed()
     run(state, 60)
     before = elongations(state)
@@ -96,7 +96,7 @@ def test_a_list_that_has_to_grow_keeps_the_springs() -> None:
 
 
 def test_springs_go_with_their_bottle() -> None:
-    """Its slot may be another's before the next rebuild."""
+    """Another bottle may get the slot before the next rebuild."""
     state = pressed()
     run(state, 60)
     gone = 5

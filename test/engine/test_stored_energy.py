@@ -1,4 +1,4 @@
-"""What contacts hold: closed forms of the laws, and, at rails that push together, the potential of their force."""
+"""Energy of contacts: closed forms of the laws, and the potential of rails that push together."""
 
 import math
 from typing import Any
@@ -16,11 +16,11 @@ DEEP = 0.004
 
 
 def stored(state: State) -> np.ndarray:
-    return stored_energy(state.world, ALONE.found)
+    return stored_energy(state.world, ALONE.rail_contacts)
 
 
 def test_contacts_hold_what_their_laws_take_up() -> None:
-    """k d^2 / 2 (glass on pet), 2/5 k_h d^2.5 (glass), and the area under a table, beyond its end too (pet)."""
+    """k d^2 / 2 (glass on pet), 2/5 k_h d^2.5 (glass), and the area under a table, beyond its end, too (pet)."""
     table = [[0.001, 2.0], [0.003, 10.0]]
     laws = scene(
         bottle_types={"bottle": kind(), "other": kind(material="pet")},
@@ -68,7 +68,7 @@ def test_mindlins_spring_holds_by_the_overlap_at_hand() -> None:
     ids=["shallow pocket", "right angle", "three pieces", "convex"],
 )
 def test_pieces_of_a_rail_that_push_together_give_back_what_they_took(course: Any) -> None:
-    """Their force is minus the slope of the energy, wherever a bottle is in the corner."""
+    """The force is minus the slope of the energy at every position in the corner."""
     rails = {"corner": polyline(course)}
     points = [(x, RADIUS - y) for x in (-0.013, 0.0, 0.004, 0.011) for y in (0.0005, 0.003)]
     step = 1e-6
@@ -85,5 +85,5 @@ def test_pieces_of_a_rail_that_push_together_give_back_what_they_took(course: An
     ]
     forces = rail_forces(rails, points)
     assert np.abs(forces).max() > 0.5
-    # Where a piece begins to share, the slope bends within a step.
+    # At the onset of sharing the slope bends within a step.
     np.testing.assert_allclose(-np.array(slopes), forces, atol=2e-3 * np.abs(forces).max())

@@ -1,4 +1,4 @@
-"""Threads: the same bits on any number of them."""
+"""Threads give the same bits in any number."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ ROWS, COLUMNS, PITCH = 30, 40, 0.131
 
 
 def crowd(**fields: Any) -> Scene:
-    """1200 bottles in a box on two belts that run against each other: several blocks of bottles and of pairs."""
+    """Return 1200 bottles in a box on two belts with opposite directions: several blocks of bottles and of pairs."""
     width, height = COLUMNS * PITCH + 0.1, ROWS * PITCH + 0.1
     box = [(0.0, 0.0), (width, 0.0), (width, height), (0.0, height)]
     laws = {"damping": ("normal", 1.0), "friction": 0.2}
@@ -57,7 +57,7 @@ VARIANTS: dict[str, dict[str, Any]] = {
 
 @pytest.mark.parametrize("name", VARIANTS)
 def test_the_same_bits_on_any_number_of_threads(name: str) -> None:
-    """Long enough for bottles to meet and lists to be rebuilt; more threads than blocks are fine."""
+    """The run is long enough for impacts and rebuilds; there may be more threads than blocks."""
     ticks, given = 15, crowd(**VARIANTS[name])
     one = Simulation(given, threads=1)
     one.advance(ticks)
@@ -93,7 +93,7 @@ def test_a_team_has_a_size() -> None:
 
 
 def test_a_thread_that_fails_is_heard_and_the_crew_goes_on() -> None:
-    """What a worker raises reaches the caller; the next call finds a new group."""
+    """An exception in a worker reaches the caller; the next call uses a new group."""
 
     def failing(_world: Any, worker: Any, _steps: int, _dt: float, _phase: int) -> int:
         if worker.rank > 0:
@@ -112,11 +112,11 @@ def test_a_thread_that_fails_is_heard_and_the_crew_goes_on() -> None:
 
 
 def test_a_process_of_another_number_has_threads_of_its_own() -> None:
-    """A fork copies queues, not threads: a pool that finds itself in a child must not wait for those of the parent."""
+    """A fork copies queues, not threads, so a pool in a child process must not wait for threads of the parent."""
     sim, other = Simulation(crowd(), threads=2), Simulation(crowd(), threads=1)
     sim.advance(2)
     tasks = list(sim._integration._pool._tasks)
-    sim._integration._pool._process = -1  # as a child sees it
+    sim._integration._pool._process = -1  # as in a child process
     sim.advance(1)
     assert sim._integration._pool._tasks[0] is not tasks[0]
     other.advance(3)

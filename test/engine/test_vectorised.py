@@ -1,7 +1,7 @@
-"""Loops over the laws are vectorised: several pairs to one instruction, which is most of the engine's speed.
+"""Loops over the laws are vectorised: several pairs per instruction, which gives most of the engine's speed.
 
-LLVM gives up without a word: at a branch, a call, too many arrays. Its vectorised loops are known by a block that it
-names `vector.body`, and by packed instructions.
+LLVM gives up silently at a branch, a call, or too many arrays. A vectorised loop has a block that LLVM names
+`vector.body`, and packed instructions.
 """
 
 import platform
@@ -27,12 +27,12 @@ COUNT = 64
 
 
 def compiled(function: Any) -> Any:
-    """As a kernel is compiled, but not from the cache, for numba shows no code that it did not compile itself."""
+    """Compile like a kernel, but without a cache, because numba shows only code that it has compiled itself."""
     return numba.njit(nogil=True, error_model="numpy", _nrt=False, pipeline_class=KernelCompiler)(function)
 
 
 def assert_vectorised(loop: Any) -> None:
-    """That the only loop of a function that was called once is."""
+    """Assert that the only loop of a function that was called once is vectorised."""
     (ir,) = loop.inspect_llvm().values()
     (assembly,) = loop.inspect_asm().values()
     assert "vector.body" in ir
@@ -67,7 +67,7 @@ ALL = [name for name in ContactLaw._fields if name != "curve"]
     ],
 )
 def test_contacts(names: list[str], atan: bool, spring: bool, implicit: bool) -> None:
-    """Every law but the table, which is searched."""
+    """Every law except the table, which needs a search."""
 
     @compiled
     def loop(
@@ -118,7 +118,7 @@ def both(compliance: Any, c: int) -> Any:
 
 
 def test_tangential_springs() -> None:
-    """How they go with the slip."""
+    """Their elongation by the slip."""
 
     @compiled
     def loop(count: int, law: Any, spring: Any, overlap: Any, slip: Any, normal: Any) -> None:

@@ -39,7 +39,10 @@ class Invariants:
         self._radius, self._mass = model.type_radius, model.type_mass
         on = {"SegmentPiece": model.segments is not None, "ArcPiece": model.arcs is not None}
         self._pieces = [
-            (rail.name, piece) for rail in model.rails_at_rest for piece in rail.pieces if on[type(piece).__name__]
+            (rail.name, piece)
+            for rail in model.plant.rails_at_rest
+            for piece in rail.pieces
+            if on[type(piece).__name__]
         ]
         self._regions = {name: np.array(feed.region) for name, feed in simulation.scene.outfeeds.items()}
         self._belts = ExpectedBelts(simulation)
@@ -167,7 +170,7 @@ class Invariants:
         if not self._stable:
             return "through a rail, in steps beyond the bound of stability"
         scene = self._sim.scene
-        material = next(shape.material for shape in self._sim.model.rail_shapes if shape.name == rail)
+        material = next(shape.material for shape in self._sim.model.plant.rails if shape.name == rail)
         pair = {list(scene.bottle_types.values())[kind].material, material}
         contact = next(contact for contact in scene.contacts if set(contact.between) == pair)
         enough = energy < work(contact, float(self._radius[kind]))

@@ -19,7 +19,7 @@ from conveyor_sim.accuracy.measure.chatter import STEPS
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.accuracy.trajectory import variant
 from conveyor_sim.columns.bottles import BottleColumns
-from conveyor_sim.engine.lists.riding import left_out
+from conveyor_sim.engine.lists.riding import skipped_slots
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.physics.stepping.guard.chatter import ChatterMeter
 from conveyor_sim.scene import Scene, parse_overrides, parse_scene
@@ -149,7 +149,7 @@ def riders(simulation: Simulation) -> int:
     """Bottles that the last step of the last tick left out, on one thread; 0 where nobody can ride."""
     world = simulation._state.world
     ids = world.bottles.id
-    return int((left_out(world.riding, ids.size) & (ids >= 0)).sum())
+    return int((skipped_slots(world.riding, ids.size) & (ids >= 0)).sum())
 
 
 def _acts(case: Case, scene: Scene) -> list[int]:
@@ -202,7 +202,7 @@ class _Watch:
         self._before: BottleColumns | None = None
         self._start: BottleColumns | None = None
         self._rail_forces: list[float] = []
-        outlines = [rail.outline() for rail in simulation.model.rail_shapes]
+        outlines = [rail.outline() for rail in simulation.model.plant.rails]
         self._starts = np.vstack([np.empty((0, 2)), *(outline[:-1] for outline in outlines)])
         self._ends = np.vstack([np.empty((0, 2)), *(outline[1:] for outline in outlines)])
 
@@ -281,7 +281,7 @@ def _energy_kept(first: BottleColumns, last: BottleColumns) -> float:
 def slips(simulation: Simulation, bottles: BottleColumns) -> F8:
     """Speed of each bottle relative to the surface under it, (bottles,), m/s."""
     ux, uy = np.zeros(bottles.x.size), np.zeros(bottles.x.size)
-    for index, (shape, speed) in enumerate(zip(simulation.model.belt_shapes, simulation.belts().actual, strict=True)):
+    for index, (shape, speed) in enumerate(zip(simulation.model.plant.belts, simulation.belts().actual, strict=True)):
         on = bottles.belt == index
         if shape.kind == "straight":
             ux[on], uy[on] = speed * math.cos(shape.angle), speed * math.sin(shape.angle)

@@ -25,9 +25,9 @@ from page.live_line import (
 from page.pixels import count_where_they_are, settled
 from protocols.waiting import until
 
+from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.replay import replay
-from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.protocols.hosting.serving import Serving
 from conveyor_sim.protocols.hosting.settings import ServerSettings
 from conveyor_sim.protocols.tags.bag_provider import BagTagProvider
@@ -130,7 +130,7 @@ def test_everything_fits_and_has_a_name_for_those_who_hear_it(page: Any, size: t
 
 def test_who_has_not_signed_in_is_refused_with_the_reason(page: Any, live: Live) -> None:
     set_speed(page, "0.3")
-    told(page, "Refused: nobody has signed in")
+    told(page, "Refused: not signed in")
     assert live.source.shown.values[SETPOINT] == 0.5
 
 

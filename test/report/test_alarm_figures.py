@@ -1,6 +1,7 @@
-"""What a run's alarms amount to."""
+"""Figures of the alarms of a run."""
 
 import numpy as np
+from facts import missing
 
 from conveyor_sim.columns.alarms import AlarmColumns
 from conveyor_sim.report.alarm_figures import AlarmTally
@@ -25,7 +26,8 @@ def test_rates_are_for_ten_minutes_and_the_worst_ten_minutes_are_found() -> None
 def test_more_than_ten_are_a_flood() -> None:
     assert not tally([float(n) for n in range(10)]).figures(60.0, 0.01).flood
     flood = tally([float(n) for n in range(11)]).figures(60.0, 0.01)
-    assert flood.flood and flood.sentence == "11 came: 11 x jam; a flood, 11 in ten minutes"
+    assert flood.flood
+    assert missing(flood.sentence, ["11 x jam", "flood", "11 in ten minutes"]) == []
 
 
 def test_none() -> None:
@@ -57,4 +59,6 @@ def test_what_stands_is_listed_by_priority_then_by_age() -> None:
     figures = counted.figures(10.0, 0.01)
     assert [(one.id, one.since) for one in figures.standing] == [("urgent", 3.0), ("old", 1.0), ("new", 2.0)]
     assert [one.text for one in figures.hidden] == ["shelved!"]
-    assert figures.sentence == ("none came\nstanding at the end: urgent since 3 s, old since 1 s, new since 2 s")
+    came, standing = figures.sentence.splitlines()
+    assert missing(came, ["none"]) == []
+    assert standing.endswith(": urgent since 3 s, old since 1 s, new since 2 s")

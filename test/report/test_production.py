@@ -1,4 +1,4 @@
-"""How a recorded line produced: read from its bag, printed and drawn."""
+"""Production of a recorded line: read from its bag, printed and drawn."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from bag.small_line import SMALL_LINE
 from click.testing import CliRunner
+from facts import missing, stating
 
 from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.bag.recorder import Recorder
@@ -63,7 +64,7 @@ def production(bag: Path) -> Production:
 
 
 def test_periods_are_where_the_counted_time_went(production: Production) -> None:
-    """Those of each machine follow one another from start to end, and sum up to its counters."""
+    """Periods of each machine are contiguous from start to end, and sum up to its counters."""
     assert tuple(production.periods) == MACHINES
     for index, (machine, periods) in enumerate(production.periods.items()):
         assert (periods[0].begin, periods[-1].end) == (production.start, production.end), machine
@@ -102,7 +103,7 @@ def test_bottles_of_the_report_are_those_of_the_counters(production: Production)
 
 
 def test_alarms_are_counted(bag: Path, tmp_path: Path) -> None:
-    """Those that a controller raises and clears; one stands at the end."""
+    """A controller raises and clears alarms; one is active at the end."""
     scene = load_scene(FAILING_LINE)
     sim = Simulation(scene)
     with Recorder(tmp_path / "bag") as recorder:
@@ -145,8 +146,9 @@ def test_of_a_line_that_has_made_nothing_yet_it_says_so(tmp_path: Path) -> None:
     shown = CliRunner().invoke(main, ["report", str(record(tmp_path / "bag", ticks=200, scene=scene)), "--no-pictures"])
     rows = [line.split() for line in shown.output.splitlines()]
     assert ["machines/packer", "idle", "1", "2.00"] in [row[:4] for row in rows]
-    assert "efficiency  not known: no bottle has left the line" in shown.output
-    assert "alarms  0 came, 0 at most in ten minutes" in shown.output
+    assert ["efficiency", "not", "known:"] in [row[:3] for row in rows]
+    assert missing(shown.output, ["no bottle has left the line"]) == []
+    assert ["alarms", "0"] in [row[:2] for row in rows]
 
 
 def test_no_name_and_no_number_is_cut_on_a_terminal_of_80_columns(bag: Path) -> None:
@@ -212,5 +214,5 @@ def test_a_recording_without_counters_is_refused_in_a_sentence(tmp_path: Path) -
         for _ in range(10):
             sim.advance()
             outputs.after_tick()
-    with pytest.raises(BagError, match="topic counters holds no message"):
+    with pytest.raises(BagError, match=stating("topic counters", "no message")):
         read_production(tmp_path / "bag")

@@ -16,7 +16,7 @@ from ros.line_client import LineClient, until
 from ros.warm_child import WarmChild
 from std_srvs.srv import Trigger
 
-from conveyor_sim.bag.typestore import default_distro
+from conveyor_sim.bag.messages.typestore import default_distro
 from conveyor_sim.ros.child import Child
 from conveyor_sim.ros.domain import private_domain
 from conveyor_sim.run.session import Session

@@ -16,8 +16,8 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
-from conveyor_sim.bag.qos import ANSWERS
-from conveyor_sim.bag.topics import TOPICS
+from conveyor_sim.bag.messages.qos import ANSWERS
+from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.ros.publishers import ros_qos
 from conveyor_sim.ros.spinner import Spinner
 from conveyor_sim.support.child_process import Process

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from bag.small_line import SMALL_LINE, SPEED, TURN
 
-from conveyor_sim.bag import messages as types
+from conveyor_sim.bag.messages import encode as types
 from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.line.run_state import RUNNING, RunState

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from conveyor_msgs import srv
+from facts import missing, stating
 from ros.conftest import SMALL_LINE
 from ros.line_client import LineClient, until
 from ros.small_line_controller import make
@@ -104,7 +105,7 @@ def test_a_refused_command_fails(scenario: Scenario, domain: int, client: LineCl
 
     with ThreadPoolExecutor(1) as pool:
         pool.submit(ask)
-        with pytest.raises(CommandError, match=r"^at 0\.00 s a command was refused: 1 names and 0 values given"):
+        with pytest.raises(CommandError, match=stating("at 0.00 s", "refused", "1 names", "0 values")):
             scenario.attach_node((), namespace="/cell", domain=domain)
 
 
@@ -113,8 +114,7 @@ def test_a_node_that_never_asks(scenario: Scenario, tmp_path: Path) -> None:
     with pytest.raises(ControlError) as failure:
         scenario.attach_node(["sh", "-c", f"echo $$ > {file}; exec sleep 600"], namespace="/cell", patience=2.0)
     text = str(failure.value)
-    assert text.startswith("at 0.00 s no request for a tick after 0 within 2 s of wall time, expected at the service ")
-    assert "the service /cell/lockstep in ROS domain " in text
+    assert missing(text, ["at 0.00 s", "no request", "after 0", "within 2 s", "/cell/lockstep", "ROS domain"]) == []
     scenario.close()
     assert not Path("/proc", file.read_text().strip()).exists()
 

@@ -17,7 +17,7 @@ from ros.line_client import LineClient, until
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
-from conveyor_sim.bag.qos import ANSWERS
+from conveyor_sim.bag.messages.qos import ANSWERS
 from conveyor_sim.ros.child import Child
 from conveyor_sim.ros.publishers import ros_qos
 from conveyor_sim.ros.spinner import Spinner

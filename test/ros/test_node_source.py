@@ -35,7 +35,7 @@ def setpoint(value: float) -> Input:
 def test_a_line_is_shown_and_worked_and_all_is_on_record(
     start_node: Callable[..., Child], client: LineClient, source: NodeSource, tmp_path: Path
 ) -> None:
-    assert source.give(setpoint(0.1)) == source.shown.lost == "nothing has been heard of the line yet"
+    assert source.give(setpoint(0.1)) == source.shown.lost == "no data of the line have arrived yet"
     node = start_node(scene=ZONED, real_time_factor=1.0, start_paused=False, duration=600.0, record=tmp_path / "bag")
     until(lambda: not source.shown.lost and source.shown.run.state == RUNNING, "the line")
     image = image_of(load_scene(ZONED))

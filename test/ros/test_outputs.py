@@ -15,8 +15,8 @@ from ros.line_client import LineClient, until
 from std_msgs.msg import Bool, Float64
 from visualization_msgs.msg import Marker, MarkerArray
 
-from conveyor_sim.bag.topics import OUTPUTS, TOPICS
-from conveyor_sim.bag.typestore import default_distro
+from conveyor_sim.bag.messages.topics import OUTPUTS, TOPICS
+from conveyor_sim.bag.messages.typestore import default_distro
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.ros.child import Child
 from conveyor_sim.ros.publishers import check_type

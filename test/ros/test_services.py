@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 import pytest
 from conveyor_msgs import srv
 from conveyor_msgs.msg import CommandOutcome, Line, Result, SimulationState
+from facts import missing
 from ros.line_client import LineClient, until
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
@@ -90,7 +91,7 @@ def test_a_step_is_refused_unless_paused(line: LineClient) -> None:
     assert set_state(line, STOPPED).result == Result.RESULT_OK
     result = step(line, 1)
     assert result.result == Result.RESULT_OPERATION_FAILED
-    assert "the simulation is STOPPED, expected PAUSED" in result.error_message
+    assert missing(result.error_message, ["STOPPED", "expected PAUSED"]) == []
 
 
 def test_states_are_set_as_asked(line: LineClient) -> None:
@@ -140,7 +141,7 @@ def test_at_the_end_it_pauses_until_a_reset(line: LineClient, shared_node: Child
     until(lambda: line.state() == PAUSED, "the end of the run")
     assert tick(line) == LAST
     for result in (step(line, 1), set_state(line, PLAYING)):
-        assert f"the run has ended at tick {LAST}" in result.error_message
+        assert missing(result.error_message, ["ended", f"tick {LAST}"]) == []
     assert not line.call(Trigger, "resume").success
     outcomes = line.listen(CommandOutcome, "outcomes")
     speed = line.publisher(Float64, "belts/feeder/cmd_speed", "cmd_speed")
@@ -151,7 +152,7 @@ def test_at_the_end_it_pauses_until_a_reset(line: LineClient, shared_node: Child
     until(lambda: len(outcomes.messages) == 1, "its outcome")
     told = outcomes.messages[0]
     assert (told.tick, told.accepted) == (LAST, False)
-    assert told.reason == f"the run has ended at tick {LAST}; expected a reset"
+    assert missing(told.reason, ["ended", f"tick {LAST}", "reset"]) == []
     line.reset()
     line.step(1)
     assert tick(line) == 1

@@ -12,9 +12,9 @@ import pytest
 from conveyor_msgs import srv
 from ros.line_client import LineClient, until
 
+from conveyor_sim.bag.messages.topics import TOPICS
+from conveyor_sim.bag.messages.typestore import default_distro, typestore
 from conveyor_sim.bag.recover import recover
-from conveyor_sim.bag.topics import TOPICS
-from conveyor_sim.bag.typestore import default_distro, typestore
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.line.commands.inputs import CommandOutcome
 from conveyor_sim.ros.child import Child

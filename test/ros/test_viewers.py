@@ -8,8 +8,8 @@ from pathlib import Path
 
 from ruamel.yaml import YAML
 
-from conveyor_sim.bag.qos import LATCHED
-from conveyor_sim.bag.topics import TOPICS
+from conveyor_sim.bag.messages.qos import LATCHED
+from conveyor_sim.bag.messages.topics import TOPICS
 
 VIEWERS = Path(__file__).resolve().parents[2] / "config" / "viewers"
 DISPLAYS = {

@@ -2,8 +2,10 @@
 
 import os
 from pathlib import Path
+from typing import Any
 
 import pytest
+from facts import missing
 
 from conveyor_sim.errors import SceneError
 from conveyor_sim.scene import load_scene, parse_scene, yaml_lines
@@ -15,13 +17,16 @@ CASES = yaml_lines.Document((HERE / "bad_scenes.yaml").read_text(encoding="utf-8
 
 
 @pytest.mark.parametrize("case", CASES, ids=[case["id"] for case in CASES])
-def test_one_wrong_thing_gets_one_line(case: dict[str, str]) -> None:
+def test_one_wrong_thing_gets_one_line(case: dict[str, Any]) -> None:
     assert GOOD.count(case["old"]) >= 1, "the change no longer fits good.yaml"
     text = GOOD.replace(case["old"], case["new"], 1)
     line = 1 + next(number for number, content in enumerate(text.splitlines()) if case["at"] in content)
     with pytest.raises(SceneError) as error:
         parse_scene(text, "plant.yaml")
-    assert str(error.value) == f"plant.yaml:{line}: {case['says']}"
+    (message,) = str(error.value).splitlines()
+    head = f"plant.yaml:{line}: {case['field']}: " if "field" in case else f"plant.yaml:{line}: "
+    assert message.startswith(head)
+    assert missing(message.removeprefix(head), [*case.get("value", "").splitlines(), *case["facts"]]) == []
 
 
 def test_the_unchanged_scene_is_accepted() -> None:
@@ -46,7 +51,7 @@ def test_no_more_than_fifty_problems_are_listed() -> None:
     lines = str(error.value).splitlines()
     assert len(lines) == 51
     assert lines[0].startswith("plant.yaml:33: bottles[1].position: [0.4, 0.4] given")
-    assert lines[50] == "plant.yaml: and 10 more problems"
+    assert missing(lines[50], ["plant.yaml", "10 more"]) == []
 
 
 def test_long_values_are_cut_short() -> None:
@@ -59,20 +64,24 @@ def test_long_values_are_cut_short() -> None:
 
 def test_missing_file(tmp_path: Path) -> None:
     path = tmp_path / "nothing.yaml"
-    with pytest.raises(SceneError, match="no such file, expected a scene file") as error:
+    with pytest.raises(SceneError) as error:
         load_scene(path)
     assert str(error.value).startswith(f"{path}: ")
+    assert missing(str(error.value), ["no such file", "scene file"]) == []
 
 
 def test_folder(tmp_path: Path) -> None:
-    with pytest.raises(SceneError, match="is a folder, expected a scene file"):
+    with pytest.raises(SceneError) as error:
         load_scene(tmp_path)
+    assert missing(str(error.value), [str(tmp_path), "folder", "scene file"]) == []
 
 
 def test_file_below_a_file(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    with pytest.raises(SceneError, match=r"can't be read \(Not a directory\), expected a scene file"):
-        load_scene(tmp_path / "file" / "scene.yaml")
+    path = tmp_path / "file" / "scene.yaml"
+    with pytest.raises(SceneError) as error:
+        load_scene(path)
+    assert missing(str(error.value), [str(path), "Not a directory", "scene file"]) == []
 
 
 @pytest.mark.parametrize("content", [b"", b"# only a comment\n", b"---\n"])
@@ -88,25 +97,33 @@ def test_not_utf_8(tmp_path: Path) -> None:
     path.write_bytes("name: a\ndescription: Zuführung\n".encode("latin-1"))
     with pytest.raises(SceneError) as error:
         load_scene(path)
-    assert str(error.value) == f"{path}:2: not UTF-8 text, expected a scene file in UTF-8"
+    assert str(error.value).startswith(f"{path}:2: ")
+    assert missing(str(error.value), ["not", "UTF-8", "scene file"]) == []
+
+
+MANDATORY = ["mapping", "name", "duration", "bottle_types"]
 
 
 @pytest.mark.parametrize(
-    ("text", "says"),
+    ("text", "line", "facts"),
     [
-        ("- 1\n", "plant.yaml:1: [1] given, expected a mapping with at least the fields name, duration, bottle_types"),
-        ("hello\n", 'plant.yaml:1: "hello" given, expected a mapping with at least the fields name, duration, '),
-        ("a: 1\n---\nb: 2\n", "plant.yaml:2: not valid YAML: expected a single document in the stream"),
-        ("a: \x01\n", "plant.yaml:1: not valid YAML: a control character that YAML does not allow"),
-        ("a: &a [*a]\n", "plant.yaml:1: not a scene: nested too deeply"),
-        ("[" * 5000, "plant.yaml:1: not a scene: nested too deeply"),
-        ("a: *nowhere\n", "plant.yaml:1: not valid YAML: found undefined alias 'nowhere'"),
+        ("- 1\n", 1, ["[1]", *MANDATORY]),
+        ("hello\n", 1, ['"hello"', *MANDATORY]),
+        ("a: 1\n---\nb: 2\n", 2, ["not valid YAML", "single document"]),
+        ("a: \x01\n", 1, ["not valid YAML", "control character"]),
+        ("a: &a [*a]\n", 1, ["nested too deeply"]),
+        ("[" * 5000, 1, ["not valid YAML", "maximum nesting depth"]),
+        ("- " * 5000, 1, ["nested too deeply"]),
+        ("é: µµµ\n\n# ééé\nb: \x01\n\n\n", 4, ["not valid YAML", "control character"]),
+        ("a: 1\nb: \ud800\n", 2, ["not valid YAML", "half of a character"]),
+        ("a: *nowhere\n", 1, ["not valid YAML", "undefined alias", "'nowhere'"]),
     ],
 )
-def test_what_is_no_scene_at_all(text: str, says: str) -> None:
+def test_what_is_no_scene_at_all(text: str, line: int, facts: list[str]) -> None:
     with pytest.raises(SceneError) as error:
         parse_scene(text, "plant.yaml")
-    assert str(error.value).startswith(says)
+    assert str(error.value).startswith(f"plant.yaml:{line}: ")
+    assert missing(str(error.value), facts) == []
 
 
 def test_aliases_that_multiply_are_stopped() -> None:
@@ -120,19 +137,20 @@ def test_a_scene_that_is_no_regular_file_is_refused_at_once(tmp_path: Path) -> N
     os.mkfifo(tmp_path / "pipe")
     with (tmp_path / "huge").open("wb") as stream:
         stream.truncate(10**8)
-    for path, told in (
-        (tmp_path / "pipe", "is a named pipe, not a regular file, expected a scene file"),
-        (Path("/dev/zero"), "is a device, not a regular file, expected a scene file"),
-        (tmp_path / "huge", "has 100 MB, more than the 8 MB that are read, expected a scene file"),
-        (tmp_path / ("x" * 300), "can't be read (File name too long), expected a scene file"),
+    for path, facts in (
+        (tmp_path / "pipe", ["named pipe", "regular file"]),
+        (Path("/dev/zero"), ["device", "regular file"]),
+        (tmp_path / "huge", ["100 MB", "8 MB"]),
+        (tmp_path / ("x" * 300), ["File name too long"]),
     ):
         with pytest.raises(SceneError) as error:
             load_scene(path)
-        assert str(error.value) == f"{path}: {told}"
+        assert str(error.value).startswith(f"{path}: ")
+        assert missing(str(error.value), [*facts, "scene file"]) == []
 
 
 def test_a_name_of_a_scene_may_be_anything(tmp_path: Path) -> None:
-    """What is no regular file is left to the reader, which says what it is."""
+    """Paths that are no regular files are left to the reader, which reports their kind."""
     os.mkfifo(tmp_path / "pipe")
     assert scene_path(tmp_path / "pipe") == tmp_path / "pipe"
     for name in ("x" * 5000, "~nobody-of-this-name/scene.yaml", "a\0b", ""):
@@ -142,7 +160,7 @@ def test_a_name_of_a_scene_may_be_anything(tmp_path: Path) -> None:
 
 def test_a_text_of_too_many_values_is_refused_before_all_of_it_is_in_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(yaml_lines, "_LARGEST", 1000)
-    with pytest.raises(SceneError, match=r"plant.yaml:1: too many values for a scene"):
+    with pytest.raises(SceneError, match=r"^plant\.yaml:1: too many values"):
         parse_scene(f"[{'a,' * 1000}", "plant.yaml")  # that it is not closed is not seen any more
 
 
@@ -150,7 +168,8 @@ def test_a_text_of_too_many_values_is_refused_before_all_of_it_is_in_memory(monk
 def test_a_number_beyond_all_bounds_is_cut_in_its_sentence(number: str) -> None:
     with pytest.raises(SceneError) as error:
         parse_scene(f"seed: {number}", "plant.yaml")
-    assert str(error.value) == f"plant.yaml:1: a value that can't be read: {number[:56]} ..."
+    assert str(error.value).startswith("plant.yaml:1: ")
+    assert missing(str(error.value), ["can't be read", f"{number[:56]} ..."]) == []
 
 
 def test_a_name_of_a_field_that_goes_on_and_on_is_cut() -> None:

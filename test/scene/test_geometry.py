@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from facts import stating
 
 from conveyor_sim.scene import belt_shapes, initial_bottles, parse_scene, rail_shapes
 from conveyor_sim.scene.geometry import ArcPiece, BeltShape, SegmentPiece, arc_centre
@@ -72,7 +73,7 @@ def test_half_chord_longer_than_the_radius_by_rounding_only_is_a_half_circle() -
 
 
 def test_centre_that_can_not_be() -> None:
-    with pytest.raises(ValueError, match=r"radius 0.9 m is shorter than half the chord, 1 m"):
+    with pytest.raises(ValueError, match=stating("radius 0.9 m", "half the chord", "1 m")):
         arc_centre((0.0, 0.0), (2.0, 0.0), 0.9, "left")
     with pytest.raises(ValueError, match="coincide"):
         arc_centre((1.0, 1.0), (1.0, 1.0), 0.9, "left")

@@ -4,6 +4,7 @@ import math
 from pathlib import Path
 
 import pytest
+from facts import missing, stating
 from pydantic import ValidationError
 
 from conveyor_sim.errors import SceneError
@@ -173,14 +174,15 @@ def test_no_overrides_is_no_text() -> None:
 def test_errors_in_overrides_say_so() -> None:
     with pytest.raises(SceneError) as error:
         parse_scene(GOOD, "plant.yaml", {"belts": {"feeder": {"speed": "fast"}}, "tick": -1})
-    assert str(error.value).splitlines() == [
-        "plant.yaml (override): tick: -1 given, expected a number greater than 0 (s)",
-        'plant.yaml (override): belts.feeder.speed: "fast" given, expected a number (m/s)',
-    ]
+    tick, speed = str(error.value).splitlines()
+    assert tick.startswith("plant.yaml (override): tick: ")
+    assert missing(tick, ["-1", "a number greater than 0", "(s)"]) == []
+    assert speed.startswith("plant.yaml (override): belts.feeder.speed: ")
+    assert missing(speed, ['"fast"', "number", "(m/s)"]) == []
 
 
 def test_overrides_that_yaml_can_not_hold() -> None:
-    with pytest.raises(SceneError, match="a value of type object given"):
+    with pytest.raises(SceneError, match=stating("type object")):
         parse_scene(GOOD, "plant.yaml", {"seed": object()})
     with pytest.raises(SceneError, match="expected a mapping"):
         parse_overrides("- 1")
@@ -214,7 +216,7 @@ def test_one_bottle_needs_no_contact_with_itself() -> None:
     text = "{name: a, duration: 1, bottle_types: {b: {radius: 0.1, mass: 2, material: c}}, bottles: [%s]}"
     one, other = "{type: b, position: [0, 0]}", "{type: b, position: [1, 0]}"
     assert isinstance(parse_scene(text % one), Scene)
-    with pytest.raises(SceneError, match="no entry for bottle of c and bottle of c"):
+    with pytest.raises(SceneError, match=stating("contacts", "no entry", "bottle of c and bottle of c")):
         parse_scene(text % f"{one}, {other}")
 
 
@@ -251,11 +253,11 @@ def test_start_time_is_kept_in_utc(given: str, kept: str) -> None:
 
 @pytest.mark.parametrize("given", ["2026-03-01 06:00:00", "2026-03-01", "17", "1969-12-31T23:00:00Z", "soon", "[]"])
 def test_start_time_that_is_none(given: str) -> None:
-    with pytest.raises(SceneError, match="expected a date and time with its zone, from 1970 to 2099, such as 2026-"):
+    with pytest.raises(SceneError, match=stating("start_time", "date", "time", "zone", "1970", "2099")):
         parse_scene(f"{SMALLEST}start_time: {given}\n")
 
 
 @pytest.mark.parametrize("given", ["a/b/c/d", "/a", "a//b", "1a", "a b", "a/", "7", "ü", f"{'a' * 101}"])
 def test_where_that_is_no_path(given: str) -> None:
-    with pytest.raises(SceneError, match=r"where: .* given, expected one to three names, area/cell/unit, such as"):
+    with pytest.raises(SceneError, match=stating("where", "one to three names", "area/cell/unit")):
         parse_scene(f"{SMALLEST}where: {given}\n")

@@ -9,6 +9,7 @@ from pathlib import Path
 from types import FrameType
 
 import pytest
+from facts import missing
 
 from conveyor_sim.errors import SceneError
 from conveyor_sim.scene import load_scene, parse_scene
@@ -62,7 +63,7 @@ def test_unknown_keys_are_counted_and_few_are_said(kind: str) -> None:
     lines, calls = refusal(UNKNOWN[kind](MANY))
     assert len(lines) == LISTED + 1
     assert all("no such field" in line for line in lines[:LISTED])
-    assert lines[LISTED] == f"plant.yaml: and {MANY - LISTED} more problems"
+    assert missing(lines[LISTED], ["plant.yaml", f"{MANY - LISTED} more"]) == []
     assert max(calls.values()) <= 2 * MOST_SAID  # each is said once, and passes its parents as it is
     if kind == "long":
         assert calls["get_close_matches"] == 0
@@ -92,7 +93,7 @@ def test_names_that_refer_to_nothing_list_few_of_those_there_are() -> None:
 def test_missing_pairs_of_materials_are_not_all_counted() -> None:
     kinds = "".join(f"  jar{n}: {{radius: 0.03, mass: 0.2, material: m{n}}}\n" for n in range(400))
     lines, _ = refusal(GOOD.replace("bottle_types:\n", f"bottle_types:\n{kinds}"))
-    assert lines[LISTED] == f"plant.yaml: and at least {MOST_SAID + 1 - LISTED} more problems"
+    assert missing(lines[LISTED], ["plant.yaml", "at least", f"{MOST_SAID + 1 - LISTED} more"]) == []
 
 
 def test_a_text_of_digits_without_end_is_no_angle() -> None:

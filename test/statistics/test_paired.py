@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 import scipy.stats
+from facts import stating
 from lindley import waits
 
 from conveyor_sim.statistics.intervals import mean_interval
@@ -34,7 +35,7 @@ def test_pairs_are_what_both_have() -> None:
     assert paired_difference([1.0, math.nan, 3.0], [0.0, 1.0, 1.0]) == mean_interval([1.0, 2.0])
     assert math.isnan(pairing_gain([1.0, math.nan], [1.0, 2.0]))
     assert pairing_gain([1.0, 2.0], [2.0, 3.0]) == math.inf
-    with pytest.raises(ValueError, match="3 and 2 values given, expected pairs"):
+    with pytest.raises(ValueError, match=stating("3 and 2 values", "pairs")):
         paired_difference([1.0, 2.0, 3.0], [1.0, 2.0])
 
 

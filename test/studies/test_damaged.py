@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from accuracy.studies import study as accuracy_study
 from click.testing import CliRunner
+from facts import stating
 from studies.small import Here, setup_of
 
 from conveyor_sim.accuracy.report.files import read_study, write_study
@@ -89,7 +90,7 @@ def test_a_damaged_run_is_named_kept_and_made_again(damage: str, one: Made, othe
         file.mkdir()
     else:
         file.write_bytes(wrong[damage])
-    with pytest.raises(StudyError, match=r"point_0_seed_1\.json: .*, expected an intact run of this study"):
+    with pytest.raises(StudyError, match=stating("point_0_seed_1.json", "intact run", "this study")):
         read_results(folder)
     rows, said, count = again(one, folder)
     assert same(rows, one[2]) and count == 1
@@ -115,10 +116,10 @@ def test_a_damaged_study_json_claims_no_run_of_another_study(
         file.write_bytes({"cut": content[:100], "empty": b"", "flipped": content.replace(b"engine", b"engime", 1),
                           "nested": b"{" * 10_000}[damage])  # fmt: skip
     before = {path: path.read_bytes() for path in folder.rglob("*.json")}
-    with pytest.raises(StudyError, match=r"its runs were made with another study.*expected another folder"):
+    with pytest.raises(StudyError, match=stating("runs", "another study", "another folder")):
         again(other, folder)
     assert {path: path.read_bytes() for path in folder.rglob("*.json")} == before
-    with pytest.raises(StudyError, match=r"study\.json: .*, expected what conveyor-sim sweep or optimise has written"):
+    with pytest.raises(StudyError, match=stating("study.json", "conveyor-sim sweep or optimise")):
         read_results(folder)
     rows, said, count = again(one, folder)
     assert same(rows, one[2]) and count == 0 and len(said) == 1 and str(file) in said[0]
@@ -182,7 +183,7 @@ def test_a_folder_without_checksums_is_read_and_said_to_be_unverified(one: Made,
     with pytest.raises(StudyError, match="expected another folder"):
         again(one, folder)
     shutil.copy(one[1] / FIRST, folder / FIRST)  # a mixture is none of both
-    with pytest.raises(StudyError, match=r"has a checksum, which study\.json has not"):
+    with pytest.raises(StudyError, match=stating("study.json", "checksum")):
         read_results(folder)
 
 
@@ -207,7 +208,7 @@ def test_a_damaged_table_is_refused(one: Made, tmp_path: Path) -> None:
     stops = table.schema.get_field_index("stops")
     wrong = table.set_column(stops, table.schema.field(stops), [[7.0] * 4])
     parquet.write_table(wrong, path)
-    with pytest.raises(StudyError, match="its checksum does not fit"):
+    with pytest.raises(StudyError, match=stating("results.parquet", "checksum")):
         read_results(path)
     content = path.read_bytes()
     for length in (0, 4, len(content) // 2, len(content) - 1):
@@ -220,9 +221,9 @@ def test_two_kinds_of_study_do_not_share_a_folder(one: Made, tmp_path: Path) -> 
     """A `study.json` of each is refused by the other, and stays."""
     write_study(accuracy_study(), tmp_path)
     before = (tmp_path / "study.json").read_bytes()
-    with pytest.raises(StudyError, match="conveyor-sim accuracy has one of the same name"):
+    with pytest.raises(StudyError, match=stating("conveyor-sim accuracy", "same name")):
         again(one, tmp_path)
-    with pytest.raises(StudyError, match="conveyor-sim accuracy has one of the same name"):
+    with pytest.raises(StudyError, match=stating("conveyor-sim accuracy", "same name")):
         read_results(tmp_path)
     (tmp_path / "study.json").write_bytes(before[:500])  # damaged, so its kind is not known; it is kept aside
     again(one, tmp_path)
@@ -230,5 +231,5 @@ def test_two_kinds_of_study_do_not_share_a_folder(one: Made, tmp_path: Path) -> 
     with pytest.raises(ConveyorError, match="all of it: found"):
         read_study(one[1] / "study.json")
     (tmp_path / "origin.json").write_text("{}")
-    with pytest.raises(StudyError, match="has a study of conveyor-sim accuracy"):
+    with pytest.raises(StudyError, match=stating(str(tmp_path), "study of conveyor-sim accuracy")):
         again(one, tmp_path)

@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from facts import stating
 from studies.small import Here, setup_of
 from studies.test_warm_up import FILLING
 from studies.waiting import until
@@ -86,7 +87,7 @@ class Cluster:
 
 @contextmanager
 def cluster(folder: Path, workers: int) -> Iterator[tuple[Cluster, str]]:
-    """With so many workers."""
+    """Start a cluster with `workers` workers."""
     made = Cluster(folder)
     try:
         address = made.scheduler()
@@ -131,7 +132,7 @@ def swept(setup: Setup, folder: Path, address: str) -> Iterator[list[Row]]:
 
 @pytest.fixture(scope="module")
 def expected(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, float]]:
-    """What the runs amount to, made here."""
+    """Return the metrics of the runs, made in this process."""
     setup = setup_of(tmp_path_factory.mktemp("expected"), parameters=RATES, duration=1.0)
     jobs = [Job(point, {"rate": rate}, seed) for point, rate in enumerate((4.0, 5.0, 6.0)) for seed in (1, 2)]
     return [dict(run_alone(setup, job, None).metrics) for job in jobs]
@@ -162,7 +163,7 @@ def test_a_scheduler_that_is_started_again(tmp_path: Path, expected: list[dict[s
 
 def test_a_scheduler_that_stays_away(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(dask_engine, "PATIENCE", 0.5)
-    with pytest.raises(StudyError, match=r"no scheduler of Dask with workers within 0 s .*the same command goes on"):
+    with pytest.raises(StudyError, match=stating("Dask", "scheduler", "workers", "0 s", "same command")):
         DaskEngine("tcp://127.0.0.1:1", None, lambda _: None)
 
 

@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from facts import missing, stating
 from studies.small import setup_of, write_study
 from studies.waiting import PATIENCE, until
 from warm import Warm, run
@@ -33,7 +34,7 @@ def test_a_process_that_is_killed_takes_no_other_run_along(tmp_path: Path, death
         rows = runs.run([Job(point, {"rate": rate}, 1) for point, rate in enumerate((6.0, 7.0, 8.0))])
     assert [row.status for row in rows] == ["finished", "finished" if deaths == 1 else "lost", "finished"]
     if deaths == 2:
-        assert rows[1].error == "the process that ran it ended without a word, twice: killed, or out of memory"
+        assert missing(rows[1].error, ["process", "ended", "twice", "killed", "out of memory"]) == []
         with Runs(setup, tmp_path / "out", WorkerPool(1)) as runs:
             rows = runs.run([Job(1, {"rate": 7.0}, 1)])
         assert rows[0].status == "finished"
@@ -63,7 +64,7 @@ def test_a_full_disk_loses_no_finished_run(tmp_path: Path) -> None:
     (tmp_path / "full.py").write_text(FULL)
     command = [sys.executable, str(tmp_path / "full.py"), str(study), str(tmp_path / "out")]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE)
-    assert "File too large); 2 finished runs are kept, and the same command goes on with them" in ended.stderr
+    assert missing(ended.stderr, ["File too large", "2 finished runs", "same command"]) == []
     kept = read_rows(tmp_path / "out")
     assert len(kept) == 2
     assert not list((tmp_path / "out" / "runs").glob(".*"))
@@ -90,7 +91,7 @@ def test_ctrl_c_ends_it_and_says_how_to_go_on(tmp_path: Path) -> None:
         process.kill()
     said = (tmp_path / "said").read_text()
     assert process.returncode == 130
-    assert f"finished runs are kept in {out}; the same command goes on with them" in said
+    assert missing(said, ["finished runs", str(out), "same command"]) == []
     assert "Traceback" not in said
     (pid,) = (int(path.name.partition("_")[2]) for path in tmp_path.glob("running_*"))
     until(lambda: not _is_alive(pid), "the end of the process that ran it")
@@ -98,7 +99,7 @@ def test_ctrl_c_ends_it_and_says_how_to_go_on(tmp_path: Path) -> None:
     (tmp_path / "go").touch()
     ended = run([*sweep_it, "--out", str(out)], timeout=PATIENCE)
     assert ended.returncode == 0, ended.stderr
-    assert f"any run alone: conveyor-sim sweep {study} --set rate=4.0 --seed 1" in ended.stdout
+    assert f": conveyor-sim sweep {study} --set rate=4.0 --seed 1" in ended.stdout
     rows = read_rows(out)
     assert len(rows) == 2 and rows[0] == finished
 
@@ -113,5 +114,5 @@ def _is_alive(pid: int) -> bool:
 
 def test_a_run_alone_raises_what_fails_in_it(tmp_path: Path) -> None:
     setup = setup_of(tmp_path, function="code.py:line", overrides={"bottle_types": {"bottle": {"radius": -1.0}}})
-    with pytest.raises(Exception, match=r"bottle_types.bottle.radius: -1 given, expected a number greater than 0"):
+    with pytest.raises(Exception, match=stating("bottle_types.bottle.radius", "-1", "a number greater than 0")):
         run_alone(setup, Job(0, {"rate": 4.0}, 1), None)

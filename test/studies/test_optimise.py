@@ -1,4 +1,4 @@
-"""Optimisation: the best point is found, the same one again, by whatever path the study came to it."""
+"""Optimisation: the best point is found, and found again on any path to it."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from facts import missing
 
 from conveyor_sim.errors import StudyError
 from conveyor_sim.studies.load import load_study
@@ -34,7 +35,7 @@ class Study:
         shutil.copy(HERE / "optimised.py", folder)
 
     def run(self, objective: str, out: str, trials: int = TRIALS, stop_after: int | None = None) -> Optimum:
-        """What comes of it in a folder `out`."""
+        """Optimise by an objective in the folder `out`, and return the result."""
         path = self.folder / "study.yaml"
         path.write_text((HERE / "optimised.py").read_text().split('STUDY = """')[1].split('"""')[0].format(
             objective=objective, trials=trials))  # fmt: skip
@@ -88,8 +89,8 @@ def test_the_best_point_is_near_the_bound_and_better_than_the_start(bounded: Opt
     fresh, start = bounded.fresh
     assert {row.seed for row in fresh.rows} == {row.seed for row in start.rows} == set(range(3, 7))
     said = "\n".join(answer(bounded, UNITS))
-    assert "speed_is < 0.5 on average, and in 4 of 4 runs" in said
-    assert "is significant with 4 seeds: best is higher than start" in said
+    assert missing(said, ["speed_is < 0.5", "on average", "4 of 4 runs"]) == []
+    assert missing(said, ["significant", "4 seeds", "best is higher than start"]) == []
 
 
 @pytest.mark.parametrize(
@@ -144,7 +145,8 @@ def test_of_two_goals_the_front_is_what_no_other_point_is_better_than(study: Stu
 
 def test_where_no_point_keeps_the_bounds_it_says_so(study: Study) -> None:
     found = study.run("maximise value subject to speed_is > 5", "none", trials=4)
-    assert list(answer(found, UNITS)) == ["no point of 4 was found for which speed_is > 5"]
+    (line,) = answer(found, UNITS)
+    assert missing(line, ["no point of 4", "speed_is > 5"]) == []
 
 
 def test_points_whose_runs_fail_are_passed_over(study: Study) -> None:
@@ -158,8 +160,8 @@ def test_points_whose_runs_fail_are_passed_over(study: Study) -> None:
     finally:
         (study.folder / "optimised.py").write_text(lines)
     first, last = answer(found, UNITS)
-    assert first.startswith("4 of 4 points have a run that failed; the first: AssertionError")
-    assert last == "no point of 4 was found for which speed_is < 0.5"
+    assert missing(first, ["4 of 4 points", "failed", "AssertionError"]) == []
+    assert missing(last, ["no point of 4", "speed_is < 0.5"]) == []
 
 
 @pytest.mark.parametrize(

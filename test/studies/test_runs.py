@@ -1,4 +1,4 @@
-"""A study from its file to its table: the same bits whoever makes the runs, in whatever order they are finished."""
+"""A study from its file to its table: equal bits from any engine, in any order of completion."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 from click.testing import CliRunner
+from facts import missing, stating
 from studies.small import CODE, Here, setup_of, write_study
 
 from conveyor_sim.bag.reader import open_bag
@@ -100,9 +101,9 @@ def test_finished_runs_are_not_made_again(made: tuple[Setup, Path, list[Row]]) -
         more = [Job(5, {"rate": 5.0}, 1), Job(0, {"rate": 4.0}, 1)]
         found = runs.run(more)
         assert engine.made == 1 and found[1] == rows[0] and found[0].parameters == {"rate": 5.0}
-        with pytest.raises(StudyError, match=r"point 0 was made with \{'rate': 4.0\}, not \{'rate': 9.0\}"):
+        with pytest.raises(StudyError, match=stating("point 0", "{'rate': 4.0}", "{'rate': 9.0}")):
             runs.run([Job(0, {"rate": 9.0}, 1)])
-        with pytest.raises(StudyError, match="another process works on this study"):
+        with pytest.raises(StudyError, match=stating("another process", "study")):
             Runs(setup, folder, Here())
     (folder / "runs" / "point_5_seed_1.json").unlink()
 
@@ -123,7 +124,7 @@ def test_runs_of_another_study_are_left_alone(made: tuple[Setup, Path, list[Row]
 
 
 def test_a_metric_that_has_become_another_is_asked_of_new_runs(tmp_path: Path) -> None:
-    """Of the same name: what older runs say to it is an answer to another question."""
+    """Older runs hold values of another metric with the same name."""
     out = tmp_path / "out"
     mean = setup_of(tmp_path, duration=0.5, seeds=3)
     with Runs(mean, out, Here()) as runs:
@@ -251,7 +252,8 @@ def test_a_metric_that_is_no_number_is_said(tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text("def words(simulation):\n    return 'many'\n")
     setup = setup_of(tmp_path, metrics=[{"mine": "mine.py:words"}], duration=0.1)
     row = make_row(Work(setup, Job(0, {"rate": 4.0}, 1)))
-    assert (row.status, row.error) == ("failed", 'words returned "many", expected a number')
+    assert row.status == "failed"
+    assert missing(row.error, ["words", '"many"', "number"]) == []
 
 
 def test_controllers_are_compared_from_one_warm_line_a_seed(tmp_path: Path) -> None:
@@ -291,4 +293,5 @@ def test_code_that_changes_meanwhile_is_noticed(tmp_path: Path) -> None:
     setup = setup_of(tmp_path)
     (tmp_path / "code.py").write_text("line = None")
     row = make_row(Work(setup, Job(0, {"rate": 4.0}, 1)))
-    assert row.status == "lost" and "code.py: has changed since the study was read" in row.error
+    assert row.status == "lost"
+    assert missing(row.error, ["code.py", "changed"]) == []

@@ -1,4 +1,4 @@
-"""What is wrong with a study is said before it runs: file, line, field, value and what was expected."""
+"""Errors of a study are reported before it runs: file, line, field, value and expectation."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from facts import stating
 from studies.small import setup_of, write_study
 
 from conveyor_sim.errors import StudyError
@@ -124,15 +125,15 @@ def test_a_line_that_cannot_be(tmp_path: Path, changes: dict[str, Any], said: st
 def test_a_value_is_a_finite_number(tmp_path: Path, value: str) -> None:
     path = write_study(tmp_path)
     path.write_text(path.read_text().replace("6.0", value))
-    with pytest.raises(StudyError, match=rf"parameters.rate.values\[1\]: {value} given, expected a number that is fin"):
+    with pytest.raises(StudyError, match=stating("parameters.rate.values[1]", value, "number", "finite")):
         load_study(path)
 
 
 def test_files_that_are_none(tmp_path: Path) -> None:
-    with pytest.raises(StudyError, match=r"none.yaml: no such file, expected a study file"):
+    with pytest.raises(StudyError, match=stating("none.yaml", "no such file", "study file")):
         load_study(tmp_path / "none.yaml")
     (tmp_path / "empty.yaml").touch()
-    with pytest.raises(StudyError, match=r"empty.yaml: the file is empty, expected a study"):
+    with pytest.raises(StudyError, match=stating("empty.yaml", "empty", "study")):
         load_study(tmp_path / "empty.yaml")
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from facts import stating
 from testing.conftest import FEEDER, ON_TABLE, STOP, TABLE, TAKEN
 from testing.test_scenario import Hold
 
@@ -65,12 +66,12 @@ def test_names_units_and_types(table: Scenario) -> None:
     assert {ON_TABLE, FEEDER, "alarms/full"} <= set(history.names)
     assert (history.unit("belts/table/speed"), history.unit(ON_TABLE), history.unit("alarms/full")) == ("m/s", "", "")
     assert (history.kind(FEEDER), history.kind(ON_TABLE), history.kind("alarms/full")) == ("number", "count", "bool")
-    with pytest.raises(ConveyorError, match="belts/tabel/speed: not in the history, expected one of belts/feeder"):
+    with pytest.raises(ConveyorError, match=stating("belts/tabel/speed", "history", "belts/feeder/speed")):
         history["belts/tabel/speed"]
 
 
 def test_a_long_run_keeps_the_last_seconds_alone() -> None:
-    """What is kept is what a whole history ends with, at any tick, and takes no more room as time goes on."""
+    """A limited history equals the end of an unlimited one at any tick, and does not grow with time."""
     whole, last = (Scenario(TABLE, history=length) for length in (None, 0.5))
     with whole, last:
         for ticks in (20, 29, 1, 1, 48, 51, 100, 333):

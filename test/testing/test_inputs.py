@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from facts import missing, stating
 from physics.stepping.guard.test_recording import bouncing
 from scenes import MASS, RADIUS
 from testing.conftest import FEEDER, ON_TABLE, STOP, TABLE
@@ -92,15 +93,15 @@ def test_from_a_checkpoint_too(tmp_path: Path) -> None:
     assert (report.first_tick, report.last_tick) == (int(table.history.time[0] / 0.01 + 0.5), table.simulation.tick)
 
     (tmp_path / "made" / "start.npz").unlink()
-    with pytest.raises(BagError, match=r"expected a run from tick 0, or the checkpoint as start\.npz beside it"):
+    with pytest.raises(BagError, match=stating("tick 0", "checkpoint", "start.npz")):
         replay(tmp_path / "made")
     with Scenario(TABLE, {"seed": 3}) as other:
         other.simulation.save(tmp_path / "made" / "start.npz")
-    with pytest.raises(BagError, match=r"start\.npz: a checkpoint at tick 0, expected the one at tick \d+, from which"):
+    with pytest.raises(BagError, match=r"start\.npz: .*tick 0\b.* tick \d+"):
         replay(tmp_path / "made")
     with Scenario(TABLE, {"seed": 4}) as other:
         other.simulation.save(tmp_path / "made" / "start.npz")
-    with pytest.raises(CheckpointError, match="saved from a scene with seed: 4, which is 3 in the scene given"):
+    with pytest.raises(CheckpointError, match=stating("scene", "seed: 4", "3")):
         replay(tmp_path / "made")
 
 
@@ -154,12 +155,10 @@ def test_a_line_that_was_changed_by_hand_is_not_the_same_run(tmp_path: Path) -> 
     recorded(tmp_path, pushed)
     made = rerun(tmp_path / "inputs", tmp_path / "made")
     # It is noticed at the next state that was noted.
-    assert made.departure == (
-        "the run made again is another at 3.00 s (tick 300), expected a test that changes its line by commands and "
-        "faults only"
-    )
+    assert missing(made.departure, ["3.00 s", "tick 300", "commands", "faults", "only"]) == []
     done = CliRunner().invoke(main, ["recover", str(tmp_path / "inputs")])
-    assert done.exit_code == 1 and "the run made again is another at 3.00 s" in done.output
+    assert done.exit_code == 1
+    assert missing(done.output, ["3.00 s", "tick 300"]) == []
 
 
 def test_of_another_version_the_versions_are_named(tmp_path: Path) -> None:
@@ -182,7 +181,7 @@ def test_of_another_version_the_versions_are_named(tmp_path: Path) -> None:
         (lambda lines: [*lines, '{"tick": 50, "hash": 1}'], r"is damaged \(ticks out of order\)"),
         (
             lambda lines: [*lines, '{"tick": 1000, "inputs": [["watchdog", "watchdog", "line", "set", [], [], []]]}'],
-            "nobody gives such",
+            "of the line itself",
         ),
     ],
 )
@@ -211,11 +210,11 @@ def test_what_ends_it_early_leaves_no_bag(tmp_path: Path) -> None:
 
 
 def test_inputs_that_are_not_there_or_are_there_already(tmp_path: Path, table: Scenario) -> None:
-    with pytest.raises(BagError, match=r"inputs\.jsonl: no such file, expected the inputs of a run"):
+    with pytest.raises(BagError, match=stating("inputs.jsonl", "no such file", "inputs of a run")):
         rerun(tmp_path, tmp_path / "made")
     with InputLog(tmp_path, table.simulation):
-        with pytest.raises(BagError, match=r"is being recorded or repaired by another process"):
+        with pytest.raises(BagError, match=stating("recorded or repaired", "another process")):
             rerun(tmp_path, tmp_path / "made")
-        with pytest.raises(BagError, match=r"can't be written \(File exists\)"):
+        with pytest.raises(BagError, match=stating("can't be written", "File exists")):
             InputLog(tmp_path, table.simulation)
     assert table.signals[ON_TABLE] == 0

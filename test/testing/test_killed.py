@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from facts import stating
 from testing.conftest import STOP, TABLE
 from testing.test_documented import PLUGIN
 from testing.test_inputs import messages
@@ -57,7 +58,7 @@ def pytest_command(*arguments: str) -> list[str]:
 
 
 def end_by(kind: signal.Signals, folder: Path) -> None:
-    """Run the test that hangs in a pytest of its own, in a folder, and end that by a signal at a known tick."""
+    """Run the test that hangs in a separate pytest, in a folder, and end that by a signal at a known tick."""
     (folder / "test_killed.py").write_text(TESTS)
     with Scenario(TABLE) as table:
         table.run_for(FIRST * 0.01)
@@ -143,7 +144,7 @@ def test_a_test_that_is_running_has_left_nothing(tmp_path: Path) -> None:
     one, other = Lines(root / "test"), Lines(root / "test")
     for lines in (one, other):
         lines(TABLE).run_for(0.1)
-        with pytest.raises(CheckpointError, match="no such file, expected a checkpoint"):
+        with pytest.raises(CheckpointError, match=stating("missing.npz", "no such file", "checkpoint")):
             lines(TABLE, start=tmp_path / "missing.npz")
     names = ["test.unfinished", "test.unfinished_2"]
     assert sorted(folder.name for folder in root.iterdir()) == names

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from facts import stating
 from testing.conftest import LINE
 from testing.soft_plc import BOTTLES, SETPOINT, speed
 
@@ -20,7 +21,7 @@ SECONDS = 4.0
 
 
 class Twin:
-    """The same program, in this process."""
+    """Controller in this process with the same program."""
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
         return {SETPOINT: speed(inputs[BOTTLES])}
@@ -60,7 +61,7 @@ def test_a_plc_that_ends_fails_the_test_with_its_last_words(face: str) -> None:
 
 
 def test_a_plc_that_says_nothing_is_waited_for_so_long(face: str) -> None:
-    with Scenario(LINE) as plant, pytest.raises(ControlError, match=r"no run/target_tick after 0 within 0\.3 s"):
+    with Scenario(LINE) as plant, pytest.raises(ControlError, match=stating("no run/target_tick", "after 0", "0.3 s")):
         if face == "modbus":
             plant.attach_modbus(patience=0.3)
         else:

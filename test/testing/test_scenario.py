@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
+from facts import missing, stating
 from testing.conftest import FEEDER, ON_TABLE, STOP, TABLE, TAKEN
 
 from conveyor_sim.bag.reader import open_bag
@@ -18,7 +19,7 @@ from conveyor_sim.testing import Scenario
 
 @dataclass
 class Hold:
-    """Holds the feeder while there are so many bottles on the table; remembers its scans."""
+    """Controller that holds the feeder while `high` bottles or more are on the table; stores its scans."""
 
     high: float
     ticks: list[int] = field(default_factory=list)
@@ -76,10 +77,10 @@ def test_what_does_not_come_true_in_time(table: Scenario) -> None:
     table.run_for(1.0)
     with pytest.raises(AssertionError) as failure:
         table.eventually(lambda s: s[ON_TABLE] > 90 and s[TAKEN] > 0, within=0.5)
-    assert str(failure.value) == (
-        "eventually(s[ON_TABLE] > 90 and s[TAKEN] > 0) did not come true within 0.5 s, from 1.00 s to 1.50 s; "
-        "the signals that it reads:\n    belts/table/bottles = 0"
-    )
+    head, *signals = str(failure.value).splitlines()
+    assert head.startswith("eventually(s[ON_TABLE] > 90 and s[TAKEN] > 0) did not come true")
+    assert missing(head, ["within 0.5 s", "from 1.00 s to 1.50 s"]) == []
+    assert signals == ["    belts/table/bottles = 0"]
     assert table.simulation.tick == 150
 
 
@@ -113,7 +114,7 @@ def test_what_is_asserted_from_now_on_is_looked_at_in_every_run(table: Scenario)
 
 
 def test_what_is_false_already_fails_at_once(table: Scenario) -> None:
-    with pytest.raises(AssertionError, match=r"was false at 0\.00 s \(tick 0\); the signals"):
+    with pytest.raises(AssertionError, match=stating("was false", "0.00 s", "tick 0")):
         table.always(lambda s: s[ON_TABLE] > 0, for_=1.0)
     assert table.simulation.tick == 0
 
@@ -124,7 +125,7 @@ def test_alarms(table: Scenario) -> None:
     table.eventually(lambda s: s["alarms/full"], within=20)
     assert table.alarms == {"full"}
     assert table.signals[ON_TABLE] == 2
-    with pytest.raises(KeyError, match=r"alarms/ful: no such signal on this line, expected one of .*alarms/full"):
+    with pytest.raises(KeyError, match=stating("alarms/ful", "no such signal", "alarms/full")):
         table.never(lambda s: s["alarms/ful"], for_=0.5)
 
 
@@ -149,14 +150,16 @@ def test_alarms_reach_the_line_with_the_commands_and_are_recorded_and_replayed(t
 
 
 def test_an_unknown_signal_is_an_error_not_a_condition_that_holds(table: Scenario) -> None:
-    with pytest.raises(KeyError, match="belts/tabel/bottles: no such signal"):
+    with pytest.raises(KeyError, match=stating("belts/tabel/bottles", "no such signal")):
         table.never(lambda s: s["belts/tabel/bottles"] > 3, for_=1.0)
 
 
 def test_inputs_that_would_be_refused_are_so_at_once(table: Scenario) -> None:
-    with pytest.raises(CommandError, match="belts/tabel/cmd_speed: no such command, expected one of"):
+    with pytest.raises(
+        CommandError, match=stating("belts/tabel/cmd_speed", "no such command", "belts/table/cmd_speed")
+    ):
         table.command("belts/tabel/cmd_speed", 0.1)
-    with pytest.raises(CommandError, match="belts/table/trip: no such fault"):
+    with pytest.raises(CommandError, match=stating("belts/table/trip", "no such fault")):
         table.inject("belts/table/trip")
 
 
@@ -166,13 +169,13 @@ def test_a_refused_command_of_the_controller_is_an_error(table: Scenario) -> Non
             return {FEEDER: 99.0}
 
     table.attach(TooFast())
-    with pytest.raises(CommandError, match=r"^at 0\.00 s a command was refused: belts/feeder/cmd_speed: 99 given"):
+    with pytest.raises(CommandError, match=stating("at 0.00 s", "refused", "belts/feeder/cmd_speed", "99")):
         table.run_for(1.0)
 
 
 def test_overrides_are_for_files() -> None:
     assert Scenario(TABLE, {"belts": {"table": {"speed": 0.1}}}).signals["belts/table/speed"] == 0.1
-    with pytest.raises(ValueError, match="expected them where it is loaded"):
+    with pytest.raises(ValueError, match=stating("overrides", "loaded")):
         Scenario(load_scene(TABLE), {"duration": 1.0})
 
 

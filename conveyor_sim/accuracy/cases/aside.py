@@ -33,7 +33,7 @@ def phases(root: float = 5.0) -> F8:
 
 
 def corner(scene: Scene) -> tuple[float, float]:
-    """A point (m) to the upper right of all belts and rails, by two of the largest diameters at least."""
+    """Return a point (m) to the upper right of all belts and rails, at least two of the largest diameters away."""
     points = [np.zeros((1, 2)), *(shape.outline() for shape in belt_shapes(scene))]
     points += [np.array(piece.box) for rail in rail_shapes(scene) for piece in rail.pieces]
     x, y = np.vstack(points).max(axis=0)

@@ -9,7 +9,7 @@ from conveyor_sim.accuracy.cases.collision import collision_of, rail_materials, 
 from conveyor_sim.accuracy.cases.head_on import HeadOn, restitution_of, slip_for_sliding
 from conveyor_sim.accuracy.cases.set_down import SetDown
 from conveyor_sim.accuracy.results import Order
-from conveyor_sim.physics.effects.terms import Meeting, Terms, impact_speed, meetings
+from conveyor_sim.physics.effects.terms import Meeting, Terms, meetings
 from conveyor_sim.scene import Scene
 
 SMOOTH_ORDERS = {
@@ -26,7 +26,7 @@ ROUNDING = 1e-11
 """Relative error below which rounding shows in positions of some metres."""
 
 FITTED = 4
-"""The finest so many of the errors make the observed order."""
+"""Number of finest errors from which the observed order is fitted."""
 
 Case = HeadOn | SetDown
 Progress = Callable[[float, float], None]
@@ -57,8 +57,9 @@ def orders(scene: Scene, integrators: Sequence[str], progress: Progress) -> tupl
 
 
 def cases_of(scene: Scene) -> tuple[list[Case], dict[str, str]]:
-    """The cases with a closed form, and those without, with the reason."""
-    terms, speed = terms_of(scene), impact_speed(scene)
+    """Return the cases with a closed form, and those without, with the reason."""
+    terms = terms_of(scene)
+    speed = terms.plant.impact_speed
     cases: list[Case] = []
     skipped: dict[str, str] = {}
     for meeting in _meetings(terms, sliding=False):

@@ -10,9 +10,10 @@ from typing import Any
 
 from conveyor_sim.engine.contact.laws import DampingLaw, ElasticLaw
 from conveyor_sim.engine.contact.laws.linear import LINEAR
-from conveyor_sim.physics.effects import choose_effects
+from conveyor_sim.physics.effects.choice import choose_effects
 from conveyor_sim.physics.effects.terms import Meeting, Terms, deepest
 from conveyor_sim.physics.laws.coefficients import build_laws
+from conveyor_sim.physics.plant import Plant
 from conveyor_sim.physics.timestep.presets import DEFAULT, PRESETS
 from conveyor_sim.scene import Scene, rail_shapes
 
@@ -25,7 +26,7 @@ LONGEST = 40 * SAMPLES
 
 @dataclass(frozen=True)
 class Collision:
-    """What two materials do to each other head on."""
+    """Contact laws of two materials in a head-on collision."""
 
     elastic: ElasticLaw
     stiffness: Any
@@ -41,14 +42,15 @@ class Collision:
 
     @property
     def coefficient(self) -> float:
-        """Of its damping, 0 without."""
+        """Return the damping coefficient, 0 without damping."""
         return 0.0 if self.damping is None else self.meeting.coefficient(self.damping)
 
 
 def terms_of(scene: Scene) -> Terms:
-    """A scene's coefficients, and the effects that are on."""
-    on = frozenset(choice.name for choice in choose_effects(scene) if choice.on)
-    return Terms(scene, build_laws(scene, rail_materials(scene), on), on, PRESETS[DEFAULT])
+    """Return the coefficients and enabled effects of a scene."""
+    plant = Plant.of(scene)
+    on = frozenset(choice.name for choice in choose_effects(plant) if choice.on)
+    return Terms(plant, build_laws(scene, rail_materials(scene), on), on, PRESETS[DEFAULT])
 
 
 def rail_materials(scene: Scene) -> list[str]:
@@ -57,15 +59,15 @@ def rail_materials(scene: Scene) -> list[str]:
 
 
 def collision_of(meeting: Meeting, terms: Terms) -> Collision:
-    """Which laws act where two things meet."""
+    """Return the laws that act between two bodies."""
     elastic, stiffness = meeting.elastic
     return Collision(elastic, stiffness, meeting.damping, meeting, terms)
 
 
 def damping_ratio(collision: Collision, speed: float) -> float:
-    """zeta = c / (2 sqrt(k m_r)) of a linear spring, or of the one that is like it at a speed (m/s).
+    """Return zeta = c / (2 sqrt(k m_r)) of a linear spring, or of the equivalent one at a speed (m/s).
 
-    0 for a law that has none.
+    Return 0 for a law without damping.
     """
     damping = collision.damping
     if damping is None or damping.ratio is None:
@@ -138,7 +140,7 @@ class _Force:
         self.clamped = collision.damping is not None and not collision.damping.isotropic
 
     def __call__(self, x: float, v: float) -> float:
-        """As long as the contact lasts: it is the caller who ends it, a clamped one where this is 0."""
+        """Return the force during contact. The caller ends the contact, with a clamped dashpot where this is 0."""
         collision, depth = self._collision, max(x, self._least)
         elastic = collision.elastic.force(collision.stiffness, depth, self._curves)
         if collision.damping is None:

@@ -16,11 +16,12 @@ from conveyor_sim.engine.contact.laws.table import TABLE
 from conveyor_sim.simulation import Simulation
 
 STRONG = 3.0
-"""Of zeta n: from there on the dashpot's jump at first touch, 0.3 x 2 pi zeta / n, is well above what the spring alone
-makes, 0.7 / n^2."""
+"""Value of zeta n above which the dashpot's jump at first touch, 0.3 x 2 pi zeta / n, is well above the error of the
+spring alone, 0.7 / n^2.
+"""
 
 WEAK = 0.07
-"""Of zeta n: up to there it is well below."""
+"""Value of zeta n up to which that jump is well below."""
 
 COARSE, FITTED = (10, 20, 40), 80
 """Steps in a contact, and the fewest that an order is taken from."""
@@ -38,9 +39,9 @@ class HeadOn:
     """m/s, of approach."""
     restitution: float
     types: tuple[str, ...]
-    """Of the two bottles, or of the one that meets the rail."""
+    """Types of the two bottles, or of the bottle that hits the rail."""
     material: str
-    """Of the rail; empty for two bottles."""
+    """Material of the rail; empty for two bottles."""
     slip: float = 0.0
     """m/s, along the rail."""
 
@@ -50,7 +51,7 @@ class HeadOn:
 
     @cached_property
     def duration(self) -> float:
-        """Of a contact, s."""
+        """Return the duration of the contact, s."""
         return duration(self.collision, self.speed)
 
     @property
@@ -61,19 +62,19 @@ class HeadOn:
 
     @property
     def strength(self) -> float:
-        """zeta of a dashpot whose order differs from the spring's, else 0."""
+        """Return zeta of a dashpot whose order differs from that of the spring, else 0."""
         return damping_ratio(self.collision, self.speed)
 
     @property
     def steps(self) -> tuple[int, ...]:
-        """Steps in a contact to try: as in practice, then so many that the order is that of the law."""
+        """Return the numbers of steps per contact: as in practice, then enough for the order of the law."""
         first = FITTED
         if self.strength > 0.0 and STRONG / self.strength <= MOST_STEPS:
             first = max(FITTED, math.ceil(STRONG / self.strength))
         return (*COARSE, *(first * 2**power for power in range(4)))
 
     def run(self, integrator: str, steps: int) -> Simulation:
-        """All impacts over, at so many steps a contact, and a half: if it were n, errors of its ends would cancel."""
+        """Run all impacts at `steps` + 1/2 steps per contact: at a whole number, end errors would cancel."""
         scene, meeting = self.collision.terms.scene, self.collision.meeting
         tick = round(self.duration * steps / (steps + 0.5), 9)
         fields = {}
@@ -141,7 +142,7 @@ def sliding_loss(collision: Collision, speed: float, slip: float, restitution: f
 
 
 def slip_for_sliding(collision: Collision, speed: float, restitution: float, turns: bool) -> float:
-    """A slip (m/s) of which v_lim and more is left after the collision."""
+    """Return a slip (m/s) of which at least v_lim remains after the collision."""
     meeting, law = collision.meeting, collision.meeting.law
     mu, left = meeting.value(law.friction), 2.0 * collision.terms.scene.slip_limit
     share = _share(collision, turns)

@@ -1,4 +1,4 @@
-"""Where a function is 0."""
+"""Root of a scalar function."""
 
 from collections.abc import Callable
 
@@ -6,12 +6,12 @@ import numpy as np
 from scipy.optimize import bisect
 
 ROUNDING = 4.0 * float(np.finfo(np.float64).eps)
-"""Of the root: as near as scipy allows."""
+"""Tolerance of the root: the finest that scipy allows."""
 
 
 def root(rising: Callable[[float], float], below: float, above: float) -> float:
-    """Where a function that is not over 0 at `below` and not under 0 at `above` is 0, to the last digits.
+    """Return the root of a function that is <= 0 at `below` and >= 0 at `above`, to the last digits.
 
-    It may be infinite at both. ValueError if its signs are otherwise.
+    The function may be infinite at both ends. Raise ValueError for other signs.
     """
     return float(bisect(rising, below, above, xtol=1e-300, rtol=ROUNDING, maxiter=2000))

@@ -27,7 +27,7 @@ class SetDown:
     """Bottle type."""
     friction: float
     ring: bool
-    """Whether the base is a ring, which has a curve of its own."""
+    """True if the base is a ring, which has a different friction curve."""
 
     @property
     def name(self) -> str:
@@ -35,7 +35,7 @@ class SetDown:
 
     @property
     def duration(self) -> float:
-        """s"""
+        """Return the duration, s."""
         return round(2.0 * self.scene.slip_limit / (self.friction * self.scene.gravity), 9)
 
     @property
@@ -49,7 +49,7 @@ class SetDown:
         return 1.5 * self.scene.slip_limit + self.friction * self.scene.gravity * self.duration / COARSEST * phases()
 
     def run(self, integrator: str, steps: int) -> Simulation:
-        """The whole case."""
+        """Run the complete case."""
         simulation = simulation_aside(
             self.scene, (self.kind,), integrator, self.duration, steps, floor={"friction": self.friction}
         )

@@ -30,7 +30,7 @@ _VERDICTS: Final = {
 
 
 def ensembles_figure(study: Study) -> Figure:
-    """A panel an observable, a row a setting: relative difference from the reference (%) with its interval."""
+    """Draw a panel per observable and a row per setting: difference from the reference (%) with its interval."""
     rows = study.comparisons
     settings = list(dict.fromkeys(row.setting for row in rows))
     names = list(dict.fromkeys(row.observable for row in rows))

@@ -1,4 +1,4 @@
-"""How integrators and settings look and are called in pictures: colour, marker and line all distinguish them."""
+"""Appearance and names of integrators and settings in figures: colour, marker and line all distinguish them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from conveyor_sim.report.figures import style
 
 @dataclass(frozen=True)
 class Look:
-    """Of one integrator."""
+    """Appearance of one integrator."""
 
     name: str
     colour: str
@@ -56,6 +56,6 @@ def setting_text(setting: Setting, tick: float) -> str:
 
 
 def dark(colour: str) -> str:
-    """The colour for small texts, which a bright one would make faint."""
+    """Return a darker colour for small texts, which would be faint in a bright colour."""
     red, green, blue = to_rgb(colour)
     return to_hex((0.72 * red, 0.72 * green, 0.72 * blue))

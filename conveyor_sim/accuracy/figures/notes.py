@@ -31,7 +31,7 @@ class Note:
     needed: bool = False
     """Stands where it covers least; else it is left out where it would cover anything."""
     box: dict[str, Any] = field(default_factory=dict)
-    """What it stands in, as of matplotlib's bbox; a line then leads to it."""
+    """Box around the text, as in matplotlib's bbox; a line then connects it to its point."""
 
 
 def place_notes(ax: Axes, notes: Sequence[Note], points: Floats, lines: Sequence[Floats]) -> None:
@@ -107,7 +107,7 @@ class _Taken:
             self.fill(x - 1.0, y - 1.0, x + 1.0, y + 1.0)
 
     def share(self, x0: float, y0: float, x1: float, y1: float) -> float:
-        """How much of a box is taken; more than 1 if it reaches out of the axes."""
+        """Return the occupied share of a box; more than 1 if it reaches beyond the axes."""
         low, high = self._cell(x0, y0), self._cell(x1, y1) + 1
         rows, columns = self._cells.shape
         if low.min() < 0 or high[0] > columns or high[1] > rows:

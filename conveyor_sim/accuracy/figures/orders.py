@@ -23,7 +23,7 @@ _MOST_STEPS: Final = 8  # on an axis
 
 
 def orders_figure(orders: Sequence[Order], scene: str) -> Figure:
-    """A panel a closed form: relative error (%) against steps, both logarithmic, with the slopes that are expected."""
+    """Draw one panel per closed form: relative error (%) against steps on log scales, with the expected slopes."""
     cases: dict[tuple[str, str], list[Order]] = {}
     for order in orders:
         cases.setdefault((order.case, order.quantity), []).append(order)
@@ -74,7 +74,7 @@ def _panel(ax: Axes, orders: Sequence[Order]) -> None:
 
 
 def _guide(ax: Axes, slope: float, orders: Sequence[Order], aside: float) -> None:
-    """A line of the expected slope, `aside` times the largest error at the fewest steps."""
+    """Draw a line of the expected slope, at `aside` times the largest error at the fewest steps."""
     first = min(order.steps[0] for order in orders)
     last = max(order.steps[-1] for order in orders)
     start = aside * max(100.0 * order.errors[0] for order in orders)

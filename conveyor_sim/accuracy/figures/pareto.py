@@ -96,7 +96,7 @@ def _inverse(values: ArrayLike) -> Floats:
 
 
 def _xy(point: Point, ax: Axes) -> tuple[float, float]:
-    """Where it stands: at the lower edge, if its error is too small to be shown."""
+    """Return the position of a point: at the lower edge if its error is too small for the axis."""
     assert point.cost is not None and point.errors is not None
     return _shown(point.cost.median, point.errors.peak_force, ax)
 
@@ -106,7 +106,7 @@ def _shown(cost: float, error: float, ax: Axes) -> tuple[float, float]:
 
 
 def _front(ax: Axes, placed: Sequence[Point]) -> Floats:
-    """The least error to be had at a cost, as a broad line behind the points."""
+    """Draw the least error at each cost as a broad line behind the points."""
     corners = np.array([_shown(*place, ax) for point in front(placed) if (place := place_of(point))])
     ax.plot(*corners.T, color=_FRONT, linewidth=7.0, solid_capstyle="round", zorder=1.8, gid="front")
     return corners
@@ -191,7 +191,7 @@ def _marks(ax: Axes, study: Study) -> list[Floats]:
 
 
 def _along(ax: Axes, x: float, y: float, text: str, ha: Literal["left", "right"] = "left") -> None:
-    """A text on a level line."""
+    """Write a text along a horizontal line."""
     shift = -4.0 if ha == "right" else 4.0
     ax.annotate(text, (x, y), (shift, 3.0), textcoords="offset points", ha=ha, va="bottom", fontsize=8.5)
 
@@ -254,7 +254,7 @@ def _step(point: Point) -> str:
 
 
 def _legend(side: Axes, placed: Sequence[Point]) -> None:
-    """What the marks of the diagram mean."""
+    """Draw the legend of the markers."""
     handles: list[Line2D] = []
     for integrator in sorted({point.setting.integrator for point in placed}, key=order_of):
         look = look_of(integrator)
@@ -275,7 +275,7 @@ def _legend(side: Axes, placed: Sequence[Point]) -> None:
 
 
 def _failures(side: Axes, study: Study) -> None:
-    """The settings that are not in the diagram, below the legend."""
+    """List the settings outside the diagram, below the legend."""
     failed = [point for point in study.points if place_of(point) is None]
     if not failed:
         return

@@ -21,11 +21,11 @@ from conveyor_sim.report.figures.heading import heading
 
 _COLUMNS: Final = 3
 _IMPACT: Final = "peak force"
-"""How the names of observables begin that grow as the square root of the stiffness."""
+"""Prefix of the observables that scale with the square root of the stiffness."""
 
 
 def stiffness_figure(rows: Sequence[StiffnessRow], scene: str) -> Figure:
-    """A panel a quantity against the factor on every stiffness; hollow where overlaps pass 1 % of the diameter."""
+    """Draw one panel per quantity against the stiffness factor; hollow where overlaps exceed 1 % of the diameter."""
     rows = sorted(rows, key=lambda row: row.factor)
     unjudged = {known.name for known in OBSERVABLES if not known.judged}
     names = [name for name in dict.fromkeys(n for row in rows for n in row.observables) if name not in unjudged]

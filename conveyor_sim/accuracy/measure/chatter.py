@@ -9,7 +9,7 @@ from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
 
 STEPS = 48
-"""Steps that are watched: chatter must fill half of them, no contact at its five steps or more rings so long."""
+"""Observed steps: chatter fills half of them, longer than any contact of five or more steps rings."""
 
 LEAST = 0.05
 """Amplitude of chatter, of v_lim, from which it is reported. It settles at 2 (1 - b) of it, b the least stable step

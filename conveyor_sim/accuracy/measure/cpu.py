@@ -12,7 +12,7 @@ from conveyor_sim.engine.compiler.numba_internals.compile_time import CompileTim
 
 
 def cpu_time() -> float:
-    """s of processor time of this process, all threads, and of the child processes that have ended."""
+    """Return the processor time, s, of all threads of this process and of its child processes that have ended."""
     times = os.times()
     return time.process_time() + times.children_user + times.children_system
 
@@ -33,7 +33,7 @@ class _FirstCompiled(CompileTime):
 
 
 class Meter(AbstractContextManager["Meter"]):
-    """What this process takes from entering to leaving."""
+    """Meter of the processor time of this process between entering and leaving."""
 
     def __init__(self, compiles: Callable[[], None] = lambda: None) -> None:
         """compiles: called as numba begins to compile for the first time."""
@@ -42,12 +42,12 @@ class Meter(AbstractContextManager["Meter"]):
 
     @property
     def compiling(self) -> float:
-        """s of processor time so far in which numba compiled."""
+        """Return the processor time of numba's compiler so far, s."""
         return self._compile_time.spent
 
     @property
     def cpu(self) -> float:
-        """s of processor time so far, compiling left out."""
+        """Return the processor time so far without compiling, s."""
         return cpu_time() - self._began - self.compiling
 
     def __enter__(self) -> Meter:

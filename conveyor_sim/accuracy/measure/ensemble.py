@@ -38,7 +38,7 @@ class _Work:
     seed: int
 
     def scene(self) -> Scene:
-        """The scene to run. Raises SceneError if it can't be simulated so."""
+        """Build the scene of the run. Raise SceneError if it can't be simulated with this setting."""
         scene = parse_scene(self.text, self.name, parse_overrides(self.overrides))
         return with_setting(scene, self.setting, **measuring(scene), **jittered(scene, self.seed))
 
@@ -53,9 +53,9 @@ class Ensemble(AbstractContextManager["Ensemble"]):
     """
 
     def __init__(self, scene: Scene, folder: Path, processes: int | None = None) -> None:
-        """processes: None is one for each core that this process may use, and no more than that are used.
+        """Open an ensemble. processes: None: one per core that this process may use, which is also the maximum.
 
-        Raises ConveyorError if the folder has runs of another scene or version (`SampleFile`).
+        Raise ConveyorError if the folder has runs of another scene or version (`SampleFile`).
         """
         cores = free_cores()
         self.processes = cores if processes is None else max(1, min(processes, cores))

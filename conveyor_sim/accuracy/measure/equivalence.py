@@ -31,7 +31,7 @@ ERROR_RATE = 0.05
 """Chance to accept an observable whose true difference is the tolerance, over all looks together; and to reject it."""
 
 CONFIDENCE = 1.0 - bonferroni(2.0 * ERROR_RATE, len(LOOKS))
-"""Of the interval at one look: by Bonferroni, as each look may err at either end by its share of ERROR_RATE."""
+"""Confidence of the interval at one look, by Bonferroni: each look may err at either end by its share of ERROR_RATE."""
 
 _EVERYTHING = (-math.inf, math.inf)
 
@@ -169,7 +169,7 @@ def _judged(samples: Sequence[Sample]) -> list[str]:
 def _sequence(
     setting: Setting, name: str, own: Sequence[Sample], known: Sequence[Sample], tolerance: float
 ) -> Comparison:
-    """The first look that decides, or else the last."""
+    """Return the first look that decides, or else the last."""
     candidate = [sample.values.get(name) for sample in own]
     reference = [sample.values.get(name) for sample in known]
     most = min(len(own), len(known))

@@ -1,6 +1,6 @@
-"""Moving rails that move in a study: every gate, pusher and diverter is sent to and fro, one after the other.
+"""Commands to moving rails in a study: every gate, pusher and diverter moves back and forth, one after the other.
 
-A scene has no controller of its own, and without commands its moving rails would stand still in all that is compared.
+A scene has no controller. Without commands its moving rails would stand still in all comparisons.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class Exercise:
         """The command of each, and whether it is at the far end of its stroke at the start."""
 
     def __bool__(self) -> bool:
-        """Whether the scene has anything that moves."""
+        """Return True if the scene has moving parts."""
         return bool(self._movers)
 
     def command(self, simulation: Simulation) -> None:

@@ -26,7 +26,7 @@ def failure_of(run: Trajectory, reference: Trajectory, model: Model) -> str:
 
 
 def place(bottles: BottleColumns, index: int) -> str:
-    """Which bottle, and where, such as `bottle 3 at (0.12, 0.30) m`."""
+    """Return the bottle and its position as text, such as `bottle 3 at (0.12, 0.30) m`."""
     return f"bottle {bottles.id[index]} at ({bottles.x[index]:.2f}, {bottles.y[index]:.2f}) m"
 
 
@@ -78,8 +78,8 @@ def _astray(frame: Frame, true: Frame, model: Model) -> str:
 
 
 def _rail_between(model: Model, one: F8, other: F8) -> str:
-    """A rail that the straight way between two points crosses, empty if there is none."""
-    for rail in model.rail_shapes:
+    """Return the name of a rail that crosses the straight line between two points; empty if there is none."""
+    for rail in model.plant.rails:
         points = rail.outline()
         if _crossed(one, other, points[:-1], points[1:]).any():
             return rail.name
@@ -87,7 +87,7 @@ def _rail_between(model: Model, one: F8, other: F8) -> str:
 
 
 def _crossed(one: F8, other: F8, starts: F8, ends: F8) -> NDArray[np.bool_]:
-    """Whether the way from one point (2,) to another crosses each of n segments, (n,)."""
+    """Return which of n segments cross the line from one point (2,) to another, (n,)."""
 
     def turn(a: F8, b: F8, c: F8) -> F8:
         (dx, dy), (ex, ey) = (b - a).T, (c - a).T

@@ -1,9 +1,9 @@
-"""How long trajectories can be compared: contact systems are chaotic, and a small difference grows without bound.
+"""Comparison horizon of trajectories: contact systems are chaotic, so a small difference grows without bound.
 
-A nudge moves bottles and leaves their velocities, and it has grown by how far apart bottles are then, RMS over those
-that were there. So free flight alone does not count: it keeps a difference of positions as it is. A difference of
-velocities that a collision made counts with the time for which it has carried bottles apart since. A scatterer of
-radius R turns a difference d into d (1 + 2 L / R) by a flight of L after it.
+A nudge moves bottles and leaves their velocities. Its growth is measured by the RMS distance of bottles that are
+present in both runs. Free flight alone does not count, because it preserves a difference of positions. A difference of
+velocities after a collision counts with the time for which it has separated bottles. A scatterer of radius R turns a
+difference d into d (1 + 2 L / R) after a flight of length L.
 """
 
 from dataclasses import dataclass, replace
@@ -35,7 +35,7 @@ touch, at first touch the force jumps (the paper's dashpot even drags a bottle a
 and the difference is that of the jump, however small the nudge. Such a bottle is not looked at from then on."""
 
 EARLY = 0.25
-"""Of the horizon by the nudge, after which the coarse setting's own error is taken."""
+"""Fraction of the horizon by the nudge after which the error of the coarse setting is evaluated."""
 
 LEAST_ERROR = 1e-11
 """m, RMS: below it the coarse setting has not erred yet, and there is nothing to watch grow."""
@@ -72,7 +72,7 @@ class HorizonFinder:
         )
 
     def find(self, start: Start, most: int) -> Horizon:
-        """The horizon from a start, at most so many ticks and at least one."""
+        """Return the horizon from a start: at least one tick, at most `most` ticks."""
         begin = start.simulation
         bottles = begin.bottles()
         angle = np.random.default_rng(0).uniform(0.0, 2.0 * np.pi, bottles.id.size)
@@ -129,7 +129,7 @@ class HorizonFinder:
 
 
 def _apart(one: Simulation, other: Simulation, ids: NDArray[np.uint64]) -> F8:
-    """Where bottles are in one Simulation less where they are in another, (2, ids), m; NaN for those not in both."""
+    """Return the positions in one simulation minus those in another, (2, ids), m; NaN for bottles absent in either."""
     a, b = one.bottles(), other.bottles()
     both, here, there = np.intersect1d(a.id, b.id, assume_unique=True, return_indices=True)
     apart = np.full((2, ids.size), np.nan)

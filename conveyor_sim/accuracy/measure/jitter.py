@@ -16,16 +16,16 @@ from conveyor_sim.scene.types import TOUCH
 from conveyor_sim.simulation import Simulation
 
 PLACE = 0.01
-"""Of the radius: how far a bottle may be out of place. Guides of an infeed leave about a millimetre."""
+"""Position jitter as a fraction of the radius. Guides of an infeed leave about a millimetre."""
 
 TIMING = 0.01
-"""Of the time between two bottles: how early or late one may be."""
+"""Timing jitter as a fraction of the time between two bottles."""
 
 ROOM = 1.0 / 3.0
-"""Of the clear gap beside a bottle: two that approach each other leave a third of it."""
+"""Usable fraction of the clear gap beside a bottle: two approaching bottles leave a third of it."""
 
 NUDGE = 0.1
-"""Of the slip limit v_lim: the speed given to a bottle without room. At rest on its base it stays all but at rest."""
+"""Speed of a bottle without clearance, as a fraction of the slip limit v_lim; static friction holds it nearly still."""
 
 
 def jittered(scene: Scene, seed: int) -> dict[str, Any]:
@@ -53,7 +53,7 @@ def disturb(simulation: Simulation, seed: int) -> None:
     radius = simulation.model.type_radius[bottles.type]
     reach = np.minimum(PLACE * radius, ROOM * _clear_gaps(simulation.scene, bottles.x, bottles.y, radius))
     tight = reach < TOUCH
-    # A word of its own beside the seed: the infeeds draw from the seed alone.
+    # A second word beside the seed, because the infeeds draw from the seed alone.
     random = np.random.Generator(np.random.PCG64([seed, 1]))
     angle = random.uniform(0.0, 2.0 * math.pi, len(radius))
     share = np.sqrt(random.uniform(0.0, 1.0, len(radius)))

@@ -1,4 +1,4 @@
-"""What a line engineer looks at in a long run: throughput, forces in queues, impacts, time to fill, spacing."""
+"""Observables of a long run for a line engineer: throughput, forces in queues, impacts, time to fill, spacing."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def measuring(scene: Scene) -> dict[str, Any]:
 
 
 class Record:
-    """What a run leaves behind for the observables."""
+    """Record of a run from which observables are computed."""
 
     def __init__(self, simulation: Simulation) -> None:
         """Look at the state before the first tick. ValueError if the scene has no peaks."""
@@ -91,7 +91,7 @@ class Observable:
     of: Callable[[Record], float | None]
     """None where the scene can have none."""
     judged: bool = True
-    """Whether a setting must reproduce it to be trusted."""
+    """True if a setting must reproduce the observable to be eligible."""
 
 
 def _throughput(record: Record) -> float | None:

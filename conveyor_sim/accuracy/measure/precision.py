@@ -25,13 +25,13 @@ MOST_WORK = 5e6
 """Bottle steps of all horizons at the preset `standard`; candidates and reference take some two hundred times that."""
 
 FIRST_WORK = 1e6
-"""The same for the first settings: a crowd is compared over shorter horizons at first, so that an answer comes soon."""
+"""Work for the first settings: a crowd is compared over shorter horizons first, so that an answer comes soon."""
 
 COST_BUDGET = 20.0
 """s that measuring costs may take."""
 
 FIRST_COST_BUDGET = 2.0
-"""The same, of the first settings, which are measured again with the others."""
+"""Budget for the costs of the first settings, which are measured again with the others."""
 
 Progress = Callable[[float, float], None]
 """Called with what is done so far and the whole."""
@@ -39,13 +39,13 @@ Progress = Callable[[float, float], None]
 
 @dataclass
 class _Trial:
-    """What came of a setting's runs."""
+    """Result of the runs of a setting."""
 
     failure: str
     errors: Errors | None = None
     simulation: Simulation | None = None
     rested: bool = False
-    """Whether resting load was looked at."""
+    """True if resting load was measured."""
     resting: float | None = None
 
 
@@ -68,7 +68,7 @@ class WorkPrecision:
         self.resting = RestingLoad(scene)
         self.horizons: list[Horizon] = []
         self.cut_short = False
-        """Whether a horizon would be longer if more work were allowed."""
+        """True if a horizon would be longer with more work."""
         self.reference: Reference | None = None
         self._true: list[Trajectory] = []
         self._trials: dict[Setting, _Trial] = {}
@@ -84,7 +84,7 @@ class WorkPrecision:
         self.resting.settle(progress)
 
     def make_resting_reference(self, progress: Progress) -> Rest:
-        """The resting forces that errors are measured against; progress in runs."""
+        """Compute the reference of resting forces; progress in runs."""
         resting = self.resting
         if not resting.settled:
             return Rest(resting.reason, None, None, resting.window, 0, 0.0)
@@ -100,9 +100,9 @@ class WorkPrecision:
         )
 
     def find_horizons(self, progress: Progress, work: float = MOST_WORK) -> None:
-        """How far trajectories from each start can be compared; progress in starts.
+        """Find how far trajectories from each start can be compared; progress in starts.
 
-        work: bottle steps of all horizons at the preset `standard`. What was tried out before is forgotten.
+        work: bottle steps of all horizons at the preset `standard`. Results of earlier trials are discarded.
         """
         finder = HorizonFinder.of(self.scene)
         bottles = sum(max(1, start.simulation.counts.present) for start in self.starts)
@@ -117,7 +117,7 @@ class WorkPrecision:
         self.cut_short = most < longest and any(horizon.length >= ends for horizon in self.horizons)
 
     def make_reference(self, progress: Progress) -> Reference:
-        """The trajectories that errors are measured against, and their doubt; progress in runs."""
+        """Compute the reference trajectories and their uncertainty; progress in runs."""
         setting = reference_setting(self.scene)
         doubtful = replace(
             setting,
@@ -162,7 +162,7 @@ class WorkPrecision:
         return []
 
     def points(self, settings: Sequence[Setting], budget: float, progress: Progress) -> list[Point]:
-        """What came of settings that were tried out; their costs are measured in turns within a budget (s)."""
+        """Return the results of settings that were tried, with their costs, measured in turns within a budget (s)."""
         tried = [(setting, self._trials[setting]) for setting in settings if setting in self._trials]
         running = {setting: trial.simulation for setting, trial in tried if trial.simulation is not None}
         costs = costs_of(running, self.starts[-1].simulation, budget, progress)
@@ -199,7 +199,7 @@ class WorkPrecision:
         return follow(simulation, start.simulation, round(self.horizons[index].length / self.scene.tick) + 1)
 
     def _runs(self, simulation: Simulation, setting: Setting) -> tuple[list[tuple[Trajectory, Trajectory]], str]:
-        """Runs of a setting beside the reference's, and why it fails, if it does."""
+        """Return the runs of a setting paired with those of the reference, and the reason of a failure."""
         probe = ChatterProbe(self.scene, setting)
         runs = []
         for index, (start, true) in enumerate(zip(self.starts, self._true, strict=True)):

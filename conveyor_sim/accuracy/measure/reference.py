@@ -6,7 +6,7 @@ from conveyor_sim.accuracy.candidates import forbidden, standard_steps
 from conveyor_sim.accuracy.cases.collision import collision_of, duration, terms_of
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.accuracy.trajectory import variant
-from conveyor_sim.physics.effects.terms import impact_speed, meetings
+from conveyor_sim.physics.effects.terms import meetings
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
 
@@ -25,7 +25,8 @@ def reference_setting(scene: Scene) -> Setting:
 
     Leapfrog in the same steps is of first order in damping and friction: it is itself off by 0.02 % in springs.
     """
-    speed, terms = impact_speed(scene), terms_of(scene)
+    terms = terms_of(scene)
+    speed = terms.plant.impact_speed
     shortest = min((duration(collision_of(meeting, terms), speed) for meeting in meetings(terms)), default=math.inf)
     standard = standard_steps(scene)
     steps = max(standard, math.ceil(STEPS * scene.tick / shortest))
@@ -35,7 +36,7 @@ def reference_setting(scene: Scene) -> Setting:
 
 
 def reference_simulation(scene: Scene, setting: Setting) -> Simulation:
-    """The scene with a reference setting, with friction solved explicitly: in short steps both are the same law."""
+    """Build the scene with a reference setting and explicit friction: in short steps both solvers have one law."""
     return variant(scene, setting, **_explicit(scene))
 
 

@@ -75,7 +75,7 @@ class RestingLoad:
         self.state: Simulation | None = None
         """At the settled state, to be left there; None where there is none."""
         self.reason = ""
-        """When it settled, or why there is no settled state: a sentence without its full stop."""
+        """Time of settling, or the reason why there is no settled state: a sentence without its full stop."""
         self.window = WINDOW
         """s, over which forces are averaged."""
         self.reference: Loads | None = None
@@ -85,7 +85,7 @@ class RestingLoad:
 
     @property
     def settled(self) -> bool:
-        """Whether there is a settled state to start from."""
+        """Return True if there is a settled state to start from."""
         return self.state is not None
 
     def settle(self, progress: Progress) -> None:
@@ -119,9 +119,9 @@ class RestingLoad:
             )
 
     def make_reference(self, progress: Progress) -> None:
-        """Loads that errors are measured against, the step halved until they no longer change; progress in runs.
+        """Compute the reference loads by halving the step until they no longer change; progress in runs.
 
-        Raises SimulationError if a run stops.
+        Raise SimulationError if a run stops.
         """
         setting = fine_setting(self.scene)
         progress(0, HALVINGS + 1)
@@ -158,7 +158,7 @@ class RestingLoad:
 
 
 def fine_setting(scene: Scene) -> Setting:
-    """Steps of the preset `standard` with velocity Verlet, which is of second order; more where it can't run."""
+    """Return the steps of the preset `standard` with velocity Verlet (second order); more where it can't run."""
     steps = standard_steps(scene)
     if "velocity_verlet" in forbidden(scene):
         return Setting("leapfrog", FIRST_ORDER * steps)
@@ -230,7 +230,7 @@ def _ticks(simulation: Simulation, window: float) -> int:
 
 
 def _now(simulation: Simulation) -> dict[tuple[int, int, int], float]:
-    """Normal force (N) of each contact at this tick."""
+    """Return the normal force (N) of each contact at this tick."""
     columns = simulation.contacts()
     a, b = columns.a.astype(np.int64), columns.b.astype(np.int64)
     pair = columns.kind == 0

@@ -26,7 +26,7 @@ SAMPLES = "samples.csv"
 MOST = 512 * MB
 """Bytes of that file that are read."""
 ORIGIN = "origin.json"
-"""What a folder's results are of: hashes that a study must share to go on with them."""
+"""File with the origin of a folder's results: hashes that a study must share to continue with them."""
 
 _OF_SETTING = ("integrator", "per_tick", "stiffness", "error")
 _COLUMNS = (*_OF_SETTING, "seed", *(observable.name for observable in OBSERVABLES), "cpu", "failure", "checksum")
@@ -116,7 +116,7 @@ def check_origin(folder: Path, scene: Scene) -> None:
 
 
 def fingerprint(scene: Scene) -> str:
-    """A short text by which a scene and a version differ from all others."""
+    """Return a short text that identifies a scene and a version."""
     return _hash(*(value.encode() for value in _origin(scene).values()))[:8]
 
 
@@ -125,7 +125,7 @@ def _unwritable(folder: Path, error: OSError) -> ConveyorError:
 
 
 def _origin(scene: Scene) -> dict[str, str]:
-    """What decides a run, beside its setting and seed."""
+    """Return the data that decide a run, beside its setting and seed."""
     return {
         "scene": _hash(scene.source_text.encode(), scene.overrides_text.encode()),
         "engine": ENGINE_HASH,

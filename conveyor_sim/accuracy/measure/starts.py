@@ -13,18 +13,18 @@ from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.accuracy.trajectory import variant
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.errors import SimulationError
-from conveyor_sim.physics.effects.terms import impact_speed, meetings
+from conveyor_sim.physics.effects.terms import meetings
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
 
 PARTS = 3
-"""Of the run, each with a start before its strongest contact."""
+"""Parts of the run, each with a start before its strongest contact."""
 
 MOST_WORK = 4e8
 """Bottle steps of the run in which starts are looked for, some ten seconds: what is longer is looked at in part."""
 
 UNTOUCHED_WORK = 1.2e9
-"""The same as long as nothing has touched anything: bottles that only ride cost less, and no second run follows."""
+"""Work limit while nothing touches: riding bottles cost less, and no second run follows."""
 
 TICK_WORK = 4e3
 """Bottle steps that cost as much as the rest of a tick, in round numbers."""
@@ -59,7 +59,7 @@ class Found:
     looked: float
     """s, simulated, of the run that was looked at."""
     touched: bool
-    """Whether any contact closed in that time."""
+    """True if a contact closed in that time."""
 
 
 def find_starts(scene: Scene, progress: Progress) -> Found:
@@ -118,9 +118,9 @@ def _advance(simulation: Simulation, exercise: Exercise | None) -> None:
 def _strongest(
     scene: Scene, setting: Setting, exercise: Exercise | None, progress: Callable[[float], None]
 ) -> tuple[Simulation, F8]:
-    """The run as far as it is looked at, and the largest contact force (N) in each of its ticks, (ticks,).
+    """Return the observed part of the run, and the largest contact force (N) in each of its ticks, (ticks,).
 
-    Progress as a share of that.
+    Progress is the share of that part.
     """
     simulation = variant(scene, setting, outputs={"bottles": 1e9 / scene.tick_ns})
     forces: list[float] = []
@@ -142,6 +142,6 @@ def _lead(scene: Scene) -> int:
     A short contact, of the beginning of which up to a twentieth of a tick would be lost, gets none.
     """
     terms = terms_of(scene)
-    times = [duration(collision_of(meeting, terms), impact_speed(scene)) for meeting in meetings(terms)]
+    times = [duration(collision_of(meeting, terms), terms.plant.impact_speed) for meeting in meetings(terms)]
     longest = max((time for time in times if time < math.inf), default=0.0)
     return math.ceil(0.5 * longest / scene.tick - 0.05)

@@ -1,4 +1,4 @@
-"""What settings cost: processor time per simulated second, from repeats that take turns."""
+"""Cost of settings: processor time per simulated second, from repeats in turns."""
 
 import time
 from collections.abc import Callable, Mapping

@@ -1,1 +1,1 @@
-"""What a study says: forecasts, answers, tables and files."""
+"""Reports of an accuracy study: forecasts, answers, tables and files."""

@@ -14,7 +14,7 @@ from conveyor_sim.accuracy.results import Answer, Comparison, Point, Reference, 
 from conveyor_sim.accuracy.setting import Setting
 
 EXACTER = 10.0
-"""How many times more exact the setting is whose cost stands beside."""
+"""Accuracy gain of the setting whose cost is stated for comparison."""
 
 NEAR = 1.05
 """Costs within this factor are taken as one: of such settings the most exact is chosen."""
@@ -23,14 +23,14 @@ SAFE = 2.0
 """Times the measured error that a prediction may be, to be called right."""
 
 NOTHING = 1e-6
-"""Relative error from which on a prediction is held against it: below is rounding, and nobody's concern."""
+"""Relative error above which a prediction is compared with a measurement; smaller errors are rounding."""
 
 
 def eligible(points: Sequence[Point], tolerance: float) -> list[Point]:
-    """Settings that may be relied on for forces, cheapest first.
+    """Return the eligible settings for forces, cheapest first.
 
-    They have the scene's own stiffness, did not fail, keep the tolerance in impacts and in resting load (as predicted,
-    where it could not be measured), and are within every bound of stability.
+    They have the scene's stiffness, did not fail, meet the tolerance in impacts and in resting load (as predicted where
+    it could not be measured), and are within every stability bound.
     """
     kept = [point for point in points if point.setting.stiffness == 1.0 and _trusted(point, tolerance)]
     return sorted(kept, key=lambda point: (_cost(point), point.setting.key))
@@ -43,7 +43,7 @@ def find_answer(
     tolerance: float,
     rest: Rest | None = None,
 ) -> Answer | None:
-    """The cheapest eligible setting that no comparison of long runs finds different; None if none is eligible."""
+    """Return the cheapest eligible setting without a significant difference in long runs; None if none is eligible."""
     refuted = {row.setting for row in comparisons if row.verdict == "different"}
     kept = eligible(points, tolerance)
     if not kept:
@@ -94,7 +94,7 @@ def _judged(predicted: float, measured: float) -> str:
 
 
 def _exceeded(point: Point, reference: Reference, rest: Rest | None) -> bool:
-    """Whether a measured error is above its prediction, by more than the reference's own doubt."""
+    """Return True if a measured error exceeds its prediction by more than the reference's uncertainty."""
     resting_doubt = 0.0 if rest is None or rest.doubt is None else rest.doubt
     rows = [
         (point.predicted, _error(point), reference.doubt.peak_force),

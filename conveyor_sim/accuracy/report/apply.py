@@ -11,6 +11,7 @@ from ruamel.yaml import YAML
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.scene import Scene, load_scene
+from conveyor_sim.support.files import FileError, write_file
 
 
 def apply(scene: Scene, setting: Setting, copy: Path) -> Scene:
@@ -36,7 +37,7 @@ def apply(scene: Scene, setting: Setting, copy: Path) -> Scene:
 
 
 def line(setting: Setting) -> str:
-    """A setting as a scene file has it."""
+    """Return a setting as it is written in a scene file."""
     error = "" if setting.error is None else f", error: {setting.error!r}"
     return f"accuracy: {{integrator: {setting.integrator}, per_tick: {setting.per_tick}{error}}}"
 
@@ -75,11 +76,8 @@ def _take_tables_along(lines: list[str], data: Any, before: Path, copy: Path) ->
 
 
 def _write(file: Path, text: str) -> None:
-    """The whole file or nothing."""
-    part = file.with_name(file.name + ".part")
+    """Write the complete file or nothing."""
     try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        part.write_text(text, encoding="utf-8")
-        os.replace(part, file)
-    except OSError as error:
-        raise ConveyorError(f"{file}: can't be written ({error.strerror}), expected a file to write to") from None
+        write_file(file, text.encode(), file.parent)
+    except FileError as error:
+        raise ConveyorError(f"{file}: {error}, expected a file to write to") from None

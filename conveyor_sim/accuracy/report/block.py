@@ -17,13 +17,13 @@ Row = TypeVar("Row")
 
 @dataclass(frozen=True)
 class Column(Generic[Row]):
-    """What stands above a column, and what it says of a row."""
+    """Column of a table: its header, and its text for a row."""
 
     heading: str
     """A line or several."""
     text: Callable[[Row], str]
     left: bool = False
-    """Where it stands: numbers right."""
+    """Alignment: False aligns right, for numbers."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Block:
         notes: Iterable[str] = (),
         strong: Callable[[Row], bool] = lambda _: False,
     ) -> Block:
-        """The block of a table whose columns are described; groups: rows by caption."""
+        """Return the block of a table with these columns; groups: rows by caption."""
 
         def cells(row: Row) -> tuple[str, ...]:
             return tuple(column.text(row) for column in columns)
@@ -62,7 +62,7 @@ class Block:
         )
 
     def markdown(self) -> str:
-        """A heading of the third level, the table, and a paragraph for each sentence."""
+        """Return the block as Markdown: a third-level heading, the table, and one paragraph per sentence."""
         parts = [f"### {self.title}"]
         if self.groups:
             lines = [_line(self.headings), _line("---" if left else "---:" for left in self.left)]

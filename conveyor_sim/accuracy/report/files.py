@@ -40,10 +40,10 @@ def write_study(study: Study, out_dir: str | Path) -> list[Path]:
 
 
 def read_study(path: str | Path, say: Callable[[str], object] = lambda _: None) -> Study:
-    """The study in a study.json, equal to the one that was written.
+    """Read a study from study.json; it equals the one that was written.
 
     say: called with one sentence for a file of an older version, which has no checksum and can't be verified.
-    Raises ConveyorError if the file can't be read, is damaged or holds no study.
+    Raise ConveyorError if the file can't be read, is damaged or holds no study.
     """
     try:
         kept = read_sealed(Path(path))

@@ -1,6 +1,6 @@
-"""What is known before anything runs: predicted errors and cost of settings, and the cheapest that is predicted to do.
+"""Forecast before any run: predicted errors and cost of settings, and the cheapest that meets the tolerance.
 
-Closed forms and bounds alone (timestep/): no kernel is compiled or loaded, and it takes a second.
+It uses closed forms and bounds only (physics/timestep/): no kernel is compiled or loaded, and it takes a second.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 from conveyor_sim.accuracy.candidates import candidates
 from conveyor_sim.accuracy.results import Point
 from conveyor_sim.accuracy.setting import Setting, with_setting
-from conveyor_sim.physics.effects import most_bottles
 from conveyor_sim.physics.model import build_model
 from conveyor_sim.physics.model.remedies import BESIDE, BOTTLE_STEP, STEP_COST
+from conveyor_sim.physics.plant import Plant
 from conveyor_sim.scene import Scene
 
 TRUSTED = ("leapfrog", "velocity_verlet")
@@ -27,7 +27,7 @@ TICK = 1e-5
 """s of a processor that a tick takes beside its steps, in round numbers."""
 
 BETTER = 10.0
-"""How many times more exact the setting is whose cost stands beside."""
+"""Accuracy gain of the setting whose cost is stated for comparison."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Forecast:
     seconds: float
     """s of one processor for a simulated second, by a rule of thumb; 0 without a setting."""
     bottles: int
-    """That the cost is for."""
+    """Number of bottles for which the cost is stated."""
     better: float | None
     """Cost of a setting that is BETTER times as exact over that of this one; None if nothing tried is."""
 
@@ -54,7 +54,7 @@ def forecast(scene: Scene, tolerance: float) -> Forecast:
     """Predict what settings do on a scene; the cheapest one of at most a tolerance (relative) is chosen."""
     points = [_unmeasured(scene, one) for one in candidates(scene) if one.integrator in TRUSTED and one.stiffness == 1]
     kept = [point for point in points if point.beyond is None or point.beyond <= 1.0 + 1e-12]
-    bottles = most_bottles(scene)
+    bottles = Plant.of(scene).most_bottles
     many = MANY if bottles is None else max(1, bottles)
     point = _cheapest(kept, tolerance)
     better = None if point is None else _cheapest(kept, predicted_error(point) / BETTER)
@@ -72,9 +72,9 @@ def forecast(scene: Scene, tolerance: float) -> Forecast:
 
 
 def foretold(scene: Scene, point: Point) -> Point:
-    """The point with what is known without measuring: predicted errors, and how far its step is from stability.
+    """Return the point with predictions: errors, and the distance of its step from the stability limit.
 
-    Predictions know no other stiffness to compare with.
+    Predictions do not compare with another stiffness.
     """
     model = build_model(with_setting(scene, point.setting))
     bounds = [bound.dt for bound in model.bounds if bound.stability]
@@ -88,18 +88,18 @@ def foretold(scene: Scene, point: Point) -> Point:
 
 
 def predicted_error(point: Point) -> float:
-    """The larger of what is predicted in impacts and in resting load; 0 where nothing touches."""
+    """Return the larger of the predicted errors in impacts and in resting load; 0 where nothing touches."""
     return max(point.predicted or 0.0, point.predicted_resting or 0.0)
 
 
 def seconds(scene: Scene, setting: Setting, bottles: int) -> float:
-    """s of one processor that a simulated second takes, by a rule of thumb."""
+    """Return the estimated time of one processor per simulated second, s."""
     evaluations = setting.per_tick / scene.tick * STEP_COST[setting.integrator]
     return evaluations * (bottles + BESIDE) * BOTTLE_STEP + TICK / scene.tick
 
 
 def _cheapest(points: Iterable[Point], tolerance: float) -> Point | None:
-    """Of at most a predicted error."""
+    """Return the cheapest point within a predicted error; None if there is none."""
     return min((point for point in points if predicted_error(point) <= tolerance), key=_work, default=None)
 
 

@@ -21,12 +21,12 @@ class Interim:
     """An answer that may still change."""
 
     title: str
-    """How it is known, one of those above."""
+    """Title that states the evidence: one of the above."""
     lines: tuple[str, ...]
 
 
 def predicted(known: Forecast) -> Interim:
-    """Forces, throughput, cost and the setting as predicted."""
+    """Return forces, throughput, cost and setting as predicted."""
     asked = percent(known.tolerance)
     if known.point is None:
         return Interim(
@@ -60,7 +60,7 @@ def predicted(known: Forecast) -> Interim:
 
 
 def preliminary(study: Study) -> Interim:
-    """Of the first settings that were measured, in impacts alone."""
+    """Return the answer from impacts of the first measured settings."""
     return Interim(
         PRELIMINARY,
         (
@@ -72,7 +72,7 @@ def preliminary(study: Study) -> Interim:
 
 
 def after_measuring(study: Study) -> Interim:
-    """Of all settings; long runs are still to come."""
+    """Return the answer from all settings, before long runs."""
     lines = (*_without_throughput(study), "Not known yet: throughput, and whether long runs agree with it.")
     return Interim(MEASURED, lines)
 

@@ -14,7 +14,7 @@ FEW = 2
 
 
 def three_lines(study: Study) -> tuple[str, str, str]:
-    """How good forces are, how good throughput is, what it costs to be better; of the recommended setting."""
+    """Return three lines on the recommended setting: accuracy of forces and throughput, cost of more accuracy."""
     if study.answer is None:
         return (
             f"Forces: no setting that was tried is good to {percent(study.tolerance)}{_best(study)}.",
@@ -25,7 +25,7 @@ def three_lines(study: Study) -> tuple[str, str, str]:
 
 
 def summary(study: Study) -> list[str]:
-    """What the command prints: the three lines, the setting, the scene's own, moving rails, what the study took."""
+    """Return the command's output: the three lines, both settings, moving rails, and the cost of the study."""
     lines = list(three_lines(study))
     if study.answer is not None:
         lines.append(f"Setting: {line(study.answer.setting)} (--apply writes it into a copy of the scene)")
@@ -40,7 +40,7 @@ def summary(study: Study) -> list[str]:
 
 
 def _own(study: Study) -> str:
-    """What the scene's own setting is worth, where another is recommended."""
+    """Return a line on the scene's setting, if another is recommended."""
     point = next((point for point in study.points if point.setting == study.own), None)
     if point is None or (study.answer is not None and study.answer.setting == study.own):
         return ""
@@ -106,6 +106,6 @@ def _cost(answer: Answer) -> str:
 
 
 def _best(study: Study) -> str:
-    """The least error of what ran within the bounds of stability, if anything did."""
+    """Return a line on the least error within the stability bounds, if any setting ran there."""
     found = min((largest_error(point) for point in eligible(study.points, math.inf)), default=math.inf)
     return f"; the best is good to {percent(found)}" if math.isfinite(found) else ""

@@ -15,15 +15,15 @@ class NoContact(Exception):
     """No bottle touched another one or a rail in a run of the scene: a study has nothing to compare."""
 
     def __init__(self, looked: float) -> None:
-        """looked: s, simulated, that were looked at."""
+        """Build the exception. looked: simulated time without contact, s."""
         super().__init__(f"nothing touched anything in {looked:g} s")
         self.looked = looked
 
 
 def without_contact(scene: Scene, known: Forecast, looked: float | None) -> tuple[Setting, list[str]]:
-    """The setting to use, and the lines of the answer: forces, throughput, cost, the setting, what it does not cover.
+    """Return the setting to use, and the lines of the answer: forces, throughput, cost, setting, exclusions.
 
-    looked: s, simulated, in which nothing touched anything; None: nothing in the scene can.
+    looked: simulated time without contact, s; None: contact is impossible.
     """
     setting = preset_setting(scene, "draft")
     prediction = build_model(with_setting(scene, setting)).prediction

@@ -9,7 +9,7 @@ from conveyor_sim.accuracy.results import Point
 
 
 def front(points: Iterable[Point], softened: bool = True) -> list[Point]:
-    """The points that none is as cheap and as exact as and better in one of the two, the cheapest first.
+    """Return the non-dominated points, the cheapest first.
 
     Cost is the median processor time, error the larger of those in impacts and in resting load. Failures are left out,
     and so are settings of another stiffness than the scene's if `softened` is false.

@@ -32,9 +32,9 @@ def plain(value: object) -> object:
 
 
 def typed(kind: Any, data: Any, where: str = "") -> Any:
-    """What `plain` made of a value of `kind`: a dataclass, tuple, dict, X | None, float, int, str or bool.
+    """Return the value of type `kind` from which `plain` produced `data`: dataclass, tuple, dict, X | None, or scalar.
 
-    Raises Unlike if it can't have been made of one.
+    Raise Unlike if `data` can't come from such a value.
     """
     inner = get_args(kind)
     if get_origin(kind) is UnionType:

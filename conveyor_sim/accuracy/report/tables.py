@@ -39,12 +39,12 @@ def terminal(study: Study) -> Group:
 
 
 def markdown(study: Study) -> str:
-    """The same as Markdown, a heading of the third level above each table."""
+    """Return the tables as Markdown, each below a third-level heading."""
     return "\n".join(block.markdown() for block in blocks(study))
 
 
 def blocks(study: Study) -> list[Block]:
-    """The tables that the study has rows for, and the answer."""
+    """Return the tables for which the study has rows, and the answer."""
     parts = [
         _orders(study.orders),
         _horizons(study),
@@ -97,7 +97,7 @@ def _horizons(study: Study) -> Block:
 
 
 def _work(study: Study) -> list[Block]:
-    """Settings that did not fail: cost and error, and the other errors."""
+    """Return the settings that did not fail: cost and error, and the other errors."""
     best = {point.setting for point in front(study.points)}
     recommended = None if study.answer is None else study.answer.setting
 
@@ -162,7 +162,7 @@ def _work(study: Study) -> list[Block]:
 
 
 def _rested(study: Study) -> str:
-    """What errors in resting load were measured from."""
+    """Return a sentence about the reference of errors in resting load."""
     rest = study.rest
     if rest is None or rest.setting is None or rest.contacts == 0:
         return f"Resting load: {'not looked at' if rest is None else rest.reason}."
@@ -227,7 +227,7 @@ def _lost_runs(study: Study) -> Block:
 
 
 def _stiffness(rows: Sequence[StiffnessRow]) -> Block:
-    """A row a quantity, a column a factor: there are more quantities than factors."""
+    """Return one row per quantity and one column per factor: there are more quantities than factors."""
     quantities: list[Quantity] = [
         ("time step, us", lambda row: _millionths(row.dt)),
         ("cost, of factor 1", lambda row: digits(row.cost_ratio)),
@@ -320,7 +320,7 @@ def _hundredths(fraction: float | None) -> str:
 
 
 def _millionths(value: float | None) -> str:
-    """um of m, us of s."""
+    """Return millionths as text: um of m, us of s."""
     return digits(None if value is None else 1e6 * value)
 
 
@@ -334,5 +334,5 @@ def _range(texts: Iterable[str]) -> str:
 
 
 def _all(values: Iterable[object]) -> str:
-    """What all rows have, or all that there are: `64`, `64 or 128`."""
+    """Return the common value of all rows, or all values: `64`, `64 or 128`."""
     return " or ".join(map(str, dict.fromkeys(values)))

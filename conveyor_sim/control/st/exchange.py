@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import select
-import subprocess
 import time
 
 _CHUNK = 65536
@@ -22,31 +21,28 @@ class EndedError(AnswerError):
     """The child has closed its pipe, before or within the answer."""
 
 
-def exchange(process: subprocess.Popen[bytes], request: bytes, patience: float, most: int) -> bytes:
-    """Send a line to the standard input of a child, and return the next line of its standard output.
+def exchange(socket: int, request: bytes, patience: float, most: int) -> bytes:
+    """Send a line to a child, and return its next line.
 
-    patience: wall time for request and answer together, s. most: largest number of bytes in the answer. The pipes must
-    be unbuffered. Raise LateError, EndedError, or AnswerError for a wrong answer.
+    socket: descriptor. patience: wall time for request and answer together, s. most: largest number of bytes in the
+    answer. Raise LateError, EndedError, or AnswerError for a wrong answer.
     """
-    assert process.stdin is not None and process.stdout is not None
-    inward, outward = process.stdout.fileno(), process.stdin.fileno()
-    for pipe in (inward, outward):
-        os.set_blocking(pipe, False)
+    os.set_blocking(socket, False)
     end, left, received = time.monotonic() + patience, memoryview(request), bytearray()
     waiting = select.poll()  # select() takes no descriptors from 1024 on
-    waiting.register(inward, select.POLLIN)
-    waiting.register(outward, select.POLLOUT)
+    waiting.register(socket, select.POLLIN | select.POLLOUT)
     while True:
         remaining = end - time.monotonic()
-        ready = dict(waiting.poll(max(0.0, remaining) * 1e3)) if remaining > 0.0 else {}
+        ready = waiting.poll(max(0.0, remaining) * 1e3) if remaining > 0.0 else []
         if not ready:
             raise LateError(f"took more than {patience:g} s of wall time")
-        if outward in ready and left:
-            left = left[_written(outward, left) :]
+        ((_, events),) = ready
+        if left and events & select.POLLOUT:
+            left = left[_written(socket, left) :]
             if not left:
-                waiting.unregister(outward)
-        if inward in ready:
-            received += (chunk := _read(inward))
+                waiting.modify(socket, select.POLLIN)
+        if events & ~select.POLLOUT:
+            received += (chunk := _read(socket))
             if b"\n" in chunk:
                 break
         if len(received) > most:
@@ -57,19 +53,22 @@ def exchange(process: subprocess.Popen[bytes], request: bytes, patience: float, 
     return line
 
 
-def _written(pipe: int, data: memoryview) -> int:
-    """Return the number of bytes that the pipe took. Raise EndedError."""
+def _written(socket: int, data: memoryview) -> int:
+    """Return the number of bytes that the socket took. Raise EndedError."""
     try:
-        return os.write(pipe, data[:_CHUNK])
+        return os.write(socket, data[:_CHUNK])
     except BlockingIOError:
         return 0
     except OSError:
         raise EndedError("has ended") from None
 
 
-def _read(pipe: int) -> bytes:
+def _read(socket: int) -> bytes:
     """Return the bytes that have arrived, at least one. Raise EndedError."""
-    chunk = os.read(pipe, _CHUNK)
+    try:
+        chunk = os.read(socket, _CHUNK)
+    except OSError:
+        chunk = b""
     if not chunk:
         raise EndedError("has ended")
     return chunk

@@ -5,10 +5,11 @@ from __future__ import annotations
 import json
 import signal
 import subprocess
-import sys
 import weakref
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
+from multiprocessing import Pipe
+from multiprocessing.connection import Connection
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from conveyor_sim.control.line_tags import LineTags
 from conveyor_sim.control.recorded import PREFIX, patterns
 from conveyor_sim.control.scan import ALARMS, ControlError, Inputs
 from conveyor_sim.control.st.exchange import AnswerError, EndedError, exchange
+from conveyor_sim.support.child_process import start_python
 from conveyor_sim.support.rounded_limit import at_limit
 
 PATIENCE = 60.0
@@ -67,13 +69,12 @@ class CompiledProgram:
         self._outs: list[str] = []
         self._limits: Mapping[str, tuple[float, float]] = {}
         self._shown: dict[str, float] = {}
-        self._process = subprocess.Popen(
-            [sys.executable, "-m", "conveyor_sim.control.st.library_host", str(self._path.resolve())],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            bufsize=0,
-        )
-        self.close = weakref.finalize(self, _end, self._process)
+        self._pipe, its_pipe = Pipe()
+        with its_pipe:
+            self._process = start_python(
+                "conveyor_sim.control.st.library_host", its_pipe, name=str(self._path.resolve())
+            )
+        self.close = weakref.finalize(self, _end, self._process, self._pipe)
         """Ends the process. Deleting this object ends it too."""
         self._call("bind", [])
 
@@ -124,7 +125,7 @@ class CompiledProgram:
         request = json.dumps({"do": do, "with": arguments}).encode() + b"\n"
         most = MOST_BYTES + (MOST_STATE_BYTES if do == "snapshot" else _VALUE_BYTES * len(self._outs))
         try:
-            answer = _answer(exchange(self._process, request, self._patience, most))
+            answer = _answer(exchange(self._pipe.fileno(), request, self._patience, most))
             if do == "scan":
                 _require_numbers(answer.get("answer", [0.0] * len(self._outs)), len(self._outs))
         except EndedError:
@@ -159,12 +160,9 @@ def _require_numbers(values: Any, count: int) -> None:
         raise AnswerError(f"sent a line without the values of {count} outputs")
 
 
-def _end(process: subprocess.Popen[bytes]) -> None:
+def _end(process: subprocess.Popen[bytes], pipe: Connection) -> None:
     """Let the process destroy its instance, then end it."""
-    for stream in (process.stdin, process.stdout):
-        if stream is not None:
-            with suppress(BrokenPipeError):
-                stream.close()
+    pipe.close()
     with suppress(subprocess.TimeoutExpired):
         process.wait(_MOMENT)
     process.kill()

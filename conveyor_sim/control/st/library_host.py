@@ -1,7 +1,7 @@
-"""Process of a compiled program: `python -m conveyor_sim.control.st.library_host LIBRARY`.
+"""Process of a compiled program. Its last argument is the path of the library.
 
-Requests and answers are lines of JSON on the original standard streams. Output of the program itself goes to standard
-error. The process ends with its standard input, and with the process that started it.
+Requests and answers are lines of JSON on a socket; the output of the program goes to standard error. The process ends
+with the socket, and with the process that started it.
 """
 
 from __future__ import annotations
@@ -10,12 +10,12 @@ import base64
 import ctypes
 import json
 import os
-import signal
 import sys
 from typing import Any
 
+from conveyor_sim.support.child_process import die_with_parent, pipes_of_child
+
 VERSION = 1
-_PR_SET_PDEATHSIG = 1
 _MOST_BYTES = 64_000_000
 
 
@@ -92,16 +92,15 @@ class _Host:
 
 
 def main() -> None:
-    """Answer requests until the input ends."""
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is handled by the parent process
-    answers = os.fdopen(os.dup(1), "w")
-    os.dup2(2, 1)
+    """Answer requests until the socket ends."""
+    die_with_parent()
+    (pipe,) = pipes_of_child()
+    requests, answers = (os.fdopen(pipe.fileno(), mode, closefd=False) for mode in "rw")
     host: _Host | None = None
-    for line in sys.stdin:
+    for line in requests:
         try:
             if host is None:
-                host = _Host(sys.argv[1])
+                host = _Host(sys.argv[-1])
             request = json.loads(line)
             answer = {"answer": getattr(host, request["do"])(*request["with"])}
         except (OSError, AttributeError, ValueError) as error:
@@ -110,7 +109,3 @@ def main() -> None:
         answers.flush()
     if host is not None:
         host.destroy()
-
-
-if __name__ == "__main__":
-    main()

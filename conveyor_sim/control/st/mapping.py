@@ -54,13 +54,13 @@ class TagMapping:
 
     def left_over(self) -> tuple[str, ...]:
         """Return the unused variables and commands, in words."""
-        unused = (("no tag for", self.variables), ("no variable for these commands:", self.commands))
+        unused = (("no tag for", self.variables), ("commands not set by the program:", self.commands))
         return tuple(f"{words} {_listed(names)}" for words, names in unused if names)
 
     def __str__(self) -> str:
         lines = [f"{one.variable} {'<-' if one.is_input else '->'} {one.tag} (by {one.how})" for one in self.bound]
         lines += [f"{name}: no tag" for name in self.variables]
-        lines += [f"{name}: a command without a variable" for name in self.commands]
+        lines += [f"{name}: command not set by the program" for name in self.commands]
         return "\n".join(lines)
 
 

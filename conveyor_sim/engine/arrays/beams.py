@@ -1,4 +1,4 @@
-"""What `sensors/beams.py` needs to know of bottles and beams, and what it finds out. N slots, B beams."""
+"""Arrays of `sensors/beams.py`: motion of bottles in a tick, beams, and when these are blocked. N slots, B beams."""
 
 from typing import NamedTuple
 
@@ -7,13 +7,13 @@ from conveyor_sim.engine.compiler.groups import group
 
 
 @group
-class Ways(NamedTuple):
-    """Where bottles begin and end a tick, and how fast, (N,)."""
+class BottleMotion(NamedTuple):
+    """Motion of bottles in a tick, (N,)."""
 
     start: F8
-    """(4, N), x, y, vx, vy at its begin, m and m/s."""
+    """x, y, vx, vy at the start of the tick, m and m/s, (4, N)."""
     x: F8
-    """At its end, as all that follows."""
+    """x at the end of the tick, as are all fields below."""
     y: F8
     vx: F8
     vy: F8
@@ -23,15 +23,15 @@ class Ways(NamedTuple):
 
 @group
 class LightBeams(NamedTuple):
-    """Beams, and when in a tick bottles blocked them."""
+    """Beams, and the times in a tick at which bottles block them."""
 
     line: F8
-    """(B, 9), of each its start, lower and upper corner, direction, m, and length, m."""
+    """Start, lower corner, upper corner, direction (m) and length (m) of each beam, (B, 9)."""
     near: I8
-    """(2, n), scratch."""
+    """Scratch, (2, n)."""
     spans: F8
-    """(B, m, 2), s from the begin of the tick, in order; those that meet are one."""
+    """Times of each beam's blocked intervals, s from the start of the tick, in order and disjoint, (B, m, 2)."""
     used: I8
-    """(B,), spans of each."""
+    """Number of intervals of each beam, (B,)."""
     state: I8
-    """(B,), FREE, BLOCKED or CHANGES."""
+    """FREE, BLOCKED or CHANGES, (B,)."""

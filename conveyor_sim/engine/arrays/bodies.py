@@ -1,4 +1,4 @@
-"""Bottles: where they are, how they move, what acts on them."""
+"""Bottles: positions, velocities, and the forces on them."""
 
 from typing import NamedTuple
 
@@ -21,35 +21,35 @@ class Bottles(NamedTuple):
     type: U4
     id: I8
     packed: F8
-    """(4 S,), x, y, vx, vy of each bottle side by side: the copy that the pairs are gathered from."""
+    """x, y, vx, vy of each bottle side by side, (4 S,): a copy from which the pairs gather."""
 
 
 @group
 class Spin(NamedTuple):
-    """Rotation about the vertical, (S,); absent when nothing can turn a bottle."""
+    """Rotation about the vertical axis, (S,); absent if nothing can turn a bottle."""
 
     theta: F8
     omega: F8
     inverse_inertia: F8
     moment: F8
-    """N m, of the last force evaluation."""
+    """Moment in the last force evaluation, N m."""
 
 
 @group
-class Load(NamedTuple):
-    """What the last force evaluation found, (S,)."""
+class ForceSums(NamedTuple):
+    """Results of the last force evaluation, (S,)."""
 
     fx: F8
     fy: F8
     normal_max: F8 | None
-    """N, largest normal force of one contact; absent when nobody asks for peaks."""
+    """Largest normal force of one contact, N; absent if peaks are not requested."""
     normal_sum: F8 | None
-    """N, normal forces of all contacts."""
+    """Sum of the normal forces of all contacts, N."""
 
 
 @group
 class Peaks(NamedTuple):
-    """Accumulated every step since the last output, (S,)."""
+    """Peaks accumulated in every step since the last output, (S,)."""
 
     force: F8
     impulse: F8

@@ -17,15 +17,16 @@ def _with_columns() -> Any:
 
 @group
 class ContactLaw(_with_columns()):  # type: ignore[misc]
-    """Coefficients of contact as flat columns; None where no contact of the scene has that law.
+    """Coefficients of contact as flat columns; None if no contact of the scene has that law.
 
-    As a table by type: (T * T,), entry a * T + b, or (T * M,), entry type * M + material. By pair: (P,). What a contact
-    does not have is 0 in the column, for the laws add up. First the columns of the laws in `contact/laws/`, then
+    As a table by type: (T * T,), entry a * T + b, or (T * M,), entry type * M + material. By pair: (P,). A contact
+    without a law has 0 in its column, because the laws are added up. First the columns of the laws in `contact/laws/`,
+    then
 
     - friction: mu
-    - tangential_stiffness: N/m, of the spring with history; 0, not None, where only Mindlin's springs are
-    - tangential_mindlin: N/m^1.5, times sqrt(delta): what overlap adds to that stiffness
-    - tangential_damping: kg/s, beside that spring
+    - tangential_stiffness: N/m, of the spring with history; 0, not None, if there are only Mindlin springs
+    - tangential_mindlin: N/m^1.5, times sqrt(delta): stiffness added by the overlap
+    - tangential_damping: kg/s, parallel to that spring
     """
 
     __slots__ = ()
@@ -33,20 +34,20 @@ class ContactLaw(_with_columns()):  # type: ignore[misc]
 
 @group
 class Curves(NamedTuple):
-    """Tables of normal force against overlap, one behind the other."""
+    """Tables of normal force against overlap, one after the other."""
 
     start: U4
-    """Curve c is entries start[c]:start[c + 1]; the first of them is (0, 0)."""
+    """Curve c consists of entries start[c]:start[c + 1]; the first of them is (0, 0)."""
     overlap: F8
     force: F8
 
 
 @group
 class PairSprings(NamedTuple):
-    """Tangential springs of the pairs, (P,), and a copy by pair that outlives a rebuild of the list."""
+    """Tangential springs of the pairs, (P,), and a copy by pair that survives a rebuild of the list."""
 
     elongation: F8
-    """m, along the tangent; positive slip lengthens it."""
+    """Elongation along the tangent, m; positive slip lengthens it."""
     kept_i: U4
     kept_j: U4
     kept: F8
@@ -56,7 +57,7 @@ class PairSprings(NamedTuple):
 
 @group
 class PairParts(NamedTuple):
-    """What of the pair forces does not give its work back, (2 P + 1,) as `Pairs.fx` (`ledger.py`)."""
+    """Dissipative parts of the pair forces, (2 P + 1,) as `Pairs.fx` (`ledger.py`)."""
 
     damping: Triple
     """N, N, N m."""
@@ -70,21 +71,21 @@ class Pairs(NamedTuple):
     i: U4
     j: U4
     reach: F8 | None
-    """R_i + R_j, m; absent when all radii are equal."""
+    """R_i + R_j, m; absent if all radii are equal."""
     radius_i: F8 | None
-    """R_i, likewise."""
+    """R_i, m; absent if all radii are equal."""
     law: ContactLaw
     used: I8
-    """(1,), pairs in use."""
+    """Number of pairs in use, (1,)."""
     fx: F8
-    """N, (2 P + 1,): on i at p, on j at P + p, and a last entry that stays 0."""
+    """Force in N, (2 P + 1,): on i at p, on j at P + p; the last entry stays 0."""
     fy: F8
     moment: F8 | None
-    """N m, likewise."""
+    """Moment in N m, laid out like `fx`."""
     normal: F8 | None
-    """N, likewise; for peaks."""
+    """Normal force in N, laid out like `fx`; for peaks."""
     touch: F8 | None
-    """1 for a closed contact, likewise; for the implicit solver."""
+    """1 for a closed contact, laid out like `fx`; for the implicit solver."""
     spring: PairSprings | None
     tangent: PairTangent | None
     parts: PairParts | None
@@ -92,41 +93,42 @@ class Pairs(NamedTuple):
 
 @group
 class Gathered(NamedTuple):
-    """Scratch: what a block of pairs needs to know of its bottles."""
+    """Scratch: data of the bottles of a block of pairs."""
 
     difference: F8
-    """(4 * BLOCK,), x, y, vx, vy of j less those of i, side by side."""
+    """x, y, vx, vy of j minus those of i, side by side, (4 * BLOCK,)."""
     turn: F8
-    """(BLOCK,), omega of i and of j together, rad/s."""
+    """omega of i plus that of j, rad/s, (BLOCK,)."""
     rim: F8
-    """(BLOCK,), R omega of i and of j together, m/s, where radii differ."""
+    """R omega of i plus that of j, m/s, for different radii, (BLOCK,)."""
     compliance: F8
-    """(BLOCK,), dt/m_t, s/kg, for the implicit solver."""
-    way: F8
-    """(4 * BLOCK,), how far j has gone less i, x and y (m), how far both have turned (rad), and their rims (m)."""
+    """dt/m_t, s/kg, for the implicit solver, (BLOCK,)."""
+    displacement: F8
+    """Displacements of j minus those of i: x, y (m); sums of rotations (rad) and rim displacements (m), (4 * BLOCK,).
+    """
 
 
 @group
 class Slots(NamedTuple):
-    """Which entries of the pair forces act on each bottle; explained in `slots.py`."""
+    """Entries of the pair forces that act on each bottle; explained in `slots.py`."""
 
     entry: U4
-    """(S * WIDTH,), by bottle, in order of the partner; unused ones point at the entry that stays 0."""
+    """Entries by bottle, in order of the partner, (S * WIDTH,); unused ones point at the entry that stays 0."""
     filled: U4
-    """(S,), entries of each bottle."""
+    """Number of entries of each bottle, (S,)."""
     more_start: U4
-    """(S + 1,), entries beyond WIDTH of bottle i are more_start[i]:more_start[i + 1]."""
+    """Entries beyond WIDTH of bottle i are more_start[i]:more_start[i + 1], (S + 1,)."""
     more_bottle: U4
     more_entry: U4
 
 
 @group
 class Implicit(NamedTuple):
-    """For friction solved implicitly, (S,)."""
+    """Data of the implicit friction solver, (S,)."""
 
     mobility: F8
     """1/m + R^2/J, 1/kg."""
     closed: F8
-    """Closed contacts of each bottle, its base among them."""
+    """Number of closed contacts, including the base."""
     compliance: F8
-    """dt times mobility times closed contacts, s/kg, times `Settings.ahead`."""
+    """dt times mobility times closed contacts, s/kg, times `EngineSettings.ahead`."""

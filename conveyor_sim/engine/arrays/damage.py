@@ -1,4 +1,4 @@
-"""Arrays of what bottles and rails bear (`damage.py`); None where an effect is absent.
+"""Arrays of loads on bottles and rails (`damage.py`); None if an effect is absent.
 
 Shapes: S bottle slots, T bottle types, G segments, A arcs, B bins of rails. SI units.
 """
@@ -13,25 +13,25 @@ from conveyor_sim.engine.arrays.types import F8, I8, U4
 from conveyor_sim.engine.compiler.groups import group
 
 MOST_TOUCHES = 16
-"""Contacts of one bottle that are remembered as closed; of any more it is not known when they closed."""
+"""Contacts of one bottle that are remembered as closed. The time of closing is unknown for any more."""
 
 MOST_BORNE = 64
-"""Contacts of one bottle at a time that are looked at."""
+"""Contacts of one bottle that are evaluated at a time."""
 
 
 @group
-class Worst(NamedTuple):
-    """The largest of a quantity, (S,)."""
+class Maximum(NamedTuple):
+    """Maximum of a quantity, (S,)."""
 
     tick: F8
-    """In the present tick."""
+    """Maximum in the present tick."""
     output: F8
-    """In the ticks before it since the last output."""
+    """Maximum in the earlier ticks since the last output."""
 
 
 @group
 class RailBins(NamedTuple):
-    """Rails cut into bins: those of segment g are segment_first[g]:segment_first[g + 1]; likewise those of arcs."""
+    """Rails cut into bins: segment g has bins segment_first[g]:segment_first[g + 1]; arcs likewise."""
 
     segment_first: U4
     """(G + 1,)"""
@@ -40,109 +40,109 @@ class RailBins(NamedTuple):
     arc_span: F8
     """(A,), rad"""
     work: F8
-    """(units, B), J, of the bottles of each unit (`workers.py`), so that sums do not depend on who did which."""
+    """Work in J by unit of bottles (`workers.py`), so that sums don't depend on the threads, (units, B)."""
     impulse: F8
-    """(units, B), N s, likewise."""
+    """Impulse in N s, (units, B)."""
 
 
 @group
-class Scuffing(NamedTuple):
+class ScuffingWork(NamedTuple):
     """Sliding work."""
 
     work: F8
-    """(S,), J, since the bottle entered."""
+    """Work in J since the bottle entered, (S,)."""
     bins: RailBins | None
 
 
 @group
 class Crushing(NamedTuple):
-    """Normal forces that act on a bottle at once."""
+    """Simultaneous normal forces on a bottle."""
 
-    total: Worst
-    """N, sum of all."""
-    opposed: Worst
-    """N, the largest squeeze by two of them."""
+    total: Maximum
+    """Sum of all, N."""
+    opposed: Maximum
+    """Largest squeeze by two of them, N."""
 
 
 @group
 class Impacts(NamedTuple):
-    """Contacts as they close."""
+    """Contacts at the moment of closing."""
 
-    speed: Worst
-    """m/s, relative and normal, one step before."""
-    force: Worst
-    """N, of any one contact, whenever it closed."""
+    speed: Maximum
+    """Relative normal speed one step before, m/s."""
+    force: Maximum
+    """Force of any one contact, whenever it closed, N."""
     vx: F8
-    """(S,), m/s, at the last look."""
+    """Velocity at the last evaluation, m/s, (S,)."""
     vy: F8
     touching: I8
-    """(S, MOST_TOUCHES), what a bottle touched at the last look: keys as in `damage.py`; a 0 ends them."""
+    """Keys (`damage.py`) of what a bottle touched at the last evaluation, ended by a 0, (S, MOST_TOUCHES)."""
     touched: I8
-    """Scratch: the same at the look before."""
+    """Scratch: the same one evaluation earlier."""
 
 
 @group
 class Tipping(NamedTuple):
-    """Overturning moment over the one that weight can hold."""
+    """Overturning moment divided by the moment that the weight can hold."""
 
-    ratio: Worst
-    """The index of tipping."""
+    ratio: Maximum
+    """Index of tipping."""
     mean_x: F8
-    """(S,), the smoothed moment, as a vector."""
+    """Smoothed moment, as a vector, (S,)."""
     mean_y: F8
     contact_lever: F8
-    """(T,), (h_c - h_cg)/R_b; 0 for a type whose heights are not known."""
+    """(h_c - h_cg)/R_b, (T,); 0 for a type without heights."""
     base_lever: F8
-    """(T,), h_cg/R_b."""
+    """h_cg/R_b, (T,)."""
     delay: F8
-    """(T,), s, over which it is smoothed."""
+    """Time constant of smoothing, s, (T,)."""
     fx: F8
-    """(S,), N, scratch: friction under each bottle."""
+    """Scratch: friction under each bottle, N, (S,)."""
     fy: F8
     moment: F8
 
 
 @group
-class Damage(NamedTuple):
-    """What is looked at in every step."""
+class DamageArrays(NamedTuple):
+    """Loads that are evaluated in every step."""
 
-    scuffing: Scuffing | None
+    scuffing: ScuffingWork | None
     crushing: Crushing | None
     impacts: Impacts | None
     tipping: Tipping | None
 
 
 @group
-class LoadHistory(NamedTuple):
+class ContactLoads(NamedTuple):
     """Scratch: the closed contacts of one bottle, (MOST_BORNE,)."""
 
     nx: F8
     ny: F8
     normal: F8
-    """N, not negative."""
+    """Normal force, N, not negative."""
     tangential: F8
     slip: F8
     """m/s"""
     approach: F8
-    """m/s, along the normal at the last look."""
+    """Speed along the normal at the last evaluation, m/s."""
     key: I8
     place: I8
     """Bin of the rail; -1 for a bottle."""
 
 
-def empty_history() -> LoadHistory:
-    """Room for the contacts of one bottle."""
+def empty_history() -> ContactLoads:
+    """Return room for the contacts of one bottle."""
 
     def reals() -> F8:
         return np.zeros(MOST_BORNE)
 
     nx, ny, normal, tangential, slip, approach = (reals() for _ in range(6))
     key, place = np.zeros((2, MOST_BORNE), np.int64)
-    return LoadHistory(nx, ny, normal, tangential, slip, approach, key, place)
+    return ContactLoads(nx, ny, normal, tangential, slip, approach, key, place)
 
 
-def worst_columns(damage: Damage) -> Iterator[Worst]:
-    """Every Worst that is there."""
+def worst_columns(damage: DamageArrays) -> Iterator[Maximum]:
+    """Yield every Maximum that is present."""
     if damage.crushing is not None:
         yield from (damage.crushing.total, damage.crushing.opposed)
     if damage.impacts is not None:
@@ -151,8 +151,8 @@ def worst_columns(damage: Damage) -> Iterator[Worst]:
         yield damage.tipping.ratio
 
 
-def slot_columns(damage: Damage) -> Iterator[NDArray[Any]]:
-    """Every array by slot that is remembered from step to step, (S, ...)."""
+def slot_columns(damage: DamageArrays) -> Iterator[NDArray[Any]]:
+    """Yield every array by slot that persists from step to step, (S, ...)."""
     for worst in worst_columns(damage):
         yield from worst
     if damage.scuffing is not None:
@@ -163,15 +163,9 @@ def slot_columns(damage: Damage) -> Iterator[NDArray[Any]]:
         yield from (damage.tipping.mean_x, damage.tipping.mean_y)
 
 
-def lasting_columns(damage: Damage) -> Iterator[F8]:
-    """Every array by slot of what a bottle has borne until now, (S,): it keeps that while a machine has it."""
+def lasting_columns(damage: DamageArrays) -> Iterator[F8]:
+    """Yield every array by slot of a bottle's load so far, (S,). A bottle retains it inside a machine."""
     for worst in worst_columns(damage):
         yield worst.output
     if damage.scuffing is not None:
         yield damage.scuffing.work
-
-
-def bin_columns(damage: Damage) -> Iterator[F8]:
-    """Every array by bin of rails, (units, B)."""
-    if damage.scuffing is not None and damage.scuffing.bins is not None:
-        yield from (damage.scuffing.bins.work, damage.scuffing.bins.impulse)

@@ -1,4 +1,4 @@
-"""Arrays that an integrator keeps within a step, or from one to the next; None with the others.
+"""Arrays that some integrators need within a step, or from step to step; None for the others.
 
 Shapes: S bottle slots, P pairs. SI units, float64.
 """
@@ -11,7 +11,7 @@ from conveyor_sim.engine.compiler.groups import group
 
 @group
 class Triple(NamedTuple):
-    """Two components and one of turning for every bottle, (S,)."""
+    """Two components and one of rotation for every bottle, (S,)."""
 
     x: F8
     y: F8
@@ -20,7 +20,7 @@ class Triple(NamedTuple):
 
 @group
 class Stage(NamedTuple):
-    """Velocities kept within a step by integrators that need them, (S,)."""
+    """Velocities stored within a step, (S,)."""
 
     vx: F8
     vy: F8
@@ -29,7 +29,7 @@ class Stage(NamedTuple):
 
 @group
 class Slopes(NamedTuple):
-    """Scratch of the Runge-Kutta methods (`runge_kutta.py`): where a step begins, (S,), and its slopes, (stages, S)."""
+    """Scratch of the Runge-Kutta methods (`runge_kutta.py`): state at the start, (S,), slopes, (stages, S)."""
 
     x: F8
     y: F8
@@ -42,16 +42,16 @@ class Slopes(NamedTuple):
     alpha: F8
     """rad/s^2"""
     normal: F8 | None
-    """N, normal forces of all contacts; for peaks."""
+    """Sum of the normal forces of all contacts, N; for peaks."""
     error: F8
-    """(S,), m/s, of a substep."""
+    """Error of a substep, m/s, (S,)."""
     progress: F8
-    """(4,), what a call that is interrupted leaves for the next one."""
+    """State that an interrupted call leaves for the next one, (4,)."""
 
 
 @group
 class Blocks(NamedTuple):
-    """A symmetric 3 x 3 matrix for every bottle, over x, y and turning, (S,)."""
+    """A symmetric 3 x 3 matrix for every bottle, over x, y and rotation, (S,)."""
 
     xx: F8
     xy: F8
@@ -66,41 +66,41 @@ class Linear(NamedTuple):
     """Scratch of the linearly implicit method (`tangent.py`, `conjugate_gradients.py`)."""
 
     x: F8
-    """(S,), where a step begins; `Bottles` has the point ahead of it at which forces are taken."""
+    """Position at the start of a step, (S,). `Bottles` holds the position ahead of it at which forces are evaluated."""
     y: F8
     own: Blocks
-    """kg, kg m, kg m^2: inertia, and what a bottle's rails and base add to it."""
+    """Inertia, plus the resistance of a bottle's rails and base, kg, kg m, kg m^2."""
     inverse: Blocks
-    """Inverse of each bottle's block of the whole matrix, its pairs included."""
+    """Inverse of each bottle's block of the complete matrix, pairs included."""
     change: Triple
-    """m/s, rad/s: the unknown, the change of velocity in a step."""
+    """Unknown: the change of velocity in a step, m/s, rad/s."""
     left: Triple
-    """kg m/s, kg m^2/s: the right-hand side, and what is left of it as the unknown is found."""
+    """Right-hand side, then the residual, kg m/s, kg m^2/s."""
     way: Triple
-    """m/s, rad/s: direction in which the solver goes."""
+    """Search direction, m/s, rad/s."""
     product: Triple
-    """The matrix times `way`; then the inverse blocks times `left`."""
+    """Matrix times search direction; afterwards inverse blocks times residual."""
     left_sum: F8
-    """(units,), part of a sum for each unit of bottles (`workers.py`)."""
+    """Partial sum for each unit of bottles (`workers.py`), (units,)."""
     way_sum: F8
-    """(units,), likewise."""
+    """Partial sum for each unit of bottles, (units,)."""
     most: F8
-    """(units,), part of a maximum."""
+    """Partial maximum for each unit of bottles, (units,)."""
 
 
 @group
 class PairTangent(NamedTuple):
-    """Contacts of the pairs as the linearly implicit method has them, (P,) by capacity."""
+    """Contacts of the pairs in the linearly implicit method, (P,) by capacity."""
 
     nx: F8
     """Unit normal from i to j."""
     ny: F8
     normal: F8
-    """kg, impulse along the normal per velocity."""
+    """Impulse along the normal per velocity, kg."""
     tangential: F8
-    """kg, likewise across it."""
+    """Impulse along the tangent per velocity, kg."""
     arm_i: F8
-    """m, from the axis to the contact point."""
+    """Distance from the axis to the contact point, m."""
     arm_j: F8
     most: F8
-    """(pairs / UNIT + 1,), part of a maximum."""
+    """Partial maximum, (pairs / UNIT + 1,)."""

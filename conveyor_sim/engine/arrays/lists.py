@@ -1,4 +1,4 @@
-"""Lists of what is near, made anew at a rebuild."""
+"""Lists of neighbours, which a rebuild renews."""
 
 from typing import NamedTuple
 
@@ -7,8 +7,8 @@ from conveyor_sim.engine.compiler.groups import group
 
 
 @group
-class Listed(NamedTuple):
-    """Some of the bottles, in order; those of the u-th unit (`workers.py`) are bottle[first[u]:first[u + 1]]."""
+class BottleList(NamedTuple):
+    """Some of the bottles, in order; unit u (`workers.py`) has bottle[first[u]:first[u + 1]]."""
 
     bottle: U4
     first: U4
@@ -16,7 +16,7 @@ class Listed(NamedTuple):
 
 @group
 class NearSprings(NamedTuple):
-    """Tangential springs by entry of a Near list, and a copy by bottle and piece that outlives a rebuild."""
+    """Tangential springs by entry of a Near list, and a copy by bottle and piece that survives a rebuild."""
 
     elongation: F8
     kept_bottle: U4
@@ -28,7 +28,7 @@ class NearSprings(NamedTuple):
 
 @group
 class Near(NamedTuple):
-    """Rail pieces near each bottle: those of slot s are piece[start[s]:start[s + 1]], in order."""
+    """Rail pieces near each bottle: slot s has piece[start[s]:start[s + 1]], in order."""
 
     start: U4
     piece: U4
@@ -37,24 +37,24 @@ class Near(NamedTuple):
 
 @group
 class Neighbourhood(NamedTuple):
-    """What a rebuild needs and leaves behind."""
+    """Data of a rebuild."""
 
     x: F8
-    """(S,), where each bottle was at the last rebuild."""
+    """Positions at the last rebuild, (S,)."""
     y: F8
     stale: I8
-    """(1,), not 0: a rebuild is due."""
+    """Not 0: a rebuild is due, (1,)."""
     cell: I8
-    """(S, 2), cell coordinates."""
+    """Cell coordinates, (S, 2)."""
     bucket: U4
-    """(buckets + 1,), starts of the hashed cells in `order`; the number of buckets is a power of two."""
+    """Starts of the hashed cells in `order`, (buckets + 1,); the number of buckets is a power of two."""
     order: U4
-    """(S,), slots by bucket."""
+    """Slots by bucket, (S,)."""
 
 
 @group
 class StaticGrid(NamedTuple):
-    """Cells over the plant; each lists what a bottle with its axis in it can come near: pieces and belts."""
+    """Cells over the plant; each lists the pieces and belts within reach of a bottle whose axis is in it."""
 
     x: float
     y: float

@@ -1,63 +1,62 @@
-"""Arrays of the rails that move (`moving.py`); None where a scene has none.
+"""Arrays of moving rails (`moving.py`); None in a scene without them.
 
-Shapes: Q moving rails. SI units; columns are float64, (Q,), unless said otherwise.
+Shapes: Q moving rails. SI units; columns are float64, (Q,), unless stated otherwise.
 """
 
-from typing import Any, NamedTuple
-
-from numpy.typing import NDArray
+from typing import NamedTuple
 
 from conveyor_sim.engine.arrays.rails import Ends
 from conveyor_sim.engine.arrays.types import F8, I1, U4
 from conveyor_sim.engine.compiler.groups import group
 
 PHASES = 4
-"""Of a course: speed up or turn round, go on, brake, rest."""
+"""Phases of a motion profile: accelerate or reverse, cruise, brake, rest."""
 
 ON_PROFILE, OFF_PROFILE, HELD = 0, 1, 2
-"""Modes of a rail: where its profile has it; a body that its drive pushes; jammed."""
+"""Modes of a rail: on its motion profile; pushed or pushing as a body with a limited drive; jammed."""
 
 UNLIMITED = 1e300
-"""N or N m: the force of a drive that has no limit, beside others that have."""
+"""Force limit of a drive without one, beside others that have one, N or N m."""
 
 
 @group
 class Actuators(NamedTuple):
-    """What drives the rails (`actuators.py`); None where no drive has a limit."""
+    """Drives of the rails (`actuators.py`); None if no drive has a limit."""
 
     limit: F8
-    """N or N m."""
+    """Force limit, N or N m."""
     mass: F8
-    """kg, or kg m^2 about the rail's start."""
+    """Mass in kg, or moment of inertia about the rail's start in kg m^2."""
     max_speed: F8
-    """m/s or rad/s."""
+    """Speed limit, m/s or rad/s."""
     max_acceleration: F8
     stroke: F8
-    """m or rad: from the end stop at home, 0, to the other one."""
+    """Distance from the end stop at home, 0, to the other one, m or rad."""
     mode: I1
     left: I1
-    """1: was off its profile, or took another, since the tick began."""
+    """1: left its profile, or changed it, since the tick began."""
     acceleration: F8
-    """In the last step off the profile."""
+    """Acceleration in the last step off the profile."""
     push: F8
-    """(units, Q, 1), N or N m, of the bottles of a unit (`workers.py`) on a rail in the last evaluation; with the
-    energy ledger (units, Q, 3), beside it what damping and what friction have of it.
+    """Force or moment of each unit of bottles (`workers.py`) on a rail in the last evaluation, N or N m, (units, Q, 1).
+
+    With the energy ledger (units, Q, 3): the shares of damping and friction follow.
     """
 
 
 @group
 class MovingSprings(NamedTuple):
-    """Tangential springs at rails that move: by bottle slot and rail, so that no list has to remember them."""
+    """Tangential springs at moving rails, by bottle slot and rail, so that they need no list."""
 
     elongation: F8
-    """(S, Q), m"""
+    """Elongation, m, (S, Q)."""
     path: F8
-    """(Q,), m or rad, how far the rail has gone since springs were last kept."""
+    """Displacement of the rail since springs were last updated, m or rad, (Q,)."""
 
 
 @group
 class MovingRails(NamedTuple):
-    """Straight rails that slide or swing. The fields up to `surface` are those of Segments, as they are now."""
+    """Straight rails that slide or swing. The fields up to `surface` are those of Segments, at the present time."""
 
     x: F8
     y: F8
@@ -69,14 +68,14 @@ class MovingRails(NamedTuple):
     rail: U4
     surface: U4
     vx: F8
-    """m/s, of the rail's start now."""
+    """Velocity of the rail's start, m/s."""
     vy: F8
     turn: F8
-    """rad/s, about its start, now."""
+    """Angular velocity about the start, rad/s."""
     position: F8
-    """m or rad, how far from home now."""
+    """Distance from home, m or rad."""
     speed: F8
-    """m/s or rad/s, now."""
+    """Speed, m/s or rad/s."""
     home_x: F8
     """Start of the rail at home."""
     home_y: F8
@@ -84,23 +83,15 @@ class MovingRails(NamedTuple):
     """Unit tangent at home."""
     home_ty: F8
     along_x: F8
-    """Unit vector along which it slides; 0 for one that swings."""
+    """Unit vector along which it slides; 0 for a rail that swings."""
     along_y: F8
     turning: F8
-    """1 swings counter-clockwise, -1 clockwise about its start; 0 slides."""
+    """1: swings counter-clockwise about its start, -1: clockwise; 0: slides."""
     sweep: F8
-    """(Q, 4), m, box of all places that the rail can be at: least x and y, greatest x and y."""
+    """Bounding box of all positions of the rail: least x and y, greatest x and y, m, (Q, 4)."""
     course: F8
-    """(Q, PHASES, 4): when a phase begins, s after the tick did; position, speed and acceleration then."""
+    """Motion profile: start of each phase, s after that of the tick; position, speed, acceleration, (Q, PHASES, 4)."""
     clock: F8
-    """(1,), steps since the tick began."""
+    """Steps since the tick began, (1,)."""
     actuators: Actuators | None
     springs: MovingSprings | None
-
-
-def present(moving: MovingRails) -> tuple[NDArray[Any], ...]:
-    """The arrays that tell where the rails are now, when that is, and where they are going."""
-    where = (moving.x, moving.y, moving.tx, moving.ty, moving.ends.x, moving.ends.y)
-    now = (*where, moving.vx, moving.vy, moving.turn, moving.position, moving.speed, moving.course, moving.clock)
-    actuators = moving.actuators
-    return now if actuators is None else (*now, actuators.mode, actuators.left, actuators.acceleration)

@@ -1,4 +1,4 @@
-"""What looks on: the energy ledger and the guard."""
+"""Arrays of the energy ledger and the guard."""
 
 from typing import NamedTuple
 
@@ -8,34 +8,35 @@ from conveyor_sim.engine.compiler.groups import group
 
 
 @group
-class Ledger(NamedTuple):
-    """Where the work of forces goes (`ledger.py`); absent when nobody asks."""
+class LedgerArrays(NamedTuple):
+    """Work of forces by account (`ledger.py`); absent if the ledger is not requested."""
 
     damping: Triple
-    """(S,), N, N, N m, on each bottle in the last evaluation: of the damping in its contacts."""
+    """Damping in the contacts of each bottle in the last evaluation, N, N, N m, (S,)."""
     friction: Triple
-    """(S,), likewise of the friction in its contacts, their tangential springs included."""
+    """Friction in the contacts, tangential springs included; as `damping`."""
     base: Triple
-    """(S,), likewise of what it stands on."""
+    """Forces of belts and floor; as `damping`."""
     belt_power: F8
-    """(units, H + 1), W, of each belt on a unit of bottles (`workers.py`) in the last evaluation; the floor is last."""
+    """Power of each belt on a unit of bottles (`workers.py`) in the last evaluation, W, (units, H + 1), the floor last.
+    """
     rail_power: F8 | None
-    """(units, Q + 2), W, of each moving rail, then what damping and friction take of it; None where no rail moves."""
+    """Power of each moving rail, then the losses by damping and by friction, W, (units, Q + 2); None without rails."""
     power: F8
-    """(stages, units, BELTS + H + 1 + Q), W, of each account in each stage of a step."""
+    """Power of each account in each stage of a step, W, (stages, units, BELTS + H + 1 + Q)."""
     work: F8
-    """(units, BELTS + H + 1 + Q), J, the accounts, since the start."""
+    """Accounts since the start, J, (units, BELTS + H + 1 + Q)."""
 
 
 @group
 class GuardProbe(NamedTuple):
-    """The deepest overlaps since the guard last looked: of two bottles, and of a bottle with a rail."""
+    """Deepest overlaps since the guard's last check: of two bottles, and of a bottle with a rail."""
 
     depth: F8
-    """(2,), over the (smaller) radius."""
+    """Overlap divided by the (smaller) radius, (2,)."""
     bottle: I8
-    """(2,), slots; the lower one of two."""
+    """Slots, (2,); the lower one of two."""
     other: I8
-    """(2,), slot of the other bottle; number of the rail."""
+    """Slot of the other bottle, and number of the rail, (2,)."""
     due: I8
-    """(1,), not 0: lists were made anew since."""
+    """Not 0: lists have been rebuilt since, (1,)."""

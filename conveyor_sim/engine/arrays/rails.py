@@ -13,7 +13,7 @@ class Ends(NamedTuple):
     x: F8
     y: F8
     joint: I1
-    """0 free end, 1 joined and the piece that answers for the joint, 2 joined and the other one."""
+    """0: free end, 1: joint for which this piece is responsible, 2: joint for which the other piece is."""
     neighbour_x: F8
     """Unit vector from a joint into the neighbouring piece."""
     neighbour_y: F8
@@ -33,7 +33,7 @@ class Segments(NamedTuple):
     material: U4
     rail: U4
     surface: U4
-    """Pieces of one surface push a bottle together, not each on its own."""
+    """Surface number; pieces of one surface push a bottle together, not separately."""
 
 
 @group
@@ -45,12 +45,12 @@ class Arcs(NamedTuple):
     y: F8
     radius: F8
     start_x: F8
-    """Unit vector from the centre to where the span starts; the span runs counter-clockwise."""
+    """Unit vector from the centre to the start of the span, which runs counter-clockwise."""
     start_y: F8
     end_x: F8
     end_y: F8
     reach: I1
-    """0 a span up to pi, 1 beyond pi, 2 the full circle."""
+    """0: span up to pi, 1: beyond pi, 2: full circle."""
     ends: Ends
     material: U4
     rail: U4
@@ -65,11 +65,11 @@ class RailContacts(NamedTuple):
     ny: F8
     overlap: F8
     share: F8
-    """Effective over geometric overlap where pieces of one surface push together."""
+    """Effective divided by geometric overlap, for pieces of one surface that push together."""
     material: U4
     rail: U4
     surface: U4
     entry: I8
-    """Of the Near list of segments; -1 - entry for one of arcs; from MOVING on a rail that moves."""
+    """Entry of the Near list of segments; -1 - entry for arcs; MOVING or more on a moving rail."""
     solution: F8
     """Effective overlaps while they are solved for."""

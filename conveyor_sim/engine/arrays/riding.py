@@ -1,4 +1,4 @@
-"""Which bottles ride (`riding.py`); None where no bottle can."""
+"""Arrays of riding bottles (`riding.py`); None if no bottle can ride."""
 
 from typing import NamedTuple
 
@@ -8,23 +8,23 @@ from conveyor_sim.engine.compiler.groups import group
 
 @group
 class Riding(NamedTuple):
-    """Runs of bottles that are stepped, block by block (`workers.py`); those between them ride. Scratch of one call.
+    """Runs of stepped bottles, by block (`workers.py`); bottles between them ride. Scratch of one call.
 
     Shapes: S bottle slots.
     """
 
     vx: F8
-    """(S,), m/s, velocities before the step that is looked at."""
+    """Velocities before the step under examination, m/s, (S,)."""
     vy: F8
     omega: F8 | None
-    """(S,), rad/s, likewise; absent where nothing turns."""
+    """Angular velocity before that step, rad/s, (S,); absent if nothing turns."""
     rides: I1
-    """(S,), 1: nothing changes its velocity until lists are made anew."""
+    """1: nothing changes the bottle's velocity until the next rebuild, (S,)."""
     first: U4
-    """(S / LEAST + 2,), where the runs begin; those of the block that begins with slot s from s / LEAST on."""
+    """Starts of the runs, (S / LEAST + 2,). A block that starts with slot s stores its runs from s / LEAST on."""
     end: U4
-    """Where these runs end, likewise."""
+    """Ends of the runs, stored likewise."""
     runs: I8
-    """(S / UNIT + 1,), how many runs a block has, at the unit that it begins with."""
+    """Number of runs of a block, at the unit with which it starts, (S / UNIT + 1,)."""
     progress: I8
-    """Likewise: whether all its bottles are stepped, are looked at, or may ride."""
+    """State of a block, stored likewise: all bottles are stepped, are examined, or may ride."""

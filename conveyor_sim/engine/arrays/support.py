@@ -1,15 +1,15 @@
-"""What bottles stand on: belts, floor, the base."""
+"""Arrays of belts, floor and bases."""
 
 from typing import NamedTuple
 
-from conveyor_sim.engine.arrays.lists import Listed
+from conveyor_sim.engine.arrays.lists import BottleList
 from conveyor_sim.engine.arrays.types import F8, I1, I4, U4
 from conveyor_sim.engine.compiler.groups import group
 
 
 @group
 class Sectors(NamedTuple):
-    """The curved ones among the belts, (H,)."""
+    """Curved belts, (H,)."""
 
     x: F8
     y: F8
@@ -20,12 +20,12 @@ class Sectors(NamedTuple):
     end_x: F8
     end_y: F8
     reach: I1
-    """As in Arcs; -1 for a straight belt."""
+    """Reach as in Arcs; -1 for a straight belt."""
 
 
 @group
 class Belts(NamedTuple):
-    """Where belts lie, (H,), and which bottle stands on which, (S,)."""
+    """Geometry of belts, (H,), and the belts under each bottle, (S,)."""
 
     x: F8
     """Corner P1 of a straight belt."""
@@ -37,11 +37,11 @@ class Belts(NamedTuple):
     width: F8
     sectors: Sectors | None
     certain: I4
-    """(S,), the belt that carries wherever the bottle moves within the skin, -1: test the candidates."""
+    """Belt that carries the bottle wherever it moves within the skin, (S,); -1: test the candidates."""
     start: U4
     candidate: U4
-    """Belts that may carry, the last listed first; those of slot s are candidate[start[s]:start[s + 1]]."""
-    uncertain: Listed
+    """Belts that may carry, the last listed first; slot s has candidate[start[s]:start[s + 1]]."""
+    uncertain: BottleList
 
 
 @group
@@ -53,20 +53,20 @@ class Surface(NamedTuple):
     turn: F8 | None
     """rad/s; absent without curved belts."""
     friction: F8
-    """(H + 1, T), coefficient by bottle type."""
+    """Friction coefficient by bottle type, (H + 1, T)."""
 
 
 @group
 class Footing(NamedTuple):
-    """What each bottle stands on, (S,): the field of its belt, copied so that the friction loop gathers nothing."""
+    """Velocity field under each bottle, (S,): a copy of its belt's, so that the friction loop gathers nothing."""
 
     carrier: I4
-    """The belt, or H, the floor."""
+    """Belt, or H for the floor."""
     ux: F8
     uy: F8
     turn: F8 | None
     friction_limit: F8
-    """mu m g, N; 0 where a ring may straddle belts and is summed point by point."""
+    """mu m g, N; 0 if a ring may straddle belts and is summed point by point."""
 
 
 @group
@@ -82,15 +82,16 @@ class StaticFriction(NamedTuple):
     """Springs between bases and belts (`static_friction.py`)."""
 
     x: F8
-    """(S,), m, the point of the belt's surface that a base is tied to."""
+    """Point of the belt's surface to which a base is tied, m, (S,)."""
     y: F8
     belt: I4
-    """(S,), the belt of that point, or H, the floor; -1: none."""
+    """Belt of that point, or H for the floor; -1: none, (S,)."""
     stiffness: F8
-    """(H + 1) T, N/m, by belt and bottle type; 0 where friction goes by its curve, as damping and friction are then."""
+    """Stiffness by belt and bottle type, N/m, ((H + 1) T,). 0 without a spring; damping and friction are 0 then, too.
+    """
     damping: F8
-    """kg/s, likewise."""
+    """Damping by belt and bottle type, kg/s."""
     friction: F8
-    """Likewise."""
+    """Friction coefficient by belt and bottle type."""
     types: int
-    """T."""
+    """Number of bottle types T."""

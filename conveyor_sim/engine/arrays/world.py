@@ -2,13 +2,13 @@
 
 from typing import Any, NamedTuple
 
-from conveyor_sim.engine.arrays.bodies import Bottles, Load, Peaks, Spin
+from conveyor_sim.engine.arrays.bodies import Bottles, ForceSums, Peaks, Spin
 from conveyor_sim.engine.arrays.contacts import ContactLaw, Curves, Gathered, Implicit, Pairs, Slots
-from conveyor_sim.engine.arrays.damage import Damage, LoadHistory
+from conveyor_sim.engine.arrays.damage import ContactLoads, DamageArrays
 from conveyor_sim.engine.arrays.integrators import Linear, Slopes, Stage, Triple
-from conveyor_sim.engine.arrays.lists import Listed, Near, Neighbourhood, StaticGrid
+from conveyor_sim.engine.arrays.lists import BottleList, Near, Neighbourhood, StaticGrid
 from conveyor_sim.engine.arrays.moving import MovingRails
-from conveyor_sim.engine.arrays.observers import GuardProbe, Ledger
+from conveyor_sim.engine.arrays.observers import GuardProbe, LedgerArrays
 from conveyor_sim.engine.arrays.rails import Arcs, RailContacts, Segments
 from conveyor_sim.engine.arrays.riding import Riding
 from conveyor_sim.engine.arrays.support import Belts, Footing, Ring, StaticFriction, Surface
@@ -17,44 +17,44 @@ from conveyor_sim.engine.compiler.groups import group
 
 
 @group
-class Settings(NamedTuple):
-    """Plain numbers."""
+class EngineSettings(NamedTuple):
+    """Constant numbers."""
 
     slip_limit: float
-    """m/s, v_lim of the regularised friction."""
+    """v_lim of the regularised friction, m/s."""
     lever: float
-    """1: lever arms reach to the middle of the overlap; 0: the paper's, the full radius."""
+    """1: lever arms reach to the middle of the overlap; 0: full radius, as in the paper."""
     skin: float
-    """m, a rebuild is due once a bottle has moved by half of it."""
+    """A rebuild is due once a bottle has moved by half of this distance, m."""
     cell: float
-    """m, edge of a neighbour cell."""
+    """Edge of a neighbour cell, m."""
     rail_materials: int
     reach: float
-    """m, R_i + R_j where all radii are equal."""
+    """R_i + R_j if all radii are equal, m."""
     atan: Any
-    """None: the polynomial friction curve; 1: the arctangent."""
+    """None: polynomial friction curve; 1: arctangent."""
     error: float
-    """m/s, largest error of a step; for the integrators that choose their own."""
+    """Largest error of a step, m/s, for integrators with error control."""
     ahead: float
-    """Steps by which implicit friction looks ahead, less `at_once`: see `friction.py`."""
+    """Steps by which implicit friction looks ahead, minus `at_once`: see `friction.py`."""
     at_once: float
-    """Share of v_lim that friction may take of a slip without looking ahead."""
+    """Share of v_lim that friction may remove from a slip without looking ahead."""
     lag: float
-    """Steps by which velocities are older than positions, in the slip on belts: 1/2 with leapfrog, else 0."""
+    """Steps by which velocities are older than positions, in the slip on belts: 1/2 for leapfrog, else 0."""
 
 
 @group
 class World(NamedTuple):
-    """All that a force evaluation reads and writes."""
+    """Arrays that a force evaluation reads and writes."""
 
-    settings: Settings
+    settings: EngineSettings
     bottles: Bottles
     spin: Spin | None
-    load: Load
+    load: ForceSums
     peaks: Peaks | None
     stage: Stage | None
     path: Triple | None
-    """m, m, rad: how far each bottle has gone since tangential springs were last kept; None: they follow the slip."""
+    """Displacement of each bottle since springs were last updated, m, m, rad; None: springs follow the slip."""
     slopes: Slopes | None
     linear: Linear | None
     implicit: Implicit | None
@@ -71,28 +71,28 @@ class World(NamedTuple):
     arcs: Arcs | None
     near_arcs: Near | None
     moving: MovingRails | None
-    railed: Listed | None
-    """Bottles with a rail near, or near where one comes by."""
+    railed: BottleList | None
+    """Bottles near a rail, or near the sweep of a moving one."""
     rail_law: ContactLaw | None
     belts: Belts | None
     surface: Surface | None
     footing: Footing | None
     ring: Ring | None
     static_friction: StaticFriction | None
-    ledger: Ledger | None
-    damage: Damage | None
+    ledger: LedgerArrays | None
+    damage: DamageArrays | None
 
 
 @group
 class Worker(NamedTuple):
-    """One of the threads that take steps together, with its scratch; explained in `workers.py`."""
+    """One of the threads that step together, with its scratch; explained in `workers.py`."""
 
     rank: int
     size: int
     sync: I8
-    """(SYNC_SIZE,), shared: counts of the barrier and flags."""
+    """Shared counts of the barrier, and flags, (SYNC_SIZE,)."""
     gathered: Gathered
-    found: RailContacts
-    history: LoadHistory
+    rail_contacts: RailContacts
+    history: ContactLoads
     callees: I8
-    """(2,), addresses of the kernels that step kernels call (`integrators/callees.py`)."""
+    """Addresses of kernels that step kernels call, (2,) (`integrators/callees.py`)."""

@@ -1,7 +1,7 @@
-"""Who compiles what: of processes that want a kernel at the same time, one compiles it and the others wait for it.
+"""Claims: if several processes need a kernel at the same time, one compiles it and the others wait.
 
-Each kernel has a byte of one file, which a process locks while it compiles. The system gives the lock back when a
-process ends, however it ends.
+Each kernel has a byte of one file, which a process locks while it compiles. The system releases the lock when a process
+ends for any reason.
 """
 
 import fcntl
@@ -14,27 +14,26 @@ from contextlib import suppress
 from pathlib import Path
 
 NAME = "claims"
-"""Of the file, in the folder of the kernels."""
+"""Name of the file, in the folder of the kernels."""
 
 LONGEST = 60.0
-"""s that another process is waited for: it may stand still. A kernel takes some seconds of a core."""
+"""Longest wait for another process, which may be stopped, s. A kernel takes some seconds of a core."""
 
 PAUSE = 0.02
-"""s between two looks."""
+"""Interval of polling, s."""
 
 
 class Claims:
-    """Those of a folder. Where files can't be locked, every process compiles for itself."""
+    """Claims of a folder. If files can't be locked, every process compiles for itself."""
 
     def __init__(self, folder: Path) -> None:
         self._path = folder / NAME
         self._file: int | None = None
 
     def take(self, name: str, look: Callable[[], object]) -> bool:
-        """Claim a kernel by the name of its file. Returns whether another process had it, and gave it back since then
-        or was waited for too long.
+        """Claim a kernel by the name of its file. Return True if another process held it until now or for too long.
 
-        look: called again and again while the other one is waited for. Raises only what that raises.
+        look: called repeatedly during the wait. Raises only its exceptions.
         """
         end = time.monotonic() + LONGEST
         waited = False
@@ -44,14 +43,14 @@ class Claims:
             waited = True
         return waited
 
-    def give_back(self, name: str) -> None:
-        """Others may look for the kernel now. Raises nothing."""
+    def release(self, name: str) -> None:
+        """Release a claim. Raises nothing."""
         if self._file is not None:
             with suppress(OSError):
                 fcntl.lockf(self._file, fcntl.LOCK_UN, 1, _place(name))
 
     def _lock(self, name: str) -> bool:
-        """Whether no other process has it."""
+        """Lock a kernel's byte. Return False if another process has it."""
         try:
             if self._file is None:
                 self._file = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
@@ -65,5 +64,5 @@ class Claims:
 
 
 def _place(name: str) -> int:
-    """Which byte: two kernels with the same one only wait for each other."""
+    """Return the byte of a kernel. Two kernels with the same byte wait for each other."""
     return int.from_bytes(hashlib.blake2b(name.encode(), digest_size=6).digest(), "big")

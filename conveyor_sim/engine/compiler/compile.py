@@ -37,7 +37,7 @@ def kernel(function: Function) -> Function:
 
 
 def part(function: Function) -> Function:
-    """Compile a function that only kernels call: without an entry from Python or machine code of its own."""
+    """Compile a function that only kernels call: it has neither an entry from Python nor separate machine code."""
     compiled: Function = part_dispatcher(function)
     return compiled
 

@@ -51,7 +51,7 @@ class _Laid(tuple[Any, ...]):
         return address
 
     def __reduce__(self) -> Any:
-        # A copy has arrays of its own, so it needs a layout of its own.
+        # A copy has other arrays, so it needs another layout.
         return type(self), tuple(self)
 
 

@@ -70,7 +70,7 @@ class KernelFolder:
     def discard(self, name: str, fault: str) -> None:
         """Delete a file that can't be used."""
         if self.path is not None:
-            LOG.warning("%s: cached kernel not used, for %s; compiling it again", self.path / name, fault)
+            LOG.warning("%s: cached kernel not used because %s; compiling it again", self.path / name, fault)
             with suppress(OSError):
                 (self.path / name).unlink()
 
@@ -94,7 +94,7 @@ class KernelFolder:
     def release(self, name: str) -> None:
         """Give back the claim, after compiling or a failure."""
         if self._claims is not None:
-            self._claims.give_back(name)
+            self._claims.release(name)
 
     def _call_before_read(self) -> None:
         if self.before_read is not None:

@@ -1,7 +1,7 @@
-"""What a function reads of the groups that it is given, itself and through what it calls: a part is compiled for that.
+"""Members of groups that a function reads, itself and through its callees: a part is compiled for these.
 
-A part that takes a World would else be compiled again for every set of effects, though it looks at two of them. What is
-in doubt counts as read. Were a member missed, the part could not take it, and numba would say so as it compiles.
+Otherwise a part that takes a World would be compiled again for every set of effects, though it reads two members. In
+doubt a member counts as read. If one were missed, numba would report an error when it compiles the part.
 """
 
 import ast
@@ -11,31 +11,31 @@ from functools import cache
 from typing import Any
 
 Path = tuple[str, ...]
-"""Names of members, from a group inwards; ALL at the end: all that is there."""
+"""Names of members, from a group inwards; ALL at the end stands for everything below."""
 
 ALL = "*"
 WHOLE = frozenset({(ALL,)})
 
 
 def reads(function: Any) -> list[frozenset[Path]]:
-    """By argument: `("bottles",)` where it asks whether that member is there, `("bottles", ALL)` where it takes it."""
+    """Return by argument: `("bottles",)` if it tests the member for None, `("bottles", ALL)` if it takes it."""
     source = function.__globals__.get(SOURCE)
     tree = _functions(source or inspect.getsourcefile(function), source is not None)
-    return _Reading(function, tree[function.__name__, function.__code__.co_firstlineno]).found
+    return _Reading(function, tree[function.__name__, function.__code__.co_firstlineno]).by_argument
 
 
 SOURCE = "__written__"
-"""Name among the globals of a function that has no file: its text."""
+"""Name of a global that holds the text of a function without a file."""
 
 
 @cache
 def _functions(source: str, is_text: bool) -> Mapping[tuple[str, int], ast.FunctionDef]:
-    """Those of a file, or of a text, by name and first line."""
+    """Return the functions of a file, or of a text, by name and first line."""
     if not is_text:
         with open(source, encoding="utf-8") as file:
             source = file.read()
-    found = (node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.FunctionDef))
-    return {(node.name, min([node.lineno, *(one.lineno for one in node.decorator_list)])): node for node in found}
+    nodes = (node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.FunctionDef))
+    return {(node.name, min([node.lineno, *(one.lineno for one in node.decorator_list)])): node for node in nodes}
 
 
 class _Reading:
@@ -46,11 +46,11 @@ class _Reading:
         self._places: dict[str, set[Path]] = {name: {(name,)} for name in arguments}
         self._read: set[Path] = set()
         before = -1
-        # A loop may use what its end assigns.
+        # Repeat, because a loop may use names that its end assigns.
         while before < (before := len(self._read) + sum(map(len, self._places.values()))):
             for statement in node.body:
                 self._statement(statement)
-        self.found = [frozenset(path[1:] for path in self._read if path[0] == name) for name in arguments]
+        self.by_argument = [frozenset(path[1:] for path in self._read if path[0] == name) for name in arguments]
 
     def _statement(self, node: ast.stmt) -> None:
         if isinstance(node, ast.Assign):
@@ -76,17 +76,17 @@ class _Reading:
             self._whole(target)
 
     def _whole(self, node: ast.AST) -> None:
-        """All of what an expression has is read."""
+        """Note that everything below an expression is read."""
         self._read |= {(*path, ALL) for path in self._places_of(node)}
 
     def _places_of(self, node: ast.AST) -> set[Path]:
-        """Which members of which arguments an expression may stand for; what it reads to get there is noted."""
+        """Return the members of arguments that an expression may stand for, and note the members read for it."""
         if isinstance(node, ast.Name):
             return self._places.get(node.id, set())
         if isinstance(node, ast.Attribute):
-            found = {(*path, node.attr) for path in self._places_of(node.value)}
-            self._read |= found
-            return found
+            paths = {(*path, node.attr) for path in self._places_of(node.value)}
+            self._read |= paths
+            return paths
         if isinstance(node, ast.IfExp):
             self._whole(node.test)
             return self._places_of(node.body) | self._places_of(node.orelse)
@@ -105,10 +105,10 @@ class _Reading:
         for keyword in node.keywords:
             self._whole(keyword.value)
         for place, argument in enumerate(node.args):
-            found = self._places_of(argument)
+            paths = self._places_of(argument)
             ends = WHOLE if inner is None else inner[place]
-            self._read |= {(*path, *end) for path in found for end in ends}
+            self._read |= {(*path, *end) for path in paths for end in ends}
 
     def _named(self, name: str) -> Any:
-        """What a name stands for outside of the function."""
+        """Return the value of a name outside of the function."""
         return self._cells[name].cell_contents if name in self._cells else self._names.get(name)

@@ -1,6 +1,6 @@
-"""A hash over what sources do: their syntax, without comments, docstrings and layout, alike on all versions of Python.
+"""Hash over the syntax of sources, without comments, docstrings and layout. It is equal on all versions of Python.
 
-Parsing takes a quarter of a second at every start. So the hash is kept in a file, named by a hash over the bytes.
+Parsing takes a quarter of a second at every start, so the hash is cached in a file, named by a hash over the bytes.
 """
 
 import ast
@@ -14,22 +14,22 @@ from conveyor_sim.engine.compiler.cache_folder import choose_cache_folder
 
 
 def source_hash(root: Path, sources: Iterable[Path], size: int) -> str:
-    """2 size hex digits over the syntax of files, and their names below a folder."""
+    """Return 2 size hex digits over the syntax of files, and their names below a folder."""
     contents = {source.relative_to(root).as_posix(): source.read_bytes() for source in sorted(sources)}
     folder, _ = choose_cache_folder("sources")
     if folder is None:
         return _parsed(contents, size)
     file = folder / _hash((part for item in contents.items() for part in (item[0].encode(), item[1])), 16)
     with suppress(OSError):
-        kept = file.read_bytes()
-        if kept == _with_checksum(kept[: 2 * size]):
-            return kept[: 2 * size].decode()
-    found = _parsed(contents, size)
+        cached = file.read_bytes()
+        if cached == _with_checksum(cached[: 2 * size]):
+            return cached[: 2 * size].decode()
+    digits = _parsed(contents, size)
     with suppress(OSError):
-        part = file.with_name(f"{file.name}.{os.getpid()}")
-        part.write_bytes(_with_checksum(found.encode()))
-        part.replace(file)
-    return found
+        temporary = file.with_name(f"{file.name}.{os.getpid()}")
+        temporary.write_bytes(_with_checksum(digits.encode()))
+        temporary.replace(file)
+    return digits
 
 
 def _with_checksum(digits: bytes) -> bytes:
@@ -49,7 +49,7 @@ def _hash(parts: Iterable[bytes], size: int) -> str:
 
 
 def _syntax(node: ast.AST) -> Iterator[str]:
-    """Kinds and fields of a node and those in it; fields without a value are left out, for newer versions have more."""
+    """Yield kinds and fields of a node and of those below. Empty fields are skipped: newer versions add some."""
     yield type(node).__name__
     for name, value in ast.iter_fields(node):
         if isinstance(value, list):
@@ -66,5 +66,5 @@ def _syntax(node: ast.AST) -> Iterator[str]:
 
 
 def _is_text(part: object) -> bool:
-    """A statement that is only a text, as docstrings are."""
+    """Return True for a statement that is only a text, such as a docstring."""
     return isinstance(part, ast.Expr) and isinstance(part.value, ast.Constant) and isinstance(part.value.value, str)

@@ -1,1 +1,1 @@
-"""The force in one contact, and contacts of two bottles."""
+"""Force in one contact, and contacts of two bottles."""

@@ -1,4 +1,4 @@
-"""The arctangent as a formula without branches: LLVM makes packed instructions of it, not of the C library's."""
+"""Arctangent without branches: LLVM vectorises it, unlike the C library's."""
 
 import math
 

@@ -1,9 +1,10 @@
-"""The force in one contact: elastic law, damping, friction (paper eqs. 22-23, 7-10, and the laws added to them).
+"""Force in one contact: elastic law, damping, friction (paper eqs. 22-23, 7-10, and further laws).
 
 Between a and b, with the unit normal n from a to b and the tangent t = (-n_y, n_x): the force on a is -N n + T t, on b
-its negative. Laws along the normal have a file each in `laws/`, and are added up by `law_sums.py`.
+its negative. Laws along the normal have one file each in `laws/`; `law_sums.py` adds them up.
 
-No branches: a loop over pairs is vectorised, and pairs apart get exactly 0. Only a curve breaks that.
+There are no branches, so a loop over pairs is vectorised, and separated pairs get exactly 0. Only a table of forces
+breaks that.
 """
 
 import math
@@ -35,18 +36,18 @@ def contact_force(
     spring: Any,
     implicit: Any,
 ) -> tuple[float, float]:
-    """Return (N, T) in N by entry e of the law; both 0 for an overlap (m) of 0 or less.
+    """Return (N, T) in N by entry e of the law; both are 0 for an overlap (m) of 0 or less.
 
-    share: effective over geometric overlap, 1 for a contact on its own; it scales the law as a whole.
-    closing: m/s, relative velocity (a less b) along n. slip: m/s, relative velocity of the contact points along t.
-    atan: which friction curve (`friction.py`). spring: m, elongation of the tangential spring, or None.
-    implicit: (dt/m_t times `Settings.ahead`, s/kg, `Settings.at_once`) for implicit friction, or None.
+    share: effective divided by geometric overlap, 1 for a single contact; it scales the law as a whole. closing: m/s,
+    relative velocity (a minus b) along n. slip: m/s, relative velocity of the contact points along t. atan: selects the
+    friction curve (`friction.py`). spring: m, elongation of the tangential spring, or None. implicit: (dt/m_t times
+    `EngineSettings.ahead`, s/kg, `EngineSettings.at_once`) for implicit friction, or None.
     """
     depth = 0.0 if overlap < 0.0 else overlap
     elastic = elastic_force(law, e, curves, depth)
     damped = never_pull(law, add_damping(law, e, elastic, elastic, depth, closing))
     normal = share * add_drag(law, e, damped, elastic, depth, closing)
-    # Coulomb's law needs a pressing contact: paper damping may pull at the end of a rebound.
+    # Coulomb's law needs a pressing contact; paper damping may pull at the end of a rebound.
     pressing = 0.0 if normal < 0.0 else normal
     tangential = _tangential(law, e, slip_limit, atan, depth, share, pressing, slip, spring, implicit)
     return normal, add_drag(law, e, tangential, elastic, depth, -slip * share)
@@ -54,19 +55,19 @@ def contact_force(
 
 @part
 def elastic_force(law: ContactLaw, e: int, curves: Any, depth: float) -> float:
-    """N by the elastic laws; depth: m, not negative."""
+    """Return the force of the elastic laws, N. depth: m, not negative."""
     return add_elastic_force(law, e, 0.0, depth, curves)
 
 
 @part
 def elastic_energy(law: ContactLaw, e: int, curves: Any, depth: float) -> float:
-    """What the elastic laws have stored, J; depth: m, not negative."""
+    """Return the energy stored by the elastic laws, J. depth: m, not negative."""
     return add_elastic_energy(law, e, 0.0, depth, curves)
 
 
 @part
 def drag_force(law: ContactLaw, e: int, elastic: float, depth: float, velocity: float) -> float:
-    """What isotropic damping alone adds to a force along a velocity (m/s), N, at an elastic force (N)."""
+    """Return the isotropic damping force along a velocity (m/s), N, at an elastic force (N)."""
     return add_drag(law, e, 0.0, elastic, depth, velocity)
 
 
@@ -83,7 +84,7 @@ def _tangential(
     spring: Any,
     implicit: Any,
 ) -> float:
-    """Coulomb friction, by its regularised curve or, where the pair has one, by its tangential spring."""
+    """Return Coulomb friction in N: by its regularised curve or, if the pair has one, by its tangential spring."""
     if law.friction is None:
         return 0.0
     most = law.friction[e] * pressing
@@ -99,7 +100,7 @@ def _tangential(
 
 @part
 def _tangential_stiffness(law: ContactLaw, e: int, depth: float) -> float:
-    """N/m, of the tangential spring at an overlap: as given, or 8 G* sqrt(R* delta) (Mindlin 1949)."""
+    """Return the tangential spring's stiffness at an overlap, N/m: constant, or 8 G* sqrt(R* delta) (Mindlin 1949)."""
     if law.tangential_mindlin is None:
         return law.tangential_stiffness[e]
     return law.tangential_stiffness[e] + law.tangential_mindlin[e] * math.sqrt(depth)
@@ -123,7 +124,7 @@ def _add_damping(force: float, damping: Any, e: int, slip: float) -> float:
 
 @part
 def spring_energy(law: ContactLaw, e: int, spring: Any, overlap: float) -> float:
-    """What a tangential spring of some elongation (m), or None, has stored at an overlap (m), J."""
+    """Return the energy of a tangential spring with an elongation (m), or None, at an overlap (m), J."""
     if spring is None:
         return 0.0
     depth = 0.0 if overlap < 0.0 else overlap
@@ -131,21 +132,22 @@ def spring_energy(law: ContactLaw, e: int, spring: Any, overlap: float) -> float
 
 
 @part
-def carried(law: ContactLaw, e: int, spring: Any, overlap: float, deeper: float, way: float) -> Any:
-    """Elongation (m), or None, of a spring at an overlap (m) that is by so much deeper (m) than where it was kept.
+def carried(law: ContactLaw, e: int, spring: Any, overlap: float, deeper: float, further: float) -> Any:
+    """Return the elongation (m) of a spring after its overlap (m) grew by `deeper` (m), or None without a spring.
 
-    A spring that has become stiffer keeps its force, for what joins a contact joins it without load; one that has
-    become softer keeps its elongation (Thornton, Cummins and Cleary 2013). So its energy never grows by itself.
-    way: m, by which it is to be drawn out from there; one that has become stiffer meets that with its mean stiffness.
+    A spring that has become stiffer keeps its force, because material that joins a contact joins it without load. One
+    that has become softer keeps its elongation (Thornton, Cummins and Cleary 2013). So its energy never grows by
+    itself. further: m, elongation of the same step; a spring that has become stiffer meets it with its mean
+    stiffness.
     """
     if spring is None:
         return None
-    return spring - _loss(law.tangential_mindlin, e, spring + 0.5 * way, 0.0 if overlap < 0.0 else overlap, deeper)
+    return spring - _loss(law.tangential_mindlin, e, spring + 0.5 * further, 0.0 if overlap < 0.0 else overlap, deeper)
 
 
 @part
 def _loss(mindlin: Any, e: int, middle: float, depth: float, deeper: float) -> float:
-    """Elongation (m) that a spring loses as it stiffens; middle: m, its elongation on the way."""
+    """Return the elongation (m) that a spring loses as it stiffens. middle: m, its mean elongation."""
     if mindlin is None:
         return 0.0
     before = depth - deeper
@@ -157,7 +159,7 @@ def _loss(mindlin: Any, e: int, middle: float, depth: float, deeper: float) -> f
 
 @part
 def stretched(spring: Any, slip: float, dt: float) -> Any:
-    """Elongation (m) with which a step acts, or None: with that of its own slip, or the spring would pump energy."""
+    """Return the elongation (m) that acts in a step, its own slip included, or None. Otherwise springs gain energy."""
     if spring is None:
         return None
     return spring + dt * slip
@@ -167,15 +169,16 @@ def stretched(spring: Any, slip: float, dt: float) -> Any:
 def spring_after(
     law: ContactLaw, e: int, spring: float, overlap: float, slip: float, dt: float, normal: float, share: float
 ) -> float:
-    """Elongation (m) of the tangential spring after dt (s) of slip (m/s), cut to mu N (Cundall and Strack 1979).
+    """Return the elongation (m) of the tangential spring after dt (s) of slip (m/s), cut to mu N.
 
-    overlap: m. normal: N, of the contact; 0, as without contact, forgets the spring. 0 for a pair that has none.
+    overlap: m. normal: N, of the contact; 0, as without contact, resets the spring. The result is 0 for a pair without
+    a spring (Cundall and Strack 1979).
     """
     depth = 0.0 if overlap < 0.0 else overlap
     stiffness = _tangential_stiffness(law, e, depth)
     longer = spring + dt * slip
     most = law.friction[e] * (0.0 if normal < 0.0 else normal)
-    # The force is that of the share of a spring, as is N.
+    # The force is `share` of that of the spring, as is N.
     scaled = share * stiffness
     cut = math.copysign(most, longer) / (scaled if scaled > 0.0 else 1.0)
     kept = cut if scaled * abs(longer) > most else longer

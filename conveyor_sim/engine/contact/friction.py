@@ -1,19 +1,19 @@
 """Coulomb friction, regularised at low slip so that it has a direction at rest (paper eqs. 7-10).
 
-The force is -mu N p(s) v/s, s = |v|. Two curves p, both with slope 2/v_lim at rest: the paper's polynomial
-2 s/v_lim - (s/v_lim)^2, 1 from v_lim on, and (2/pi) atan(pi s/v_lim). `atan`: None is the polynomial, anything else the
-arctangent.
+The force is -mu N p(s) v/s, s = |v|. There are two curves p, both with slope 2/v_lim at rest: the paper's polynomial 2
+s/v_lim - (s/v_lim)^2, 1 from v_lim on, and (2/pi) atan(pi s/v_lim). `atan`: None selects the polynomial, anything else
+the arctangent.
 
-Implicit: the force is that of the slip *after* the step, s + b v_lim p(s) = s_0 with b = dt mu N/(m_t v_lim), 1/m_t
-what the slip gains from a unit of impulse. It never turns the slip round, whatever the step.
+Implicit: the force is that of the slip *after* the step, s + b v_lim p(s) = s_0 with b = dt mu N/(m_t v_lim), where
+1/m_t is the slip per unit of impulse. It never reverses the slip, at any step size.
 
-That is semi-implicit Euler. For velocity Verlet and rk4 the same is solved with B = max(0, ahead b - at_once) in place
-of b (`integrators.AHEAD`). At rest the force then takes at most 1/ahead of the slip in a step, and velocity Verlet,
-whose slip s_0 is that at the end of the step, turns no slip round while that is at most 2/3, rk4 while it is at most 1.
-Up to b = at_once/ahead friction is the explicit one, and so is its order. Beyond, a steady pull of a share f of mu N
-creeps by B f v_lim too fast (semi-implicit Euler: by b f v_lim, at any b).
+That is semi-implicit Euler. For velocity Verlet and rk4 the same equation is solved with B = max(0, ahead b - at_once)
+in place of b (`integrators.AHEAD`). At rest the force then removes at most 1/ahead of the slip in a step. Velocity
+Verlet, whose slip s_0 is that at the end of the step, reverses no slip while that is at most 2/3, rk4 while it is at
+most 1. Up to b = at_once/ahead friction is the explicit one, and so is its order. Beyond, a steady pull of a share f of
+mu N creeps by B f v_lim too fast (semi-implicit Euler: by b f v_lim, at any b).
 
-Formulas without branches and without a division by a slip that may be 0, so that loops over them are vectorised.
+The formulas have no branches and no division by a slip that may be 0, so that loops over them are vectorised.
 """
 
 import math
@@ -23,12 +23,12 @@ from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.contact.arctangent import arctangent
 
 _LEAST = 1e-100
-"""Share of v_lim that a slip is taken for at least where a quotient by it is asked for."""
+"""Smallest share of v_lim that is used for a slip in a quotient."""
 
 
 @part
 def regularisation(slip: float, slip_limit: float, atan: Any) -> float:
-    """p(s)/s in s/m for a slip speed s >= 0: times -mu N v it is the force. At rest it is 2/v_lim."""
+    """Return p(s)/s in s/m for a slip speed s >= 0. The force is -mu N v times it. At rest it is 2/v_lim."""
     if atan is not None:
         least = _LEAST * slip_limit
         slip = least if least > slip else slip
@@ -39,7 +39,7 @@ def regularisation(slip: float, slip_limit: float, atan: Any) -> float:
 
 @part
 def friction_share(slip: float, slip_limit: float, atan: Any) -> float:
-    """p(|s|), with the sign of the slip s (m/s), of a contact, whose slip has one dimension."""
+    """Return p(|s|) with the sign of the slip s (m/s) of a contact, whose slip has one dimension."""
     t = abs(slip) * (1.0 / slip_limit)
     if atan is not None:
         return math.copysign(_atan_curve(t), slip)
@@ -49,7 +49,7 @@ def friction_share(slip: float, slip_limit: float, atan: Any) -> float:
 
 @part
 def implicit_regularisation(slip: float, b: float, slip_limit: float, atan: Any) -> float:
-    """p(s)/s_0 in s/m, s the slip speed after the step, s_0 = slip >= 0 before it; b = 0 is the explicit quotient."""
+    """Return p(s)/s_0 in s/m, s the slip speed after the step, s_0 = slip >= 0 before it. With b = 0 it is explicit."""
     t = slip / slip_limit
     if atan is not None:
         t = _LEAST if t < _LEAST else t
@@ -61,7 +61,7 @@ def implicit_regularisation(slip: float, b: float, slip_limit: float, atan: Any)
 
 @part
 def implicit_share(slip: float, b: float, slip_limit: float, atan: Any) -> float:
-    """p(s), s the slip speed after the step, with the sign of the slip (m/s) before it."""
+    """Return p(s), s the slip speed after the step, with the sign of the slip (m/s) before it."""
     t = abs(slip) * (1.0 / slip_limit)
     if atan is not None:
         _, p = _implicit_atan(t, b)
@@ -72,7 +72,7 @@ def implicit_share(slip: float, b: float, slip_limit: float, atan: Any) -> float
 
 @part
 def implicit_slip(slip: float, b: float, slip_limit: float, atan: Any) -> float:
-    """The slip (m/s, signed) after the step, from that before it."""
+    """Return the slip (m/s, signed) after the step from that before it."""
     t = abs(slip) / slip_limit
     if atan is not None:
         s, _ = _implicit_atan(t, b)
@@ -89,10 +89,10 @@ def _atan_curve(t: float) -> float:
 
 @part
 def _implicit_quotient(t: float, b: float) -> float:
-    """min(s, v_lim)/s_0 on the polynomial, t = s_0/v_lim.
+    """Return min(s, v_lim)/s_0 on the polynomial, t = s_0/v_lim.
 
-    Up to t = 1 + b it is 2/(1 + 2b + root((1 + 2b)^2 - 4bt)), the root's argument without its cancellation; from there
-    on the slip stays above v_lim and it is 1/t, the smaller of the two.
+    Up to t = 1 + b it is 2/(1 + 2b + root((1 + 2b)^2 - 4bt)), with the argument of the root written without
+    cancellation. From there on the slip stays above v_lim and it is 1/t, the smaller of the two.
     """
     room = 1.0 + b - t
     room = 0.0 if room < 0.0 else room
@@ -102,11 +102,11 @@ def _implicit_quotient(t: float, b: float) -> float:
 
 @part
 def _implicit_atan(t: float, b: float) -> tuple[float, float]:
-    """s/v_lim after the step and p there, on the arctangent, t = s_0/v_lim.
+    """Return s/v_lim after the step and p there, on the arctangent, t = s_0/v_lim.
 
-    Newton's method rises towards the root, for the curve is concave and the start is below it: p is at most 2 s and at
-    most that of the hyperbola k s/(1 + k s), k = pi^2/2, with which the equation is quadratic. Four rounds leave 6e-12
-    of s and 2e-12 in p for any b from 1e-4 to 1e6.
+    Newton's method rises towards the root, because the curve is concave and the start is below it: p is at most 2 s and
+    at most that of the hyperbola k s/(1 + k s), k = pi^2/2, with which the equation is quadratic. Four rounds leave
+    6e-12 of s and 2e-12 in p for any b from 1e-4 to 1e6.
     """
     k = 0.5 * math.pi * math.pi
     q = 1.0 + k * (b - t)
@@ -124,7 +124,7 @@ def _implicit_atan(t: float, b: float) -> tuple[float, float]:
 
 @part
 def _newton(s: float, t: float, b: float) -> tuple[float, float]:
-    """The next s, and p there along the tangent, with which s + b p = t holds as it stands."""
+    """Return the next s, and p there along the tangent, with which s + b p = t holds exactly."""
     x = math.pi * s
     p = (2.0 / math.pi) * arctangent(x)
     slope = 2.0 / (1.0 + x * x)

@@ -1,7 +1,7 @@
-"""The laws of a contact added up, for kernels: each sum is written out from the list of laws.
+"""Sums of the laws of a contact, written out for kernels from the list of laws.
 
-The laws of a pair of materials add up; what a pair does not have is 0 in its column, what no pair of the scene has is
-None and not in the machine code. Numba loops over no list of functions.
+The laws of a pair of materials are added up. A law that a pair lacks has 0 in its column; one that no pair of the scene
+has is None and not in the machine code. Numba can't loop over a list of functions.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,22 +14,22 @@ _ALONG = [law for law in DAMPING if not law.isotropic]
 _ISOTROPIC = [law for law in DAMPING if law.isotropic]
 
 
-def _sum(columns: Sequence[str], functions: Sequence[Callable[..., float]], given: str) -> Any:
-    """A function (law, e, total, given...) that adds what the functions make of entry e of the columns to the total."""
+def _sum(columns: Sequence[str], functions: Sequence[Callable[..., float]], inputs: str) -> Any:
+    """Return a part (law, e, total, args...) that adds functions of entry e of the columns to the total."""
     places = range(len(columns))
     arguments = "".join(f"column_{n}, " for n in places)
-    # Pruned only where the test is of an argument.
-    body = [f"    if column_{n} is not None: total += force_{n}(column_{n}[e], {given})" for n in places]
-    head = f"def function(total, {arguments}e, {given}):"
+    # A branch is pruned only if its test is of an argument.
+    body = [f"    if column_{n} is not None: total += force_{n}(column_{n}[e], {inputs})" for n in places]
+    head = f"def function(total, {arguments}e, {inputs}):"
     forces = {f"force_{n}": part(function) for n, function in enumerate(functions)}
     inner = written("\n".join([head, *body, "    return total"]), **forces)
     passed = "".join(f"law.{column}, " for column in columns)
-    text = f"def function(law, e, total, {given}): return inner(total, {passed}e, {given})"
+    text = f"def function(law, e, total, {inputs}): return inner(total, {passed}e, {inputs})"
     return written(text, inner=inner)
 
 
 def _clamp(columns: Sequence[str]) -> Any:
-    """A function (law, total) that makes 0 of a total below it, where any of the columns is there."""
+    """Return a part (law, total) that raises a negative total to 0 if any of the columns is present."""
     arguments = ", ".join(f"column_{n}" for n in range(len(columns)))
     tests = [f"{'    ' * (n + 1)}if column_{n} is None:" for n in range(len(columns))]
     body = [*tests, f"{'    ' * (len(columns) + 1)}return total", "    return 0.0 if total < 0.0 else total"]
@@ -40,17 +40,17 @@ def _clamp(columns: Sequence[str]) -> Any:
 
 _columns = [law.column for law in ELASTIC]
 add_elastic_force: Any = _sum(_columns, [law.force for law in ELASTIC], "depth, curves")
-"""(law, e, total, depth, curves): with the elastic force, N, at an overlap (m, not negative)."""
+"""(law, e, total, depth, curves): total plus the elastic force, N, at an overlap (m, not negative)."""
 
 add_elastic_energy: Any = _sum(_columns, [law.energy for law in ELASTIC], "depth, curves")
-"""(law, e, total, depth, curves): with what it has stored, J."""
+"""(law, e, total, depth, curves): total plus the energy stored, J."""
 
-_given = "elastic, depth, velocity"
-add_damping: Any = _sum([law.column for law in _ALONG], [law.force for law in _ALONG], _given)
-"""(law, e, total, elastic, depth, velocity): with damping along the normal, N, at an elastic force (N) and m/s."""
+_inputs = "elastic, depth, velocity"
+add_damping: Any = _sum([law.column for law in _ALONG], [law.force for law in _ALONG], _inputs)
+"""(law, e, total, elastic, depth, velocity): total plus damping along the normal, N, at a force (N) and speed (m/s)."""
 
 never_pull: Any = _clamp([law.column for law in _ALONG])
-"""(law, total): a contact that has it never pulls."""
+"""(law, total): total, at least 0 if the contact has such damping, so that it never pulls."""
 
-add_drag: Any = _sum([law.column for law in _ISOTROPIC], [law.force for law in _ISOTROPIC], _given)
-"""(law, e, total, elastic, depth, velocity): with damping in all directions, N, along the one of the velocity (m/s)."""
+add_drag: Any = _sum([law.column for law in _ISOTROPIC], [law.force for law in _ISOTROPIC], _inputs)
+"""(law, e, total, elastic, depth, velocity): total plus isotropic damping, N, along the velocity (m/s)."""

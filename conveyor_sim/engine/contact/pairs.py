@@ -1,18 +1,18 @@
 """Contact of two bottles: overlap delta = R_i + R_j - |r_i - r_j|, for all listed pairs, block by block.
 
-The fast layout, once round. Pairs p = 0, 1, ... are listed by (i, j); a block is some of them:
+The fast layout, step by step. Pairs p = 0, 1, ... are listed by (i, j); a block is some of them:
 
-    packed   | x y vx vy | x y vx vy | x y vx vy | ...          one row a bottle, made anew before every evaluation
-                  i            j                                 1. gather: row j less row i, one packed load each
-    gathered | dx dy du dv | dx dy du dv | ...                   of this block only: it stays in the first cache
-                  v v v v v v v v                                2. law: eight pairs at a time, no branches; a pair
-    pairs.fx | on i: 0 .. P-1 | on j: P .. 2P-1 | 0 |               apart gets 0. Written twice, once a partner:
-                  ^     ^            ^                               nobody adds to what another wrote
+    packed   | x y vx vy | x y vx vy | x y vx vy | ...          one row per bottle, renewed before every evaluation
+                  i            j                                 1. gather: row j minus row i, one packed load each
+    gathered | dx dy du dv | dx dy du dv | ...                   of this block only: it stays in the first-level cache
+                  v v v v v v v v                                2. law: eight pairs at a time, no branches; separate
+    pairs.fx | on i: 0 .. P-1 | on j: P .. 2P-1 | 0 |               pairs get 0. Written twice, once per partner:
+                  ^     ^            ^                               no thread adds to another one's entry
     slots    | 2  5  P+1  -  -  - | ...                          3. sum (slots.py): each bottle adds its own entries,
                                                                     six to a row; "-" is the entry that stays 0
 
-Steps 1 and 2 write by pair, step 3 by bottle: no two threads write to one place, and every sum has one order, that of
-the partners. A scatter to both bottles would need neither copies nor slots, but races, and does not vectorise.
+Steps 1 and 2 write by pair, step 3 by bottle: no two threads write to the same entry, and every sum has one order, that
+of the partners. A scatter to both bottles would need neither copies nor slots, but has races and does not vectorise.
 """
 
 import math
@@ -22,13 +22,13 @@ from numba import uint64
 
 from conveyor_sim.engine.arrays.bodies import Bottles
 from conveyor_sim.engine.arrays.contacts import Gathered, Pairs
-from conveyor_sim.engine.arrays.world import Settings, Worker, World
+from conveyor_sim.engine.arrays.world import EngineSettings, Worker, World
 from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.contact.contact import carried, contact_force, spring_after, stretched
-from conveyor_sim.engine.contact.path import slip_time_of, way_in_touch
+from conveyor_sim.engine.contact.path import displacement_in_touch, slip_time_of
 from conveyor_sim.engine.threads.workers import BLOCK, share
 
-# Unsigned and known to the compiler: a signed index would be tested for wrapping round, and a lane would not be one.
+# Unsigned constants: a signed index would be tested for wrap-around, and the lanes would not be constants.
 _1, _2, _3, _4 = uint64(1), uint64(2), uint64(3), uint64(4)
 
 
@@ -41,7 +41,7 @@ def pack(bottles: Bottles, first: int, end: int) -> None:
 
 @part
 def pack_row(packed: Any, i: int, x: float, y: float, vx: float, vy: float) -> None:
-    """Write the row of bottle i, an unsigned index."""
+    """Write the row of bottle i. i: unsigned."""
     row = i * _4
     packed[row] = x
     packed[row + _1] = y
@@ -51,9 +51,9 @@ def pack_row(packed: Any, i: int, x: float, y: float, vx: float, vy: float) -> N
 
 @part
 def pair_forces(world: World, worker: Worker, spring_dt: float) -> None:
-    """Find the forces and moments of this worker's share of the pairs, from `bottles.packed` and `spin.omega`.
+    """Compute forces and moments of this worker's share of the pairs, from `bottles.packed` and `spin.omega`.
 
-    spring_dt: s, how far the tangential springs are taken along (`pair_phase`).
+    spring_dt: s, time by which the tangential springs are advanced (`pair_phase`).
     """
     pairs, gathered = world.pairs, worker.gathered
     if pairs is None:
@@ -64,7 +64,7 @@ def pair_forces(world: World, worker: Worker, spring_dt: float) -> None:
         count: Any = uint64(min(BLOCK, stop - start))
         _gather(world.bottles.packed, world.spin, pairs, pairs.reach, first, count, gathered)
         _gather_compliance(world.implicit, pairs, first, count, gathered.compliance)
-        _gather_ways(world.path, pairs, pairs.reach, first, count, gathered.way)
+        _gather_displacements(world.path, pairs, pairs.reach, first, count, gathered.displacement)
         _law(world, gathered, first, count, spring_dt)
 
 
@@ -74,7 +74,7 @@ def _gather(packed: Any, spin: Any, pairs: Pairs, reach: Any, first: int, count:
     for c in range(count):
         a, b = uint64(pairs.i[first + c]), uint64(pairs.j[first + c])
         i, j = a * _4, b * _4
-        # All loads before all stores, or they can't be joined.
+        # All loads come before all stores, otherwise they can't be joined.
         dx = packed[j] - packed[i]
         dy = packed[j + _1] - packed[i + _1]
         dvx = packed[j + _2] - packed[i + _2]
@@ -108,30 +108,30 @@ def _gather_compliance(implicit: Any, pairs: Pairs, first: int, count: int, comp
 
 
 @part
-def _gather_ways(path: Any, pairs: Pairs, reach: Any, first: int, count: int, way: Any) -> None:
+def _gather_displacements(path: Any, pairs: Pairs, reach: Any, first: int, count: int, displacement: Any) -> None:
     if path is None:
         return
     for c in range(count):
         p, row = first + c, c * _4
         i, j = uint64(pairs.i[p]), uint64(pairs.j[p])
-        way[row] = path.x[j] - path.x[i]
-        way[row + _1] = path.y[j] - path.y[i]
-        way[row + _2] = path.turn[i] + path.turn[j]
-        way[row + _3] = 0.0 if reach is None else _rim_way(path, pairs, reach, p)
+        displacement[row] = path.x[j] - path.x[i]
+        displacement[row + _1] = path.y[j] - path.y[i]
+        displacement[row + _2] = path.turn[i] + path.turn[j]
+        displacement[row + _3] = 0.0 if reach is None else _rim_displacement(path, pairs, reach, p)
 
 
 @part
-def _rim_way(path: Any, pairs: Pairs, reach: Any, p: int) -> float:
+def _rim_displacement(path: Any, pairs: Pairs, reach: Any, p: int) -> float:
     radius = pairs.radius_i[p]
     return radius * path.turn[pairs.i[p]] + (reach[p] - radius) * path.turn[pairs.j[p]]
 
 
 @part
 def normal_and_overlap(dx: float, dy: float, reach: float) -> tuple[float, float, float]:
-    """Overlap (m; 0 or less: apart) and unit normal of two circles, (dx, dy) being the way from axis to axis."""
+    """Return overlap (m; 0 or less: apart) and unit normal of two circles. (dx, dy): vector from axis to axis, m."""
     distance = math.sqrt(dx * dx + dy * dy)
     inverse = 1.0 / distance if distance > 0.0 else 0.0
-    # Coincident centres have no normal of their own: any will part them, the same one every time.
+    # Coincident centres have no normal; any constant one separates them.
     return reach - distance, dx * inverse if distance > 0.0 else 1.0, dy * inverse
 
 
@@ -185,22 +185,22 @@ def _law(world: World, gathered: Gathered, first: int, count: int, spring_dt: fl
 
 
 @part
-def _reach(settings: Settings, reach: Any, p: int) -> float:
+def _reach(settings: EngineSettings, reach: Any, p: int) -> float:
     if reach is None:
         return settings.reach
     return reach[p]
 
 
 @part
-def _radii(settings: Settings, pairs: Pairs, reach: Any, p: int) -> tuple[float, float]:
+def _radii(settings: EngineSettings, pairs: Pairs, reach: Any, p: int) -> tuple[float, float]:
     if reach is None:
         return 0.5 * settings.reach, 0.5 * settings.reach
     return pairs.radius_i[p], reach[p] - pairs.radius_i[p]
 
 
 @part
-def _rim_slip(settings: Settings, spin: Any, reach: Any, gathered: Any, c: int, shorter: float) -> float:
-    """Slip of the rims, m/s: omega_i arm_i + omega_j arm_j, arms shorter than the radii by half the overlap."""
+def _rim_slip(settings: EngineSettings, spin: Any, reach: Any, gathered: Any, c: int, shorter: float) -> float:
+    """Return the slip of the rims, m/s: omega_i arm_i + omega_j arm_j; arms are radii minus half the overlap."""
     if spin is None:
         return 0.0
     if reach is None:
@@ -210,7 +210,7 @@ def _rim_slip(settings: Settings, spin: Any, reach: Any, gathered: Any, c: int, 
 
 @part
 def elongation(springs: Any, p: int) -> Any:
-    """Elongation (m) of the tangential spring of pair p, or None."""
+    """Return the elongation (m) of the tangential spring of pair p, or None."""
     if springs is None:
         return None
     return springs.elongation[p]
@@ -218,39 +218,41 @@ def elongation(springs: Any, p: int) -> Any:
 
 @part
 def _drawn_out(world: World, gathered: Gathered, c: int, p: int, overlap: float, nx: float, ny: float) -> Any:
-    """Elongation (m) of a spring, or None, after what its bottles have gone since it was kept."""
+    """Return the elongation (m) of a spring after the displacement of its bottles since the last update, or None."""
     settings, pairs = world.settings, world.pairs
     if pairs.spring is None:
         return None
     spring, reach = pairs.spring.elongation[p], pairs.reach
-    way: Any = gathered.way
+    displacement: Any = gathered.displacement
     row: Any = c * _4
-    approach = -(way[row] * nx + way[row + _1] * ny)
-    # The normal turns on the way, and its mean is that of half of it: |r| n of its end over |r| of its middle.
+    approach = -(displacement[row] * nx + displacement[row + _1] * ny)
+    # The normal turns during the displacement. Its mean is that at half of it: |r| n of its end over |r| of its middle.
     distance = _reach(settings, reach, p) - overlap
-    along = (way[row] * ny - way[row + _1] * nx) * (distance / (distance + 0.5 * approach))
+    along = (displacement[row] * ny - displacement[row + _1] * nx) * (distance / (distance + 0.5 * approach))
     shorter = 0.5 * settings.lever * (overlap - 0.5 * approach)
-    further = way_in_touch(along + _rims_way(settings, reach, way, row, shorter), approach, overlap)
+    further = displacement_in_touch(
+        along + _rims_displacement(settings, reach, displacement, row, shorter), approach, overlap
+    )
     return carried(pairs.law, p, spring, overlap, approach, further) + further
 
 
 @part
-def _rims_way(settings: Settings, reach: Any, way: Any, row: int, shorter: float) -> float:
+def _rims_displacement(settings: EngineSettings, reach: Any, displacement: Any, row: int, shorter: float) -> float:
     if reach is None:
-        return (0.5 * settings.reach - shorter) * way[row + _2]
-    return way[row + _3] - shorter * way[row + _2]
+        return (0.5 * settings.reach - shorter) * displacement[row + _2]
+    return displacement[row + _3] - shorter * displacement[row + _2]
 
 
 @part
-def _compliance(settings: Settings, implicit: Any, gathered: Any, c: int) -> Any:
+def _compliance(settings: EngineSettings, implicit: Any, gathered: Any, c: int) -> Any:
     if implicit is None:
         return None
     return gathered.compliance[c], settings.at_once
 
 
 @part
-def find_touching(settings: Settings, bottles: Bottles, pairs: Any, worker: Worker) -> None:
-    """Note in `pairs.touch` which of this worker's share of the pairs are closed; for the implicit solver."""
+def find_touching(settings: EngineSettings, bottles: Bottles, pairs: Any, worker: Worker) -> None:
+    """Mark in `pairs.touch` the closed ones of this worker's share of the pairs; for the implicit solver."""
     if pairs is None:
         return
     begin, stop = share(worker, pairs.used[0])

@@ -1,7 +1,7 @@
-"""How far bottles have gone since the tangential springs were last kept: what integrators draw springs out by.
+"""Displacements of bottles since the last update of the tangential springs, from which integrators elongate springs.
 
-Semi-implicit Euler draws a spring out by dt times the slip that it takes forces at. The others take forces at
-velocities that are not those which move the bottles: there, springs follow the ways that bottles have gone
+Semi-implicit Euler elongates a spring by dt times the slip at which it evaluates forces. The other integrators evaluate
+forces at velocities that are not those that move the bottles. There springs follow the displacements of bottles
 (`World.path`), and are as exact as positions are.
 """
 
@@ -18,7 +18,7 @@ from conveyor_sim.engine.threads.workers import share
 
 @part
 def note_path(path: Any, stage: Stage, dt: float, first: int, end: int) -> None:
-    """Bottles first to end have just gone on for dt (s) at the velocities kept in `stage`."""
+    """Add to the displacements of bottles first to end a motion of dt (s) at the velocities in `stage`."""
     if path is None:
         return
     for i in range(uint64(first), uint64(end)):
@@ -28,8 +28,8 @@ def note_path(path: Any, stage: Stage, dt: float, first: int, end: int) -> None:
 
 
 @part
-def note_stage(world: World, times: F8, ways: F8, s: int, h: float, first: int, end: int) -> None:
-    """Bottles first to end are where row s of a tableau has them in a step of h (s); see `runge_kutta.py`."""
+def note_stage(world: World, times: F8, squared: F8, s: int, h: float, first: int, end: int) -> None:
+    """Set the displacements of bottles first to end to row s of a tableau in a step of h (s); see `runge_kutta.py`."""
     path, bottles, slopes = world.path, world.bottles, world.slopes
     if path is None:
         return
@@ -42,23 +42,23 @@ def note_stage(world: World, times: F8, ways: F8, s: int, h: float, first: int, 
         for stage in range(s):
             j: Any = uint64(stage)
             for i in range(uint64(first), uint64(end)):
-                path.turn[i] += h * h * ways[s, stage] * slopes.alpha[j, i]
+                path.turn[i] += h * h * squared[s, stage] * slopes.alpha[j, i]
 
 
 @part
-def forget_path(path: Any, moving: Any, worker: Worker) -> None:
-    """Springs are as long as they were kept. Seen by all after the next `wait_for_all`."""
+def reset_path(path: Any, moving: Any, worker: Worker) -> None:
+    """Reset all displacements, which springs now contain. All workers see it after the next `wait_for_all`."""
     if path is None:
         return
     begin, stop = share(worker, path.x.size)
     for i in range(begin, stop):
         path.x[i] = path.y[i] = path.turn[i] = 0.0
     if worker.rank == 0:
-        _forget_rails(moving)
+        _reset_rails(moving)
 
 
 @part
-def _forget_rails(moving: Any) -> None:
+def _reset_rails(moving: Any) -> None:
     if moving is None:
         return
     _clear(moving.springs)
@@ -74,14 +74,14 @@ def _clear(springs: Any) -> None:
 
 @part
 def slip_time_of(path: Any, spring_dt: float) -> float:
-    """Time (s) of slip by which springs are drawn out; 0 where they follow a path."""
+    """Return the time (s) of slip by which springs are elongated; 0 if they follow a path."""
     if path is None:
         return spring_dt
     return 0.0
 
 
 @part
-def way_in_touch(way: float, approach: float, overlap: float) -> float:
-    """What of a way (m) along a contact was gone in touch. approach: m, how much the overlap (m) has grown by it."""
+def displacement_in_touch(displacement: float, approach: float, overlap: float) -> float:
+    """Return the part of a displacement (m) along a contact that was covered in touch. approach: m, overlap gained."""
     depth = 0.0 if overlap < 0.0 else overlap
-    return way * (depth / approach) if depth < approach else way
+    return displacement * (depth / approach) if depth < approach else displacement

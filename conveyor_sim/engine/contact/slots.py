@@ -1,15 +1,15 @@
-"""Each bottle sums the forces of its pairs, through a table of WIDTH slots a bottle (drawn in `pairs.py`).
+"""Sums of pair forces by bottle, through a table of WIDTH slots per bottle (drawn in `pairs.py`).
 
 A slot holds an index into the columns of pair forces. Slots are in order of the partner, so a bottle's sum does not
-depend on when the lists were made: entries of pairs apart are 0. More than WIDTH neighbours, which unequal bottles can
-have, go on in a list of their own.
+depend on when the lists were rebuilt: entries of separate pairs are 0. More than WIDTH neighbours, which unequal
+bottles can have, continue in a list of their own.
 """
 
 from typing import Any
 
 from numba import uint64
 
-from conveyor_sim.engine.arrays.bodies import Load
+from conveyor_sim.engine.arrays.bodies import ForceSums
 from conveyor_sim.engine.arrays.contacts import Slots
 from conveyor_sim.engine.compiler.compile import fill, part
 
@@ -21,7 +21,7 @@ _1, _2, _3, _4, _5, _6 = uint64(1), uint64(2), uint64(3), uint64(4), uint64(5), 
 
 @part
 def fill_slots(pairs: Any, slots: Any) -> int:
-    """Make the table from the pair list; return the entries beyond WIDTH, which may exceed their capacity."""
+    """Fill the table from the pair list; return the number of entries beyond WIDTH, which may exceed their capacity."""
     if slots is None:
         return 0
     capacity, used = pairs.i.size, pairs.used[0]
@@ -36,7 +36,7 @@ def fill_slots(pairs: Any, slots: Any) -> int:
     slots.more_start[slots.filled.size] = min(total, slots.more_entry.size)
     fill(slots.entry, 2 * capacity)
     fill(slots.filled, 0)
-    # By (i, j): what a bottle has as the second of a pair, its lower partners, comes before what it has as the first.
+    # By (i, j): lower partners, of which the bottle is the second, come before those of which it is the first.
     for p in range(used):
         _enter(slots, pairs.j[p], capacity + p)
         _enter(slots, pairs.i[p], p)
@@ -55,8 +55,8 @@ def _enter(slots: Slots, bottle: int, entry: int) -> None:
 
 
 @part
-def sum_pair_forces(pairs: Any, slots: Any, load: Load, moments: Any, first: int, end: int) -> None:
-    """Set `load` and, where bottles turn, `moments` of bottles first to end to what their pairs exert."""
+def sum_pair_forces(pairs: Any, slots: Any, load: ForceSums, moments: Any, first: int, end: int) -> None:
+    """Set `load` and, if bottles turn, `moments` of bottles first to end to the sum of their pair forces."""
     if pairs is None:
         _clear(load, moments, first, end)
         return
@@ -65,7 +65,7 @@ def sum_pair_forces(pairs: Any, slots: Any, load: Load, moments: Any, first: int
 
 
 @part
-def _clear(load: Load, moments: Any, first: int, end: int) -> None:
+def _clear(load: ForceSums, moments: Any, first: int, end: int) -> None:
     _set_zero(load.fx, first, end)
     _set_zero(load.fy, first, end)
     _set_zero(moments, first, end)
@@ -123,7 +123,7 @@ def _sum_normals(slots: Slots, normals: Any, sums: Any, largest: Any, first: int
 
 @part
 def sum_slots(slots: Any, values: Any, first: int, end: int, sums: Any) -> None:
-    """Set sums[i] of bottles first to end to the sum of their entries of any column of pair values."""
+    """Set sums[i] of bottles first to end to the sum of their entries in any column of pair values."""
     if slots is None:
         _set_zero(sums, first, end)
         return

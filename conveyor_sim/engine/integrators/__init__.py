@@ -1,9 +1,10 @@
-"""Time integrators, one a file, each a function ``advance(world, worker, steps, dt, phase) -> whole steps done``.
+"""Time integrators, one per file, each a function ``advance(world, worker, steps, dt, phase) -> complete steps done``.
 
-``phase`` is START for the first call in a tick. A call may return with ``neighbourhood.stale`` set: a neighbour list
-did not fit. The caller then grows and rebuilds it and calls again with RESUME for the rest; the bits are those of an
-uninterrupted tick. Every worker of a group calls it alike (`workers.py`). Workers are those of a ThreadPool: it gives
-them the addresses of the kernels that an integrator calls (`callees.py`), and without these the process crashes.
+``phase`` is START for the first call in a tick. A call may return with ``neighbourhood.stale`` set, because a neighbour
+list did not fit. The caller then enlarges and rebuilds it, and calls again with RESUME for the remaining steps; the
+bits are those of an uninterrupted tick. Every worker of a group makes the same call (`workers.py`). Workers must be
+those of a ThreadPool. It gives them the addresses of the kernels that an integrator calls (`callees.py`); without these
+the process crashes.
 """
 
 from collections.abc import Callable
@@ -26,22 +27,22 @@ INTEGRATORS: dict[str, Advance] = {
 }
 
 AHEAD = {"leapfrog": (1.0, 0.0), "semi_implicit_euler": (1.0, 0.0), "velocity_verlet": (1.5, 0.5), "rk4": (1.0, 0.5)}
-"""Integrators with implicit friction: `Settings.ahead` and `at_once` (`friction.py`)."""
+"""Integrators with implicit friction: `EngineSettings.ahead` and `at_once` (`friction.py`)."""
 
 LAG = {"leapfrog": 0.5}
-"""Integrators that ask belts for their velocity where bottles were at mid-step (`Settings.lag`)."""
+"""Integrators that use the belt's velocity at the bottle's mid-step position (`EngineSettings.lag`)."""
 
 ON_PATHS = frozenset({"velocity_verlet", "rk4"})
-"""Integrators whose tangential springs follow the ways of bottles (``World.path``, `path.py`)."""
+"""Integrators whose tangential springs follow the displacements of bottles (``World.path``, `path.py`)."""
 
 STAGED = frozenset({"velocity_verlet"})
 """Integrators that keep a copy of the velocities within a step (``World.stage``)."""
 
 RIDES = frozenset({"leapfrog", "semi_implicit_euler", "velocity_verlet"})
-"""Integrators that can leave out bottles whose velocity stays as it is (``World.riding``, `riding.py`)."""
+"""Integrators that can skip bottles whose velocity stays constant (``World.riding``, `riding.py`)."""
 
 SLOPES = {"rk4": rk4.STAGES, "dormand_prince": dormand_prince.STAGES}
-"""Integrators that keep the slopes of so many stages within a step (``World.slopes``)."""
+"""Integrators that store slopes within a step, and their number of stages (``World.slopes``)."""
 
 LINEAR = frozenset({"linearly_implicit"})
 """Integrators that solve a linear system in every step (``World.linear``, ``Pairs.tangent``)."""

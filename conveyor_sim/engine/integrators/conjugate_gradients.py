@@ -1,18 +1,19 @@
-"""Conjugate gradients for the linearly implicit method: (M + what resists) dv = h F, a block of 3 x 3 for each bottle.
+"""Conjugate gradients for the linearly implicit method: (M + resistance) dv = h F, with 3 x 3 blocks per bottle.
 
-Preconditioned by the blocks themselves, each divided into factors. Products are made as forces are: by pair, then
-summed by bottle in a fixed order; scalar products are added up by units of bottles, in order. So the bits do not depend
-on the number of threads. (Saad, Iterative Methods for Sparse Linear Systems, algorithm 9.1.)
+The preconditioner is the factorised blocks. Products are computed as forces are: by pair, then summed by bottle in a
+fixed order. Scalar products are added up by units of bottles, in order. So the bits do not depend on the number of
+threads. (Saad, Iterative Methods for Sparse Linear Systems, algorithm 9.1.)
 
-At the end each bottle gets what is left of its impulse as a change of its own velocity: the sum of all is then that of
-the forces, which are equal and opposite, and momentum is conserved to rounding however early the search ends.
+At the end the residual impulse of each bottle changes the velocity of that bottle alone. The sum of all impulses is
+then that of the forces, which are equal and opposite. So momentum is conserved to rounding however early the search
+ends.
 """
 
 from typing import Any
 
 from numba import uint64
 
-from conveyor_sim.engine.arrays.bodies import Bottles, Load
+from conveyor_sim.engine.arrays.bodies import Bottles, ForceSums
 from conveyor_sim.engine.arrays.integrators import Blocks, Linear, Triple
 from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import part
@@ -21,18 +22,18 @@ from conveyor_sim.engine.integrators.tangent_pairs import resist_pairs
 from conveyor_sim.engine.threads.workers import UNIT, share, wait_for_all
 
 RELATIVE = 1e-8
-"""Of the largest kick that the forces alone would give in the step: what may be left of it."""
+"""Tolerated residual, as a share of the largest kick that the forces alone would give in the step."""
 
 LEAST = 1e-9
-"""m/s; kicks below are not pursued."""
+"""Kicks below this speed, m/s, are neglected."""
 
 MOST_ROUNDS = 1000
-"""The search ends there. What it has by then lowers the error as well, only less."""
+"""Rounds after which the search ends. The change up to then reduces the error as well, only less."""
 
 
 @part
 def factor(own: Blocks, inverse: Blocks, first: int, end: int) -> None:
-    """Divide the blocks in `inverse` of bottles first to end into L D L^T, in place: xx, yy, tt are then 1/D."""
+    """Factorise the blocks in `inverse` of bottles first to end into L D L^T, in place: xx, yy, tt are then 1/D."""
     for i in range(uint64(first), uint64(end)):
         inverse_x = 1.0 / inverse.xx[i]
         xy, xt = inverse.xy[i] * inverse_x, inverse.xt[i] * inverse_x
@@ -48,8 +49,8 @@ def factor(own: Blocks, inverse: Blocks, first: int, end: int) -> None:
 
 
 @part
-def begin_search(bottles: Bottles, spin: Any, load: Load, linear: Linear, dt: float, first: int, end: int) -> None:
-    """Start from the change so far, with the impulse of `load` in dt (s), of bottles first to end."""
+def begin_search(bottles: Bottles, spin: Any, load: ForceSums, linear: Linear, dt: float, first: int, end: int) -> None:
+    """Start from the present change, with the impulse of `load` in dt (s), of bottles first to end."""
     left, own = linear.left, linear.own
     for i in range(uint64(first), uint64(end)):
         x, y, turn = linear.change.x[i], linear.change.y[i], linear.change.turn[i]
@@ -58,12 +59,15 @@ def begin_search(bottles: Bottles, spin: Any, load: Load, linear: Linear, dt: fl
         moment = dt * spin.moment[i] if spin is not None else 0.0
         left.turn[i] = moment - (own.xt[i] * x + own.yt[i] * y + own.tt[i] * turn)
         linear.way.x[i] = linear.way.y[i] = linear.way.turn[i] = 0.0
-    _look_back(bottles, spin, linear, first, end)
+    _precondition(bottles, spin, linear, first, end)
 
 
 @part
 def search(world: World, worker: Worker, small: float) -> bool:
-    """Find `linear.change`; True if what is left is small enough. All must have begun; every worker calls it alike."""
+    """Solve for `linear.change`; return True if the residual is at most `small`.
+
+    All workers must have begun; every worker calls it with the same arguments.
+    """
     bottles: Bottles = world.bottles
     linear: Any = world.linear
     begin, stop = share(worker, bottles.x.size)
@@ -73,12 +77,12 @@ def search(world: World, worker: Worker, small: float) -> bool:
         resist_pairs(world.pairs, linear.product, linear.way, beta, worker)
         wait_for_all(worker)
         for first in range(begin, stop, UNIT):
-            _go_on(world.pairs, world.slots, linear, beta, first, min(first + UNIT, stop))
+            _new_direction(world.pairs, world.slots, linear, beta, first, min(first + UNIT, stop))
         wait_for_all(worker)
         alpha = before / _total(linear.way_sum)
         for first in range(begin, stop, UNIT):
             _step(linear, alpha, first, min(first + UNIT, stop))
-            _look_back(bottles, world.spin, linear, first, min(first + UNIT, stop))
+            _precondition(bottles, world.spin, linear, first, min(first + UNIT, stop))
         wait_for_all(worker)
         after = _total(linear.left_sum)
         beta, before = after / before, after
@@ -89,7 +93,7 @@ def search(world: World, worker: Worker, small: float) -> bool:
 
 @part
 def largest_kick(linear: Linear) -> float:
-    """Of all bottles, what the impulse that is left would change a bottle's own velocity by, m/s."""
+    """Return the largest change of a bottle's own velocity that its residual impulse would cause, m/s."""
     return _largest(linear.most)
 
 
@@ -110,8 +114,8 @@ def _largest(column: Any) -> float:
 
 
 @part
-def _look_back(bottles: Bottles, spin: Any, linear: Linear, first: int, end: int) -> None:
-    """Of units of bottles: the blocks' inverse times what is left, its product with that, the largest kick in it."""
+def _precondition(bottles: Bottles, spin: Any, linear: Linear, first: int, end: int) -> None:
+    """Compute by units: inverse blocks times residual, its product with the residual, and the largest kick."""
     left, product, inverse = linear.left, linear.product, linear.inverse
     for start in range(first, end, UNIT):
         total = most = 0.0
@@ -135,8 +139,8 @@ def _look_back(bottles: Bottles, spin: Any, linear: Linear, first: int, end: int
 
 
 @part
-def _go_on(pairs: Any, slots: Any, linear: Linear, beta: float, first: int, end: int) -> None:
-    """Of a unit of bottles: the new direction, the matrix times it, and their scalar product."""
+def _new_direction(pairs: Any, slots: Any, linear: Linear, beta: float, first: int, end: int) -> None:
+    """Compute for a unit of bottles the new direction, the matrix times it, and their scalar product."""
     way, product, own = linear.way, linear.product, linear.own
     for i in range(uint64(first), uint64(end)):
         way.x[i] = product.x[i] + beta * way.x[i]
@@ -183,7 +187,7 @@ def _step(linear: Linear, alpha: float, first: int, end: int) -> None:
 
 @part
 def kick_with_rest(bottles: Bottles, spin: Any, linear: Linear, first: int, end: int) -> None:
-    """Add to the change of bottles first to end what is left as each one's own kick."""
+    """Add to the change of bottles first to end the kick of each one's residual."""
     change, left = linear.change, linear.left
     for i in range(uint64(first), uint64(end)):
         change.x[i] += left.x[i] * bottles.inverse_mass[i]

@@ -1,21 +1,23 @@
-"""The embedded pair 5(4) of Dormand and Prince with error control: the reference that others are measured against.
+"""Embedded pair 5(4) of Dormand and Prince with error control: the reference for the other integrators.
 
 A step of dt is divided into substeps, the same for all bottles, such that the two methods of the pair differ by at most
-`accuracy.error` (m/s) in each; dt is the longest, so that no contact is stepped over. Six force evaluations a substep.
+`accuracy.error` (m/s) in each. The longest substep is dt, so that no contact is stepped over. A substep takes six force
+evaluations.
 
-The error of an impact is proportional to `accuracy.error`, whatever sets in at first touch, and 3 to 12 times as large
-(RMS over phases of entry, test/engine/test_dormand_prince.py): a jump of the force, as a dashpot's, or of its slope is
-passed in a substep so short that it does not matter. Where forces are smooth, friction below v_lim among them, the
-error is less than a hundredth of `accuracy.error` and falls as its power 5/4; across v_lim it is up to three times as
-large. With substeps of dt throughout the order in dt is 5 where forces are smooth, 3 across v_lim, and at first touch
-every method's: 1 with a dashpot, clamped or not, 2 without, 2.5 in velocity with Hertz.
+The error of an impact is proportional to `accuracy.error`, whichever law starts at first touch, and 3 to 12 times as
+large (RMS over phases of entry, test/engine/test_dormand_prince.py). A jump of the force, such as a dashpot's, or of
+its slope is passed in a substep so short that it does not matter. Where forces are smooth, which includes friction
+below v_lim, the error is less than a hundredth of `accuracy.error` and falls as its power 5/4; across v_lim it is up to
+three times as large. With substeps of dt throughout, the order in dt is 5 where forces are smooth, 3 across v_lim, and
+at first touch that of every method: 1 with a dashpot, clamped or not, 2 without, 2.5 in velocity with Hertz.
 
-Of the error in velocity that a jump of the force makes, the pair's difference in velocity shows as little as 1/169,
-that in position over the substep 1/79. The latter counts tenfold: then no jump makes more than 8 times what is seen.
+The pair's difference in velocity shows as little as 1/169 of the error that a jump of the force causes in velocity;
+that in position over the substep shows 1/79. The latter is weighted tenfold, so no jump causes more than 8 times the
+error estimate.
 
-Peak forces are those at the ends of substeps, missed by up to (pi/n)^2/8 at n substeps a contact. A bottle that two
-belts hold on the line where they run against each other lets the force jump all the time, and takes substeps of about
-`accuracy.error` over the jump of its acceleration.
+Peak forces are those at the ends of substeps, missed by up to (pi/n)^2/8 at n substeps per contact. If two belts that
+run against each other hold a bottle on the line between them, the force jumps all the time. Substeps are then about
+`accuracy.error` divided by the jump of the acceleration.
 
 (J. R. Dormand and P. J. Prince, A family of embedded Runge-Kutta formulae, J. Comput. Appl. Math. 6 (1980) 19-26.)
 """
@@ -35,13 +37,13 @@ from conveyor_sim.engine.integrators.motion import lists_hold, note_moved, probe
 from conveyor_sim.engine.integrators.phase import RESUME
 from conveyor_sim.engine.integrators.runge_kutta import (
     add_impulses,
-    come_to_rest,
     go_to,
-    keep_slopes,
-    keep_state,
     note_peaks,
+    settle_all,
+    squared_weights,
+    store_slopes,
+    store_state,
     turn,
-    ways_of,
 )
 from conveyor_sim.engine.observers.damage import note_damage
 from conveyor_sim.engine.observers.ledger import book_stages, note_powers
@@ -61,43 +63,50 @@ WEIGHTS = np.array(
         [35.0 / 384.0, 0.0, 500.0 / 1113.0, 125.0 / 192.0, -2187.0 / 6784.0, 11.0 / 84.0],
     ]
 )
-WAYS = ways_of(WEIGHTS)
+SQUARED = squared_weights(WEIGHTS)
 ERRORS = np.array([71.0 / 57600.0, 0.0, -71.0 / 16695.0, 71.0 / 1920.0, -17253.0 / 339200.0, 22.0 / 525.0, -0.025])
-"""(STAGES,), what the new velocity differs by from that of order 4, over h."""
+"""Weights of the difference between the new velocity and that of order 4, over h, (STAGES,)."""
 WAY_ERRORS = np.append(ERRORS[:LAST] @ WEIGHTS[:LAST] + ERRORS[LAST] * WEIGHTS[LAST], 0.0)
 
-WAY_SHARE = 10.0
-"""What the difference in position over h counts for, beside that in velocity."""
+DRIFT_WEIGHT = 10.0
+"""Weight of the difference in position over h, relative to that in velocity."""
 
 SAFETY = 0.9
 SHRINK, GROW = 0.2, 5.0
-"""How much shorter or longer the next substep is at the most."""
+"""Limits of the ratio between the next substep and the present one."""
 
 LEAST = 1e-13
-"""m/s: to ask for less is to ask for rounding errors to be smaller than they are."""
+"""Smallest usable error, m/s; below it rounding dominates."""
 
 FLOOR = 1e-9
-"""Of dt: a substep so short is taken whatever its error. A jump of the force costs less than 1e-9 of the speed of
-impact by then, and what is not a number must end."""
+"""Shortest substep as a share of dt; it is taken even with a larger error.
+
+A jump of the force costs less than 1e-9 of the impact speed by then, and a state that is not finite must end.
+"""
 
 
 MOST = 1_000_000
-"""Substeps of a call, those not taken among them: where it takes more, forces are too stiff for an explicit method."""
+"""Limit of substeps in a call, rejected ones included; beyond it forces are too stiff for an explicit method."""
 
 
 @kernel
 def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> int:
     """Take `steps` steps of dt seconds, each in substeps; return how many were finished (see the package's docstring).
 
-    What is not a number even in the shortest substep, or takes more than MOST of them, ends the call as if all were
-    finished: the state is not finite then.
+    If the state is not finite even in the shortest substep, or a call takes more than MOST substeps, the call ends as
+    if all steps were finished. The state is not finite then.
     """
     bottles, allowed = world.bottles, max(world.settings.error, LEAST)
     slopes: Any = world.slopes
     begin, stop = share(worker, bottles.x.size)
-    stage, h, left, tried = 0, dt, dt, 0
+    stage, h, remaining, tried = 0, dt, dt, 0
     if phase == RESUME:
-        stage, h, left, tried = int(slopes.progress[0]), slopes.progress[1], slopes.progress[2], int(slopes.progress[3])
+        stage, h, remaining, tried = (
+            int(slopes.progress[0]),
+            slopes.progress[1],
+            slopes.progress[2],
+            int(slopes.progress[3]),
+        )
     taken = 0
     pack_all(world, worker)
     while taken < steps:
@@ -105,10 +114,10 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
         for first in range(begin, stop, BLOCK):
             end = min(first + BLOCK, stop)
             bottle_forces(world, worker, h, 0.0, first, end)
-            keep_slopes(bottles, world.load, world.spin, slopes.normal, slopes, stage, first, end)
+            store_slopes(bottles, world.load, world.spin, slopes.normal, slopes, stage, first, end)
             note_powers(bottles, world.spin, world.load, world.ledger, 0.0, stage, first, end)
             if stage == 0:
-                keep_state(bottles, world.spin, slopes, first, end)
+                store_state(bottles, world.spin, slopes, first, end)
                 note_peaks(world.load, world.peaks, first, end)
             if stage == LAST:
                 _note_errors(bottles.radius, world.spin, slopes, h, first, end)
@@ -125,38 +134,43 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
                     if worst == math.inf:
                         _spoil(bottles, slopes.error, first, end, tried > MOST)
                 note_damage(world, worker, h)
-                left -= h
+                remaining -= h
                 probe_rebuilt(world, worker)
-                if left == 0.0:
-                    left = dt
+                if remaining == 0.0:
+                    remaining = dt
                     taken += 1
                 if worst == math.inf:
                     taken = steps
-            h = _next(h, worst, allowed, left, dt)
+            h = _next(h, worst, allowed, remaining, dt)
             stage = 0
             if taken == steps:
                 return steps
         stage += 1
         for first in range(begin, stop, BLOCK):
             end = min(first + BLOCK, stop)
-            go_to(world, TIMES, WEIGHTS, WAYS, stage, h, first, end)
+            go_to(world, TIMES, WEIGHTS, SQUARED, stage, h, first, end)
             if stage == LAST:
-                come_to_rest(bottles, world.spin, first, end)
+                settle_all(bottles, world.spin, first, end)
             pack(bottles, first, end)
             note_moved(world, worker, first, end)
         if not lists_hold(world, worker):
             if worker.rank == 0:
-                slopes.progress[0], slopes.progress[1], slopes.progress[2], slopes.progress[3] = stage, h, left, tried
+                slopes.progress[0], slopes.progress[1], slopes.progress[2], slopes.progress[3] = (
+                    stage,
+                    h,
+                    remaining,
+                    tried,
+                )
             return taken
     return taken
 
 
 @part
 def _note_errors(radius: Any, spin: Any, slopes: Any, h: float, first: int, end: int) -> None:
-    """Note how far the two methods of the pair are apart after a substep, for each bottle, in m/s.
+    """Store the difference between the two methods of the pair after a substep, for each bottle, in m/s.
 
-    The largest of the differences in velocity, in that of the rim, and in position over h (see above); inf for what is
-    not finite.
+    It is the largest of the differences in velocity, in rim velocity, and in position over h (see above); inf if not
+    finite.
     """
     for i in range(uint64(first), uint64(end)):
         vx, vy, x, y = 0.0, 0.0, 0.0, 0.0
@@ -167,8 +181,8 @@ def _note_errors(radius: Any, spin: Any, slopes: Any, h: float, first: int, end:
             x += WAY_ERRORS[j] * ax
             y += WAY_ERRORS[j] * ay
         speed = h * math.sqrt(vx * vx + vy * vy)
-        way = WAY_SHARE * h * math.sqrt(x * x + y * y)
-        slopes.error[i] = _finite(speed if speed > way else way)
+        drift = DRIFT_WEIGHT * h * math.sqrt(x * x + y * y)
+        slopes.error[i] = _finite(speed if speed > drift else drift)
     if spin is not None:
         for i in range(uint64(first), uint64(end)):
             omega = 0.0
@@ -180,7 +194,7 @@ def _note_errors(radius: Any, spin: Any, slopes: Any, h: float, first: int, end:
 
 @part
 def _finite(error: float) -> float:
-    """The error, or inf where it is not a number: that would be lost among the others."""
+    """Return the error, or inf if it is not a number, which would disappear among the others."""
     return error if error < math.inf else math.inf
 
 
@@ -193,29 +207,29 @@ def _largest(errors: Any) -> float:
 
 
 @part
-def _next(h: float, worst: float, allowed: float, left: float, dt: float) -> float:
-    """Length of the next substep, s, by the largest error in one of h: it divides what is left of the step evenly."""
+def _next(h: float, worst: float, allowed: float, remaining: float, dt: float) -> float:
+    """Return the length of the next substep, s, from the largest error in one of h. It divides the remaining step."""
     factor = GROW
     if worst > 0.0:
         factor = min(GROW, max(SHRINK, SAFETY * math.pow(allowed / worst, 0.2)))
-    return left / math.ceil(left / max(factor * h, 0.5 * FLOOR * dt))
+    return remaining / math.ceil(remaining / max(factor * h, 0.5 * FLOOR * dt))
 
 
 @part
 def _accept(world: World, slopes: Any, h: float, first: int, end: int) -> None:
-    """End a substep at the state reached, and begin the next one there, with the forces found there."""
-    turn(world.spin, slopes, WAYS, h, first, end)
+    """End a substep at the present state, and start the next one there with the present forces."""
+    turn(world.spin, slopes, SQUARED, h, first, end)
     add_impulses(world.peaks, slopes, WEIGHTS, h, first, end)
     book_stages(world.ledger, WEIGHTS, h, first, end)
     note_powers(world.bottles, world.spin, world.load, world.ledger, 0.0, 0, first, end)
     note_peaks(world.load, world.peaks, first, end)
-    keep_state(world.bottles, world.spin, slopes, first, end)
-    keep_slopes(world.bottles, world.load, world.spin, slopes.normal, slopes, 0, first, end)
+    store_state(world.bottles, world.spin, slopes, first, end)
+    store_slopes(world.bottles, world.load, world.spin, slopes.normal, slopes, 0, first, end)
 
 
 @part
 def _spoil(bottles: Bottles, errors: Any, first: int, end: int, every: bool) -> None:
-    """Leave no number as the speed of bottles whose forces were not finite, or of every one, so that they are found."""
+    """Set the speed of bottles with forces that are not finite, or of every bottle, to NaN, so that it is detected."""
     for i in range(first, end):
         if every or errors[i] == math.inf:
             bottles.vx[i] = math.nan

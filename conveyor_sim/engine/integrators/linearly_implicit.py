@@ -1,12 +1,13 @@
-"""Linearly implicit: forces are taken ahead in the step, made linear in the change of velocity, which is solved for.
+"""Linearly implicit: forces ahead in the step are linear in the change of velocity, for which a system is solved.
 
     (M + theta^2 h^2 K + theta h C) dv = h F(r + theta h v, v),  r += h (v + theta dv),  v += dv     (`tangent.py`)
 
-Where a step resolves the stiffest contact, theta is 1/2, the implicit midpoint rule: order 2 where forces are smooth
-and through friction, at first touch every method's: 1 with a dashpot, clamped or not, 2 without, 2.5 in velocity with
-Hertz (RMS over 64 phases: 1.00, 1.00, 2.00, 2.52; through friction 2.00). In longer steps theta goes to 1, implicit
-Euler, and the system is solved again about its own solution up to PASSES times, for contacts close and open: impacts
-are then lost within a step, but packings and queues stay stable and press with the right forces, at any step.
+If a step resolves the stiffest contact, theta is 1/2, the implicit midpoint rule. Its order is 2 where forces are
+smooth and through friction, and at first touch that of every method: 1 with a dashpot, clamped or not, 2 without, 2.5
+in velocity with Hertz (RMS over 64 phases: 1.00, 1.00, 2.00, 2.52; through friction 2.00). In longer steps theta goes
+to 1, implicit Euler, and the system is solved again about its own solution up to PASSES times, because contacts close
+and open. Impacts within a step are then lost, but packings and queues stay stable and press with the right forces, at
+any step.
 
 A system is solved by conjugate gradients (`conjugate_gradients.py`).
 """
@@ -43,10 +44,10 @@ from conveyor_sim.engine.support.footing import check_footing
 from conveyor_sim.engine.threads.workers import BLOCK, MOVED, UNIT, raise_flag, share, wait_for_all
 
 PASSES = 10
-"""Of a step longer than a contact, at most; what is left of the impulses then is kept, so that momentum is."""
+"""Limit of passes in a step longer than a contact. The residual impulse is then applied, which conserves momentum."""
 
 ENOUGH = 1e-4
-"""Of the largest kick at first: what may be left of it when the system is made anew."""
+"""Residual at which the system is assembled again, as a share of the largest initial kick."""
 
 
 @kernel
@@ -60,13 +61,13 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
         for first in range(begin, stop, BLOCK):
             end = min(first + BLOCK, stop)
             _begin(bottles, linear, first, end)
-            _look_ahead(world, dt, 0.0, first, end)
+            _predict(world, dt, 0.0, first, end)
         squared = dt * dt * _stiffest(world, worker)
         theta = _theta_of(squared)
         small = enough = 0.0
         for again in range(PASSES if theta > 0.5 else 1):
             for first in range(begin, stop, BLOCK):
-                _look_ahead(world, theta * dt, theta, first, min(first + BLOCK, stop))
+                _predict(world, theta * dt, theta, first, min(first + BLOCK, stop))
             wait_for_all(worker)
             linear_pairs(world, worker, (dt, theta), again)
             wait_for_all(worker)
@@ -86,7 +87,7 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
             _move(bottles, linear, dt, theta, first, end)
             _turn(world.spin, linear, dt, theta, first, end)
             accumulate_peaks(world.load, world.peaks, dt, first, end)
-            # Half of what other methods allow: bottles are looked for as far ahead again.
+            # Half of the distance that other methods allow, because contacts are evaluated as far ahead again.
             if moved_too_far(bottles, world.neighbourhood, 0.5 * world.settings.skin, first, end) or _fast(
                 bottles, 0.25 * world.settings.skin / dt, first, end
             ):
@@ -107,16 +108,16 @@ def _begin(bottles: Bottles, linear: Linear, first: int, end: int) -> None:
 
 
 @part
-def _look_ahead(world: World, time: float, theta: float, first: int, end: int) -> None:
-    """Put bottles where they would be after some time (s), but no farther than the lists hold."""
+def _predict(world: World, time: float, theta: float, first: int, end: int) -> None:
+    """Move bottles to their predicted positions after some time (s), but no farther than the lists hold."""
     bottles: Bottles = world.bottles
     linear: Any = world.linear
     far = 0.25 * world.settings.skin
     for i in range(uint64(first), uint64(end)):
         vx, vy = bottles.vx[i] + theta * linear.change.x[i], bottles.vy[i] + theta * linear.change.y[i]
-        way = time * math.sqrt(vx * vx + vy * vy)
+        distance = time * math.sqrt(vx * vx + vy * vy)
         allowed = max(far, time * math.sqrt(bottles.vx[i] * bottles.vx[i] + bottles.vy[i] * bottles.vy[i]))
-        reached = time * (allowed / way if way > allowed else 1.0)
+        reached = time * (allowed / distance if distance > allowed else 1.0)
         bottles.x[i] = linear.x[i] + reached * vx
         bottles.y[i] = linear.y[i] + reached * vy
 
@@ -131,14 +132,14 @@ def _fast(bottles: Bottles, limit: float, first: int, end: int) -> bool:
 
 @part
 def _stiffest(world: World, worker: Worker) -> float:
-    """The largest stiffness times mobility of all contacts, 1/s^2."""
+    """Return the largest stiffness times mobility of all contacts, 1/s^2."""
     bottles: Bottles = world.bottles
     linear: Any = world.linear
     begin, stop = share(worker, bottles.x.size)
     wait_for_all(worker)
     stiffest_pairs(world, worker)
     for first in range(begin, stop, BLOCK):
-        stiffest_rails(world, worker.found, first, min(first + BLOCK, stop))
+        stiffest_rails(world, worker.rail_contacts, first, min(first + BLOCK, stop))
     wait_for_all(worker)
     most = _most_of_pairs(world.pairs)
     for unit in range(linear.most.size):
@@ -157,20 +158,20 @@ def _most_of_pairs(pairs: Any) -> float:
 
 @part
 def _theta_of(squared: float) -> float:
-    """Where in a step forces are taken: in the middle, or towards its end, by (w dt)^2 of the stiffest contact."""
+    """Return theta, the position in a step at which forces are evaluated, from (w dt)^2 of the stiffest contact."""
     squared = 1.0 if squared < 1.0 else squared
     return 1.0 - 0.5 / (squared * squared)
 
 
 @part
 def _assemble(world: World, worker: Worker, dt: float, theta: float, first: int, end: int) -> None:
-    """Make the blocks and the right-hand side of bottles first to end, and begin the search."""
+    """Assemble blocks and right-hand side of bottles first to end, and begin the search."""
     bottles: Bottles = world.bottles
     linear: Any = world.linear
     own, inverse = linear.own, linear.inverse
     sum_pair_forces(world.pairs, world.slots, world.load, _moments(world.spin), first, end)
     _inertia(bottles, world.spin, own, first, end)
-    linear_rails(world, worker.found, (dt, theta), first, end)
+    linear_rails(world, worker.rail_contacts, (dt, theta), first, end)
     check_footing(bottles, world.belts, world.surface, world.footing, world.ring, first, end)
     add_base_friction(world, world.spin, world.load, None, dt, first, end)
     add_straddling_friction(world, world.spin, world.load, None, world.settings.lag * dt, first, end)
@@ -190,7 +191,7 @@ def _moments(spin: Any) -> Any:
 
 @part
 def _inertia(bottles: Bottles, spin: Any, own: Blocks, first: int, end: int) -> None:
-    """Blocks of nothing but inertia; free slots, and what can't turn, have 1, for nothing pushes them."""
+    """Set blocks to inertia alone. Free slots, and bottles that can't turn, have 1, because nothing pushes them."""
     for i in range(uint64(first), uint64(end)):
         mass = 1.0 / bottles.inverse_mass[i] if bottles.inverse_mass[i] > 0.0 else 1.0
         own.xx[i] = own.yy[i] = mass
@@ -233,7 +234,7 @@ def _turn(spin: Any, linear: Linear, dt: float, theta: float, first: int, end: i
 
 @part
 def _book_solution(world: World, linear: Linear, ledger: Any, worker: Worker, dt: float, theta: float) -> None:
-    """Book a step by what the laws exert where it took the forces: what linear ones differ by is its error."""
+    """Book a step from the laws at the point where it took the forces; the linear model's difference is its error."""
     if ledger is None:
         return
     bottles: Bottles = world.bottles
@@ -241,12 +242,12 @@ def _book_solution(world: World, linear: Linear, ledger: Any, worker: Worker, dt
     change, way, product = linear.change, linear.way, linear.product
     for first in range(begin, stop, BLOCK):
         end = min(first + BLOCK, stop)
-        # The new state is kept in what the search has left behind.
+        # The arrays of the search, which has ended, hold the new state meanwhile.
         for i in range(uint64(first), uint64(end)):
             way.x[i], way.y[i], product.x[i], product.y[i] = bottles.x[i], bottles.y[i], bottles.vx[i], bottles.vy[i]
             bottles.vx[i] -= change.x[i]
             bottles.vy[i] -= change.y[i]
-        _look_ahead(world, theta * dt, theta, first, end)
+        _predict(world, theta * dt, theta, first, end)
         _set_velocities(bottles, world.spin, linear, 1.0 - theta, True, first, end)
     pack_all(world, worker)
     pair_phase(world, worker, dt, 0.0)
@@ -263,7 +264,7 @@ def _book_solution(world: World, linear: Linear, ledger: Any, worker: Worker, dt
 
 @part
 def _set_velocities(bottles: Bottles, spin: Any, linear: Linear, back: float, keep: bool, first: int, end: int) -> None:
-    """Set velocities to those kept after the step less a share of its change; keep: note those of spin first."""
+    """Set velocities to the stored ones after the step minus a share of its change; keep: store those of spin first."""
     change, kept = linear.change, linear.product
     for i in range(uint64(first), uint64(end)):
         bottles.vx[i] = kept.x[i] - back * change.x[i]

@@ -1,13 +1,13 @@
-"""The parts that integrators are made of: kick (velocities), and what follows every step.
+"""Parts of integrators: the kick (velocities), and the work that follows every step.
 
-Each works on bottles first to end.
+Each part works on bottles first to end.
 """
 
 from typing import Any
 
 from numba import uint64
 
-from conveyor_sim.engine.arrays.bodies import Bottles, Load
+from conveyor_sim.engine.arrays.bodies import Bottles, ForceSums
 from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.integrators.callees import call_probe, call_rebuild
@@ -17,18 +17,18 @@ from conveyor_sim.engine.lists.riding import wake_all
 from conveyor_sim.engine.threads.workers import MOVED, flag_raised, lower_flag, raise_flag, wait_for_all
 
 TINY = 1e-100
-"""m/s or rad/s. A resting bottle's speed decays to denormal numbers, which slow the arithmetic: below this it is 0."""
+"""Speed below which a bottle rests, m/s or rad/s. Decaying speeds would become denormal numbers, which are slow."""
 
 
 @part
 def settle(speed: float) -> float:
-    """The speed, or 0 for one below TINY; what is not a number stays so, and is found."""
+    """Return the speed, or 0 if it is below TINY. NaN stays NaN, so that it is detected."""
     return 0.0 if abs(speed) <= TINY else speed
 
 
 @part
-def kick(bottles: Bottles, spin: Any, load: Load, dt: float, first: int, end: int) -> None:
-    """v += dt a and omega += dt alpha, with a = F/m, alpha = M/J (paper eqs. 1, 5)."""
+def kick(bottles: Bottles, spin: Any, load: ForceSums, dt: float, first: int, end: int) -> None:
+    """Apply v += dt a and omega += dt alpha, with a = F/m, alpha = M/J (paper eqs. 1, 5)."""
     for i in range(uint64(first), uint64(end)):
         bottles.vx[i] = settle(bottles.vx[i] + dt * (load.fx[i] * bottles.inverse_mass[i]))
         bottles.vy[i] = settle(bottles.vy[i] + dt * (load.fy[i] * bottles.inverse_mass[i]))
@@ -38,8 +38,8 @@ def kick(bottles: Bottles, spin: Any, load: Load, dt: float, first: int, end: in
 
 
 @part
-def accumulate_peaks(load: Load, peaks: Any, dt: float, first: int, end: int) -> None:
-    """Note the largest normal force (N) and the impulse of all normal forces (N s) of each bottle."""
+def accumulate_peaks(load: ForceSums, peaks: Any, dt: float, first: int, end: int) -> None:
+    """Update each bottle's largest normal force (N) and the impulse of all its normal forces (N s)."""
     if peaks is None:
         return
     _accumulate(load.normal_max, load.normal_sum, peaks, dt, first, end)
@@ -61,7 +61,7 @@ def note_moved(world: World, worker: Worker, first: int, end: int) -> None:
 
 @part
 def lists_hold(world: World, worker: Worker) -> bool:
-    """Wait for all; rebuild the lists if a bottle has moved too far; False if they did not fit and must be grown."""
+    """Wait for all; rebuild the lists if a bottle has moved too far. Return False if they did not fit."""
     wait_for_all(worker)
     if flag_raised(worker, MOVED):
         wait_for_all(worker)
@@ -77,7 +77,7 @@ def lists_hold(world: World, worker: Worker) -> bool:
 
 @part
 def probe_rebuilt(world: World, worker: Worker) -> None:
-    """At the end of a step: look at the overlaps if the lists were made anew since the last look (`guard_probe.py`)."""
+    """Update the deepest overlaps at the end of a step if the lists were rebuilt in the meantime (`guard_probe.py`)."""
     if world.probe.due[0] != 0:
         wait_for_all(worker)
         if worker.rank == 0:

@@ -1,3 +1,3 @@
-"""Where in a tick an integrator is called."""
+"""Positions in a tick at which an integrator is called."""
 
 START, RESUME = 0, 1

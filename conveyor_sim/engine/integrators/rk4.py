@@ -1,17 +1,18 @@
-"""The classical Runge-Kutta method. Four force evaluations a step, and one more a tick.
+"""Classical Runge-Kutta method, with four force evaluations per step, and one more per tick.
 
-Order 4 where forces are smooth, as in a contact that lasts or in friction below v_lim; 3 through v_lim, where the
-friction curve bends. First touch bounds it as it bounds every method, though with a third of velocity Verlet's error:
-order 1 with a dashpot, clamped or not, whose force jumps; 2 with an undamped linear spring, whose slope does; 2.5 in
-velocity with Hertz. Measured in a rebound: 1.00 with a dashpot, 0.99 clamped, 1.99 without, 2.50 with Hertz; through
-friction 4.03 below v_lim, 3.09 across it (test/physics/test_head_on.py, test_contact_laws.py, test_set_down.py).
+It has order 4 where forces are smooth, as in a lasting contact or in friction below v_lim, and 3 through v_lim, where
+the friction curve bends. First touch limits it as it limits every method, though with a third of velocity Verlet's
+error: order 1 with a dashpot, clamped or not, whose force jumps; 2 with an undamped linear spring, whose slope does;
+2.5 in velocity with Hertz. Measured in a rebound: 1.00 with a dashpot, 0.99 clamped, 1.99 without, 2.50 with Hertz;
+through friction 4.03 below v_lim, 3.09 across it (test/physics/test_head_on.py, test_contact_laws.py,
+test_set_down.py).
 
-Peak forces are those at the beginning of each step, and at the end of the tick: the states of other evaluations are off
-the path. An undamped peak between two steps is missed by up to (pi/n)^2/8 at n steps a contact, and none is exceeded.
-Impulses weight all evaluations as the momentum does.
+Peak forces are those at the start of each step and at the end of the tick, because the states of other evaluations are
+off the path. An undamped peak between two steps is missed by up to (pi/n)^2/8 at n steps per contact, and none is
+exceeded. Impulses weight all evaluations as the momentum does.
 
-Tangential springs in a stage are as long as its way draws them, and are cut and kept where a step ends, once: order 4
-while a contact sticks. Within a tick the look at damage sees them one step late.
+Tangential springs in a stage follow the displacement of the stage. They are cut and stored once, at the end of a step:
+order 4 while a contact sticks. Within a tick the damage evaluation sees them one step late.
 """
 
 from typing import Any
@@ -21,19 +22,19 @@ import numpy as np
 from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import kernel
 from conveyor_sim.engine.contact.pairs import pack
-from conveyor_sim.engine.contact.path import forget_path, note_stage
+from conveyor_sim.engine.contact.path import note_stage, reset_path
 from conveyor_sim.engine.forces import bottle_forces, pack_all, pair_phase
 from conveyor_sim.engine.integrators.motion import lists_hold, note_moved, probe_rebuilt
 from conveyor_sim.engine.integrators.phase import RESUME, START
 from conveyor_sim.engine.integrators.runge_kutta import (
     add_impulses,
-    come_to_rest,
     go_to,
-    keep_slopes,
-    keep_state,
     note_peaks,
+    settle_all,
+    squared_weights,
+    store_slopes,
+    store_state,
     turn,
-    ways_of,
 )
 from conveyor_sim.engine.observers.damage import note_damage
 from conveyor_sim.engine.observers.ledger import book_stages, note_powers
@@ -50,7 +51,7 @@ WEIGHTS = np.array(
         [1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0],
     ]
 )
-WAYS = ways_of(WEIGHTS)
+SQUARED = squared_weights(WEIGHTS)
 
 
 @kernel
@@ -62,12 +63,12 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
     stage = int(slopes.progress[0]) if phase == RESUME else 0
     taken = 0
     if phase == START:
-        forget_path(world.path, world.moving, worker)
+        reset_path(world.path, world.moving, worker)
     pack_all(world, worker)
     while True:
         if stage == 0 and taken < steps:
             note_damage(world, worker, dt)
-        # Springs are as long as a stage's way draws them, and are cut and kept where a step ends.
+        # Springs follow the displacement of a stage; they are cut and stored at the end of a step.
         kept = dt if stage == 0 else 0.0
         pair_phase(world, worker, dt, kept)
         for first in range(begin, stop, BLOCK):
@@ -77,14 +78,14 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
                 note_peaks(world.load, world.peaks, first, end)
                 if taken == steps:
                     continue
-                keep_state(bottles, world.spin, slopes, first, end)
+                store_state(bottles, world.spin, slopes, first, end)
             note_powers(bottles, world.spin, world.load, world.ledger, 0.0, stage, first, end)
-            keep_slopes(bottles, world.load, world.spin, slopes.normal, slopes, stage, first, end)
-            go_to(world, TIMES, WEIGHTS, WAYS, stage + 1, dt, first, end)
-            note_stage(world, TIMES, WAYS, stage + 1, dt, first, end)
+            store_slopes(bottles, world.load, world.spin, slopes.normal, slopes, stage, first, end)
+            go_to(world, TIMES, WEIGHTS, SQUARED, stage + 1, dt, first, end)
+            note_stage(world, TIMES, SQUARED, stage + 1, dt, first, end)
             if stage + 1 == STAGES:
-                come_to_rest(bottles, world.spin, first, end)
-                turn(world.spin, slopes, WAYS, dt, first, end)
+                settle_all(bottles, world.spin, first, end)
+                turn(world.spin, slopes, SQUARED, dt, first, end)
                 add_impulses(world.peaks, slopes, WEIGHTS, dt, first, end)
                 book_stages(world.ledger, WEIGHTS, dt, first, end)
             pack(bottles, first, end)

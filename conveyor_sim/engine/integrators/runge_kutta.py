@@ -1,31 +1,31 @@
-"""Parts of explicit Runge-Kutta methods: slopes kept within a step, and states put together from them.
+"""Parts of explicit Runge-Kutta methods: slopes stored within a step, and states computed from them.
 
-Row s of a tableau is where a step of h goes after s evaluations, with the accelerations a_j = F_j/m found in them:
+Row s of a tableau gives the state of a step of h after s evaluations with accelerations a_j = F_j/m:
     v = v_0 + h sum_j weights[s, j] a_j
-    r = r_0 + h times[s] v_0 + h^2 sum_j ways[s, j] a_j,   ways = weights @ weights
-The last row is the new state. The second line is the method's own sum over velocities with the first put in: so free
-flight is exact, and no velocities are kept. Each part works on bottles first to end; `slopes` is the World's.
+    r = r_0 + h times[s] v_0 + h^2 sum_j squared[s, j] a_j,   squared = weights @ weights
+The last row is the new state. The second line is the method's own sum over velocities with the first line inserted: so
+free flight is exact, and no velocities are stored. Each part works on bottles first to end; `slopes` is the World's.
 """
 
 from typing import Any
 
 from numba import uint64
 
-from conveyor_sim.engine.arrays.bodies import Bottles, Load
+from conveyor_sim.engine.arrays.bodies import Bottles, ForceSums
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.engine.arrays.world import World
 from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.integrators.motion import settle
 
 
-def ways_of(weights: F8) -> F8:
-    """Weights of the accelerations in positions, over h^2, from those in velocities over h; both (rows, stages)."""
+def squared_weights(weights: F8) -> F8:
+    """Return the weights of accelerations in positions, over h^2, from those in velocities, over h; (rows, stages)."""
     return weights @ weights[: weights.shape[1]]
 
 
 @part
-def keep_state(bottles: Bottles, spin: Any, slopes: Any, first: int, end: int) -> None:
-    """A step begins here."""
+def store_state(bottles: Bottles, spin: Any, slopes: Any, first: int, end: int) -> None:
+    """Store the state at the start of a step."""
     for i in range(uint64(first), uint64(end)):
         slopes.x[i] = bottles.x[i]
         slopes.y[i] = bottles.y[i]
@@ -37,10 +37,10 @@ def keep_state(bottles: Bottles, spin: Any, slopes: Any, first: int, end: int) -
 
 
 @part
-def keep_slopes(
-    bottles: Bottles, load: Load, spin: Any, normals: Any, slopes: Any, stage: int, first: int, end: int
+def store_slopes(
+    bottles: Bottles, load: ForceSums, spin: Any, normals: Any, slopes: Any, stage: int, first: int, end: int
 ) -> None:
-    """Note what the forces just evaluated do: the `stage`-th of a step. normals: `slopes.normal`."""
+    """Store the accelerations of the last evaluation, the `stage`-th of a step. normals: `slopes.normal`."""
     j: Any = uint64(stage)
     for i in range(uint64(first), uint64(end)):
         slopes.ax[j, i] = load.fx[i] * bottles.inverse_mass[i]
@@ -60,8 +60,8 @@ def _keep_normals(normals: Any, sums: Any, j: int, first: int, end: int) -> None
 
 
 @part
-def go_to(world: World, times: F8, weights: F8, ways: F8, s: int, h: float, first: int, end: int) -> None:
-    """Put bottles where row s of a tableau has them in a step of h seconds; angles wait for the step's end."""
+def go_to(world: World, times: F8, weights: F8, squared: F8, s: int, h: float, first: int, end: int) -> None:
+    """Move bottles to row s of a tableau in a step of h seconds; angles wait for the end of the step."""
     bottles, spin, slopes = world.bottles, world.spin, world.slopes
     ahead = h * times[s]
     for i in range(uint64(first), uint64(end)):
@@ -74,20 +74,20 @@ def go_to(world: World, times: F8, weights: F8, ways: F8, s: int, h: float, firs
             spin.omega[i] = slopes.omega[i]
     for stage in range(s):
         j: Any = uint64(stage)
-        speed, way = h * weights[s, stage], h * h * ways[s, stage]
-        # A slope without weight is left out, for it may be one of a step that was given up, and not finite.
-        if speed != 0.0 or way != 0.0:
-            _add_slope(bottles, spin, slopes, j, speed, way, first, end)
+        speed, shift = h * weights[s, stage], h * h * squared[s, stage]
+        # A slope without weight is skipped, because it may be from a rejected step, and not finite.
+        if speed != 0.0 or shift != 0.0:
+            _add_slope(bottles, spin, slopes, j, speed, shift, first, end)
 
 
 @part
 def _add_slope(
-    bottles: Bottles, spin: Any, slopes: Any, j: int, speed: float, way: float, first: int, end: int
+    bottles: Bottles, spin: Any, slopes: Any, j: int, speed: float, shift: float, first: int, end: int
 ) -> None:
     for i in range(uint64(first), uint64(end)):
         ax, ay = slopes.ax[j, i], slopes.ay[j, i]
-        bottles.x[i] += way * ax
-        bottles.y[i] += way * ay
+        bottles.x[i] += shift * ax
+        bottles.y[i] += shift * ay
         bottles.vx[i] += speed * ax
         bottles.vy[i] += speed * ay
     if spin is not None:
@@ -96,8 +96,8 @@ def _add_slope(
 
 
 @part
-def come_to_rest(bottles: Bottles, spin: Any, first: int, end: int) -> None:
-    """Set speeds of next to nothing to 0 (`settle`)."""
+def settle_all(bottles: Bottles, spin: Any, first: int, end: int) -> None:
+    """Set very small speeds to 0 (`settle`)."""
     for i in range(uint64(first), uint64(end)):
         bottles.vx[i] = settle(bottles.vx[i])
         bottles.vy[i] = settle(bottles.vy[i])
@@ -107,22 +107,22 @@ def come_to_rest(bottles: Bottles, spin: Any, first: int, end: int) -> None:
 
 
 @part
-def turn(spin: Any, slopes: Any, ways: F8, h: float, first: int, end: int) -> None:
-    """Turn bottles by what a whole step of h seconds turns them."""
+def turn(spin: Any, slopes: Any, squared: F8, h: float, first: int, end: int) -> None:
+    """Turn bottles by the rotation of a complete step of h seconds."""
     if spin is None:
         return
-    last = ways.shape[0] - 1
+    last = squared.shape[0] - 1
     for i in range(uint64(first), uint64(end)):
         spin.theta[i] += h * slopes.omega[i]
-    for stage in range(ways.shape[1]):
-        j, way = uint64(stage), h * h * ways[last, stage]
+    for stage in range(squared.shape[1]):
+        j, shift = uint64(stage), h * h * squared[last, stage]
         for i in range(uint64(first), uint64(end)):
-            spin.theta[i] += way * slopes.alpha[j, i]
+            spin.theta[i] += shift * slopes.alpha[j, i]
 
 
 @part
 def add_impulses(peaks: Any, slopes: Any, weights: F8, h: float, first: int, end: int) -> None:
-    """Add the impulse of all normal forces (N s) in a whole step, weighted as the method weights accelerations."""
+    """Add the impulse of all normal forces (N s) in a complete step, weighted as the method weights accelerations."""
     if peaks is None:
         return
     last = weights.shape[0] - 1
@@ -133,8 +133,8 @@ def add_impulses(peaks: Any, slopes: Any, weights: F8, h: float, first: int, end
 
 
 @part
-def note_peaks(load: Load, peaks: Any, first: int, end: int) -> None:
-    """Note the largest normal force (N) of each bottle in the last evaluation."""
+def note_peaks(load: ForceSums, peaks: Any, first: int, end: int) -> None:
+    """Update the largest normal force (N) of each bottle with the last evaluation."""
     if peaks is None:
         return
     _note_largest(load.normal_max, peaks, first, end)

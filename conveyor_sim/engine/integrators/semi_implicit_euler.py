@@ -1,27 +1,35 @@
 """Semi-implicit Euler, the paper's integrator (eqs. 5 and 6), and leapfrog: v += dt a(r, v), then r += dt v, the new v.
 
-Velocities are those of mid-step, positions those of the step's end. Semi-implicit Euler takes both for one instant,
-so a bottle that a turning belt carries seems to slip outward by half a step's acceleration: its forces at rest are off
-by mu g dt / v_lim. Leapfrog asks the belt for its velocity where the bottle was at mid-step (`Settings.lag`), and is
-not (test/physics/test_resting_load.py). On straight belts and floors the two are the same to the bit.
+Velocities are those of mid-step, positions those of the end of the step. Semi-implicit Euler treats both as
+simultaneous, so a bottle that a turning belt carries seems to slip outward by half a step's acceleration: its forces at
+rest are off by mu g dt / v_lim. Leapfrog uses the belt's velocity at the bottle's mid-step position
+(`EngineSettings.lag`) and has no such error (test/physics/test_resting_load.py). On straight belts and floors the two
+agree to the bit.
 
-Order 1 through dashpots, clamped or not, and through friction, with a jump at first touch or without. Without damping
-its errors in energy stay bounded; a rebound and a peak force are of order 2 then, with Hertz a rebound is of 2.5.
-Measured in a rebound: 0.93 with a dashpot, 0.99 clamped, 1.99 without, 2.46 with Hertz; 1.00 in friction
-(test/physics/test_head_on.py, test_contact_laws.py, test_set_down.py). One force evaluation a step.
+The order is 1 through dashpots, clamped or not, and through friction, with or without a jump at first touch. Without
+damping its errors in energy stay bounded; a rebound and a peak force are then of order 2, with Hertz a rebound is of
+2.5. Measured in a rebound: 0.93 with a dashpot, 0.99 clamped, 1.99 without, 2.46 with Hertz; 1.00 in friction
+(test/physics/test_head_on.py, test_contact_laws.py, test_set_down.py). A step takes one force evaluation.
 """
 
 from typing import Any
 
 from numba import uint64
 
-from conveyor_sim.engine.arrays.bodies import Bottles, Load
+from conveyor_sim.engine.arrays.bodies import Bottles, ForceSums
 from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import kernel, part
 from conveyor_sim.engine.contact.pairs import pack_row
 from conveyor_sim.engine.forces import bottle_forces, pack_all, pair_phase
 from conveyor_sim.engine.integrators.motion import accumulate_peaks, lists_hold, note_moved, probe_rebuilt, settle
-from conveyor_sim.engine.lists.riding import begin_look, end_look, ride, step_all, stepped_run, stepped_runs
+from conveyor_sim.engine.lists.riding import (
+    begin_examination,
+    end_examination,
+    ride,
+    step_all,
+    stepped_run,
+    stepped_runs,
+)
 from conveyor_sim.engine.observers.damage import note_damage
 from conveyor_sim.engine.observers.ledger import book_kick
 from conveyor_sim.engine.rails.moving import pass_step, place_rails
@@ -44,14 +52,14 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
             end = min(first + BLOCK, stop)
             bottle_forces(world, worker, dt, dt, first, end)
             book_kick(bottles, world.spin, world.load, world.ledger, dt, first, end)
-            begin_look(bottles, world.spin, world.riding, first, end)
+            begin_examination(bottles, world.spin, world.riding, first, end)
             for run in range(stepped_runs(world.riding, first)):
                 left, right = stepped_run(world.riding, first, end, run)
                 _move(bottles, world.load, dt, left, right)
                 _turn(world.spin, dt, left, right)
                 accumulate_peaks(world.load, world.peaks, dt, left, right)
             ride(bottles, world.spin, world.riding, dt, first, end)
-            end_look(world, None, first, end)
+            end_examination(world, None, first, end)
             carry_anchors(world.footing, world.static_friction, dt, first, end)
             note_moved(world, worker, first, end)
         hold = lists_hold(world, worker)
@@ -63,8 +71,8 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
 
 
 @part
-def _move(bottles: Bottles, load: Load, dt: float, first: int, end: int) -> None:
-    """Move bottles first to end, and pack them for the next step, all in one pass."""
+def _move(bottles: Bottles, load: ForceSums, dt: float, first: int, end: int) -> None:
+    """Move bottles first to end and pack them for the next step, in one pass."""
     for i in range(uint64(first), uint64(end)):
         vx = settle(bottles.vx[i] + dt * (load.fx[i] * bottles.inverse_mass[i]))
         vy = settle(bottles.vy[i] + dt * (load.fy[i] * bottles.inverse_mass[i]))

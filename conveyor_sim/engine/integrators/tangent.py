@@ -1,15 +1,15 @@
-"""One contact as the linearly implicit method has it: its force ahead, and how it resists a change of velocity.
+"""One contact in the linearly implicit method: its force ahead, and its resistance to a change of velocity.
 
 A step of h from (r, v) changes v by dv and takes forces at r + theta h (v + theta dv) and v + theta dv, linear in dv:
     (M + theta^2 h^2 K + theta h C) dv = h F(r + theta h v, v)
-with K and C symmetric and nowhere negative: of each contact its stiffness along the normal, its damping, and the slope
-of its friction. The turning of normals and the change of friction with the normal force are left out; they are of a
-higher order. Slopes are differences of `contact_force`, so every law has them, and no law is written twice.
+with K and C symmetric and positive semidefinite: for each contact its stiffness along the normal, its damping, and the
+slope of its friction. The rotation of normals and the change of friction with the normal force are omitted; they are of
+a higher order. Slopes are differences of `contact_force`, so every law has them, and no law is written twice.
 
 In steps longer than a contact, theta > 1/2, three things differ, by `late` = 2 theta - 1:
-- A contact that was closed before the step and is open ahead is held on to, or a packing at rest would come loose.
-- Friction takes the normal force from before the step: ahead, deep in each other, the bottles would press far too hard.
-- Friction and damping resist by their secant to rest, force over slip, where a step could otherwise turn a slip round.
+- A contact that was closed before the step and is open ahead is retained, or a packing at rest would come loose.
+- Friction uses the normal force before the step: ahead, with deep overlaps, bottles would press far too hard.
+- Friction and damping resist by their secant to rest, force over slip, if a step could otherwise reverse a slip.
 """
 
 from conveyor_sim.engine.arrays.contacts import ContactLaw
@@ -18,10 +18,10 @@ from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.contact.contact import contact_force
 
 DIFFERENCE = 1e-6
-"""Share of an overlap, or of v_lim, over which slopes are taken."""
+"""Share of an overlap, or of v_lim, over which slopes are computed."""
 
 CONTACTS = 12.0
-"""Of a bottle that may act together: six in a hexagonal packing, and six more for its base."""
+"""Contacts of a bottle that may act together: six in a hexagonal packing, and six more for its base."""
 
 
 @part
@@ -37,10 +37,10 @@ def linear_contact(
     step: tuple[float, float],
     hold: bool,
 ) -> tuple[float, float, float, float, float]:
-    """Return N and T (N) ahead, what resists dv along n and t (kg), and N before the step.
+    """Return N and T (N) ahead, the resistance to dv along n and t (kg), and N before the step.
 
     overlaps: m, before the step and ahead; 0 or less: apart. share, closing, slip: as in `contact_force`, closing
-    before and ahead. mobility: 1/kg, what closing speed and slip gain from a unit of impulse. step: dt, s, and theta.
+    before and ahead. mobility: 1/kg, closing speed and slip per unit of impulse. step: dt, s, and theta.
     """
     curves, slip_limit, atan = world.curves, world.settings.slip_limit, world.settings.atan
     before, ahead = overlaps
@@ -70,31 +70,30 @@ def linear_contact(
 
 @part
 def resistance(slope: float, secant: float, theta: float, mobility: float) -> float:
-    """What resists (kg), from a force's slope over velocity and its quotient by velocity, both times dt (kg).
+    """Return the resistance (kg) from a force's slope over velocity and its quotient by velocity, both times dt (kg).
 
-    theta times the slope, as the method has it, and as much of the secant as keeps the step from turning the velocity
-    round.
-    mobility: 1/kg, what the velocity gains from a unit of impulse, times the contacts that may act together.
+    It is theta times the slope, as in the method, plus as much of the secant as prevents the step from reversing the
+    velocity. mobility: 1/kg, velocity per unit of impulse, times the number of contacts that may act together.
     """
     return theta * slope + firmness(secant * mobility) * (secant - theta * slope)
 
 
 @part
 def firmness(turns: float) -> float:
-    """Share of the secant that is needed, by what the force alone would change in a step, over the velocity."""
+    """Return the share of the secant that is needed. turns: velocity change by the force alone, over the velocity."""
     return 1.0 - 1.0 / turns if turns > 1.0 else 0.0
 
 
 @part
 def contact_stiffness(world: World, law: ContactLaw, e: int, depth: float, share: float) -> float:
-    """Slope of the elastic force over the overlap, N/m, at a depth in m; 0 apart."""
+    """Return the slope of the elastic force over the overlap, N/m, at a depth in m; 0 apart."""
     stiffness, _, _ = _slopes(world, law, e, depth, share)
     return stiffness
 
 
 @part
 def _slopes(world: World, law: ContactLaw, e: int, depth: float, share: float) -> tuple[float, float, float]:
-    """Slope of N over overlap at rest (N/m), over closing speed (kg/s), where nothing is clamped, and N at rest (N)."""
+    """Return slopes of N over overlap at rest (N/m) and closing speed (kg/s), unclamped, and N at rest (N)."""
     if not depth > 0.0:
         return 0.0, 0.0, 0.0
     curves, slip_limit, atan = world.curves, world.settings.slip_limit, world.settings.atan

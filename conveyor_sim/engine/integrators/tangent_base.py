@@ -1,4 +1,4 @@
-"""Friction under the bottles for the linearly implicit method: how it resists a change of velocity (`tangent.py`)."""
+"""Friction under the bottles in the linearly implicit method: its resistance to a change of velocity (`tangent.py`)."""
 
 import math
 
@@ -13,7 +13,7 @@ from conveyor_sim.engine.threads.workers import units
 
 @part
 def resist_base(world: World, dt: float, theta: float, first: int, end: int) -> None:
-    """Add to the blocks of bottles first to end how the base friction resists, kg; `footing` must be that of now."""
+    """Add the resistance of base friction, kg, to the blocks of bottles first to end. `footing` must be current."""
     ring = world.ring
     if world.footing is None:
         return
@@ -81,14 +81,14 @@ def _resist_ring(world: World, dt: float, theta: float, i: int) -> None:
 
 @part
 def _ring_forces(slide: float, rim: float, slip_limit: float) -> tuple[float, float]:
-    """F/(mu m g) and M/(mu m g R_b) of a ring that slides and spins at speeds greater than 0, m/s."""
+    """Return F/(mu m g) and M/(mu m g R_b) of a ring that slides and spins at speeds greater than 0, m/s."""
     limit, first, rest = ring_means(slide, rim, slip_limit)
     return slide * ring_share(slide, rim, limit, first, rest), rim * ring_share(rim, slide, limit, first, rest)
 
 
 @part
 def _resist_straddling(world: World, dt: float, theta: float, first: int, end: int) -> None:
-    """Rings that may stand on several belts; their secant is taken as if all stood on the belt under the axis."""
+    """Add the resistance of rings that may straddle belts; the secant is that of the belt under the axis alone."""
     settings, bottles, belts, footing = world.settings, world.bottles, world.belts, world.footing
     own = world.linear.own
     if belts is None:

@@ -1,4 +1,4 @@
-"""The contacts of bottle pairs for the linearly implicit method (`tangent.py`)."""
+"""Contacts of bottle pairs in the linearly implicit method (`tangent.py`)."""
 
 import math
 from typing import Any
@@ -20,7 +20,7 @@ from conveyor_sim.engine.threads.workers import UNIT, share
 def stiffest_pairs(world: World, worker: Worker) -> None:
     """Write to `pairs.tangent.most`, for each unit, the largest stiffness times mobility (1/s^2) of closed contacts.
 
-    Closed now, that is at `bottles.x`, or before the step.
+    These are closed at `bottles.x` or were so before the step.
     """
     bottles, pairs = world.bottles, world.pairs
     if pairs is None:
@@ -41,7 +41,7 @@ def stiffest_pairs(world: World, worker: Worker) -> None:
 
 @part
 def linear_pairs(world: World, worker: Worker, step: tuple[float, float], again: int) -> None:
-    """Find forces and moments ahead, and `pairs.tangent`, of this worker's share of the pairs.
+    """Compute forces and moments ahead, and `pairs.tangent`, of this worker's share of the pairs.
 
     Normal forces, for peaks, are those before the step. step: as in `linear_contact`.
     """
@@ -64,7 +64,7 @@ def linear_pairs(world: World, worker: Worker, step: tuple[float, float], again:
 
 @part
 def _overlaps(bottles: Bottles, linear: Linear, i: int, j: int) -> tuple[float, float, float, float]:
-    """Overlaps (m) ahead and before, and the normal ahead."""
+    """Return the overlaps (m) ahead and before, and the normal ahead."""
     reach = bottles.radius[i] + bottles.radius[j]
     ahead, nx, ny = normal_and_overlap(bottles.x[j] - bottles.x[i], bottles.y[j] - bottles.y[i], reach)
     dx, dy = linear.x[j] - linear.x[i], linear.y[j] - linear.y[i]
@@ -81,7 +81,7 @@ def _close(
     step: tuple[float, float],
     hold: bool,
 ) -> None:
-    """overlaps, step, hold: as in `linear_contact`."""
+    """Compute one pair. overlaps, step, hold: as in `linear_contact`."""
     bottles, spin, pairs, change = world.bottles, world.spin, world.pairs, world.linear.change
     i, j = uint64(pairs.i[p]), uint64(pairs.j[p])
     vx, vy = bottles.vx[i] - bottles.vx[j], bottles.vy[i] - bottles.vy[j]
@@ -140,33 +140,33 @@ def _note_normal(pairs: Pairs, p: int, normal: float) -> None:
 
 
 @part
-def resist_pairs(pairs: Any, way: Any, old: Any, beta: float, worker: Worker) -> None:
-    """Write the impulses with which this worker's pairs resist the velocities way + beta old, both Triples, by pair."""
+def resist_pairs(pairs: Any, direction: Any, old: Any, beta: float, worker: Worker) -> None:
+    """Write, by pair, the impulses with which this worker's pairs resist velocities direction + beta old (Triples)."""
     if pairs is None:
         return
     begin, stop = share(worker, pairs.used[0])
     for p in range(uint64(begin), uint64(stop)):
-        _resist(pairs, way, old, beta, p)
+        _resist(pairs, direction, old, beta, p)
 
 
 @part
-def _resist(pairs: Pairs, way: Any, old: Any, beta: float, p: int) -> None:
+def _resist(pairs: Pairs, direction: Any, old: Any, beta: float, p: int) -> None:
     tangent: Any = pairs.tangent
     i, j = uint64(pairs.i[p]), uint64(pairs.j[p])
     nx, ny = tangent.nx[p], tangent.ny[p]
-    vx = (way.x[i] + beta * old.x[i]) - (way.x[j] + beta * old.x[j])
-    vy = (way.y[i] + beta * old.y[i]) - (way.y[j] + beta * old.y[j])
+    vx = (direction.x[i] + beta * old.x[i]) - (direction.x[j] + beta * old.x[j])
+    vy = (direction.y[i] + beta * old.y[i]) - (direction.y[j] + beta * old.y[j])
     slip = vy * nx - vx * ny
     arm_i, arm_j = tangent.arm_i[p], tangent.arm_j[p]
     if pairs.moment is not None:
-        slip += (way.turn[i] + beta * old.turn[i]) * arm_i + (way.turn[j] + beta * old.turn[j]) * arm_j
+        slip += (direction.turn[i] + beta * old.turn[i]) * arm_i + (direction.turn[j] + beta * old.turn[j]) * arm_j
     along, across = tangent.normal[p] * (vx * nx + vy * ny), tangent.tangential[p] * slip
     _write(pairs, p, along * nx - across * ny, along * ny + across * nx, across * arm_i, across * arm_j)
 
 
 @part
 def add_pair_blocks(pairs: Any, slots: Any, blocks: Blocks, first: int, end: int) -> None:
-    """Add to the blocks of bottles first to end what their pairs resist their own velocities with."""
+    """Add to the blocks of bottles first to end the resistance of their pairs to their own velocities."""
     if pairs is None:
         return
     for i in range(first, end):
@@ -184,7 +184,7 @@ def _add_pair_block(pairs: Any, entry: int, blocks: Blocks, i: int) -> None:
     tangent = pairs.tangent
     first = entry < count
     p = entry if first else entry - count
-    # The second of a pair sees the normal from the other side.
+    # For the second bottle of a pair the normal is reversed.
     nx, ny = (tangent.nx[p], tangent.ny[p]) if first else (-tangent.nx[p], -tangent.ny[p])
     add_block(
         blocks, i, tangent.normal[p], tangent.tangential[p], nx, ny, tangent.arm_i[p] if first else tangent.arm_j[p]
@@ -193,7 +193,7 @@ def _add_pair_block(pairs: Any, entry: int, blocks: Blocks, i: int) -> None:
 
 @part
 def add_block(blocks: Blocks, i: int, along: float, across: float, nx: float, ny: float, arm: float) -> None:
-    """Add to the block of bottle i what resists (kg) along a normal away from it, and across at an arm (m)."""
+    """Add to the block of bottle i a resistance (kg) along a normal away from it, and one across it at an arm (m)."""
     blocks.xx[i] += along * nx * nx + across * ny * ny
     blocks.xy[i] += (along - across) * nx * ny
     blocks.yy[i] += along * ny * ny + across * nx * nx

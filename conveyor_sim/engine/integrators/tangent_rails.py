@@ -1,4 +1,4 @@
-"""The contacts of bottles with rails for the linearly implicit method (`tangent.py`)."""
+"""Contacts of bottles with rails in the linearly implicit method (`tangent.py`)."""
 
 from typing import Any
 
@@ -15,10 +15,10 @@ from conveyor_sim.engine.threads.workers import UNIT, units
 
 
 @part
-def stiffest_rails(world: World, found: RailContacts, first: int, end: int) -> None:
+def stiffest_rails(world: World, contacts: RailContacts, first: int, end: int) -> None:
     """Write to `linear.most`, for each unit of bottles first to end, the largest stiffness over mass (1/s^2).
 
-    Of the contacts with rails that are closed now, at `bottles.x`.
+    It is the maximum over the contacts with rails that are closed at `bottles.x`.
     """
     bottles, linear, railed = world.bottles, world.linear, world.railed
     begin, stop = units(first, end)
@@ -29,17 +29,17 @@ def stiffest_rails(world: World, found: RailContacts, first: int, end: int) -> N
     for place in range(railed.first[begin], railed.first[stop]):
         i = railed.bottle[place]
         most = linear.most[i // UNIT]
-        for c in range(find_rail_contacts(i, world, found)):
-            entry = law_entry(world, found, c, i)
-            stiffness = contact_stiffness(world, world.rail_law, entry, found.overlap[c], found.share[c])
+        for c in range(find_rail_contacts(i, world, contacts)):
+            entry = law_entry(world, contacts, c, i)
+            stiffness = contact_stiffness(world, world.rail_law, entry, contacts.overlap[c], contacts.share[c])
             rate = stiffness * bottles.inverse_mass[i]
             most = rate if rate > most else most
         linear.most[i // UNIT] = most
 
 
 @part
-def linear_rails(world: World, found: RailContacts, step: tuple[float, float], first: int, end: int) -> None:
-    """Add what rails exert ahead on bottles first to end to `load` and `spin.moment`, and resist to `linear.own`.
+def linear_rails(world: World, contacts: RailContacts, step: tuple[float, float], first: int, end: int) -> None:
+    """Add the forces of rails ahead on bottles first to end to their load, and the resistance to `linear.own`.
 
     step: as in `linear_contact`.
     """
@@ -51,28 +51,29 @@ def linear_rails(world: World, found: RailContacts, step: tuple[float, float], f
         i = railed.bottle[place]
         x, y, radius = bottles.x[i], bottles.y[i], bottles.radius[i]
         old_x, old_y = linear.x[i], linear.y[i]
-        # Contacts that are closed ahead; then those that were before the step, of surfaces that are not touched ahead.
+        # First contacts that are closed ahead, then those that were closed before the step, of surfaces not touched
+        # ahead.
         for earlier in range(2 if step[1] > 0.5 else 1):
             if earlier:
                 bottles.x[i], bottles.y[i] = old_x, old_y
-            count = find_rail_contacts(i, world, found)
+            count = find_rail_contacts(i, world, contacts)
             bottles.x[i], bottles.y[i] = x, y
             for c in range(count):
-                overlap = found.overlap[c]
+                overlap = contacts.overlap[c]
                 if earlier:
-                    away = found.nx[c] * (x - old_x) + found.ny[c] * (y - old_y)
+                    away = contacts.nx[c] * (x - old_x) + contacts.ny[c] * (y - old_y)
                     before, ahead = overlap, min(overlap + away, 0.0)
                 else:
-                    before = _overlap(world, found.entry[c], old_x, old_y, radius)
+                    before = _overlap(world, contacts.entry[c], old_x, old_y, radius)
                     ahead = overlap
-                seen_to = earlier and _touched(world, found.surface[c], i, x, y, radius)
-                if found.share[c] > 0.0 and not seen_to:
-                    _add_contact(world, found, c, i, (before, ahead), step, earlier > 0)
+                handled = earlier and _touches(world, contacts.surface[c], i, x, y, radius)
+                if contacts.share[c] > 0.0 and not handled:
+                    _add_contact(world, contacts, c, i, (before, ahead), step, earlier > 0)
 
 
 @part
 def _overlap(world: World, entry: int, x: float, y: float, radius: float) -> float:
-    """Overlap (m) of a circle with the piece at an entry of the lists (`RailContacts.entry`)."""
+    """Return the overlap (m) of a circle with the piece at an entry of the lists (`RailContacts.entry`)."""
     if entry >= 0:
         return _segment_overlap(world.segments, world.near_segments, entry, x, y, radius)
     return _arc_overlap(world.arcs, world.near_arcs, -1 - entry, x, y, radius)
@@ -95,8 +96,8 @@ def _arc_overlap(arcs: Any, near: Any, entry: int, x: float, y: float, radius: f
 
 
 @part
-def _touched(world: World, surface: int, i: int, x: float, y: float, radius: float) -> bool:
-    """Whether bottle i at (x, y) touches a rail surface."""
+def _touches(world: World, surface: int, i: int, x: float, y: float, radius: float) -> bool:
+    """Return True if bottle i at (x, y) touches a rail surface."""
     segments, near_segments, arcs, near_arcs = world.segments, world.near_segments, world.arcs, world.near_arcs
     touched = False
     if segments is not None:
@@ -113,16 +114,16 @@ def _touched(world: World, surface: int, i: int, x: float, y: float, radius: flo
 @part
 def _add_contact(
     world: World,
-    found: RailContacts,
+    contacts: RailContacts,
     c: int,
     i: int,
     overlaps: tuple[float, float],
     step: tuple[float, float],
     hold: bool,
 ) -> None:
-    """overlaps, step, hold: as in `linear_contact`."""
+    """Add one contact. overlaps, step, hold: as in `linear_contact`."""
     bottles, spin, load, linear = world.bottles, world.spin, world.load, world.linear
-    nx, ny = found.nx[c], found.ny[c]
+    nx, ny = contacts.nx[c], contacts.ny[c]
     closing, slip = bottles.vx[i] * nx + bottles.vy[i] * ny, bottles.vy[i] * nx - bottles.vx[i] * ny
     closing_change = linear.change.x[i] * nx + linear.change.y[i] * ny
     mobility = rim_mobility = bottles.inverse_mass[i]
@@ -134,16 +135,16 @@ def _add_contact(
     normal, tangential, along, across, normal_before = linear_contact(
         world,
         world.rail_law,
-        law_entry(world, found, c, i),
+        law_entry(world, contacts, c, i),
         overlaps,
-        found.share[c],
+        contacts.share[c],
         (closing, closing + step[1] * closing_change),
         slip,
         (mobility, rim_mobility),
         step,
         hold,
     )
-    # The block, which holds this contact, will take that off again.
+    # The block, which contains this contact, will subtract that again.
     normal -= along * closing_change / step[0]
     load.fx[i] += -normal * nx - tangential * ny
     load.fy[i] += tangential * nx - normal * ny

@@ -1,30 +1,39 @@
-"""Velocity Verlet, second order in velocity-dependent forces too.
+"""Velocity Verlet, second order in velocity-dependent forces, too.
 
-v_half = v + a dt/2; r += dt v_half; a' = a(r, v_half + a dt/2); v = v_half + a' dt/2. Taking a' at v_half alone would
-be first order in damping; the prediction to the end of the step is second. Order 2 for smooth damping, friction and an
-undamped linear spring, 2.5 in velocity for Hertz; 1 through a dashpot, clamped or not, for its force jumps at first
-touch. Measured in a rebound: 1.00 with a dashpot, clamped or not, 1.99 without, 2.46 with Hertz; 2.00 in friction
-(test/physics/test_head_on.py, test_contact_laws.py, test_set_down.py). One force evaluation a step, one more a tick.
+v_half = v + a dt/2; r += dt v_half; a' = a(r, v_half + a dt/2); v = v_half + a' dt/2. With a' at v_half alone the
+method would be first order in damping; the prediction to the end of the step makes it second. The order is 2 for smooth
+damping, friction and an undamped linear spring, 2.5 in velocity for Hertz. It is 1 through a dashpot, clamped or not,
+because its force jumps at first touch. Measured in a rebound: 1.00 with a dashpot, clamped or not, 1.99 without, 2.46
+with Hertz; 2.00 in friction (test/physics/test_head_on.py, test_contact_laws.py, test_set_down.py). A step takes one
+force evaluation, a tick one more.
 
-Tangential springs are drawn out by the way of the drift, dt v_half, and cut where the step ends: order 2, and no cycle
-of sticking and slipping gains energy. A drag gamma is unstable from gamma dt = 1 on: the force then shakes from step to
-step, velocities hardly (test/physics/test_drag_limits.py). Implicit friction holds gamma dt at 2/3 (`friction.py`).
+Tangential springs are elongated by the displacement of the drift, dt v_half, and cut at the end of the step: order 2,
+and no cycle of sticking and slipping gains energy. A drag gamma is unstable from gamma dt = 1 on: the force then
+oscillates from step to step, velocities hardly (test/physics/test_drag_limits.py). Implicit friction limits gamma dt to
+2/3 (`friction.py`).
 """
 
 from typing import Any
 
 from numba import uint64
 
-from conveyor_sim.engine.arrays.bodies import Bottles, Load
+from conveyor_sim.engine.arrays.bodies import Bottles, ForceSums
 from conveyor_sim.engine.arrays.integrators import Stage
 from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import kernel, part
 from conveyor_sim.engine.contact.pairs import pack_row
-from conveyor_sim.engine.contact.path import forget_path, note_path
+from conveyor_sim.engine.contact.path import note_path, reset_path
 from conveyor_sim.engine.forces import bottle_forces, pack_all, pair_phase
 from conveyor_sim.engine.integrators.motion import accumulate_peaks, kick, lists_hold, note_moved, probe_rebuilt, settle
 from conveyor_sim.engine.integrators.phase import START
-from conveyor_sim.engine.lists.riding import begin_look, end_look, ride, step_all, stepped_run, stepped_runs
+from conveyor_sim.engine.lists.riding import (
+    begin_examination,
+    end_examination,
+    ride,
+    step_all,
+    stepped_run,
+    stepped_runs,
+)
 from conveyor_sim.engine.observers.damage import note_damage
 from conveyor_sim.engine.observers.ledger import book_kick
 from conveyor_sim.engine.rails.moving import pass_step, place_rails
@@ -36,30 +45,30 @@ from conveyor_sim.engine.threads.workers import BLOCK, share
 def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> int:
     """Take `steps` steps of dt seconds; return how many were finished (see the package's docstring).
 
-    A step ends and the next one begins in one pass over the bottles. A call that is broken off has moved them.
+    A step ends and the next one starts in one pass over the bottles. A call that is interrupted has moved them.
     """
     stage: Any = world.stage
     damage = _is_there(world.damage)
     begin, stop = share(worker, world.bottles.x.size)
     place_rails(world.moving, worker, dt)
-    # Commands and supply come in between ticks: the last forces are of another line. What is found first ends no step.
+    # Commands and supply act between ticks, so the last forces are outdated. The first evaluation ends no step.
     fresh = phase == START
     if fresh:
-        forget_path(world.path, world.moving, worker)
+        reset_path(world.path, world.moving, worker)
     step_all(world.riding, world.bottles, worker)
     pack_all(world, worker)
     done = 0
     while True:
         drawn = 0.0 if fresh else dt
         done += not fresh
-        # One place alone has the forces: they would be compiled again for each.
+        # Forces have one call site, because each would compile them again.
         pair_phase(world, worker, dt, drawn)
         for first in range(begin, stop, BLOCK):
             end = min(first + BLOCK, stop)
             bottle_forces(world, worker, dt, drawn, first, end)
             if not fresh:
                 _end_step(world, stage, dt, first, end)
-                end_look(world, stage, first, end)
+                end_examination(world, stage, first, end)
             if done < steps and not damage:
                 _begin_step(world, stage, worker, dt, first, end)
         if done == steps:
@@ -83,10 +92,10 @@ def _is_there(group: Any) -> bool:
 
 @part
 def _begin_step(world: World, stage: Stage, worker: Worker, dt: float, first: int, end: int) -> None:
-    """Move bottles first to end, and give them the velocities at which the forces at the end of the step are taken."""
+    """Move bottles first to end, and set the velocities at which the forces at the end of the step are evaluated."""
     bottles, spin, load, half = world.bottles, world.spin, world.load, 0.5 * dt
     book_kick(bottles, spin, load, world.ledger, half, first, end)
-    begin_look(bottles, spin, world.riding, first, end)
+    begin_examination(bottles, spin, world.riding, first, end)
     for run in range(stepped_runs(world.riding, first)):
         left, right = stepped_run(world.riding, first, end, run)
         _move(bottles, load, stage, dt, left, right)
@@ -99,7 +108,7 @@ def _begin_step(world: World, stage: Stage, worker: Worker, dt: float, first: in
 
 @part
 def _end_step(world: World, stage: Stage, dt: float, first: int, end: int) -> None:
-    """Give bottles first to end their velocities at the end of the step, from those at its middle."""
+    """Set the velocities of bottles first to end at the end of the step, from those at its middle."""
     bottles, spin, load, half = world.bottles, world.spin, world.load, 0.5 * dt
     for run in range(stepped_runs(world.riding, first)):
         left, right = stepped_run(world.riding, first, end, run)
@@ -112,7 +121,7 @@ def _end_step(world: World, stage: Stage, dt: float, first: int, end: int) -> No
 
 
 @part
-def _move(bottles: Bottles, load: Load, stage: Stage, dt: float, first: int, end: int) -> None:
+def _move(bottles: Bottles, load: ForceSums, stage: Stage, dt: float, first: int, end: int) -> None:
     half = 0.5 * dt
     for i in range(uint64(first), uint64(end)):
         kick_x = half * (load.fx[i] * bottles.inverse_mass[i])
@@ -139,7 +148,7 @@ def _turn(spin: Any, stage: Stage, dt: float, first: int, end: int) -> None:
 
 @part
 def _recall(bottles: Bottles, spin: Any, stage: Stage, first: int, end: int) -> None:
-    """Take the velocities at the middle of the step back."""
+    """Restore the velocities at the middle of the step."""
     for i in range(uint64(first), uint64(end)):
         bottles.vx[i] = stage.vx[i]
         bottles.vy[i] = stage.vy[i]

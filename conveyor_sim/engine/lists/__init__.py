@@ -1,1 +1,1 @@
-"""Lists of what is near a bottle, and when they are made anew."""
+"""Lists of neighbours of a bottle, and their rebuilds."""

@@ -1,4 +1,4 @@
-"""Hashed cells: bottles sorted by the square cell they are in, so that neighbours are found in nine cells."""
+"""Hashed cells: bottles sorted by square cell, so that neighbours are in nine cells."""
 
 import math
 
@@ -9,13 +9,13 @@ from conveyor_sim.engine.compiler.compile import fill, part
 
 @part
 def bucket_of(cx: int, cy: int, buckets: int) -> int:
-    """Bucket of a cell; different cells may share one, so a member's own cell must still be compared."""
+    """Return the bucket of a cell. Different cells may share one, so a member's own cell must still be compared."""
     return (cx * 73856093 ^ cy * 19349663) & (buckets - 1)
 
 
 @part
 def sort_into_cells(bottles: Bottles, hood: Neighbourhood, cell: float) -> None:
-    """Counting sort of the occupied slots by hashed cell."""
+    """Sort the occupied slots by hashed cell (counting sort)."""
     buckets = hood.bucket.size - 1
     fill(hood.bucket, 0)
     for i in range(bottles.x.size):
@@ -27,7 +27,7 @@ def sort_into_cells(bottles: Bottles, hood: Neighbourhood, cell: float) -> None:
     for b in range(buckets + 1):
         total += hood.bucket[b]
         hood.bucket[b] = total
-    # Backwards, so that each bucket ends up at its start and in the order of slots.
+    # Backwards, so that each bucket ends at its start and in the order of slots.
     for i in range(bottles.x.size - 1, -1, -1):
         if bottles.id[i] >= 0:
             b = bucket_of(hood.cell[i, 0], hood.cell[i, 1], buckets)

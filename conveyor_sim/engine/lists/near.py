@@ -1,6 +1,6 @@
-"""Which rail pieces are near each bottle, within its radius and half the skin; made at each rebuild.
+"""Rail pieces near each bottle, within its radius and half the skin; listed at each rebuild.
 
-Tangential springs at rails are kept by piece: a bottle that goes from one piece of a surface to the next, over a joint,
+Tangential springs at rails are stored by piece: a bottle that passes a joint from one piece of a surface to the next
 starts a new spring there.
 """
 
@@ -8,7 +8,7 @@ import math
 from typing import Any
 
 from conveyor_sim.engine.arrays.bodies import Bottles
-from conveyor_sim.engine.arrays.lists import Listed, Near
+from conveyor_sim.engine.arrays.lists import BottleList, Near
 from conveyor_sim.engine.compiler.compile import kernel, part
 from conveyor_sim.engine.lists.static_grid import static_cell
 from conveyor_sim.engine.rails.moving import near_sweep
@@ -17,10 +17,10 @@ from conveyor_sim.engine.threads.workers import UNIT
 
 @part
 def list_near_segments(bottles: Bottles, grid: Any, segments: Any, near: Any, margin: float) -> int:
-    """List the straight rail pieces within radius + margin of each bottle; return how many entries that takes."""
+    """List the straight rail pieces within radius + margin of each bottle; return the number of entries needed."""
     if segments is None:
         return 0
-    _keep_springs(near, near.springs)
+    _copy_springs(near, near.springs)
     count = 0
     for i in range(bottles.x.size):
         near.start[i] = min(count, near.piece.size)
@@ -42,16 +42,16 @@ def list_near_segments(bottles: Bottles, grid: Any, segments: Any, near: Any, ma
                 count += 1
     near.start[bottles.x.size] = min(count, near.piece.size)
     if count <= near.piece.size:
-        _put_springs_back(near, near.springs)
+        _restore_springs(near, near.springs)
     return count
 
 
 @part
 def list_near_arcs(bottles: Bottles, grid: Any, arcs: Any, near: Any, margin: float) -> int:
-    """List the arcs within radius + margin of each bottle; return how many entries that takes."""
+    """List the arcs within radius + margin of each bottle; return the number of entries needed."""
     if arcs is None:
         return 0
-    _keep_springs(near, near.springs)
+    _copy_springs(near, near.springs)
     count = 0
     for i in range(bottles.x.size):
         near.start[i] = min(count, near.piece.size)
@@ -63,20 +63,20 @@ def list_near_arcs(bottles: Bottles, grid: Any, arcs: Any, near: Any, margin: fl
             k = grid.arc[entry]
             dx = bottles.x[i] - arcs.x[k]
             dy = bottles.y[i] - arcs.y[k]
-            # The whole circle stands for the arc here: never too few candidates.
+            # The full circle replaces the arc here, so there are never too few candidates.
             if abs(math.sqrt(dx * dx + dy * dy) - arcs.radius[k]) <= reach:
                 if count < near.piece.size:
                     near.piece[count] = k
                 count += 1
     near.start[bottles.x.size] = min(count, near.piece.size)
     if count <= near.piece.size:
-        _put_springs_back(near, near.springs)
+        _restore_springs(near, near.springs)
     return count
 
 
 @part
 def list_railed(bottles: Bottles, near_segments: Any, near_arcs: Any, moving: Any, railed: Any, margin: float) -> None:
-    """List the bottles that have any rail near, within radius + margin (m), by unit."""
+    """List the bottles with any rail within radius + margin (m), by unit."""
     if railed is None:
         return
     count = 0
@@ -90,8 +90,8 @@ def list_railed(bottles: Bottles, near_segments: Any, near_arcs: Any, moving: An
 
 
 @part
-def end_list(listed: Listed, bottles: int, count: int) -> None:
-    """Close a list by unit that holds `count` of all bottles."""
+def end_list(listed: BottleList, bottles: int, count: int) -> None:
+    """End a list by unit that holds `count` of all bottles."""
     for unit in range((bottles + UNIT - 1) // UNIT, listed.first.size):
         listed.first[unit] = count
 
@@ -104,8 +104,8 @@ def _has_near(near: Any, i: int) -> bool:
 
 
 @part
-def _keep_springs(near: Near, springs: Any) -> None:
-    """Copy the springs by bottle and piece, unless that was done and the list then turned out too short."""
+def _copy_springs(near: Near, springs: Any) -> None:
+    """Copy the springs by bottle and piece, unless that is done and the list was too short."""
     if springs is None:
         return
     if springs.kept_count[0] >= 0:
@@ -122,8 +122,8 @@ def _keep_springs(near: Near, springs: Any) -> None:
 
 
 @part
-def _put_springs_back(near: Near, springs: Any) -> None:
-    """Give entries that are still listed their springs; both lists are by bottle."""
+def _restore_springs(near: Near, springs: Any) -> None:
+    """Restore the springs of entries that are still listed; both lists are by bottle."""
     if springs is None:
         return
     k, kept = 0, springs.kept_count[0]
@@ -142,7 +142,7 @@ def _put_springs_back(near: Near, springs: Any) -> None:
 
 @kernel
 def drop_near_springs(near: Any, springs: Any, slot: int) -> None:
-    """Forget the springs of a bottle that is taken away."""
+    """Reset the springs of a bottle that is removed."""
     if springs is None:
         return
     for entry in range(near.start[slot], near.start[slot + 1]):

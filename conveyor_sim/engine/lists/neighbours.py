@@ -1,6 +1,6 @@
-"""The Verlet list of bottle pairs: who may touch whom, valid until a bottle has moved by half the skin.
+"""Verlet list of bottle pairs that may touch; it holds until a bottle has moved by half the skin.
 
-Sorted by slot, so that sums over it, and hence the bits of a run, do not depend on when it was made.
+It is sorted by slot, so that sums over it, and hence the bits of a run, do not depend on the time of a rebuild.
 """
 
 from typing import Any
@@ -17,11 +17,11 @@ from conveyor_sim.engine.lists.cells import bucket_of, sort_into_cells
 def list_pairs(bottles: Bottles, hood: Neighbourhood, pairs: Any, cell: float, skin: float) -> int:
     """Fill the pair list, sorted by (i, j), i < j; return the number of pairs, which may exceed its capacity.
 
-    Radii and tangential springs by pair are filled or carried over too; coefficients, by `fill_laws` afterwards.
+    Radii and tangential springs by pair are filled or transferred, too; `fill_laws` fills coefficients afterwards.
     """
     if pairs is None:
         return 0
-    _keep_springs(pairs, pairs.spring)
+    _copy_springs(pairs, pairs.spring)
     sort_into_cells(bottles, hood, cell)
     buckets = hood.bucket.size - 1
     capacity = pairs.i.size
@@ -52,13 +52,13 @@ def list_pairs(bottles: Bottles, hood: Neighbourhood, pairs: Any, cell: float, s
     pairs.used[0] = min(count, capacity)
     _fill_radii(pairs, pairs.reach, bottles)
     if count <= capacity:
-        _put_springs_back(pairs, pairs.spring)
+        _restore_springs(pairs, pairs.spring)
     return count
 
 
 @kernel
 def fill_column(column: Any, table: Any, pairs_i: U4, pairs_j: U4, used: I8, types: U4) -> None:
-    """A coefficient by pair, from its table by types; both are None where no contact has that law."""
+    """Fill a coefficient by pair from its table by types; both are None if no contact has that law."""
     if column is None:
         return
     count = round(table.size**0.5)
@@ -82,7 +82,7 @@ _fill_columns: Any = written(
 
 @part
 def fill_laws(pairs: Any, law: Any, bottles: Bottles) -> None:
-    """The coefficients by pair of a list made anew; law: by type."""
+    """Fill the coefficients by pair of a rebuilt list; law: by type."""
     if pairs is not None:
         _fill_columns(pairs, pairs.law, law, bottles.type)
 
@@ -97,8 +97,8 @@ def _fill_radii(pairs: Pairs, reach: Any, bottles: Bottles) -> None:
 
 
 @part
-def _keep_springs(pairs: Pairs, springs: Any) -> None:
-    """Copy the springs by pair, unless that was done and the list then turned out too short."""
+def _copy_springs(pairs: Pairs, springs: Any) -> None:
+    """Copy the springs by pair, unless that is done and the list was too short."""
     if springs is None:
         return
     if springs.kept_count[0] >= 0:
@@ -114,8 +114,8 @@ def _keep_springs(pairs: Pairs, springs: Any) -> None:
 
 
 @part
-def _put_springs_back(pairs: Pairs, springs: Any) -> None:
-    """Give pairs that are still listed their springs; both lists are sorted by (i, j)."""
+def _restore_springs(pairs: Pairs, springs: Any) -> None:
+    """Restore the springs of pairs that are still listed; both lists are sorted by (i, j)."""
     if springs is None:
         return
     k, kept = 0, springs.kept_count[0]
@@ -123,14 +123,14 @@ def _put_springs_back(pairs: Pairs, springs: Any) -> None:
         i, j = pairs.i[p], pairs.j[p]
         while k < kept and (springs.kept_i[k] < i or (springs.kept_i[k] == i and springs.kept_j[k] < j)):
             k += 1
-        found = k < kept and springs.kept_i[k] == i and springs.kept_j[k] == j
-        springs.elongation[p] = springs.kept[k] if found else 0.0
+        stored = k < kept and springs.kept_i[k] == i and springs.kept_j[k] == j
+        springs.elongation[p] = springs.kept[k] if stored else 0.0
     springs.kept_count[0] = -1
 
 
 @kernel
 def drop_springs(pairs: Any, springs: Any, slot: int) -> None:
-    """Forget the springs of a bottle that is taken away: its slot may be another's before the next rebuild."""
+    """Reset the springs of a bottle that is removed: another bottle may get its slot before the next rebuild."""
     if springs is None:
         return
     for p in range(pairs.used[0]):

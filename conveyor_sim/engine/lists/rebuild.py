@@ -1,6 +1,6 @@
-"""Neighbour lists with a skin: made anew once a bottle has moved by half of it, all at the same time.
+"""Rebuild of all neighbour lists together, which is due once a bottle has moved by half of the skin.
 
-When that is follows from the state alone, never from how a run is divided into calls.
+Its time follows from the state alone, never from the division of a run into calls.
 """
 
 from typing import Any
@@ -20,10 +20,11 @@ from conveyor_sim.engine.support.footing import refresh_footing
 
 @kernel
 def rebuild(world: World) -> tuple[int, int, int, int, int]:
-    """Make all lists anew; return the entries that pairs, slots, segments, arcs and belts need.
+    """Rebuild all lists; return the numbers of entries that pairs, slots, segments, arcs and belts need.
 
-    Coefficients by pair are not filled, so that this is compiled once for all laws: `fill_laws` comes after it. Where
-    a list needs more than it holds, the lists are incomplete and `neighbourhood.stale` is set: grow, call again.
+    Coefficients by pair are not filled, so that this is compiled once for all laws: `fill_laws` must follow. If a list
+    needs more than its capacity, the lists are incomplete and `neighbourhood.stale` is set: enlarge them and call
+    again.
     """
     bottles, hood = world.bottles, world.neighbourhood
     skin = world.settings.skin
@@ -73,7 +74,7 @@ def _fits_belts(needed: int, belts: Any) -> bool:
 
 @part
 def moved_too_far(bottles: Bottles, hood: Neighbourhood, skin: float, first: int, end: int) -> bool:
-    """Whether some bottle of first to end has moved by more than half the skin since the last rebuild."""
+    """Return True if a bottle of first to end has moved by more than half the skin since the last rebuild."""
     limit = 0.25 * skin * skin
     far = 0
     for i in range(uint64(first), uint64(end)):

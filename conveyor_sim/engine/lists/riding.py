@@ -1,15 +1,14 @@
-"""Bottles that ride: alone on a straight belt, and as fast as a step leaves them, to the bit.
+"""Riding bottles: alone on a straight belt, with a velocity that a step leaves unchanged to the bit.
 
-Such a bottle needs no forces. They depend on its velocity alone, which the next step leaves as it is again, so that
-all steps do to it is x += dt v. It rides until lists are made anew: up to then nobody is within its reach (it has no
-pair and no rail in the lists, those that move included) and it stays on its belt (which is certain). Whatever else can
-change its motion comes in between ticks: speeds of belts, bottles that come or go, faults, edits. So each call of an
-integrator begins with all bottles stepped, and so does what follows a rebuild; the first step is looked at.
+Such a bottle needs no forces. They depend on its velocity alone, which the next step leaves unchanged again, so a step
+only adds x += dt v. It rides until the next rebuild: until then nothing is within its reach (the lists hold no pair and
+no rail for it, moving ones included) and it stays on its belt (which is certain). Everything else that changes its
+motion happens between ticks: speeds of belts, bottles that come or go, faults, edits. So each call of an integrator
+starts with all bottles stepped, and so does the time after a rebuild; the first step is examined.
 
-Riding changes no bit. That makes it free to leave out: only LEAST bottles or more that ride in slots side by side are
-left out of the loops, for a loop over few costs more than they do. A block of bottles is then some runs that are
-stepped. What of a rider is not stepped (its force, its velocities within a step) stays as the last step left it, which
-is what each step would write.
+Riding changes no bit. So it is optional: only LEAST or more riding bottles in adjacent slots are left out of the loops,
+because a loop over few costs more than they do. The rest of a block is some runs of stepped bottles. The force of a
+rider and its velocities within a step stay as the last step left them, which is what each step would write.
 """
 
 from typing import Any
@@ -26,15 +25,15 @@ from conveyor_sim.engine.contact.pairs import pack
 from conveyor_sim.engine.threads.workers import BLOCK, UNIT, share, units, wait_for_all
 
 LEAST = 8
-"""Bottles side by side, as many as one instruction works on."""
+"""Adjacent bottles that can ride, the number on which one instruction works."""
 
-STEPPED, LOOKED_AT, PLANNED = 0, 1, 2
-"""Of a block: all its bottles are stepped; its velocities are kept; who rides is found out."""
+STEPPED, EXAMINED, PLANNED = 0, 1, 2
+"""State of a block: all its bottles are stepped; its velocities are stored for comparison; riders are determined."""
 
 
 @part
 def step_all(riding: Any, bottles: Bottles, worker: Worker) -> None:
-    """Nobody of this worker's bottles rides."""
+    """Mark all bottles of this worker as stepped."""
     if riding is None:
         return
     begin, stop = share(worker, bottles.x.size)
@@ -48,7 +47,7 @@ def step_all(riding: Any, bottles: Bottles, worker: Worker) -> None:
 
 @part
 def wake_all(riding: Any, bottles: Bottles, worker: Worker) -> None:
-    """After a rebuild: nobody rides, and those who did are packed where they are now; all are on return."""
+    """Mark all bottles as stepped after a rebuild, and pack riders at their present positions. All are then packed."""
     if riding is None:
         return
     begin, stop = share(worker, bottles.x.size)
@@ -59,7 +58,7 @@ def wake_all(riding: Any, bottles: Bottles, worker: Worker) -> None:
 
 @part
 def stepped_runs(riding: Any, first: int) -> int:
-    """How many runs of the block that begins with a slot are stepped."""
+    """Return the number of stepped runs in the block that starts with a slot."""
     if riding is None:
         return 1
     return int(riding.runs[first // UNIT])
@@ -67,14 +66,14 @@ def stepped_runs(riding: Any, first: int) -> int:
 
 @part
 def stepped_run(riding: Any, first: int, end: int, run: int) -> tuple[int, int]:
-    """The run-th of them: its first slot, and where it ends. end: of the block."""
+    """Return the first slot of a stepped run, and the slot after its last. end: that of the block."""
     if riding is None:
         return first, end
     return int(riding.first[first // LEAST + run]), int(riding.end[first // LEAST + run])
 
 
-def left_out(riding: Riding | None, slots: int) -> NDArray[np.bool_]:
-    """Which of all slots the next step would leave out, free ones among them; as blocks are on one thread."""
+def skipped_slots(riding: Riding | None, slots: int) -> NDArray[np.bool_]:
+    """Return which of all slots the next step would skip, free ones included; with blocks as on one thread."""
     rides = np.zeros(slots, np.bool_)
     if riding is None:
         return rides
@@ -87,13 +86,13 @@ def left_out(riding: Riding | None, slots: int) -> NDArray[np.bool_]:
 
 
 @part
-def begin_look(bottles: Bottles, spin: Any, riding: Any, first: int, end: int) -> None:
-    """Before a block is kicked: keep its velocities if this is the step that is looked at."""
+def begin_examination(bottles: Bottles, spin: Any, riding: Any, first: int, end: int) -> None:
+    """Store the velocities of a block before its kick, if this step is to be examined."""
     if riding is None:
         return
     if riding.progress[first // UNIT] != STEPPED:
         return
-    riding.progress[first // UNIT] = LOOKED_AT
+    riding.progress[first // UNIT] = EXAMINED
     for i in range(uint64(first), uint64(end)):
         riding.vx[i] = bottles.vx[i]
         riding.vy[i] = bottles.vy[i]
@@ -103,15 +102,15 @@ def begin_look(bottles: Bottles, spin: Any, riding: Any, first: int, end: int) -
 
 
 @part
-def end_look(world: World, stage: Any, first: int, end: int) -> None:
-    """After a block was kicked: find out who rides from now on if this was the step that is looked at.
+def end_examination(world: World, stage: Any, first: int, end: int) -> None:
+    """Determine the riders of a block after its kick, if this step is to be examined.
 
-    stage: velocities within the step that must not differ either, or None.
+    stage: velocities within the step that must be unchanged, too, or None.
     """
     riding = world.riding
     if riding is None:
         return
-    if riding.progress[first // UNIT] != LOOKED_AT:
+    if riding.progress[first // UNIT] != EXAMINED:
         return
     riding.progress[first // UNIT] = PLANNED
     _find_steady(world, stage, riding, first, end)
@@ -121,10 +120,10 @@ def end_look(world: World, stage: Any, first: int, end: int) -> None:
 
 @part
 def _find_steady(world: World, stage: Any, riding: Riding, first: int, end: int) -> None:
-    """Note who is as fast as before, has no pair, and is sure of its belt, which does not turn."""
+    """Mark bottles with an unchanged velocity, no pair, and a certain belt that does not turn."""
     bottles, spin, slots, belts, footing = world.bottles, world.spin, world.slots, world.belts, world.footing
     for i in range(uint64(first), uint64(end)):
-        # What is not a number is not as it was either.
+        # NaN counts as changed.
         steady = riding.vx[i] == bottles.vx[i] and riding.vy[i] == bottles.vy[i]
         if stage is not None:
             steady = steady and riding.vx[i] == stage.vx[i] and riding.vy[i] == stage.vy[i]
@@ -153,7 +152,7 @@ def _find_railed(railed: Any, riding: Riding, first: int, end: int) -> None:
 
 @part
 def _plan(riding: Riding, first: int, end: int) -> None:
-    """Cut a block into runs: LEAST riders or more side by side end one."""
+    """Divide a block into runs, which end at LEAST or more adjacent riders."""
     place = first // LEAST
     count, begin, i = 0, first, first
     while i < end:
@@ -176,19 +175,19 @@ def _plan(riding: Riding, first: int, end: int) -> None:
 
 @part
 def ride(bottles: Bottles, spin: Any, riding: Any, dt: float, first: int, end: int) -> None:
-    """Take those of bottles first to end that ride along for dt seconds, by the additions that a step makes."""
+    """Move the riding bottles of first to end by dt seconds, with the additions of a step."""
     if riding is None:
         return
     begin = first
     for run in range(stepped_runs(riding, first)):
         left, right = stepped_run(riding, first, end, run)
-        _go_on(bottles, spin, dt, begin, left)
+        _coast(bottles, spin, dt, begin, left)
         begin = right
-    _go_on(bottles, spin, dt, begin, end)
+    _coast(bottles, spin, dt, begin, end)
 
 
 @part
-def _go_on(bottles: Bottles, spin: Any, dt: float, first: int, end: int) -> None:
+def _coast(bottles: Bottles, spin: Any, dt: float, first: int, end: int) -> None:
     for i in range(uint64(first), uint64(end)):
         bottles.x[i] = bottles.x[i] + dt * bottles.vx[i]
         bottles.y[i] = bottles.y[i] + dt * bottles.vy[i]

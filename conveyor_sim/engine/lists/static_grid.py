@@ -1,4 +1,4 @@
-"""A grid over the plant, made once: which rail pieces and belts a bottle with its axis in a cell can come near."""
+"""Grid over the plant, made once: rail pieces and belts within reach of a bottle whose axis is in a cell."""
 
 import math
 from typing import Any
@@ -22,9 +22,9 @@ def build_static_grid(
 ) -> StaticGrid:
     """Build the grid.
 
-    segments, arcs, belts: (n, 4) bounding boxes x_min, y_min, x_max, y_max, m. rail_reach: m, how far from a rail an
-    axis can be and matter (radius and skin); belt_reach likewise for belts. cell: m, wanted edge of a cell; larger
-    where the plant would need more than MOST_CELLS. Belts are listed last first, rails in order.
+    segments, arcs, belts: (n, 4) bounding boxes x_min, y_min, x_max, y_max, m. rail_reach: m, largest distance of an
+    axis from a rail at which the rail matters (radius and skin); belt_reach likewise for belts. cell: m, desired edge
+    of a cell; it is larger if the plant would need more than MOST_CELLS. Belts are listed last first, rails in order.
     """
     rails = np.concatenate([segments, arcs]) + np.array([-rail_reach, -rail_reach, rail_reach, rail_reach])
     carriers = belts + np.array([-belt_reach, -belt_reach, belt_reach, belt_reach])
@@ -35,7 +35,7 @@ def build_static_grid(
     columns, rows = int(width / size) + 1, int(height / size) + 1
 
     def fill(group: NDArray[np.float64], order: range) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:
-        """The items in each cell, one cell after the other, and where each cell's begin."""
+        """Return the items in each cell, one cell after the other, and the start of each cell's items."""
         first = ((group[:, :2] - (x, y)) / size).astype(np.int64)
         last = np.minimum(((group[:, 2:] - (x, y)) / size).astype(np.int64), (columns - 1, rows - 1))
         blocks = [
@@ -58,7 +58,7 @@ def build_static_grid(
 
 @part
 def static_cell(grid: Any, x: float, y: float) -> int:
-    """Cell of the static grid under a point, -1 outside: nothing of the plant is near there."""
+    """Return the cell of the static grid under a point; -1 outside, where nothing of the plant is near."""
     if not (x >= grid.x and y >= grid.y):
         return -1
     column = (x - grid.x) / grid.size

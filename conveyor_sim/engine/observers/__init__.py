@@ -1,1 +1,1 @@
-"""What looks on: contacts as columns, the energy ledger, damage, the guard."""
+"""Observers: contacts as columns, the energy ledger, damage, the guard."""

@@ -1,4 +1,4 @@
-"""All closed contacts as columns, by the same functions that make the forces; read-only."""
+"""All closed contacts as columns, by the functions that compute the forces; read-only."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,13 +17,13 @@ BOTTLE_BOTTLE, BOTTLE_RAIL = 0, 1
 
 
 @kernel
-def list_contacts(world: World, found: RailContacts, kind: NDArray[np.uint8], a: I8, b: I8, values: F8) -> int:
-    """Write the contacts of the present state; return how many there are, which may exceed the columns' length.
+def list_contacts(world: World, contacts: RailContacts, kind: NDArray[np.uint8], a: I8, b: I8, values: F8) -> int:
+    """Write the contacts of the present state; return their number, which may exceed the length of the columns.
 
-    found: scratch. kind: (C,). a, b: (C,), slots, or b the rail. values: (7, C): x, y (m), normal x, y, overlap (m),
-    N, T (N). The neighbour lists must hold. Friction that is solved implicitly is listed as the explicit law has it.
+    contacts: scratch. kind: (C,). a, b: (C,), slots, or b the rail. values: (7, C): x, y (m), normal x, y, overlap
+    (m), N, T (N). The neighbour lists must hold. Friction that is solved implicitly is listed by the explicit law.
     """
-    return _rail_contacts(world, found, kind, a, b, values, _pair_contacts(world, kind, a, b, values))
+    return _rail_contacts(world, contacts, kind, a, b, values, _pair_contacts(world, kind, a, b, values))
 
 
 @part
@@ -51,7 +51,7 @@ def _pair_contacts(world: World, kind: NDArray[np.uint8], a: I8, b: I8, values: 
 
 @part
 def pair_contact(world: World, p: int, overlap: float, nx: float, ny: float) -> tuple[float, float, float]:
-    """N and T (N) on the first bottle of pair p, and its slip (m/s); the normal is that from the first to the other."""
+    """Return N and T (N) on the first bottle of pair p, and its slip (m/s); the normal points to the other bottle."""
     settings, bottles, spin, pairs = world.settings, world.bottles, world.spin, world.pairs
     i, j = pairs.i[p], pairs.j[p]
     vx = bottles.vx[i] - bottles.vx[j]
@@ -70,21 +70,21 @@ def pair_contact(world: World, p: int, overlap: float, nx: float, ny: float) -> 
 
 @part
 def _rail_contacts(
-    world: World, found: RailContacts, kind: NDArray[np.uint8], a: I8, b: I8, values: F8, count: int
+    world: World, contacts: RailContacts, kind: NDArray[np.uint8], a: I8, b: I8, values: F8, count: int
 ) -> int:
     bottles = world.bottles
     if world.rail_law is None:
         return count
     for i in range(bottles.x.size):
-        for c in range(find_rail_contacts(i, world, found)):
-            if found.share[c] > 0.0:
+        for c in range(find_rail_contacts(i, world, contacts)):
+            if contacts.share[c] > 0.0:
                 if count < kind.size:
-                    spring = rail_elongation(world, i, found.entry[c])
-                    normal, tangential, _, _ = rail_contact(c, i, world, found, spring, 0.0, None)
-                    nx, ny, overlap = found.nx[c], found.ny[c], found.overlap[c]
+                    spring = rail_elongation(world, i, contacts.entry[c])
+                    normal, tangential, _, _ = rail_contact(c, i, world, contacts, spring, 0.0, None)
+                    nx, ny, overlap = contacts.nx[c], contacts.ny[c], contacts.overlap[c]
                     kind[count] = BOTTLE_RAIL
                     a[count] = i
-                    b[count] = found.rail[c]
+                    b[count] = contacts.rail[c]
                     arm = bottles.radius[i] - overlap
                     _write_point(values, count, bottles, i, arm * nx, arm * ny)
                     _write_force(values, count, nx, ny, overlap, normal, tangential)
@@ -94,7 +94,7 @@ def _rail_contacts(
 
 @part
 def _write_point(values: F8, c: int, bottles: Bottles, i: int, x: float, y: float) -> None:
-    """x, y: from the axis of bottle i, m."""
+    """Write the contact point. x, y: from the axis of bottle i, m."""
     values[0, c] = bottles.x[i] + x
     values[1, c] = bottles.y[i] + y
 
@@ -108,12 +108,12 @@ def _write_force(values: F8, c: int, nx: float, ny: float, overlap: float, norma
     values[6, c] = tangential
 
 
-def closed_contacts(world: World, found: RailContacts) -> tuple[NDArray[np.uint8], I8, F8]:
-    """Every closed contact of the present state as `list_contacts` has it: kind (C,), ends (2, C), values (7, C)."""
+def closed_contacts(world: World, contacts: RailContacts) -> tuple[NDArray[np.uint8], I8, F8]:
+    """Return every closed contact of the present state as in `list_contacts`: kind (C,), ends (2, C), values (7, C)."""
     world, room = contacts_of(world), 64
     while True:
         kind, ends, values = np.zeros(room, np.uint8), np.zeros((2, room), np.int64), np.zeros((7, room))
-        count = list_contacts(world, found, kind, ends[0], ends[1], values)
+        count = list_contacts(world, contacts, kind, ends[0], ends[1], values)
         if count <= room:
             return kind[:count], ends[:, :count], values[:, :count]
         room = count

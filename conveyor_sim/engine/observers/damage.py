@@ -1,18 +1,18 @@
-"""What bottles and rails bear in every step: scuffing, crushing, impacts, tipping. Changes no force.
+"""Loads on bottles and rails in every step: scuffing, crushing, impacts, tipping. It changes no force.
 
-A look at the state between two steps: each bottle lists its closed contacts, with the forces that the laws exert
-there, and adds up its own; what it shares with another both add up. So no bottle writes to what is another's, no sum
-runs over bottles of several threads, and it is the same for every integrator. Nothing is noted within a step.
+The state is evaluated between two steps. Each bottle lists its closed contacts, with the forces of the laws there, and
+adds up its own; both partners add up a contact that they share. So no bottle writes data of another one, no sum runs
+over bottles of several threads, and the evaluation is the same for every integrator. Nothing is recorded within a step.
 
-Keys of contacts: id + 1 of the other bottle; -1 - 2 g for segment g; -2 - 2 k for arc k; less than -MOVING for a rail
-that moves.
+Keys of contacts: id + 1 of the other bottle; -1 - 2 g for segment g; -2 - 2 k for arc k; less than -MOVING for a moving
+rail.
 """
 
 import math
 from typing import Any
 
-from conveyor_sim.engine.arrays.bodies import Bottles, Load, Spin
-from conveyor_sim.engine.arrays.damage import MOST_BORNE, MOST_TOUCHES, LoadHistory, RailBins, Worst
+from conveyor_sim.engine.arrays.bodies import Bottles, ForceSums, Spin
+from conveyor_sim.engine.arrays.damage import MOST_BORNE, MOST_TOUCHES, ContactLoads, Maximum, RailBins
 from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.contact.pairs import normal_and_overlap
@@ -28,9 +28,9 @@ from conveyor_sim.engine.threads.workers import BLOCK, UNIT, share, wait_for_all
 
 @part
 def note_damage(world: World, worker: Worker, dt: float) -> None:
-    """Note what all bottles bear in the present state, for a step of dt seconds; lists hold and bottles are in place.
+    """Evaluate the loads on all bottles in the present state, for a step of dt seconds.
 
-    Every worker calls it; on return all have read what they need.
+    Lists must hold and bottles must be in place. Every worker calls it; on return all have read what they need.
     """
     _note(world, world.damage, worker, dt)
 
@@ -39,7 +39,7 @@ def note_damage(world: World, worker: Worker, dt: float) -> None:
 def _note(world: World, damage: Any, worker: Worker, dt: float) -> None:
     if damage is None:
         return
-    # Velocity Verlet has just given bottles their velocities, each worker those of its own.
+    # Velocity Verlet has just set velocities, each worker for its share of the bottles.
     wait_for_all(worker)
     begin, stop = share(worker, world.bottles.x.size)
     for first in range(begin, stop, BLOCK):
@@ -54,18 +54,18 @@ def _note(world: World, damage: Any, worker: Worker, dt: float) -> None:
                 _hit(i, damage.impacts, worker.history, count)
                 _tip(i, world.bottles, damage.tipping, worker.history, count, dt)
     wait_for_all(worker)
-    _keep_velocities(world.bottles, damage.impacts, begin, stop)
+    _store_velocities(world.bottles, damage.impacts, begin, stop)
 
 
 @part
-def _list_pairs(i: int, world: World, impacts: Any, history: LoadHistory) -> int:
-    """Write the closed contacts of bottle i with others to `history`; return how many."""
+def _list_pairs(i: int, world: World, impacts: Any, history: ContactLoads) -> int:
+    """Write the closed contacts of bottle i with others to `history`; return their number."""
     slots = world.slots
     if world.pairs is None:
         return 0
     count = 0
     for place in range(int(slots.filled[i])):
-        # In one loop, or all of the law would be compiled twice.
+        # One loop, because two call sites would compile the law twice.
         further = int(slots.more_start[i]) + place - WIDTH
         entry = slots.entry[i * WIDTH + place] if place < WIDTH else slots.more_entry[further]
         count = _list_pair(i, int(entry), world, impacts, history, count)
@@ -73,7 +73,7 @@ def _list_pairs(i: int, world: World, impacts: Any, history: LoadHistory) -> int
 
 
 @part
-def _list_pair(i: int, entry: int, world: World, impacts: Any, history: LoadHistory, count: int) -> int:
+def _list_pair(i: int, entry: int, world: World, impacts: Any, history: ContactLoads, count: int) -> int:
     bottles, pairs = world.bottles, world.pairs
     p = entry if entry < pairs.i.size else entry - pairs.i.size
     j = int(pairs.j[p]) if entry < pairs.i.size else int(pairs.i[p])
@@ -95,23 +95,23 @@ def _list_pair(i: int, entry: int, world: World, impacts: Any, history: LoadHist
 def _list_rails(i: int, world: World, damage: Any, worker: Worker, count: int) -> int:
     if world.rail_law is None:
         return count
-    bottles, found = world.bottles, worker.found
-    for c in range(find_rail_contacts(i, world, found)):
-        # What pushes through another piece of its surface counts there.
-        if found.share[c] > 0.0 and count < MOST_BORNE:
-            entry = found.entry[c]
+    bottles, contacts = world.bottles, worker.rail_contacts
+    for c in range(find_rail_contacts(i, world, contacts)):
+        # A contact that pushes through another piece of its surface counts there.
+        if contacts.share[c] > 0.0 and count < MOST_BORNE:
+            entry = contacts.entry[c]
             spring = rail_elongation(world, i, entry)
-            normal, tangential, slip, _ = rail_contact(c, i, world, found, spring, 0.0, None)
-            nx, ny = found.nx[c], found.ny[c]
-            arm = bottles.radius[i] - found.overlap[c]
+            normal, tangential, slip, _ = rail_contact(c, i, world, contacts, spring, 0.0, None)
+            nx, ny = contacts.nx[c], contacts.ny[c]
+            arm = bottles.radius[i] - contacts.overlap[c]
             x, y = bottles.x[i] + arm * nx, bottles.y[i] + arm * ny
             if moves(world.moving, entry):
-                # Work on a rail that moves belongs to no place of the line.
+                # Work on a moving rail belongs to no place of the line.
                 key, place = -entry, -1
             else:
                 key = _rail_key(world.near_segments, world.near_arcs, entry)
                 place = _bin(damage.scuffing, world.segments, world.arcs, key, x, y)
-            ux, uy = surface_velocity(world.moving, found, c, bottles, i)
+            ux, uy = surface_velocity(world.moving, contacts, c, bottles, i)
             approach = _approach(damage.impacts, i, nx, ny) - (ux * nx + uy * ny)
             _write_force(worker.history, count, nx, ny, normal, tangential, slip)
             _write_place(worker.history, count, approach, key, place)
@@ -121,7 +121,7 @@ def _list_rails(i: int, world: World, damage: Any, worker: Worker, count: int) -
 
 @part
 def _write_force(
-    history: LoadHistory, c: int, nx: float, ny: float, normal: float, tangential: float, slip: float
+    history: ContactLoads, c: int, nx: float, ny: float, normal: float, tangential: float, slip: float
 ) -> None:
     history.nx[c] = nx
     history.ny[c] = ny
@@ -132,7 +132,7 @@ def _write_force(
 
 
 @part
-def _write_place(history: LoadHistory, c: int, approach: float, key: int, place: int) -> None:
+def _write_place(history: ContactLoads, c: int, approach: float, key: int, place: int) -> None:
     history.approach[c] = approach
     history.key[c] = key
     history.place[c] = place
@@ -140,7 +140,7 @@ def _write_place(history: LoadHistory, c: int, approach: float, key: int, place:
 
 @part
 def _approach(impacts: Any, i: int, nx: float, ny: float) -> float:
-    """Speed of bottle i along a normal at the last look, m/s."""
+    """Return the speed of bottle i along a normal at the last evaluation, m/s."""
     if impacts is None:
         return 0.0
     return impacts.vx[i] * nx + impacts.vy[i] * ny
@@ -162,7 +162,7 @@ def _piece(near: Any, entry: int) -> int:
 
 @part
 def _bin(scuffing: Any, segments: Any, arcs: Any, key: int, x: float, y: float) -> int:
-    """Bin of the rail piece of a key at a point (m); -1 where nobody asks."""
+    """Return the bin of a rail piece, by its key, at a point (m); -1 if bins are not requested."""
     if scuffing is None:
         return -1
     if key % 2 != 0:
@@ -185,7 +185,7 @@ def _arc_bin(bins: RailBins, arcs: Any, k: int, x: float, y: float) -> int:
     dx, dy = x - arcs.x[k], y - arcs.y[k]
     start_x, start_y = arcs.start_x[k], arcs.start_y[k]
     angle = math.atan2(start_x * dy - start_y * dx, start_x * dx + start_y * dy)
-    # From half the gap before the start on.
+    # The range of angles starts at half the gap before the start.
     span = bins.arc_span[k]
     if angle < 0.5 * span - math.pi:
         angle += 2.0 * math.pi
@@ -193,14 +193,14 @@ def _arc_bin(bins: RailBins, arcs: Any, k: int, x: float, y: float) -> int:
 
 
 @part
-def _bin_at(first: int, end: int, way: float) -> int:
-    """Which of the bins first to end lies at a share of the way along them."""
-    return first + min(max(math.floor(way * (end - first)), 0), end - first - 1)
+def _bin_at(first: int, end: int, position: float) -> int:
+    """Return which of the bins first to end lies at a share of the length along them."""
+    return first + min(max(math.floor(position * (end - first)), 0), end - first - 1)
 
 
 @part
-def _scuff(i: int, scuffing: Any, history: LoadHistory, count: int, dt: float) -> None:
-    """Add |T s| dt to the bottle, and to the rail where it slides."""
+def _scuff(i: int, scuffing: Any, history: ContactLoads, count: int, dt: float) -> None:
+    """Add |T s| dt to the bottle, and to the rail on which it slides."""
     if scuffing is None:
         return
     for c in range(count):
@@ -219,8 +219,8 @@ def _wear(bins: Any, unit: int, place: int, work: float, impulse: float) -> None
 
 
 @part
-def _crush(i: int, crushing: Any, history: LoadHistory, count: int) -> None:
-    """Note the sum of normal forces, and the largest min(N_a, N_b) |cos| of two that oppose each other."""
+def _crush(i: int, crushing: Any, history: ContactLoads, count: int) -> None:
+    """Update the sum of normal forces, and the largest min(N_a, N_b) |cos| of two opposing ones."""
     if crushing is None:
         return
     total = opposed = 0.0
@@ -234,8 +234,8 @@ def _crush(i: int, crushing: Any, history: LoadHistory, count: int) -> None:
 
 
 @part
-def _hit(i: int, impacts: Any, history: LoadHistory, count: int) -> None:
-    """Note the largest force of one contact, and the speed at which those closed that were open at the last look."""
+def _hit(i: int, impacts: Any, history: ContactLoads, count: int) -> None:
+    """Update the largest force of one contact, and the closing speed of contacts that were open before."""
     if impacts is None:
         return
     before = 0
@@ -256,13 +256,13 @@ def _hit(i: int, impacts: Any, history: LoadHistory, count: int) -> None:
 
 
 @part
-def _raise(worst: Worst, i: int, value: float) -> None:
+def _raise(worst: Maximum, i: int, value: float) -> None:
     if value > worst.tick[i]:
         worst.tick[i] = value
 
 
 @part
-def _keep_velocities(bottles: Bottles, impacts: Any, begin: int, stop: int) -> None:
+def _store_velocities(bottles: Bottles, impacts: Any, begin: int, stop: int) -> None:
     if impacts is None:
         return
     for i in range(begin, stop):
@@ -272,12 +272,12 @@ def _keep_velocities(bottles: Bottles, impacts: Any, begin: int, stop: int) -> N
 
 @part
 def _find_base(world: World, tipping: Any, dt: float, first: int, end: int) -> None:
-    """Find the friction under bottles first to end, N."""
+    """Compute the friction under bottles first to end, N."""
     if tipping is None:
         return
     for i in range(first, end):
         tipping.fx[i] = tipping.fy[i] = tipping.moment[i] = 0.0
-    load = Load(tipping.fx, tipping.fy, None, None)
+    load = ForceSums(tipping.fx, tipping.fy, None, None)
     check_footing(world.bottles, world.belts, world.surface, world.footing, world.ring, first, end)
     spin, lag = _apart(world.spin, tipping.moment), world.settings.lag * dt
     add_base_friction(world, spin, load, None, dt, first, end)
@@ -287,15 +287,15 @@ def _find_base(world: World, tipping: Any, dt: float, first: int, end: int) -> N
 
 @part
 def _apart(spin: Any, moment: Any) -> Any:
-    """The spins, with another place for moments."""
+    """Return the spins with another array for moments."""
     if spin is None:
         return None
     return Spin(spin.theta, spin.omega, spin.inverse_inertia, moment)
 
 
 @part
-def _tip(i: int, bottles: Bottles, tipping: Any, history: LoadHistory, count: int, dt: float) -> None:
-    """Note |F_c (h_c - h_cg) - F_b h_cg| / (m g R_b), smoothed: a blow is over before a bottle can tip."""
+def _tip(i: int, bottles: Bottles, tipping: Any, history: ContactLoads, count: int, dt: float) -> None:
+    """Update |F_c (h_c - h_cg) - F_b h_cg| / (m g R_b), smoothed because a blow is over before a bottle can tip."""
     if tipping is None:
         return
     if bottles.weight[i] <= 0.0:

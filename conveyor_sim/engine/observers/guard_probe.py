@@ -1,7 +1,7 @@
-"""What the guard looks at: bottles that are not finite, the fastest one, kinetic energy, the deepest overlaps.
+"""Data for the guard: bottles that are not finite, the fastest one, kinetic energy, the deepest overlaps.
 
-Overlaps are looked at at the end of a step after which the lists were made anew, that is before a bottle has moved by
-more than a tenth of the smallest radius, so that none passes through another or through a rail between two looks.
+Overlaps are evaluated at the end of a step after which the lists were rebuilt. That is before a bottle has moved by
+more than a tenth of the smallest radius, so none passes through another or a rail unnoticed.
 """
 
 import math
@@ -19,8 +19,9 @@ from conveyor_sim.engine.threads.workers import units
 
 @kernel
 def look(bottles: Bottles, spin: Any) -> tuple[int, int, float, float, float]:
-    """Return the first slot whose bottle is not finite (-1: none), the slot of the fastest bottle (-1: no bottle), the
-    square of its speed (m^2/s^2), the weight of all (N), and their kinetic energy (J).
+    """Return the first slot that is not finite, the fastest slot, its squared speed, the weight and kinetic energy.
+
+    The slots are -1 if there is none. Units: m^2/s^2; N and J of all bottles.
     """
     bad, fastest, square, weight, energy = -1, -1, -1.0, 0.0, 0.0
     for i in range(bottles.x.size):
@@ -37,10 +38,10 @@ def look(bottles: Bottles, spin: Any) -> tuple[int, int, float, float, float]:
 
 
 @kernel
-def probe_overlaps(world: World, found: RailContacts) -> None:
-    """Note the deepest overlaps in `world.probe`; the lists must hold."""
+def probe_overlaps(world: World, contacts: RailContacts) -> None:
+    """Update the deepest overlaps in `world.probe`; the lists must hold."""
     _probe_pairs(world.bottles, world.pairs, world.probe)
-    _probe_rails(world, world.railed, world.probe, found)
+    _probe_rails(world, world.railed, world.probe, contacts)
 
 
 @part
@@ -70,15 +71,15 @@ def _probe_pairs(bottles: Bottles, pairs: Any, probe: GuardProbe) -> None:
 
 
 @part
-def _probe_rails(world: World, railed: Any, probe: GuardProbe, found: RailContacts) -> None:
+def _probe_rails(world: World, railed: Any, probe: GuardProbe, contacts: RailContacts) -> None:
     if railed is None:
         return
     bottles = world.bottles
     begin, stop = units(0, bottles.x.size)
     for place in range(railed.first[begin], railed.first[stop]):
         i = railed.bottle[place]
-        for c in range(find_rail_contacts(i, world, found)):
-            _note(probe, 1, found.overlap[c] / bottles.radius[i], i, found.rail[c])
+        for c in range(find_rail_contacts(i, world, contacts)):
+            _note(probe, 1, contacts.overlap[c] / bottles.radius[i], i, contacts.rail[c])
 
 
 @part

@@ -1,33 +1,34 @@
-"""The energy ledger's books: where the work of forces goes, added up in every step.
+"""Accounts of the energy ledger: the work of forces, added up in every step.
 
-An evaluation of the forces leaves their parts (`ledger_parts.py`); a part's power is that force times a velocity,
-summed over the bottles of a unit (`workers.py`) by one thread in their order: the sums do not depend on who did which.
+An evaluation of the forces leaves their parts (`ledger_parts.py`). A part's power is that force times a velocity,
+summed over the bottles of a unit (`workers.py`) by one thread in their order, so sums do not depend on the threads.
 
-A kick, v += h F/m, is booked with the mean of the velocities before and after it: the change of kinetic energy is then
+A kick, v += h F/m, is booked with the mean of the velocities before and after it. The change of kinetic energy is then
 exactly the sum of all powers times h. The Runge-Kutta methods book each stage with its own velocity and the method's
-weight, so that the accounts are integrated as the motion is. Elastic forces are not booked: what springs hold follows
-from the state (`stored_energy.py`), and what that and the books differ by is the integrator's error.
+weight, so that the accounts are integrated as the motion is. Elastic forces are not booked, because the energy of
+springs follows from the state (`stored_energy.py`). The difference between that and the accounts is the integrator's
+error.
 """
 
 from typing import Any
 
 from numba import uint64
 
-from conveyor_sim.engine.arrays.bodies import Bottles, Load
-from conveyor_sim.engine.arrays.observers import Ledger
+from conveyor_sim.engine.arrays.bodies import Bottles, ForceSums
+from conveyor_sim.engine.arrays.observers import LedgerArrays
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.threads.workers import UNIT, units
 
 DAMPING, CONTACT_FRICTION, BASE_FRICTION, BELTS = 0, 1, 2, 3
-"""Columns of the accounts: what is dissipated, then the work of each belt, then that of each moving rail."""
+"""Columns of the accounts: dissipated energy, then the work of each belt, then that of each moving rail."""
 
 
 @part
 def note_powers(
-    bottles: Bottles, spin: Any, load: Load, ledger: Any, ahead: float, stage: int, first: int, end: int
+    bottles: Bottles, spin: Any, load: ForceSums, ledger: Any, ahead: float, stage: int, first: int, end: int
 ) -> None:
-    """Find the power of each account on bottles first to end at velocities `ahead` (s) on from the present ones."""
+    """Compute the power of each account on bottles first to end at velocities `ahead` (s) after the present ones."""
     if ledger is None:
         return
     begin, stop = units(first, end)
@@ -46,7 +47,7 @@ def note_powers(
 
 @part
 def _note_rails(power: F8, rail_power: Any, first: int, stage: int, unit: int) -> None:
-    """The power of each moving rail, and what damping and friction take of it; first: account of the first rail."""
+    """Store the power of each moving rail, and the losses by damping and friction. first: account of the first rail."""
     if rail_power is None:
         return
     rails = rail_power.shape[1] - 2
@@ -58,9 +59,9 @@ def _note_rails(power: F8, rail_power: Any, first: int, stage: int, unit: int) -
 
 @part
 def _powers(
-    bottles: Bottles, spin: Any, load: Load, ledger: Ledger, ahead: float, first: int, end: int
+    bottles: Bottles, spin: Any, load: ForceSums, ledger: LedgerArrays, ahead: float, first: int, end: int
 ) -> tuple[float, float, float]:
-    """Of damping, contact friction and base on the bottles, W."""
+    """Return the powers of damping, contact friction and base on the bottles, W."""
     damping = friction = base = 0.0
     for i in range(uint64(first), uint64(end)):
         vx = bottles.vx[i] + ahead * (load.fx[i] * bottles.inverse_mass[i])
@@ -89,7 +90,7 @@ def book(ledger: Any, stage: int, h: float, first: int, end: int) -> None:
 
 
 @part
-def book_kick(bottles: Bottles, spin: Any, load: Load, ledger: Any, h: float, first: int, end: int) -> None:
+def book_kick(bottles: Bottles, spin: Any, load: ForceSums, ledger: Any, h: float, first: int, end: int) -> None:
     """Book a kick of h seconds that bottles first to end are about to get."""
     note_powers(bottles, spin, load, ledger, 0.5 * h, 0, first, end)
     book(ledger, 0, h, first, end)
@@ -100,6 +101,6 @@ def book_stages(ledger: Any, weights: F8, h: float, first: int, end: int) -> Non
     """Book a step of h seconds of bottles first to end, weighted as the method weights accelerations."""
     last = weights.shape[0] - 1
     for stage in range(weights.shape[1]):
-        # A stage without weight may be one of a step that was given up, and not finite.
+        # A stage without weight may be from a rejected step, and not finite.
         if weights[last, stage] != 0.0:
             book(ledger, stage, h * weights[last, stage], first, end)

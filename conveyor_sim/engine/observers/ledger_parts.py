@@ -1,15 +1,15 @@
-"""Parts of the forces for the energy ledger (`ledger.py`): what dissipates, and what belts do, in an evaluation.
+"""Parts of the forces for the energy ledger (`ledger.py`): dissipation, and the work of belts, in an evaluation.
 
-Beside the sum of forces on a bottle stay those of the damping in its contacts, of the friction in them, and of what it
-stands on. Damping is all along the normal that the elastic law does not exert, and isotropic damping across it;
-friction is the rest across, tangential springs and the dashpots beside them included. Nothing here changes a force.
+Three parts are stored beside the sum of forces on a bottle: damping in its contacts, friction in them, and the force of
+the surface under it. Damping is everything along the normal except the elastic law, and isotropic damping across it.
+Friction is the rest across, including tangential springs and their dashpots. Nothing here changes a force.
 """
 
 from typing import Any
 
 from numba import uint64
 
-from conveyor_sim.engine.arrays.bodies import Bottles, Load
+from conveyor_sim.engine.arrays.bodies import Bottles, ForceSums
 from conveyor_sim.engine.arrays.integrators import Triple
 from conveyor_sim.engine.arrays.rails import RailContacts
 from conveyor_sim.engine.arrays.world import Worker, World
@@ -24,7 +24,7 @@ from conveyor_sim.engine.threads.workers import UNIT, share, units
 
 @part
 def find_pair_parts(world: World, worker: Worker) -> None:
-    """Take the forces just found for this worker's share of the pairs apart, into `pairs.parts`."""
+    """Divide the forces just computed for this worker's share of the pairs into parts, in `pairs.parts`."""
     bottles, spin, pairs = world.bottles, world.spin, world.pairs
     if world.ledger is None:
         return
@@ -77,7 +77,7 @@ def _write(
 
 @part
 def sum_pair_parts(pairs: Any, slots: Any, ledger: Any, first: int, end: int) -> None:
-    """Set the parts of bottles first to end to what their pairs exert."""
+    """Set the parts of bottles first to end to the sums over their pairs."""
     if ledger is None:
         return
     if pairs is None:
@@ -103,14 +103,14 @@ def _sum(slots: Any, by_pair: Triple, force: Triple, first: int, end: int) -> No
 
 @part
 def add_rail_parts(
-    world: World, found: RailContacts, c: int, i: int, normal: float, tangential: float, slip: float
+    world: World, contacts: RailContacts, c: int, i: int, normal: float, tangential: float, slip: float
 ) -> None:
-    """Take N and T (N) of contact c of bottle i with a rail apart; slip in m/s."""
+    """Divide N and T (N) of contact c of bottle i with a rail into parts; slip in m/s."""
     ledger, law = world.ledger, world.rail_law
     if ledger is None:
         return
-    nx, ny, overlap, shared = found.nx[c], found.ny[c], found.overlap[c], found.share[c]
-    entry, arm = law_entry(world, found, c, i), rail_arm(overlap, world.bottles.radius[i], world.settings.lever)
+    nx, ny, overlap, shared = contacts.nx[c], contacts.ny[c], contacts.overlap[c], contacts.share[c]
+    entry, arm = law_entry(world, contacts, c, i), rail_arm(overlap, world.bottles.radius[i], world.settings.lever)
     elastic = elastic_force(law, entry, world.curves, overlap)
     drag = shared * drag_force(law, entry, elastic, overlap, -slip)
     along = normal - shared * elastic
@@ -122,12 +122,12 @@ def add_rail_parts(
     friction.x[i] -= across * ny
     friction.y[i] += across * nx
     friction.turn[i] += arm * across
-    add_rail_power(world, found, c, i, normal, tangential, along, drag, across)
+    add_rail_power(world, contacts, c, i, normal, tangential, along, drag, across)
 
 
 @part
 def clear_belt_powers(ledger: Any, first: int, end: int) -> None:
-    """Clear what belts do to bottles first to end, which begin with a unit."""
+    """Reset the powers of belts on bottles first to end, which start with a unit."""
     if ledger is None:
         return
     begin, stop = units(first, end)
@@ -137,8 +137,8 @@ def clear_belt_powers(ledger: Any, first: int, end: int) -> None:
 
 
 @part
-def keep_load(load: Load, spin: Any, ledger: Any, first: int, end: int) -> None:
-    """Keep what the contacts exert on bottles first to end: before base friction is added."""
+def store_load(load: ForceSums, spin: Any, ledger: Any, first: int, end: int) -> None:
+    """Store the contact forces on bottles first to end, before base friction is added."""
     if ledger is None:
         return
     for i in range(uint64(first), uint64(end)):
@@ -151,7 +151,7 @@ def keep_load(load: Load, spin: Any, ledger: Any, first: int, end: int) -> None:
 
 @part
 def find_base_parts(world: World, first: int, end: int) -> None:
-    """Find what base friction has added to the load of bottles first to end."""
+    """Compute the part that base friction has added to the load of bottles first to end."""
     load, spin, ledger = world.load, world.spin, world.ledger
     if ledger is None:
         return
@@ -166,13 +166,13 @@ def find_base_parts(world: World, first: int, end: int) -> None:
 
 @part
 def add_belt_powers(world: World, first: int, end: int) -> None:
-    """Add the power of each belt on bottles first to end; riders' bases drag as they did."""
+    """Add the power of each belt on bottles first to end; the base friction of riders is unchanged."""
     footing, ledger = world.footing, world.ledger
     if ledger is None:
         return
     if footing is not None:
         for i in range(uint64(first), uint64(end)):
-            # A ring that may straddle belts was booked point by point.
+            # A ring that may straddle belts is booked point by point.
             if not _by_points(world.belts, world.ring, i):
                 power = _belt_power(world.bottles, footing, footing.turn, ledger.base, i)
                 ledger.belt_power[i // uint64(UNIT), footing.carrier[i]] += power
@@ -189,7 +189,7 @@ def _by_points(belts: Any, ring: Any, i: int) -> bool:
 
 @part
 def _belt_power(bottles: Bottles, footing: Any, turn: Any, base: Triple, i: int) -> float:
-    """F u + M Omega (W): a belt's velocity field is that of a rigid body, so u at the axis and its turn are enough."""
+    """Return F u + M Omega (W). A belt moves as a rigid body, so u at the axis and its rotation suffice."""
     ux, uy, moment = footing.ux[i], footing.uy[i], 0.0
     if turn is not None:
         ux -= turn[i] * bottles.y[i]

@@ -1,4 +1,4 @@
-"""The energy that a state holds: kinetic, in contacts, in tangential springs, in springs under the bottles."""
+"""Energy of a state: kinetic, in contacts, in tangential springs, in springs under the bottles."""
 
 from typing import Any
 
@@ -18,24 +18,24 @@ from conveyor_sim.engine.world_views import energy_of
 KINETIC, ELASTIC, SPRINGS, BASE_SPRINGS = 0, 1, 2, 3
 
 
-def stored_energy(world: World, found: RailContacts) -> F8:
-    """The energy of all bottles, (4,), J. found: scratch. The neighbour lists must hold."""
+def stored_energy(world: World, contacts: RailContacts) -> F8:
+    """Return the energy of all bottles, (4,), J. contacts: scratch. The neighbour lists must hold."""
     energy = np.zeros(4)
-    find_stored_energy(energy_of(world), found, energy)
+    find_stored_energy(energy_of(world), contacts, energy)
     return energy
 
 
 @kernel
-def find_stored_energy(world: World, found: RailContacts, energy: F8) -> None:
+def find_stored_energy(world: World, contacts: RailContacts, energy: F8) -> None:
     """Write the energy (J) of all bottles to energy, (4,).
 
-    Pieces of a rail's surface that push together hold their share of a contact's: with a linear law that is exactly
-    what they give back.
+    Pieces of a rail's surface that push together store their share of a contact's energy: with a linear law that is
+    exactly what they return.
     """
     energy[:] = 0.0
     _kinetic(world.bottles, world.spin, energy)
     _in_pairs(world.bottles, world.pairs, world.curves, energy)
-    _at_rails(world, found, energy)
+    _at_rails(world, contacts, energy)
     anchor_energy(world.bottles, world.static_friction, energy, BASE_SPRINGS)
 
 
@@ -65,13 +65,13 @@ def _in_pairs(bottles: Any, pairs: Any, curves: Any, energy: F8) -> None:
 
 
 @part
-def _at_rails(world: World, found: RailContacts, energy: F8) -> None:
+def _at_rails(world: World, contacts: RailContacts, energy: F8) -> None:
     law = world.rail_law
     if law is None:
         return
     for i in range(world.bottles.x.size):
-        for c in range(find_rail_contacts(i, world, found)):
-            e = law_entry(world, found, c, i)
-            spring = rail_elongation(world, i, found.entry[c])
-            energy[ELASTIC] += found.share[c] * elastic_energy(law, e, world.curves, found.overlap[c])
-            energy[SPRINGS] += found.share[c] * spring_energy(law, e, spring, found.overlap[c])
+        for c in range(find_rail_contacts(i, world, contacts)):
+            e = law_entry(world, contacts, c, i)
+            spring = rail_elongation(world, i, contacts.entry[c])
+            energy[ELASTIC] += contacts.share[c] * elastic_energy(law, e, world.curves, contacts.overlap[c])
+            energy[SPRINGS] += contacts.share[c] * spring_energy(law, e, spring, contacts.overlap[c])

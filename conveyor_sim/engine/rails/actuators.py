@@ -1,12 +1,12 @@
-"""What drives a rail that moves, with at most so much force: it follows its profile, or is a body that bottles hold up.
+"""Drives of moving rails, with limited force: a rail follows its profile, or is a body that bottles can hold up.
 
-While its drive can exert what the profile takes, M a less what bottles exert, the rail is where the profile has it.
-When it can't, the rail is a body of mass M between the end stops, M a = F + Q: F within the limit, as near as it can be
-to what the fastest way to the target takes, and Q the sum of what bottles exert. As soon as the limit is kept again, a
-new profile begins where the rail is. What bottles exert is summed by units of bottles in their order, then unit by
-unit, so it does not depend on the threads.
+While its drive can exert the force that the profile needs, M a minus the force of the bottles, the rail is on its
+profile. Otherwise the rail is a body of mass M between the end stops, M a = F + Q. F is within the limit, as near as
+possible to the force for the fastest motion to the target; Q is the sum of the bottles' forces. As soon as the limit
+suffices again, a new profile starts at the rail's position. The bottles' forces are summed by units of bottles in their
+order, then unit by unit, so the sum does not depend on the threads.
 
-A rail that swings has torque, moment of inertia, rad in place of force, mass and m.
+For a rail that swings, force, mass and m stand for torque, moment of inertia and rad.
 """
 
 from typing import Any
@@ -22,7 +22,7 @@ from conveyor_sim.engine.threads.workers import UNIT, units
 
 @part
 def clear_push(actuators: Any, first: int, end: int) -> None:
-    """Forget what bottles first to end exert on the rails."""
+    """Reset the forces of bottles first to end on the rails."""
     if actuators is None:
         return
     begin, stop = units(first, end)
@@ -34,20 +34,20 @@ def clear_push(actuators: Any, first: int, end: int) -> None:
 
 @part
 def add_push(
-    moving: MovingRails, found: RailContacts, c: int, q: int, bottles: Bottles, i: int, n: float, t: float
+    moving: MovingRails, contacts: RailContacts, c: int, q: int, bottles: Bottles, i: int, n: float, t: float
 ) -> None:
-    """Add what contact c of bottle i exerts on rail q along its motion; n and t: N and T on the bottle, N."""
+    """Add the force of contact c of bottle i on rail q along its motion; n and t: N and T on the bottle, N."""
     actuators = moving.actuators
     if actuators is None:
         return
-    ahead, aside = _motion_at(moving, found, c, q, bottles, i)
+    ahead, aside = _motion_at(moving, contacts, c, q, bottles, i)
     actuators.push[i // UNIT, q, 0] += n * ahead - t * aside
 
 
 @part
 def add_push_parts(
     moving: MovingRails,
-    found: RailContacts,
+    contacts: RailContacts,
     c: int,
     q: int,
     bottles: Bottles,
@@ -56,30 +56,30 @@ def add_push_parts(
     drag: float,
     across: float,
 ) -> None:
-    """The same of what damping and friction have of it, for the energy ledger (`add_rail_power`)."""
+    """Add the shares of damping and friction in that force, for the energy ledger (`add_rail_power`)."""
     actuators = moving.actuators
     if actuators is None:
         return
-    ahead, aside = _motion_at(moving, found, c, q, bottles, i)
+    ahead, aside = _motion_at(moving, contacts, c, q, bottles, i)
     actuators.push[i // UNIT, q, 1] += damped * ahead - drag * aside
     actuators.push[i // UNIT, q, 2] -= across * aside
 
 
 @part
 def _motion_at(
-    moving: MovingRails, found: RailContacts, c: int, q: int, bottles: Bottles, i: int
+    moving: MovingRails, contacts: RailContacts, c: int, q: int, bottles: Bottles, i: int
 ) -> tuple[float, float]:
-    """Velocity of rail q at contact c along its normal and across it, over the speed of the rail."""
-    arm = bottles.radius[i] - found.overlap[c]
-    dx = bottles.x[i] + arm * found.nx[c] - moving.x[q]
-    dy = bottles.y[i] + arm * found.ny[c] - moving.y[q]
+    """Return the velocity of rail q at contact c along its normal and across it, over the speed of the rail."""
+    arm = bottles.radius[i] - contacts.overlap[c]
+    dx = bottles.x[i] + arm * contacts.nx[c] - moving.x[q]
+    dy = bottles.y[i] + arm * contacts.ny[c] - moving.y[q]
     ux, uy = moving.along_x[q] - moving.turning[q] * dy, moving.along_y[q] + moving.turning[q] * dx
-    return ux * found.nx[c] + uy * found.ny[c], uy * found.nx[c] - ux * found.ny[c]
+    return ux * contacts.nx[c] + uy * contacts.ny[c], uy * contacts.nx[c] - ux * contacts.ny[c]
 
 
 @part
 def is_off_profile(actuators: Any, q: int) -> bool:
-    """Whether rail q is a body that its drive pushes with all it has."""
+    """Return True if rail q is a body that its drive pushes with limited force."""
     if actuators is None:
         return False
     return actuators.mode[q] == OFF_PROFILE
@@ -87,10 +87,10 @@ def is_off_profile(actuators: Any, q: int) -> bool:
 
 @part
 def drive_rails(actuators: Any, moving: MovingRails, ledger: Any, time: float, dt: float, centred: bool) -> None:
-    """Decide which rails can follow their profiles from a time (s) on, and move those that can't by a step of dt (s).
+    """Determine which rails can follow their profiles from a time (s) on, and move the others by a step of dt (s).
 
-    What bottles exert is that of the last evaluation, at the same time. centred: velocity Verlet, which has evaluated
-    it at a speed that was foreseen; else semi-implicit Euler, as bottles are moved.
+    The forces of bottles are those of the last evaluation, at the same time. centred: velocity Verlet, which has
+    evaluated them at a predicted speed; else semi-implicit Euler, as for bottles.
     """
     if actuators is None:
         return
@@ -110,7 +110,7 @@ def drive_rails(actuators: Any, moving: MovingRails, ledger: Any, time: float, d
 
 @part
 def _leave_profile(actuators: Actuators, moving: MovingRails, q: int, push: float, time: float) -> float:
-    """Leave the profile if the drive can't follow it; return the acceleration that is possible."""
+    """Leave the profile if the drive can't follow it; return the possible acceleration."""
     wanted = moving.course[q, phase_at(moving.course, q, time), 3]
     acceleration = _possible(actuators, moving, q, wanted, push)
     if acceleration != wanted:
@@ -123,17 +123,17 @@ def _leave_profile(actuators: Actuators, moving: MovingRails, q: int, push: floa
 def _rejoin_profile(
     actuators: Actuators, moving: MovingRails, ledger: Any, q: int, push: float, time: float, dt: float, centred: bool
 ) -> float:
-    """Begin a profile if the drive can follow it; return the acceleration that is possible."""
+    """Start a profile if the drive can follow it; return the possible acceleration."""
     target, most, braking = moving.course[q, PHASES - 1, 1], actuators.max_speed[q], actuators.max_acceleration[q]
     position, speed = moving.position[q], moving.speed[q]
     wanted = wanted_acceleration(position, speed, target, most, braking)
     acceleration = _possible(actuators, moving, q, wanted, push)
     if acceleration == wanted:
-        found = _found(actuators, q, acceleration, dt, centred)
-        speed += found
-        # A profile goes no faster than it may, and turns round before the end stops.
+        correction = _correction(actuators, q, acceleration, dt, centred)
+        speed += correction
+        # A profile respects the speed limit, and reverses before the end stops.
         if abs(speed) <= most and 0.0 <= stopping_place(position, speed, braking) <= actuators.stroke[q]:
-            _book(ledger, actuators, q, dt * found)
+            _book(ledger, actuators, q, dt * correction)
             plan_profile(moving.course, q, time, position, speed, target, most, braking)
             actuators.mode[q], actuators.left[q] = ON_PROFILE, 1
     return acceleration
@@ -141,7 +141,7 @@ def _rejoin_profile(
 
 @part
 def _possible(actuators: Actuators, moving: MovingRails, q: int, wanted: float, push: float) -> float:
-    """The acceleration nearest to the wanted one that the drive and the end stops can bring about against a push."""
+    """Return the acceleration nearest to the wanted one that drive and end stops permit against a push."""
     limit, mass = actuators.limit[q], actuators.mass[q]
     acceleration = min(max(wanted, (push - limit) / mass), (push + limit) / mass)
     if moving.position[q] <= 0.0 and moving.speed[q] <= 0.0 and acceleration < min(wanted, 0.0):
@@ -152,8 +152,8 @@ def _possible(actuators: Actuators, moving: MovingRails, q: int, wanted: float, 
 
 
 @part
-def _found(actuators: Actuators, q: int, acceleration: float, dt: float, centred: bool) -> float:
-    """By how much the speed is greater than was foreseen, now that the acceleration is known."""
+def _correction(actuators: Actuators, q: int, acceleration: float, dt: float, centred: bool) -> float:
+    """Return the correction of the predicted speed, now that the acceleration is known."""
     return 0.5 * dt * (acceleration - actuators.acceleration[q]) if centred else 0.0
 
 
@@ -163,14 +163,14 @@ def _move(
 ) -> None:
     position, speed, stroke = moving.position[q], moving.speed[q], actuators.stroke[q]
     if centred:
-        found = _found(actuators, q, acceleration, dt, centred)
-        position += dt * (speed + found + 0.5 * dt * acceleration)
-        speed += found + dt * acceleration
-        _book(ledger, actuators, q, dt * found)
+        correction = _correction(actuators, q, acceleration, dt, centred)
+        position += dt * (speed + correction + 0.5 * dt * acceleration)
+        speed += correction + dt * acceleration
+        _book(ledger, actuators, q, dt * correction)
     else:
         speed += dt * acceleration
         position += dt * speed
-        # Booked with the speed before the step; a kick takes the mean of those before and after.
+        # Booked with the speed before the step; a kick takes the mean of those before and after it.
         _book(ledger, actuators, q, 0.5 * dt * dt * acceleration)
     if position <= 0.0:
         position, speed = 0.0, max(speed, 0.0)
@@ -181,8 +181,8 @@ def _move(
 
 
 @part
-def _book(ledger: Any, actuators: Actuators, q: int, way: float) -> None:
-    """Add the work of rail q over a way (m) by which it went further than was booked."""
+def _book(ledger: Any, actuators: Actuators, q: int, displacement: float) -> None:
+    """Add the work of rail q over a displacement (m) that has not been booked."""
     if ledger is None:
         return
     push = damped = rubbed = 0.0
@@ -190,6 +190,6 @@ def _book(ledger: Any, actuators: Actuators, q: int, way: float) -> None:
         push += actuators.push[unit, q, 0]
         damped += actuators.push[unit, q, 1]
         rubbed += actuators.push[unit, q, 2]
-    ledger.work[0, BELTS + ledger.belt_power.shape[1] + q] -= push * way
-    ledger.work[0, DAMPING] -= damped * way
-    ledger.work[0, CONTACT_FRICTION] -= rubbed * way
+    ledger.work[0, BELTS + ledger.belt_power.shape[1] + q] -= push * displacement
+    ledger.work[0, DAMPING] -= damped * displacement
+    ledger.work[0, CONTACT_FRICTION] -= rubbed * displacement

@@ -1,4 +1,4 @@
-"""A bottle and an arc rail: the nearest point of the arc, its end points included."""
+"""A bottle and an arc rail: nearest point of the arc, end points included."""
 
 import math
 
@@ -10,7 +10,7 @@ from conveyor_sim.engine.support.sector import span_distance
 
 @part
 def arc_contact(arcs: Arcs, k: int, x: float, y: float, radius: float) -> tuple[float, float, float]:
-    """Overlap (m) of a circle with arc k and the unit normal from its centre to the rail; 0 or less: none."""
+    """Return the overlap (m) of a circle with arc k, and the unit normal from its centre to it; 0 or less: none."""
     dx = x - arcs.x[k]
     dy = y - arcs.y[k]
     squared = dx * dx + dy * dy
@@ -33,7 +33,7 @@ def arc_contact(arcs: Arcs, k: int, x: float, y: float, radius: float) -> tuple[
         return 0.0, 0.0, 0.0
     distance = math.sqrt(to_start if end == 0 else to_end)
     if distance == 0.0:
-        # A centre exactly on the end: pushed off along the arc's radius.
+        # A centre exactly on the end is pushed off along the arc's radius.
         return (
             radius,
             -arcs.start_x[k] if end == 0 else -arcs.end_x[k],

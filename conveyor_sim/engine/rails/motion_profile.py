@@ -1,7 +1,7 @@
-"""Motion profiles of rails that move: a trapezoid of speed at a bounded acceleration, as a closed form of time.
+"""Motion profiles of moving rails: a trapezoid of speed at limited acceleration, as a closed form of time.
 
-A profile is (PHASES, 4): for each phase when it begins (s), and position, speed and acceleration then. All in m and s,
-or rad and s.
+A profile is (PHASES, 4): start of each phase (s), and position, speed and acceleration then. Units: m and s, or rad and
+s.
 """
 
 import math
@@ -12,17 +12,17 @@ from conveyor_sim.engine.compiler.compile import part
 
 
 @part
-def phase_at(course: F8, q: int, time: float) -> int:
-    """The phase that profile q is in at a time (s)."""
+def phase_at(profiles: F8, q: int, time: float) -> int:
+    """Return the phase of profile q at a time (s)."""
     k = 0
-    while k + 1 < PHASES and course[q, k + 1, 0] <= time:
+    while k + 1 < PHASES and profiles[q, k + 1, 0] <= time:
         k += 1
     return k
 
 
 @part
 def plan_profile(
-    course: F8,
+    profiles: F8,
     q: int,
     begin: float,
     position: float,
@@ -31,29 +31,33 @@ def plan_profile(
     max_speed: float,
     acceleration: float,
 ) -> None:
-    """Write profile q: the fastest way from a position and speed, at most `max_speed`, to rest at the target.
+    """Write profile q: the fastest motion from a position and speed, at most `max_speed`, to rest at the target.
 
-    It may turn round first. begin: s, when it does.
+    It may reverse first. begin: s, its start.
     """
     if speed == 0.0 and target == position:
         for k in range(PHASES):
-            course[q, k, 0], course[q, k, 1], course[q, k, 2], course[q, k, 3] = 0.0, position, 0.0, 0.0
+            profiles[q, k, 0], profiles[q, k, 1], profiles[q, k, 2], profiles[q, k, 3] = 0.0, position, 0.0, 0.0
         return
     braked = position + 0.5 * speed * abs(speed) / acceleration
     sign = 1.0 if target >= braked else -1.0
-    # Speed up to v and brake from it: (v^2 - speed^2) / 2a + v^2 / 2a is the way, speeds and way along `sign`.
-    way = sign * (target - position)
-    top = min(max_speed, math.sqrt(max(0.0, acceleration * way + 0.5 * speed * speed)))
+    # Accelerate to v and brake from it: (v^2 - speed^2) / 2a + v^2 / 2a is the distance, all along `sign`.
+    distance = sign * (target - position)
+    top = min(max_speed, math.sqrt(max(0.0, acceleration * distance + 0.5 * speed * speed)))
     speeding = max(0.0, (top - sign * speed) / acceleration)
     braking = top / acceleration
-    left = way - 0.5 * (top + sign * speed) * speeding - 0.5 * top * braking
-    going = max(0.0, left / top) if top > 0.0 else 0.0
+    rest = distance - 0.5 * (top + sign * speed) * speeding - 0.5 * top * braking
+    going = max(0.0, rest / top) if top > 0.0 else 0.0
     begin_brake = target - sign * 0.5 * top * braking
-    course[q, 0, 0], course[q, 0, 1], course[q, 0, 2] = begin, position, speed
-    course[q, 1, 0], course[q, 1, 1], course[q, 1, 2] = begin + speeding, begin_brake - sign * top * going, sign * top
-    course[q, 2, 0], course[q, 2, 1], course[q, 2, 2] = begin + (speeding + going), begin_brake, sign * top
-    course[q, 3, 0], course[q, 3, 1], course[q, 3, 2] = begin + (speeding + going + braking), target, 0.0
-    course[q, 0, 3], course[q, 1, 3], course[q, 2, 3], course[q, 3, 3] = (
+    profiles[q, 0, 0], profiles[q, 0, 1], profiles[q, 0, 2] = begin, position, speed
+    profiles[q, 1, 0], profiles[q, 1, 1], profiles[q, 1, 2] = (
+        begin + speeding,
+        begin_brake - sign * top * going,
+        sign * top,
+    )
+    profiles[q, 2, 0], profiles[q, 2, 1], profiles[q, 2, 2] = begin + (speeding + going), begin_brake, sign * top
+    profiles[q, 3, 0], profiles[q, 3, 1], profiles[q, 3, 2] = begin + (speeding + going + braking), target, 0.0
+    profiles[q, 0, 3], profiles[q, 1, 3], profiles[q, 2, 3], profiles[q, 3, 3] = (
         sign * acceleration,
         0.0,
         -sign * acceleration,
@@ -63,7 +67,7 @@ def plan_profile(
 
 @part
 def wanted_acceleration(position: float, speed: float, target: float, max_speed: float, acceleration: float) -> float:
-    """The acceleration with which the fastest way to rest at the target begins, from any speed."""
+    """Return the initial acceleration of the fastest motion to rest at the target, from any speed."""
     if speed == 0.0 and position == target:
         return 0.0
     sign = 1.0 if target >= stopping_place(position, speed, acceleration) else -1.0
@@ -75,5 +79,5 @@ def wanted_acceleration(position: float, speed: float, target: float, max_speed:
 
 @part
 def stopping_place(position: float, speed: float, acceleration: float) -> float:
-    """Where it comes to rest if it brakes from now on."""
+    """Return the position of rest after braking from now on."""
     return position + 0.5 * speed * abs(speed) / acceleration

@@ -1,9 +1,9 @@
-"""Rails that move: where they are at every step, what touches them, and how fast they are there.
+"""Moving rails: their positions at every step, their contacts, and the speed there.
 
-A rail's course is a closed form of time, constant accelerations one after another, so it moves within a tick, and a
-tick can be done again in shorter steps. It leaves its course where its drive is held up (`actuators.py`). A contact
-knows a rail by an entry of MOVING and more. Few rails move, so that every bottle near the box that a rail sweeps tests
-it, and no list depends on where the rail is.
+A rail's motion profile is a closed form of time, constant accelerations one after another, so it moves within a tick,
+and a tick can be repeated in shorter steps. It leaves its profile when its drive is held up (`actuators.py`). A contact
+identifies a moving rail by an entry of MOVING or more. There are few moving rails. So every bottle near the box that a
+rail sweeps tests it, and no list depends on the rail's position.
 """
 
 import math
@@ -21,12 +21,12 @@ from conveyor_sim.engine.rails.segment import segment_contact
 from conveyor_sim.engine.threads.workers import UNIT, units, wait_for_all
 
 MOVING = 1 << 40
-"""Added to the number of a moving rail, in `RailContacts.entry`."""
+"""Offset of the number of a moving rail in `RailContacts.entry`."""
 
 
 @part
 def place_rails(moving: Any, worker: Worker, dt: float) -> None:
-    """Put the rails where they are at the clock, in steps of dt (s); seen by all after the next `wait_for_all`."""
+    """Move the rails to their positions at the clock, in steps of dt (s). All see it after the next `wait_for_all`."""
     if moving is None:
         return
     if worker.rank == 0:
@@ -35,7 +35,7 @@ def place_rails(moving: Any, worker: Worker, dt: float) -> None:
 
 @part
 def pass_step(moving: Any, ledger: Any, worker: Worker, dt: float, centred: bool) -> None:
-    """Move the rails on by a step, right after a `wait_for_all`; all see it on return. centred: see `drive_rails`."""
+    """Move the rails by a step, right after a `wait_for_all`; on return all see it. centred: see `drive_rails`."""
     if moving is None:
         return
     if worker.rank == 0:
@@ -49,7 +49,7 @@ def pass_step(moving: Any, ledger: Any, worker: Worker, dt: float, centred: bool
 
 @part
 def _note_path(moving: MovingRails, springs: Any, sign: float) -> None:
-    """Before a step, and after it: its way is the difference of the positions."""
+    """Update displacements. Called before and after a step, because they are differences of positions."""
     if springs is None:
         return
     for q in range(moving.x.size):
@@ -80,7 +80,7 @@ def _place(moving: MovingRails, time: float) -> None:
 
 @part
 def near_sweep(moving: Any, bottles: Bottles, i: int, margin: float) -> bool:
-    """Whether bottle i, moved by up to margin (m), can touch a rail wherever that is."""
+    """Return True if bottle i, moved by up to margin (m), can touch a rail at any of its positions."""
     if moving is None:
         return False
     if bottles.id[i] < 0:
@@ -94,43 +94,43 @@ def near_sweep(moving: Any, bottles: Bottles, i: int, margin: float) -> bool:
 
 
 @part
-def moving_contacts(i: int, bottles: Bottles, moving: Any, found: RailContacts, count: int) -> int:
-    """Add the contacts of bottle i with moving rails to the `count` found so far; return how many there are then."""
+def moving_contacts(i: int, bottles: Bottles, moving: Any, contacts: RailContacts, count: int) -> int:
+    """Append the contacts of bottle i with moving rails to the first `count`; return their new number."""
     if moving is None:
         return count
     for q in range(moving.x.size):
         overlap, nx, ny = segment_contact(moving, q, bottles.x[i], bottles.y[i], bottles.radius[i])
         if overlap > 0.0:
             material, rail, surface = moving.material[q], moving.rail[q], moving.surface[q]
-            count = keep_deepest(found, count, overlap, nx, ny, material, rail, surface, MOVING + q)
+            count = keep_deepest(contacts, count, overlap, nx, ny, material, rail, surface, MOVING + q)
     return count
 
 
 @part
 def moves(moving: Any, entry: int) -> bool:
-    """Whether a contact is with a moving rail, by its entry."""
+    """Return True if a contact is with a moving rail, by its entry."""
     if moving is None:
         return False
     return entry >= MOVING
 
 
 @part
-def surface_velocity(moving: Any, found: RailContacts, c: int, bottles: Bottles, i: int) -> tuple[float, float]:
-    """Velocity (m/s) of the rail at contact c of bottle i; 0 for a rail at rest."""
+def surface_velocity(moving: Any, contacts: RailContacts, c: int, bottles: Bottles, i: int) -> tuple[float, float]:
+    """Return the velocity (m/s) of the rail at contact c of bottle i; 0 for a rail at rest."""
     if moving is None:
         return 0.0, 0.0
-    q = found.entry[c] - MOVING
+    q = contacts.entry[c] - MOVING
     if q < 0:
         return 0.0, 0.0
-    arm = bottles.radius[i] - found.overlap[c]
-    dx = bottles.x[i] + arm * found.nx[c] - moving.x[q]
-    dy = bottles.y[i] + arm * found.ny[c] - moving.y[q]
+    arm = bottles.radius[i] - contacts.overlap[c]
+    dx = bottles.x[i] + arm * contacts.nx[c] - moving.x[q]
+    dy = bottles.y[i] + arm * contacts.ny[c] - moving.y[q]
     return moving.vx[q] - moving.turn[q] * dy, moving.vy[q] + moving.turn[q] * dx
 
 
 @part
 def clear_rail_push(moving: Any, first: int, end: int) -> None:
-    """Forget what bottles first to end exert on moving rails."""
+    """Reset the forces of bottles first to end on moving rails."""
     if moving is None:
         return
     clear_push(moving.actuators, first, end)
@@ -138,35 +138,35 @@ def clear_rail_push(moving: Any, first: int, end: int) -> None:
 
 @part
 def add_rail_push(
-    moving: Any, found: RailContacts, c: int, bottles: Bottles, i: int, normal: float, tangential: float
+    moving: Any, contacts: RailContacts, c: int, bottles: Bottles, i: int, normal: float, tangential: float
 ) -> None:
-    """Add what contact c of bottle i exerts on its rail, if that moves; N and T on the bottle, N."""
+    """Add the force of contact c of bottle i on its rail, if it is a moving one; N and T on the bottle, N."""
     if moving is None:
         return
-    q = found.entry[c] - MOVING
+    q = contacts.entry[c] - MOVING
     if q < 0:
         return
-    add_push(moving, found, c, q, bottles, i, normal, tangential)
+    add_push(moving, contacts, c, q, bottles, i, normal, tangential)
 
 
 @part
-def surface_path(moving: Any, found: RailContacts, c: int, bottles: Bottles, i: int) -> tuple[float, float]:
-    """How far (m) the rail has gone at contact c of bottle i since springs were last kept; 0 for a rail at rest."""
+def surface_path(moving: Any, contacts: RailContacts, c: int, bottles: Bottles, i: int) -> tuple[float, float]:
+    """Return the rail's displacement (m) at contact c of bottle i since springs were updated; 0 for a rail at rest."""
     if moving is None:
         return 0.0, 0.0
-    q = found.entry[c] - MOVING
+    q = contacts.entry[c] - MOVING
     if q < 0:
         return 0.0, 0.0
-    arm, path = bottles.radius[i] - found.overlap[c], moving.springs.path[q]
+    arm, path = bottles.radius[i] - contacts.overlap[c], moving.springs.path[q]
     turned = moving.turning[q] * path
-    dx = bottles.x[i] + arm * found.nx[c] - moving.x[q]
-    dy = bottles.y[i] + arm * found.ny[c] - moving.y[q]
+    dx = bottles.x[i] + arm * contacts.nx[c] - moving.x[q]
+    dy = bottles.y[i] + arm * contacts.ny[c] - moving.y[q]
     return moving.along_x[q] * path - turned * dy, moving.along_y[q] * path + turned * dx
 
 
 @part
 def moving_spring(moving: Any, i: int, entry: int) -> float:
-    """Elongation (m) of the spring of bottle i at a moving rail, by the entry of the contact."""
+    """Return the elongation (m) of the spring of bottle i at a moving rail, by the entry of the contact."""
     if moving is None:
         return 0.0
     return moving.springs.elongation[i, entry - MOVING]
@@ -174,14 +174,14 @@ def moving_spring(moving: Any, i: int, entry: int) -> float:
 
 @part
 def set_moving_spring(moving: Any, i: int, entry: int, elongation: float) -> None:
-    """Keep the elongation (m) of that spring."""
+    """Store the elongation (m) of that spring."""
     if moving is not None:
         moving.springs.elongation[i, entry - MOVING] = elongation
 
 
 @part
-def forget_moving_springs(moving: Any, i: int) -> None:
-    """Forget the springs of bottle i at all rails that move."""
+def reset_moving_springs(moving: Any, i: int) -> None:
+    """Reset the springs of bottle i at all moving rails."""
     if moving is not None:
         for q in range(moving.x.size):
             moving.springs.elongation[i, q] = 0.0
@@ -189,7 +189,7 @@ def forget_moving_springs(moving: Any, i: int) -> None:
 
 @part
 def clear_rail_power(ledger: Any, moving: Any, first: int, end: int) -> None:
-    """Forget the power of the rails on bottles first to end."""
+    """Reset the power of the rails on bottles first to end."""
     if ledger is None:
         return
     if moving is None:
@@ -203,7 +203,7 @@ def clear_rail_power(ledger: Any, moving: Any, first: int, end: int) -> None:
 @part
 def add_rail_power(
     world: World,
-    found: RailContacts,
+    contacts: RailContacts,
     c: int,
     i: int,
     normal: float,
@@ -212,22 +212,22 @@ def add_rail_power(
     drag: float,
     across: float,
 ) -> None:
-    """Add the power of the rail in contact c of bottle i: F u, and what damping and friction have of it.
+    """Add the power of the rail in contact c of bottle i: F u, and the losses by damping and friction.
 
-    N of the contact and of its damping, T of the contact, of its drag and of its friction, all in N. What a force F
-    dissipates is F (u - v): `ledger.py` has F v.
+    The forces are N of the contact and of its damping, T of the contact, of its drag and of its friction, all in N. A
+    force F dissipates F (u - v); `ledger.py` adds F v.
     """
     moving, ledger = world.moving, world.ledger
     if moving is None:
         return
-    q = found.entry[c] - MOVING
+    q = contacts.entry[c] - MOVING
     if q < 0:
         return
-    ux, uy = surface_velocity(moving, found, c, world.bottles, i)
-    ahead = ux * found.nx[c] + uy * found.ny[c]
-    aside = uy * found.nx[c] - ux * found.ny[c]
+    ux, uy = surface_velocity(moving, contacts, c, world.bottles, i)
+    ahead = ux * contacts.nx[c] + uy * contacts.ny[c]
+    aside = uy * contacts.nx[c] - ux * contacts.ny[c]
     unit, rails = i // UNIT, moving.x.size
     ledger.rail_power[unit, q] += tangential * aside - normal * ahead
     ledger.rail_power[unit, rails] += drag * aside - damped * ahead
     ledger.rail_power[unit, rails + 1] += across * aside
-    add_push_parts(moving, found, c, q, world.bottles, i, damped, drag, across)
+    add_push_parts(moving, contacts, c, q, world.bottles, i, damped, drag, across)

@@ -1,14 +1,14 @@
-"""Contact of bottles with rails: straight pieces and arcs, found through lists made at each rebuild."""
+"""Contact of bottles with rails: straight pieces and arcs, from lists made at each rebuild."""
 
 from typing import Any
 
 from conveyor_sim.engine.arrays.bodies import Bottles
 from conveyor_sim.engine.arrays.contacts import ContactLaw
 from conveyor_sim.engine.arrays.rails import RailContacts
-from conveyor_sim.engine.arrays.world import Settings, World
+from conveyor_sim.engine.arrays.world import EngineSettings, World
 from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.contact.contact import carried, contact_force, spring_after, stretched
-from conveyor_sim.engine.contact.path import slip_time_of, way_in_touch
+from conveyor_sim.engine.contact.path import displacement_in_touch, slip_time_of
 from conveyor_sim.engine.observers.ledger_parts import add_rail_parts
 from conveyor_sim.engine.rails.arc import arc_contact
 from conveyor_sim.engine.rails.deepest_contacts import keep_deepest, law_entry, rail_arm
@@ -16,10 +16,10 @@ from conveyor_sim.engine.rails.moving import (
     add_rail_push,
     clear_rail_power,
     clear_rail_push,
-    forget_moving_springs,
     moves,
     moving_contacts,
     moving_spring,
+    reset_moving_springs,
     set_moving_spring,
     surface_path,
     surface_velocity,
@@ -30,7 +30,7 @@ from conveyor_sim.engine.threads.workers import units
 
 
 @part
-def _segment_contacts(i: int, bottles: Bottles, segments: Any, near: Any, found: RailContacts, count: int) -> int:
+def _segment_contacts(i: int, bottles: Bottles, segments: Any, near: Any, contacts: RailContacts, count: int) -> int:
     if segments is None:
         return count
     for entry in range(near.start[i], near.start[i + 1]):
@@ -38,12 +38,12 @@ def _segment_contacts(i: int, bottles: Bottles, segments: Any, near: Any, found:
         overlap, nx, ny = segment_contact(segments, g, bottles.x[i], bottles.y[i], bottles.radius[i])
         if overlap > 0.0:
             material, rail, surface = segments.material[g], segments.rail[g], segments.surface[g]
-            count = keep_deepest(found, count, overlap, nx, ny, material, rail, surface, entry)
+            count = keep_deepest(contacts, count, overlap, nx, ny, material, rail, surface, entry)
     return count
 
 
 @part
-def _arc_contacts(i: int, bottles: Bottles, arcs: Any, near: Any, found: RailContacts, count: int) -> int:
+def _arc_contacts(i: int, bottles: Bottles, arcs: Any, near: Any, contacts: RailContacts, count: int) -> int:
     if arcs is None:
         return count
     for entry in range(near.start[i], near.start[i + 1]):
@@ -51,49 +51,49 @@ def _arc_contacts(i: int, bottles: Bottles, arcs: Any, near: Any, found: RailCon
         overlap, nx, ny = arc_contact(arcs, k, bottles.x[i], bottles.y[i], bottles.radius[i])
         if overlap > 0.0:
             material, rail, surface = arcs.material[k], arcs.rail[k], arcs.surface[k]
-            count = keep_deepest(found, count, overlap, nx, ny, material, rail, surface, -1 - entry)
+            count = keep_deepest(contacts, count, overlap, nx, ny, material, rail, surface, -1 - entry)
     return count
 
 
 @part
-def find_rail_contacts(i: int, world: World, found: RailContacts) -> int:
-    """Fill `found` with the contacts of bottle i with rails, shares included; return how many."""
-    count = _segment_contacts(i, world.bottles, world.segments, world.near_segments, found, 0)
-    count = _arc_contacts(i, world.bottles, world.arcs, world.near_arcs, found, count)
-    count = moving_contacts(i, world.bottles, world.moving, found, count)
+def find_rail_contacts(i: int, world: World, contacts: RailContacts) -> int:
+    """Write the contacts of bottle i with rails, shares included; return their number."""
+    count = _segment_contacts(i, world.bottles, world.segments, world.near_segments, contacts, 0)
+    count = _arc_contacts(i, world.bottles, world.arcs, world.near_arcs, contacts, count)
+    count = moving_contacts(i, world.bottles, world.moving, contacts, count)
     if count == 1:
-        found.share[0] = 1.0
+        contacts.share[0] = 1.0
     elif count > 1:
-        share_overlaps(found, count)
+        share_overlaps(contacts, count)
     return count
 
 
 @part
 def rail_contact(
-    c: int, i: int, world: World, found: RailContacts, spring: Any, spring_dt: float, implicit: Any
+    c: int, i: int, world: World, contacts: RailContacts, spring: Any, spring_dt: float, implicit: Any
 ) -> tuple[float, float, float, Any]:
-    """N and T (N) on bottle i in its contact c with a rail, its slip (m/s) along it, and its spring before that slip.
+    """Return N and T (N) on bottle i in its contact c with a rail, its slip (m/s), and its spring before that slip.
 
-    spring: m, or None, to be stretched by spring_dt (s) of slip; implicit: as in `contact_force`.
+    spring: m, or None, to be elongated by spring_dt (s) of slip; implicit: as in `contact_force`.
     """
     bottles, spin, settings, law = world.bottles, world.spin, world.settings, world.rail_law
-    nx, ny = found.nx[c], found.ny[c]
-    ux, uy = surface_velocity(world.moving, found, c, bottles, i)
+    nx, ny = contacts.nx[c], contacts.ny[c]
+    ux, uy = surface_velocity(world.moving, contacts, c, bottles, i)
     vx, vy = bottles.vx[i] - ux, bottles.vy[i] - uy
     closing = vx * nx + vy * ny
     slip = -vx * ny + vy * nx
     if spin is not None:
-        slip += spin.omega[i] * rail_arm(found.overlap[c], bottles.radius[i], settings.lever)
-    entry = law_entry(world, found, c, i)
-    kept = carried(law, entry, spring, found.overlap[c], closing * spring_dt, slip * spring_dt)
+        slip += spin.omega[i] * rail_arm(contacts.overlap[c], bottles.radius[i], settings.lever)
+    entry = law_entry(world, contacts, c, i)
+    kept = carried(law, entry, spring, contacts.overlap[c], closing * spring_dt, slip * spring_dt)
     normal, tangential = contact_force(
         law,
         entry,
         world.curves,
         settings.slip_limit,
         settings.atan,
-        found.overlap[c],
-        found.share[c],
+        contacts.overlap[c],
+        contacts.share[c],
         closing,
         slip,
         stretched(kept, slip, spring_dt),
@@ -103,7 +103,7 @@ def rail_contact(
 
 
 @part
-def count_rail_contacts(world: World, found: RailContacts, first: int, end: int, counts: Any) -> None:
+def count_rail_contacts(world: World, contacts: RailContacts, first: int, end: int, counts: Any) -> None:
     """Add to counts[i] the closed rail contacts of bottles first to end; for the implicit solver."""
     railed = world.railed
     if railed is None:
@@ -111,14 +111,14 @@ def count_rail_contacts(world: World, found: RailContacts, first: int, end: int,
     begin, stop = units(first, end)
     for place in range(railed.first[begin], railed.first[stop]):
         i = railed.bottle[place]
-        counts[i] += find_rail_contacts(i, world, found)
+        counts[i] += find_rail_contacts(i, world, contacts)
 
 
 @part
-def add_rail_forces(world: World, found: RailContacts, first: int, end: int, spring_dt: float) -> None:
+def add_rail_forces(world: World, contacts: RailContacts, first: int, end: int, spring_dt: float) -> None:
     """Add the forces and moments of all rails on bottles first to end to `load` and `spin.moment`.
 
-    spring_dt: s, how far the tangential springs are taken along (`pair_phase`).
+    spring_dt: s, time by which the tangential springs are advanced (`pair_phase`).
     """
     railed = world.railed
     if railed is None:
@@ -130,46 +130,53 @@ def add_rail_forces(world: World, found: RailContacts, first: int, end: int, spr
     slip_time = slip_time_of(world.path, spring_dt)
     for place in range(railed.first[begin], railed.first[stop]):
         i = railed.bottle[place]
-        count = find_rail_contacts(i, world, found)
+        count = find_rail_contacts(i, world, contacts)
         for c in range(count):
-            found.solution[c] = 0.0
-            if found.share[c] > 0.0:
-                spring = _drawn_out(world, found, c, i, rail_elongation(world, i, found.entry[c]))
+            contacts.solution[c] = 0.0
+            if contacts.share[c] > 0.0:
+                spring = _drawn_out(world, contacts, c, i, rail_elongation(world, i, contacts.entry[c]))
                 compliance = _compliance(world.settings, world.implicit, i)
-                normal, tangential, slip, spring = rail_contact(c, i, world, found, spring, slip_time, compliance)
-                load.fx[i] += -normal * found.nx[c] - tangential * found.ny[c]
-                load.fy[i] += -normal * found.ny[c] + tangential * found.nx[c]
-                add_rail_push(world.moving, found, c, bottles, i, normal, tangential)
+                normal, tangential, slip, spring = rail_contact(c, i, world, contacts, spring, slip_time, compliance)
+                load.fx[i] += -normal * contacts.nx[c] - tangential * contacts.ny[c]
+                load.fy[i] += -normal * contacts.ny[c] + tangential * contacts.nx[c]
+                add_rail_push(world.moving, contacts, c, bottles, i, normal, tangential)
                 _note_normal(load.normal_sum, load.normal_max, i, normal)
-                add_rail_parts(world, found, c, i, normal, tangential, slip)
+                add_rail_parts(world, contacts, c, i, normal, tangential, slip)
                 if spin is not None:
-                    spin.moment[i] += rail_arm(found.overlap[c], bottles.radius[i], world.settings.lever) * tangential
-                entry = law_entry(world, found, c, i)
-                found.solution[c] = _spring_after(
-                    law, entry, spring, found.overlap[c], slip, slip_time, normal, found.share[c]
+                    spin.moment[i] += (
+                        rail_arm(contacts.overlap[c], bottles.radius[i], world.settings.lever) * tangential
+                    )
+                entry = law_entry(world, contacts, c, i)
+                contacts.solution[c] = _spring_after(
+                    law, entry, spring, contacts.overlap[c], slip, slip_time, normal, contacts.share[c]
                 )
         if spring_dt > 0.0:
-            _store_springs(world, found, count, i)
+            _store_springs(world, contacts, count, i)
 
 
 @part
-def _drawn_out(world: World, found: RailContacts, c: int, i: int, spring: Any) -> Any:
-    """Elongation (m) of a spring, or None, after what bottle and rail have gone since it was kept."""
+def _drawn_out(world: World, contacts: RailContacts, c: int, i: int, spring: Any) -> Any:
+    """Return the elongation (m) of a spring after the displacement since its last update, or None."""
     path = world.path
     if spring is None:
         return None
     if path is None:
         return spring
     bottles = world.bottles
-    nx, ny = found.nx[c], found.ny[c]
-    ux, uy = surface_path(world.moving, found, c, bottles, i)
+    nx, ny = contacts.nx[c], contacts.ny[c]
+    ux, uy = surface_path(world.moving, contacts, c, bottles, i)
     x, y = path.x[i] - ux, path.y[i] - uy
     approach = x * nx + y * ny
-    way = y * nx - x * ny
+    displacement = y * nx - x * ny
     if world.spin is not None:
-        way += path.turn[i] * rail_arm(found.overlap[c] - 0.5 * approach, bottles.radius[i], world.settings.lever)
-    further = way_in_touch(way, approach, found.overlap[c])
-    return carried(world.rail_law, law_entry(world, found, c, i), spring, found.overlap[c], approach, further) + further
+        displacement += path.turn[i] * rail_arm(
+            contacts.overlap[c] - 0.5 * approach, bottles.radius[i], world.settings.lever
+        )
+    further = displacement_in_touch(displacement, approach, contacts.overlap[c])
+    return (
+        carried(world.rail_law, law_entry(world, contacts, c, i), spring, contacts.overlap[c], approach, further)
+        + further
+    )
 
 
 @part
@@ -189,7 +196,7 @@ def _note_normal(sums: Any, largest: Any, i: int, normal: float) -> None:
 
 
 @part
-def _compliance(settings: Settings, implicit: Any, i: int) -> Any:
+def _compliance(settings: EngineSettings, implicit: Any, i: int) -> Any:
     if implicit is None:
         return None
     return implicit.compliance[i], settings.at_once
@@ -197,7 +204,7 @@ def _compliance(settings: Settings, implicit: Any, i: int) -> Any:
 
 @part
 def rail_elongation(world: World, i: int, entry: int) -> Any:
-    """Elongation of the spring of a contact of bottle i, by its entry in the lists (`RailContacts.entry`), or None."""
+    """Return the elongation of the spring of a contact of bottle i, by its entry (`RailContacts.entry`), or None."""
     if world.rail_law.tangential_stiffness is None:
         return None
     if moves(world.moving, entry):
@@ -215,24 +222,24 @@ def _spring_at(near: Any, entry: int) -> float:
 
 
 @part
-def _store_springs(world: World, found: RailContacts, count: int, i: int) -> None:
-    """Keep the springs of the closed contacts of bottle i, forget those of all its other rails."""
+def _store_springs(world: World, contacts: RailContacts, count: int, i: int) -> None:
+    """Store the springs of the closed contacts of bottle i; reset those of all its other rails."""
     if world.rail_law.tangential_stiffness is None:
         return
-    _forget_springs(world.near_segments, i)
-    _forget_springs(world.near_arcs, i)
-    forget_moving_springs(world.moving, i)
+    _reset_springs(world.near_segments, i)
+    _reset_springs(world.near_arcs, i)
+    reset_moving_springs(world.moving, i)
     for c in range(count):
-        if moves(world.moving, found.entry[c]):
-            set_moving_spring(world.moving, i, found.entry[c], found.solution[c])
-        elif found.entry[c] >= 0:
-            _set_spring(world.near_segments, found.entry[c], found.solution[c])
+        if moves(world.moving, contacts.entry[c]):
+            set_moving_spring(world.moving, i, contacts.entry[c], contacts.solution[c])
+        elif contacts.entry[c] >= 0:
+            _set_spring(world.near_segments, contacts.entry[c], contacts.solution[c])
         else:
-            _set_spring(world.near_arcs, -1 - found.entry[c], found.solution[c])
+            _set_spring(world.near_arcs, -1 - contacts.entry[c], contacts.solution[c])
 
 
 @part
-def _forget_springs(near: Any, i: int) -> None:
+def _reset_springs(near: Any, i: int) -> None:
     if near is not None:
         for entry in range(near.start[i], near.start[i + 1]):
             near.springs.elongation[entry] = 0.0

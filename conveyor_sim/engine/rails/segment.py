@@ -1,4 +1,4 @@
-"""A bottle and a straight rail piece: the nearest point of the segment, its end points included."""
+"""A bottle and a straight rail piece: nearest point of the segment, end points included."""
 
 import math
 
@@ -9,7 +9,7 @@ from conveyor_sim.engine.rails.joint import end_counts
 
 @part
 def segment_contact(segments: Segments, g: int, x: float, y: float, radius: float) -> tuple[float, float, float]:
-    """Overlap (m) of a circle with segment g and the unit normal from its centre to the rail; 0 or less: none."""
+    """Return the overlap (m) of a circle with segment g, and the unit normal from its centre to it; 0 or less: none."""
     dx = x - segments.x[g]
     dy = y - segments.y[g]
     tx, ty = segments.tx[g], segments.ty[g]

@@ -1,10 +1,10 @@
-"""One surface pushes once: how pieces of one rail surface that touch a bottle together share the push.
+"""Shared push of the pieces of one rail surface that touch a bottle together.
 
-Two pieces with normals at an angle of cosine c would push twice near a shallow joint: a bump of a doubled force. The
+Two pieces with normals at an angle of cosine c would push twice near a shallow joint, with up to double the force. The
 surface as a whole pushes with k times the shortest displacement d that clears all its overlaps, n_a . d >= delta_a.
 That is d = sum lambda_a n_a with G lambda = delta, lambda >= 0 and G the cosines between normals. Collinear pieces then
-push as one, pieces at a right angle as two walls, and nothing jumps in between. Obtuse pairs (c < 0, a wedge) keep
-their own push: clearing both would call for a force without bound.
+push as one, pieces at a right angle as two walls, and the force is continuous in between. Obtuse pairs (c < 0, a wedge)
+push separately, because clearing both would need an unbounded force.
 """
 
 from conveyor_sim.engine.arrays.rails import RailContacts
@@ -13,12 +13,12 @@ from conveyor_sim.engine.compiler.compile import part
 SWEEPS = 64
 
 IN_LINE = 1e-10
-"""Square of the sine between normals, below which two pieces are one and the same: rounding would be divided by it."""
+"""Squared sine between normals below which two pieces count as one; rounding would be divided by it."""
 
 
 @part
 def share_overlaps(contacts: RailContacts, count: int) -> None:
-    """Set `share` = lambda / delta of the first `count` contacts of one bottle; each surface for itself."""
+    """Set `share` = lambda / delta of the first `count` contacts of one bottle, each surface by itself."""
     for a in range(count):
         contacts.share[a] = 1.0
     for a in range(count):
@@ -38,7 +38,7 @@ def share_overlaps(contacts: RailContacts, count: int) -> None:
 
 @part
 def _share_two(contacts: RailContacts, a: int, b: int) -> None:
-    """In closed form."""
+    """Solve for two pieces, in closed form."""
     cosine = contacts.nx[a] * contacts.nx[b] + contacts.ny[a] * contacts.ny[b]
     if cosine <= 0.0:
         return
@@ -49,7 +49,7 @@ def _share_two(contacts: RailContacts, a: int, b: int) -> None:
     if over_a <= cosine * over_b:
         contacts.share[a] = 0.0
         return
-    # 1 - cosine^2, without its cancellation where the pieces are nearly in line.
+    # 1 - cosine^2, without its cancellation if the pieces are nearly in line.
     sine = contacts.nx[a] * contacts.ny[b] - contacts.ny[a] * contacts.nx[b]
     rest = sine * sine
     if rest < IN_LINE:
@@ -61,7 +61,7 @@ def _share_two(contacts: RailContacts, a: int, b: int) -> None:
 
 @part
 def _share_many(contacts: RailContacts, first: int, count: int) -> None:
-    """Three or more pieces at once, which is rare: projected Gauss-Seidel."""
+    """Solve for three or more pieces, which is rare, by projected Gauss-Seidel."""
     surface = contacts.surface[first]
     for a in range(first, count):
         contacts.solution[a] = 0.0

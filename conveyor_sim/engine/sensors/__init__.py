@@ -1,1 +1,1 @@
-"""What sensors of a line look for in a tick: beams that are blocked, lines that are passed, regions with bottles in."""
+"""Evaluation of a line's sensors in a tick: blocked beams, crossed lines, regions with bottles."""

@@ -1,38 +1,38 @@
-"""From when to when in a tick a bottle's circle blocks each of some beams.
+"""Times in a tick at which the circles of bottles block light beams.
 
-A bottle's way through a tick is the cubic through its places and velocities at both ends (Hermite), cut into chords of
-equal duration. Each slot keeps its bottle through a tick, for bottles come and go between ticks only.
+A bottle's path through a tick is the cubic through its positions and velocities at both ends (Hermite), divided into
+chords of equal duration. Bottles come and go between ticks only, so each slot has the same bottle throughout.
 """
 
 import math
 
 import numpy as np
 
-from conveyor_sim.engine.arrays.beams import LightBeams, Ways
+from conveyor_sim.engine.arrays.beams import BottleMotion, LightBeams
 from conveyor_sim.engine.arrays.types import F8, I8
 from conveyor_sim.engine.compiler.compile import kernel, part
 
 CHORDS = 8
-"""A way is cut into so many straight pieces: at 1 g in a tick of 10 ms they leave it by 2 micrometres."""
+"""Chords per path. At 1 g in a tick of 10 ms they deviate from it by 2 micrometres."""
 
 STILL = 1e-13
-"""m; a bottle that moves by less in a chord stands."""
+"""A bottle that moves by less than this distance in a chord rests, m."""
 
 ROUNDING = 1e-9
-"""s; shorter than this is nothing."""
+"""Shorter intervals are ignored, s."""
 
 FREE, BLOCKED, CHANGES = 0, 1, 2
-"""What becomes of a beam in a tick: free all the time, blocked all the time, or neither."""
+"""State of a beam in a tick: free throughout, blocked throughout, or neither."""
 
 
 @kernel
-def block_beams(ways: Ways, length: float, beams: LightBeams) -> int:
-    """When in a tick of `length` s bottles blocked each beam: write its spans, their number and its state.
+def block_beams(motion: BottleMotion, length: float, beams: LightBeams) -> int:
+    """Compute when in a tick of `length` s bottles block each beam: write its spans, their number and its state.
 
-    Returns what is too short for that: 0 nothing, 1 near, 2 spans.
+    Return which array is too small: 0 none, 1 near, 2 spans.
     """
     count, state, spans, near = beams.used, beams.state, beams.spans, beams.near
-    pairs = _near(ways, length / 3.0, beams.line, near)
+    pairs = _near(motion, length / 3.0, beams.line, near)
     if pairs < 0:
         return 1
     for beam in range(count.size):
@@ -40,38 +40,38 @@ def block_beams(ways: Ways, length: float, beams: LightBeams) -> int:
         state[beam] = FREE
     for pair in range(pairs):
         beam, i = near[0, pair], near[1, pair]
-        # What is within reach of a segment is convex: a way whose hull is in it is in it all the time.
-        if state[beam] != BLOCKED and _throughout(ways, length / 3.0, beams.line, beam, i):
+        # Points within reach of a segment form a convex set: a path whose hull is inside stays inside.
+        if state[beam] != BLOCKED and _throughout(motion, length / 3.0, beams.line, beam, i):
             state[beam] = BLOCKED
             count[beam] = 1
             spans[beam, 0, 0], spans[beam, 0, 1] = 0.0, length
     for pair in range(pairs):
         beam, i = near[0, pair], near[1, pair]
         if state[beam] != BLOCKED:
-            if not _follow(ways, length, beams, beam, i):
+            if not _follow(motion, length, beams, beam, i):
                 return 2
     for beam in range(count.size):
         if state[beam] != BLOCKED and count[beam] > 0:
             count[beam] = _join(spans[beam], count[beam])
             first, last = spans[beam, 0, 0], spans[beam, count[beam] - 1, 1]
-            whole = count[beam] == 1 and first <= ROUNDING and last >= length - ROUNDING
-            state[beam] = BLOCKED if whole else CHANGES
+            throughout = count[beam] == 1 and first <= ROUNDING and last >= length - ROUNDING
+            state[beam] = BLOCKED if throughout else CHANGES
     return 0
 
 
 @part
-def _near(ways: Ways, third: float, line: F8, near: I8) -> int:
-    """Pairs of a beam and a slot whose way may come within reach; -1 if there are more than `near` has room for."""
-    start, x, y, radius = ways.start, ways.x, ways.y, ways.radius
+def _near(motion: BottleMotion, third: float, line: F8, near: I8) -> int:
+    """Write pairs of a beam and a slot whose path may come within reach. Return their number, -1 if they don't fit."""
+    start, x, y, radius = motion.start, motion.x, motion.y, motion.radius
     pairs = 0
     for i in range(x.size):
-        if ways.id[i] < 0:
+        if motion.id[i] < 0:
             continue
         # A cubic lies within the hull of its four control points (Bézier).
-        ahead, behind = start[0, i] + third * start[2, i], x[i] - third * ways.vx[i]
+        ahead, behind = start[0, i] + third * start[2, i], x[i] - third * motion.vx[i]
         low_x = min(min(start[0, i], ahead), min(behind, x[i])) - radius[i]
         high_x = max(max(start[0, i], ahead), max(behind, x[i])) + radius[i]
-        ahead, behind = start[1, i] + third * start[3, i], y[i] - third * ways.vy[i]
+        ahead, behind = start[1, i] + third * start[3, i], y[i] - third * motion.vy[i]
         low_y = min(min(start[1, i], ahead), min(behind, y[i])) - radius[i]
         high_y = max(max(start[1, i], ahead), max(behind, y[i])) + radius[i]
         for beam in range(line.shape[0]):
@@ -85,39 +85,39 @@ def _near(ways: Ways, third: float, line: F8, near: I8) -> int:
 
 
 @part
-def _throughout(ways: Ways, third: float, line: F8, beam: int, i: int) -> bool:
-    """Whether the whole way of slot i is within reach of a beam."""
-    start, x, y, radius = ways.start, ways.x[i], ways.y[i], ways.radius[i]
+def _throughout(motion: BottleMotion, third: float, line: F8, beam: int, i: int) -> bool:
+    """Return True if the complete path of slot i is within reach of a beam."""
+    start, x, y, radius = motion.start, motion.x[i], motion.y[i], motion.radius[i]
     return (
         _beside(line, beam, start[0, i], start[1, i]) <= radius
         and _beside(line, beam, start[0, i] + third * start[2, i], start[1, i] + third * start[3, i]) <= radius
-        and _beside(line, beam, x - third * ways.vx[i], y - third * ways.vy[i]) <= radius
+        and _beside(line, beam, x - third * motion.vx[i], y - third * motion.vy[i]) <= radius
         and _beside(line, beam, x, y) <= radius
     )
 
 
 @part
 def _beside(line: F8, beam: int, x: float, y: float) -> float:
-    """From a point to a beam, m."""
+    """Return the distance of a point from a beam, m."""
     along, aside = _seen_from(line, beam, x, y)
     return math.hypot(along - min(max(along, 0.0), line[beam, 8]), aside)
 
 
 @part
 def _seen_from(line: F8, beam: int, x: float, y: float) -> tuple[float, float]:
-    """A point as seen from the start of a beam: along it, and to the left of it, m."""
+    """Return a point relative to the start of a beam: along it, and to its left, m."""
     x, y = x - line[beam, 0], y - line[beam, 1]
     ahead, across = line[beam, 6], line[beam, 7]
     return x * ahead + y * across, y * ahead - x * across
 
 
 @part
-def _follow(ways: Ways, length: float, beams: LightBeams, beam: int, i: int) -> bool:
-    """Add the stretches of one way to the spans of a beam, by their begins; whether there was room."""
+def _follow(motion: BottleMotion, length: float, beams: LightBeams, beam: int, i: int) -> bool:
+    """Add the blocked intervals of one path to the spans of a beam, by start; return False if there is no room."""
     third, share = length / 3.0, length / CHORDS
-    start, x, y, line, spans, count = ways.start, ways.x[i], ways.y[i], beams.line, beams.spans, beams.used
-    x1, x2 = start[0, i] + third * start[2, i], x - third * ways.vx[i]
-    y1, y2 = start[1, i] + third * start[3, i], y - third * ways.vy[i]
+    start, x, y, line, spans, count = motion.start, motion.x[i], motion.y[i], beams.line, beams.spans, beams.used
+    x1, x2 = start[0, i] + third * start[2, i], x - third * motion.vx[i]
+    y1, y2 = start[1, i] + third * start[3, i], y - third * motion.vy[i]
     a, b = _seen_from(line, beam, start[0, i], start[1, i])
     for chord in range(CHORDS):
         # Ends are exact, so that ticks join without a gap.
@@ -125,7 +125,7 @@ def _follow(ways: Ways, length: float, beams: LightBeams, beam: int, i: int) -> 
         end_x = x if last else cubic(start[0, i], x1, x2, x, (chord + 1) / CHORDS)
         end_y = y if last else cubic(start[1, i], y1, y2, y, (chord + 1) / CHORDS)
         next_a, next_b = _seen_from(line, beam, end_x, end_y)
-        enter, leave = within_reach(a, b, next_a, next_b, line[beam, 8], ways.radius[i])
+        enter, leave = within_reach(a, b, next_a, next_b, line[beam, 8], motion.radius[i])
         if enter <= leave:
             if count[beam] == spans.shape[1]:
                 return False
@@ -137,9 +137,9 @@ def _follow(ways: Ways, length: float, beams: LightBeams, beam: int, i: int) -> 
 
 @part
 def cubic(c0: float, c1: float, c2: float, c3: float, s: float) -> float:
-    """Where a cubic with these control points is at a parameter."""
+    """Return the point of a cubic with these control points at a parameter."""
     r = 1.0 - s
-    # By differences from its beginning: what stands stays where it is to the last bit.
+    # Differences from the start, so that a point at rest stays constant to the last bit.
     return c0 + (3.0 * (r * r) * s * (c1 - c0) + 3.0 * r * (s * s) * (c2 - c0) + s * s * s * (c3 - c0))
 
 
@@ -154,7 +154,7 @@ def _insert(spans: F8, count: int, begin: float, end: float) -> None:
 
 @part
 def _join(spans: F8, count: int) -> int:
-    """Make one of spans that meet; how many are left."""
+    """Merge spans that touch; return their new number."""
     kept = 1
     for n in range(1, count):
         if spans[n, 0] <= spans[kept - 1, 1] + ROUNDING:
@@ -167,10 +167,10 @@ def _join(spans: F8, count: int) -> int:
 
 @part
 def within_reach(a: float, b: float, next_a: float, next_b: float, length: float, radius: float) -> tuple[float, float]:
-    """Shares of a chord at which a point comes within a radius of a segment and leaves; enter > leave if never.
+    """Return the shares of a chord at which a point comes within a radius of a segment and leaves; or enter > leave.
 
-    (a, b) to (next_a, next_b): the chord's ends along the segment and to its left, m, seen from its start. What is
-    within a radius of a segment is convex (two discs and a rectangle), so a chord has one such stretch.
+    (a, b) to (next_a, next_b): the chord's ends along the segment and to its left, m, from its start. The points within
+    a radius of a segment form a convex set (two discs and a rectangle), so a chord has at most one such interval.
     """
     u, v = next_a - a, next_b - b
     if math.hypot(u, v) <= STILL:
@@ -194,17 +194,17 @@ def _widen(enter: float, leave: float, first: float, last: float) -> tuple[float
 
 
 @part
-def _slab(place: float, way: float, low: float, high: float) -> tuple[float, float]:
-    """From which share of its way on, and up to which, a coordinate is in [low, high]."""
-    if way == 0.0:
+def _slab(place: float, step: float, low: float, high: float) -> tuple[float, float]:
+    """Return the shares of a motion between which a coordinate is in [low, high]."""
+    if step == 0.0:
         return (-np.inf, np.inf) if low <= place <= high else (np.inf, -np.inf)
-    one, other = (low - place) / way, (high - place) / way
+    one, other = (low - place) / step, (high - place) / step
     return min(one, other), max(one, other)
 
 
 @part
 def _disc(a: float, b: float, u: float, v: float, radius: float) -> tuple[float, float]:
-    """From which share of its way on, and up to which, a point is within a radius of the origin."""
+    """Return the shares of a motion between which a point is within a radius of the origin."""
     square, half, out = u * u + v * v, a * u + b * v, a * a + b * b - radius * radius
     if square == 0.0:
         return (-np.inf, np.inf) if out <= 0.0 else (np.inf, -np.inf)

@@ -1,4 +1,4 @@
-"""Bottles whose axes pass over a line within a tick, with the time of each."""
+"""Bottles whose axes cross a line within a tick, with the time of each."""
 
 from conveyor_sim.engine.arrays.types import F8, I8
 from conveyor_sim.engine.compiler.compile import kernel, part
@@ -8,10 +8,10 @@ from conveyor_sim.engine.compiler.compile import kernel, part
 def find_crossings(
     before: F8, ids_before: I8, x: F8, y: F8, ids: I8, line: F8, slots: I8, share: F8, forward: I8
 ) -> int:
-    """How many axes passed a line, straight from where they were before, (2, slots), m, to where they are.
+    """Return the number of axes that crossed a line on the straight path from their previous positions, (2, slots), m.
 
-    line: its start, its way, m, and that way's square: (5,). Written, (slots,): the slots that passed, the share of the
-    tick at which they did, and 1 for those that went from the line's left to its right.
+    line: its start, its vector, m, and the vector's square: (5,). Written, (slots,): the slots that crossed, the share
+    of the tick at which they did, and 1 for those that went from the line's left to its right.
     """
     count = 0
     for i in range(ids_before.size):
@@ -30,6 +30,6 @@ def find_crossings(
 
 @part
 def _seen(line: F8, x: float, y: float) -> tuple[float, float]:
-    """How far a point is to the left of a line (in its lengths), and how far along it (0 to 1)."""
+    """Return how far a point is to the left of a line (in its lengths), and how far along it (0 to 1)."""
     dx, dy = x - line[0], y - line[1]
     return (line[2] * dy - line[3] * dx) / line[4], (line[2] * dx + line[3] * dy) / line[4]

@@ -6,9 +6,9 @@ from conveyor_sim.engine.compiler.compile import kernel
 
 @kernel
 def find_inside(corners: F8, x: F8, y: F8, ids: I8, slots: I8) -> int:
-    """How many bottles are in a simple polygon (n, 2), m; their slots are written, in order, to `slots`, (slots,).
+    """Return the number of bottles in a simple polygon (n, 2), m; write their slots, in order, to `slots`, (slots,).
 
-    By the parity of edges crossed on the way to the right.
+    A bottle is inside if a ray to the right crosses an odd number of edges.
     """
     count = 0
     for i in range(x.size):

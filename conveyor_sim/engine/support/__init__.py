@@ -1,1 +1,1 @@
-"""What bottles stand on: which belt carries, and its friction."""
+"""Belts, floor and bases: the belt that carries a bottle, and its friction."""

@@ -1,7 +1,7 @@
 """Friction between a bottle's base and the belt or floor under it, N = m g (paper eqs. 7, 15).
 
-The base is a point at the axis, the paper's, or a ring (`ring.py`). Bottles whose belt is certain go through one loop
-without branches; a ring that may stand on several belts is summed point by point.
+The base is a point at the axis, as in the paper, or a ring (`ring.py`). Bottles whose belt is certain go through one
+loop without branches; a ring that may straddle belts is summed point by point.
 """
 
 import math
@@ -9,7 +9,7 @@ from typing import Any
 
 from numba import uint64
 
-from conveyor_sim.engine.arrays.bodies import Bottles, Load
+from conveyor_sim.engine.arrays.bodies import Bottles, ForceSums
 from conveyor_sim.engine.arrays.world import World
 from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.contact.friction import implicit_regularisation, regularisation
@@ -18,8 +18,8 @@ from conveyor_sim.engine.threads.workers import units
 
 
 @part
-def add_base_friction(world: World, spin: Any, load: Load, implicit: Any, dt: float, first: int, end: int) -> None:
-    """Add the friction of belts and floor to `load` and `spin.moment` of bottles first to end, but of straddling rings.
+def add_base_friction(world: World, spin: Any, load: ForceSums, implicit: Any, dt: float, first: int, end: int) -> None:
+    """Add the friction of belts and floor on bottles first to end, straddling rings excepted, to their load and moment.
 
     spin, load, implicit: those of the World, or others.
     """
@@ -33,7 +33,7 @@ def add_base_friction(world: World, spin: Any, load: Load, implicit: Any, dt: fl
 
 @part
 def relative_velocity(bottles: Bottles, footing: Any, turn: Any, lag: float, i: int) -> tuple[float, float]:
-    """Velocity of the axis relative to the belt, m/s; where the axis was when it had this velocity, lag seconds ago."""
+    """Return the velocity of the axis relative to the belt, m/s, at the axis's position lag seconds ago."""
     vx = bottles.vx[i] - footing.ux[i]
     vy = bottles.vy[i] - footing.uy[i]
     if turn is not None:
@@ -43,7 +43,7 @@ def relative_velocity(bottles: Bottles, footing: Any, turn: Any, lag: float, i: 
 
 
 @part
-def _point_friction(world: World, load: Load, implicit: Any, dt: float, first: int, end: int) -> None:
+def _point_friction(world: World, load: ForceSums, implicit: Any, dt: float, first: int, end: int) -> None:
     bottles, footing, lag = world.bottles, world.footing, world.settings.lag * dt
     for i in range(uint64(first), uint64(end)):
         vx, vy = relative_velocity(bottles, footing, footing.turn, lag, i)
@@ -63,8 +63,8 @@ def _quotient(world: World, implicit: Any, dt: float, i: int, speed: float) -> f
 
 
 @part
-def _ring_friction(world: World, spin: Any, load: Load, implicit: Any, dt: float, begin: int, end: int) -> None:
-    """A bottle with a base radius of 0 stands on a point beside others on rings."""
+def _ring_friction(world: World, spin: Any, load: ForceSums, implicit: Any, dt: float, begin: int, end: int) -> None:
+    """Add ring friction. A bottle with a base radius of 0, beside others with rings, stands on a point."""
     bottles, footing, ring, settings = world.bottles, world.footing, world.ring, world.settings
     for i in range(uint64(begin), uint64(end)):
         vx, vy = relative_velocity(bottles, footing, footing.turn, settings.lag * dt, i)
@@ -90,10 +90,12 @@ def _turn(turn: Any, i: int) -> float:
 
 
 @part
-def add_straddling_friction(world: World, spin: Any, load: Load, powers: Any, lag: float, first: int, end: int) -> None:
-    """Add to those of bottles first to end, which begin with a unit, the friction on rings that may straddle belts.
+def add_straddling_friction(
+    world: World, spin: Any, load: ForceSums, powers: Any, lag: float, first: int, end: int
+) -> None:
+    """Add the friction on rings that may straddle belts to the load of bottles first to end, which start with a unit.
 
-    powers: (units, H + 1), W, to which what they take from each belt is added, or None. lag: s, as in
+    powers: (units, H + 1), W, to which the power taken from each belt is added, or None. lag: s, as in
     `relative_velocity`.
     """
     bottles, belts = world.bottles, world.belts

@@ -1,4 +1,4 @@
-"""Which belt carries a bottle: the last listed one under its axis, else the floor (paper eqs. 11-15)."""
+"""The belt that carries a bottle: the last listed one under its axis, else the floor (paper eqs. 11-15)."""
 
 import math
 from typing import Any
@@ -14,9 +14,9 @@ from conveyor_sim.engine.threads.workers import UNIT
 
 @part
 def belt_distance(belts: Belts, sectors: Any, h: int, x: float, y: float) -> float:
-    """Signed distance in m of a point from the edge of belt h: >= 0 on it, never more in size than the true one."""
+    """Return the signed distance (m) of a point from the edge of belt h: >= 0 on it, in size at most the true one."""
     if sectors is not None:
-        if sectors.reach[h] >= 0:  # a test for None is pruned where it stands alone
+        if sectors.reach[h] >= 0:  # a test for None is pruned only if it stands alone
             return _sector_distance(sectors, h, x, y)
     dx = x - belts.x[h]
     dy = y - belts.y[h]
@@ -41,7 +41,7 @@ def _sector_distance(sectors: Any, h: int, x: float, y: float) -> float:
 
 @part
 def carrier(i: int, belts: Any, floor: int, x: float, y: float) -> int:
-    """The belt under the axis of bottle i, or `floor`; candidates were listed at the last rebuild."""
+    """Return the belt under the axis of bottle i, or `floor`; candidates were listed at the last rebuild."""
     if belts is None:
         return floor
     certain = belts.certain[i]
@@ -56,7 +56,7 @@ def carrier(i: int, belts: Any, floor: int, x: float, y: float) -> int:
 
 @part
 def surface_velocity(h: int, x: float, y: float, surface: Any, turn: Any) -> tuple[float, float]:
-    """Velocity of surface h at a point, m/s: uniform on a straight belt, Omega x (r - C) on a curved one."""
+    """Return the velocity of surface h at a point, m/s: uniform on a straight belt, Omega x (r - C) on a curved one."""
     ux, uy = surface.ux[h], surface.uy[h]
     if turn is not None:
         ux -= turn[h] * y
@@ -66,7 +66,7 @@ def surface_velocity(h: int, x: float, y: float, surface: Any, turn: Any) -> tup
 
 @part
 def list_belts(bottles: Bottles, grid: Any, belts: Any, ring: Any, floor: int, margin: float) -> int:
-    """Find the belt that is certain within `margin` of each base, else list candidates; return how many."""
+    """List the belt that is certain within `margin` of each base, else candidates; return the number of candidates."""
     if belts is None:
         return 0
     count = 0

@@ -1,6 +1,6 @@
-"""What each bottle stands on: the velocity field of its belt, kept beside it until it may have left the belt.
+"""Velocity field of the belt under each bottle, stored by bottle until it may have left the belt.
 
-At a rebuild each bottle's belt is either certain, wherever it moves within the skin, or tested anew at every force
+At a rebuild each bottle's belt is either certain, wherever it moves within the skin, or tested at every force
 evaluation. Only the latter are visited then.
 """
 
@@ -34,7 +34,7 @@ def _turn_with(footing_turn: Any, surface_turn: Any, i: int, h: int) -> None:
 
 @kernel
 def refresh_footing(bottles: Bottles, belts: Any, surface: Any, footing: Any, ring: Any) -> None:
-    """Put every bottle on its belt: after commands, supply and rebuilds."""
+    """Put every bottle on its belt, after commands, supply and rebuilds."""
     if surface is None:
         return
     floor = surface.ux.size - 1
@@ -52,7 +52,7 @@ def _certain(belts: Any, i: int) -> bool:
 
 @part
 def check_footing(bottles: Bottles, belts: Any, surface: Any, footing: Any, ring: Any, first: int, end: int) -> None:
-    """Put those of bottles first to end that may have changed belts on the one under their axes."""
+    """Put those of bottles first to end that may have changed belts on the belt under their axes."""
     if belts is None:
         return
     floor = surface.ux.size - 1
@@ -66,8 +66,9 @@ def check_footing(bottles: Bottles, belts: Any, surface: Any, footing: Any, ring
 
 @kernel
 def find_carriers(bottles: Bottles, belts: Any, surface: Surface, carriers: Any, carried: Any) -> None:
-    """Write the belt under each bottle's axis now, (slots,), -1 for the floor and free slots, and how many bottles are
-    on each belt, (belts,); the state stays as it is.
+    """Write the belt under each bottle's axis, and the number of bottles on each belt, (belts,).
+
+    The belts are (slots,), -1 for the floor and free slots. The state does not change.
     """
     floor = surface.ux.size - 1
     for h in range(floor):

@@ -1,10 +1,10 @@
-"""Friction of a base that is a ring: sliding and spinning share it (the paper's base is a point).
+"""Friction of a base that is a ring, which sliding and spinning share (the paper's base is a point).
 
 For a disc: Farkas, Bartels, Unger and Wolf, Phys. Rev. Lett. 90, 248302 (2003).
 
-Every point of the ring drags with its share of mu m g along its own slip v, smoothed to v/sqrt(v^2 + eps^2) with
-eps = v_lim/2: the slope at rest, 2/v_lim, is that of the regularised point. A ring that spins as well
-slides the more easily, and its spin slows down.
+Every point of the ring drags with its share of mu m g along its own slip v, smoothed to v/sqrt(v^2 + eps^2) with eps =
+v_lim/2: the slope at rest, 2/v_lim, is that of the regularised point. A ring that also spins slides more easily, and
+its spin slows down.
 """
 
 import math
@@ -18,9 +18,9 @@ from conveyor_sim.engine.support.belts import carrier, surface_velocity
 from conveyor_sim.engine.threads.workers import UNIT
 
 POINTS = 32
-"""Of a ring that may stand on several belts."""
+"""Points of a ring that may straddle belts."""
 HALVINGS = 6
-"""Which find the edge between two points: the force is then right to 0.2 % of mu m g rms, 2 % at most."""
+"""Bisections for the edge between two points. The force is then accurate to 0.2 % of mu m g rms, 2 % at most."""
 
 _ANGLES = 2.0 * np.pi * np.arange(POINTS) / POINTS
 _COS, _SIN = np.cos(_ANGLES), np.sin(_ANGLES)
@@ -28,18 +28,18 @@ _COS, _SIN = np.cos(_ANGLES), np.sin(_ANGLES)
 
 @part
 def ring_means(slide: float, spin: float, slip_limit: float) -> tuple[float, float, float]:
-    """What `ring_share` needs of a ring on one belt: (limit, first, rest), m/s, m/s, m^2/s^2.
+    """Return (limit, first, rest) of a ring on one belt for `ring_share`, m/s, m/s, m^2/s^2.
 
     slide: s_v >= 0, m/s, speed of the axis relative to the belt. spin: s_w = |omega| R_b >= 0, m/s, relative as well.
 
-    The mean over the ring is of complete elliptic integrals: the limit of the arithmetic-geometric mean that starts
-    from S = sqrt((s_v + s_w)^2 + eps^2) and D = sqrt((s_v - s_w)^2 + eps^2), its first arithmetic mean, and
-    sum_(n > 1) 2^(n-2) c_n^2 with c_n half the difference before round n. Six rounds do for D/S down to 1e-6.
+    The mean over the ring consists of complete elliptic integrals: the limit of the arithmetic-geometric mean that
+    starts from S = sqrt((s_v + s_w)^2 + eps^2) and D = sqrt((s_v - s_w)^2 + eps^2), its first arithmetic mean, and
+    sum_(n > 1) 2^(n-2) c_n^2 with c_n half the difference before round n. Six rounds suffice for D/S down to 1e-6.
     """
     squared = 0.25 * slip_limit * slip_limit
     sum_squared = (slide + spin) * (slide + spin) + squared
     difference_squared = (slide - spin) * (slide - spin) + squared
-    # D by way of S: two roots that wait for nothing would be packed to one, which then packs with no other bottle's.
+    # D from S: two independent roots would be packed into one instruction, which then can't be packed across bottles.
     unit = 1.0 / math.sqrt(sum_squared)
     ratio = math.sqrt(difference_squared * unit * unit)
     a = first = 0.5 * (1.0 + ratio)
@@ -56,18 +56,19 @@ def ring_means(slide: float, spin: float, slip_limit: float) -> tuple[float, flo
 
 @part
 def _mean(a: float, b: float, rest: float, weight: float) -> tuple[float, float, float]:
-    """One round: the two means, and `rest` with weight times the square of half the difference."""
+    """Return the two means of one round, and `rest` plus weight times the square of half the difference."""
     c = 0.5 * (a - b)
     return 0.5 * (a + b), math.sqrt(a * b), rest + weight * c * c
 
 
 @part
 def ring_share(own: float, other: float, limit: float, first: float, rest: float) -> float:
-    """F/(mu m g s_v) for own s_v and other s_w, M/(mu m g R_b s_w) for own s_w and other s_v; s/m, finite at rest.
+    """Return F/(mu m g s_v) for own s_v and other s_w, M/(mu m g R_b s_w) for own s_w and other s_v; s/m; finite.
 
-    [1 - (s_w/first)^2/2 - rest/s_v^2]/limit, in which nothing cancels; its c_1 = s_v s_w/first is in the second term.
+    It is [1 - (s_w/first)^2/2 - rest/s_v^2]/limit, in which nothing cancels; its c_1 = s_v s_w/first is in the second
+    term.
     """
-    # `rest` goes with the fourth power of the smaller speed: far below the other one it is nothing but rounding.
+    # `rest` scales with the fourth power of the smaller speed: far below the other one it is nothing but rounding.
     least = 1e-8 * first
     own = least if least > own else own
     inverse = 1.0 / (own * first * limit)
@@ -80,10 +81,10 @@ def ring_share(own: float, other: float, limit: float, first: float, rest: float
 def straddling_ring(
     i: int, world: World, vx: float, vy: float, omega: float, lag: float, powers: Any
 ) -> tuple[float, float, float]:
-    """Force (N, x and y) and moment about the axis (N m) on a ring whose points may stand on different belts.
+    """Return force (N, x and y) and moment about the axis (N m) on a ring whose points may be on different belts.
 
     i: the bottle, whose candidate belts are listed. vx, vy: m/s, omega: rad/s, of its axis. lag: s, as in
-    `relative_velocity`. powers: (units, H + 1), W, the power of each belt is added to it; or None.
+    `relative_velocity`. powers: (units, H + 1), W, to which the power of each belt is added; or None.
     """
     bottles, belts, surface, slip_limit = world.bottles, world.belts, world.surface, world.settings.slip_limit
     x, y, radius, weight, kind = bottles.x[i], bottles.y[i], world.ring.radius[i], bottles.weight[i], bottles.type[i]
@@ -131,7 +132,7 @@ def _extent(
     next_y: float,
     there: int,
 ) -> float:
-    """How much of the way from a point to the next one counts as the first one's: half, or as far as its belt goes."""
+    """Return the share of the arc between two points that counts as the first one's: half, or up to its belt's edge."""
     if here == there:
         return 0.5
     low, high = 0.0, 1.0

@@ -1,4 +1,4 @@
-"""Angular spans without angles: two unit vectors and a code, so that spans wrap and the kernels need no arctangent."""
+"""Angular spans without angles: two unit vectors and a code. So spans can wrap, and kernels need no arctangent."""
 
 from typing import Any
 
@@ -9,7 +9,7 @@ UP_TO_HALF, BEYOND_HALF, FULL_CIRCLE = 0, 1, 2
 
 @part
 def span_distance(x: float, y: float, start_x: float, start_y: float, end_x: float, end_y: float, reach: Any) -> float:
-    """Signed distance in m of (x, y), relative to the centre, from the span's edges: >= 0 inside.
+    """Return the signed distance (m) of (x, y), relative to the centre, from the span's edges: >= 0 inside.
 
     Its size is never more than the true distance to an edge, and its sign is exact.
     """

@@ -1,10 +1,10 @@
 """Static friction with memory: a spring from each base to a point of its belt (Cundall and Strack 1979).
 
-The point, the anchor, is carried with the belt's surface, so on a turning belt the spring turns with it. The spring
-pulls with k e + c v, e from the anchor to the axis, v the velocity relative to the belt; at most with mu m g. Drawn out
-to mu m g / k, the base slides, and drags the anchor after it. On another belt the spring begins anew, slack.
+The point, the anchor, moves with the belt's surface, so on a turning belt the spring turns with it. The spring pulls
+with k e + c v, at most mu m g; e from the anchor to the axis, v the velocity relative to the belt. Elongated to mu m g
+/ k, the base slides and drags the anchor along. On another belt the spring starts anew, without load.
 
-Anchors are kept, not elongations: a spring is exactly as long as the bottle is away, whatever the integrator.
+Anchors are stored, not elongations, so the length of a spring is exact for any integrator.
 """
 
 import math
@@ -12,7 +12,7 @@ from typing import Any
 
 from numba import uint64
 
-from conveyor_sim.engine.arrays.bodies import Bottles, Load
+from conveyor_sim.engine.arrays.bodies import Bottles, ForceSums
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.support.base import relative_velocity
@@ -20,12 +20,12 @@ from conveyor_sim.engine.support.base import relative_velocity
 
 @part
 def add_static_friction(
-    bottles: Bottles, load: Load, footing: Any, static: Any, lag: float, drags: bool, first: int, end: int
+    bottles: Bottles, load: ForceSums, footing: Any, static: Any, lag: float, drags: bool, first: int, end: int
 ) -> None:
-    """Add the pull of the springs to `load` of bottles first to end; `footing` must be that of now.
+    """Add the pull of the springs to `load` of bottles first to end; `footing` must be up to date.
 
-    lag: s, as in `relative_velocity`. drags: set anchors where there are none, and drag them where the base slides;
-    False for a look at the forces.
+    lag: s, as in `relative_velocity`. drags: create missing anchors, and drag those of sliding bases; False to compute
+    forces only.
     """
     if static is None:
         return
@@ -56,7 +56,7 @@ def add_static_friction(
 
 @part
 def carry_anchors(footing: Any, static: Any, dt: float, first: int, end: int) -> None:
-    """Take the anchors of bottles first to end along with their belts for dt seconds."""
+    """Move the anchors of bottles first to end with their belts for dt seconds."""
     if static is None:
         return
     for i in range(uint64(first), uint64(end)):
@@ -67,7 +67,7 @@ def carry_anchors(footing: Any, static: Any, dt: float, first: int, end: int) ->
 
 @part
 def _carried(ux: float, uy: float, turn: Any, static: Any, dt: float, i: int) -> tuple[float, float]:
-    """Way of an anchor in dt, m; on a turning belt by Cayley's rotation, which keeps it on its circle."""
+    """Return the displacement of an anchor in dt, m; on a turning belt by Cayley's rotation, which keeps its radius."""
     if turn is None:
         return dt * ux, dt * uy
     half = 0.5 * dt * turn[i]
@@ -78,7 +78,7 @@ def _carried(ux: float, uy: float, turn: Any, static: Any, dt: float, i: int) ->
 
 @part
 def anchor_energy(bottles: Bottles, static: Any, energy: F8, account: int) -> None:
-    """Add what the springs under the bottles hold (J) to an account of `energy`."""
+    """Add the energy of the springs under the bottles (J) to an account of `energy`."""
     if static is None:
         return
     for i in range(bottles.x.size):

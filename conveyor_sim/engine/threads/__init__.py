@@ -1,1 +1,1 @@
-"""Threads that step together, to the same bits as one."""
+"""Threads that step together, with the bits of a single one."""

@@ -1,24 +1,24 @@
-"""How many threads to use: as many as are measured to be fastest, which changes when others want the cores.
+"""Choice of the number of threads: the fastest one by measurement, which changes with the load on the cores.
 
-A tick now and then is taken with half or twice the threads. Every trial that loses doubles the wait for the next, so on
-a busy machine trials cost little; a tick that is much slower than its like calls for a trial at once.
+Occasionally a tick is taken with half or twice the threads. Every trial that loses doubles the wait for the next, so on
+a busy machine trials cost little. A tick that is suddenly much slower starts a trial at once.
 """
 
 LEAST_WORK = 300e-6
-"""s, of a tick on one thread: for less, waking others costs more than they do."""
+"""Duration of a tick on one thread, s, below which waking other threads costs more than they save."""
 
 GAIN = 0.95
 """A trial wins if it takes less than this share of the time."""
 
 SUDDEN = 1.3
-"""So many times slower than before calls for a trial."""
+"""Slowdown of a tick that starts a trial."""
 
 FIRST_WAIT, LONGEST_WAIT = 4, 512
 """Ticks between trials."""
 
 
 class ThreadChoice:
-    """Tells how many threads to take the next tick with, from 1 to `most`, and learns from how long it took."""
+    """Chooses the number of threads for the next tick, from 1 to `most`, by the durations of earlier ticks."""
 
     def __init__(self, most: int) -> None:
         self._sizes = [size for size in (1 << power for power in range(most.bit_length())) if size <= most]
@@ -33,11 +33,11 @@ class ThreadChoice:
 
     @property
     def size(self) -> int:
-        """Threads for the next tick."""
+        """Return the number of threads for the next tick."""
         return self._sizes[self._index if self._trial is None else self._trial]
 
     def took(self, seconds: float, work: float) -> None:
-        """Learn that a tick with `size` threads took so many seconds for so much work (bottle-steps)."""
+        """Record that a tick with `size` threads took `seconds` for an amount of work (bottle-steps)."""
         rate = seconds / work
         if self._trial is not None:
             self._judge(rate)

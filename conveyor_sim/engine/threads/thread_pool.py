@@ -1,4 +1,4 @@
-"""A pool of threads: they wait in Python between ticks, and take the steps of a tick together (`workers.py`)."""
+"""Pool of threads, which wait in Python between ticks, and take the steps of a tick together (`workers.py`)."""
 
 import os
 import threading
@@ -16,9 +16,9 @@ Task = tuple[Advance, World, Worker, int, float, int]
 
 
 class ThreadPool:
-    """Teams of up to `most` threads, the calling one among them. The others start when first needed.
+    """Teams of up to `most` threads, the calling one included. The others start when first needed.
 
-    A pool is for Worlds of one scene: their arrays may be replaced, their types not.
+    A pool is for Worlds of one scene: their arrays may be replaced, their types must not change.
     """
 
     def __init__(self, most: int) -> None:
@@ -31,7 +31,7 @@ class ThreadPool:
         weakref.finalize(self, _dismiss, self._tasks)
 
     def advance(self, size: int, function: Advance, world: World, steps: int, dt: float, phase: int) -> int:
-        """Run an integrator on `size` threads; return the steps that it took. Raises ValueError beyond `most`."""
+        """Run an integrator on `size` threads; return the number of steps taken. Raise ValueError beyond `most`."""
         group = self.group(size)
         if not group[0].callees[0]:
             find_callees(world, group[0])
@@ -45,13 +45,13 @@ class ThreadPool:
                 if (error := self._done.get()) is not None:
                     raise error
         except BaseException:
-            # Interrupted in between: who is where is not known, so the next call begins with others.
+            # After an interrupt the progress of threads is unknown, so the next call starts others.
             self._disband()
             raise
         return taken
 
     def group(self, size: int) -> tuple[Worker, ...]:
-        """Workers in a group of `size`; those of one size are always the same."""
+        """Return the workers of a group of `size`; a size always has the same workers."""
         if not 1 <= size <= self.most:
             raise ValueError(f"a group of {size} threads, expected 1 to {self.most}")
         if size not in self._groups:
@@ -59,7 +59,7 @@ class ThreadPool:
         return self._groups[size]
 
     def _compiled(self, function: Any, *arguments: Any) -> Advance:
-        """The machine code for arguments of these types, which never change in a pool's life."""
+        """Return the machine code for arguments of these types, which never change in a pool's life."""
         if function not in self._entries:
             self._entries[function] = entry(function, *arguments)
         return self._entries[function]
@@ -90,7 +90,7 @@ def _work(tasks: "SimpleQueue[Task | None]", done: "SimpleQueue[BaseException | 
             done.put(error)
         else:
             done.put(None)
-        # While it waits it must not keep the arrays of a run that has ended.
+        # A waiting thread must not retain the arrays of a run that has ended.
         del task, function, world, worker
 
 

@@ -1,8 +1,8 @@
-"""Threads that take steps together: who does which block of the work, and where they wait for each other.
+"""Threads that take steps together: their shares of the work, and barriers.
 
-Every thread runs the same integrator on the same World with a Worker of its own. Pairs, and bottles, are shared out in
-whole units, and each share is worked on block by block. No block reads what another writes in the same phase, and no
-sum runs over blocks, so the bits do not depend on who did which.
+Every thread runs the same integrator on the same World, with its own Worker. Pairs and bottles are shared out in
+complete units, and each share is processed block by block. No block reads data that another writes in the same phase,
+and no sum runs over blocks, so the bits do not depend on the threads.
 """
 
 import numpy as np
@@ -16,20 +16,21 @@ from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.compiler.numba_internals.atomics import add_atomic, load_atomic, sched_yield, store_atomic
 
 UNIT = 64
-"""Pairs, or bottles, that are never parted: few enough that shares are even, and no two threads write to one line."""
+"""Pairs or bottles that stay together: few enough for even shares; no two threads write to the same cache line."""
 
 BLOCK = 8 * UNIT
-"""Pairs, or bottles, at a time at the most: what a thread holds of them stays in the first cache."""
+"""Pairs or bottles that are processed at a time, at most: their scratch fits into the first-level cache."""
 
 MOST_CONTACTS = 32
-"""Of one bottle with rails at a time, the deepest ones; as many touch only in a pocket drawn as a fine polyline."""
+"""Contacts of one bottle with rails at a time, the deepest ones. More touch only in a pocket drawn as a fine polyline.
+"""
 
-# Places in `Worker.sync`, a cache line apart.
+# Indices in `Worker.sync`, one cache line apart.
 ARRIVED, TURN, MOVED = 0, 8, 16
 SYNC_SIZE = 24
 
 SPINS = 2000
-"""Looks at the barrier before a thread offers its core to others: about 20 us."""
+"""Polls of the barrier before a thread yields its core: about 20 us."""
 
 
 def workers(size: int) -> tuple[Worker, ...]:
@@ -48,7 +49,7 @@ def _rail_contacts() -> RailContacts:
     def reals() -> F8:
         return np.zeros(MOST_CONTACTS)
 
-    def whole() -> U4:
+    def indices() -> U4:
         return np.zeros(MOST_CONTACTS, np.uint32)
 
     return RailContacts(
@@ -56,9 +57,9 @@ def _rail_contacts() -> RailContacts:
         ny=reals(),
         overlap=reals(),
         share=reals(),
-        material=whole(),
-        rail=whole(),
-        surface=whole(),
+        material=indices(),
+        rail=indices(),
+        surface=indices(),
         entry=np.zeros(MOST_CONTACTS, np.int64),
         solution=reals(),
     )
@@ -66,9 +67,9 @@ def _rail_contacts() -> RailContacts:
 
 @part
 def share(worker: Worker, count: int) -> tuple[int, int]:
-    """This worker's share of `count` things: the first, and where it ends."""
+    """Return this worker's share of `count` items: the first, and the one after the last."""
     units = (count + UNIT - 1) // UNIT
-    # What can't be shared is for the calling thread, rank 0, which is awake already.
+    # The remainder is for the calling thread, rank 0, which is already awake.
     begin = (worker.rank * units + worker.size - 1) // worker.size
     stop = ((worker.rank + 1) * units + worker.size - 1) // worker.size
     return min(begin * UNIT, count), min(stop * UNIT, count)
@@ -76,13 +77,13 @@ def share(worker: Worker, count: int) -> tuple[int, int]:
 
 @part
 def units(first: int, end: int) -> tuple[int, int]:
-    """The units of things first to end, which begin with a unit: the first, and where they end."""
+    """Return the units of items first to end, which start with a unit: the first, and the one after the last."""
     return first // UNIT, (end + UNIT - 1) // UNIT
 
 
 @part
 def wait_for_all(worker: Worker) -> None:
-    """Return when all workers have called it; what they wrote before is then seen by all."""
+    """Return when all workers have called it. All then see what each wrote before."""
     if worker.size == 1:
         return
     turn = load_atomic(worker.sync, TURN)
@@ -99,17 +100,17 @@ def wait_for_all(worker: Worker) -> None:
 
 @part
 def raise_flag(worker: Worker, flag: int) -> None:
-    """Set a flag that all see after the next `wait_for_all`."""
+    """Set a flag, which all see after the next `wait_for_all`."""
     store_atomic(worker.sync, flag, 1)
 
 
 @part
 def lower_flag(worker: Worker, flag: int) -> None:
-    """Clear a flag; by one worker, between two barriers."""
+    """Clear a flag. Only one worker may call it, between two barriers."""
     store_atomic(worker.sync, flag, 0)
 
 
 @part
 def flag_raised(worker: Worker, flag: int) -> bool:
-    """Whether a flag is set."""
+    """Return True if a flag is set."""
     return load_atomic(worker.sync, flag) != 0

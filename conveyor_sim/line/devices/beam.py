@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from conveyor_sim.engine.arrays.beams import LightBeams, Ways
+from conveyor_sim.engine.arrays.beams import BottleMotion, LightBeams
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.engine.sensors.beams import block_beams
 from conveyor_sim.line.device import Device, ScanContext
@@ -35,7 +35,7 @@ class Beams(Device):
         )
         self._room: F8 = np.empty((4, 0))
         self._began: F8 | None = None
-        self._ways: Ways | None = None
+        self._ways: BottleMotion | None = None
         self._states: list[int] = [0] * len(ends)
 
     def begin(self, now: ScanContext) -> None:
@@ -54,7 +54,7 @@ class Beams(Device):
             vx = vy = np.zeros(bottles.x.size)
             start = np.stack((bottles.x, bottles.y, vx, vy))
         self._began = None
-        ways = Ways(start, bottles.x, bottles.y, vx, vy, bottles.radius, bottles.id)
+        ways = BottleMotion(start, bottles.x, bottles.y, vx, vy, bottles.radius, bottles.id)
         # The layout for kernels is made once, so equal arrays are passed in the same tuple.
         if self._ways is None or any(a is not b for a, b in zip(self._ways, ways, strict=True)):
             self._ways = ways

@@ -14,7 +14,7 @@ class BeltSurfaces:
 
     def __init__(self, state: State) -> None:
         self._state = state
-        shapes = state.model.belt_shapes
+        shapes = state.model.plant.belts
         straight = [index for index, shape in enumerate(shapes) if shape.kind == "straight"]
         self._straight = np.array(straight, dtype=np.int64)
         self._along_x = np.array([math.cos(shapes[index].angle) for index in straight])

@@ -36,7 +36,7 @@ class Mover(Device):
     """
 
     def __init__(self, name: str, part: MoverPart, setup: DeviceSetup) -> None:
-        shapes = setup.model.moving_shapes
+        shapes = setup.model.plant.moving
         index = [shape.name for shape in shapes].index(name)
         shape = shapes[index]
         order, home, away, at_home, at_end = WORDS[name.split("/")[0]]

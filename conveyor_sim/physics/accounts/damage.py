@@ -6,7 +6,7 @@ from dataclasses import astuple
 import numpy as np
 
 from conveyor_sim.columns.damage import DamageColumns, DamageEvent, RailWearColumns
-from conveyor_sim.engine.arrays.damage import Damage, Worst, worst_columns
+from conveyor_sim.engine.arrays.damage import DamageArrays, Maximum, worst_columns
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.physics.state import State
 from conveyor_sim.physics.state.empty_damage import rail_places
@@ -104,7 +104,7 @@ class DamageAccount:
         work, impulse = bins.work.sum(axis=0), bins.impulse.sum(axis=0)
         return RailWearColumns(places.rail, places.x, places.y, places.length, work, impulse)
 
-    def _worst(self) -> Iterator[Worst]:
+    def _worst(self) -> Iterator[Maximum]:
         damage = self._state.world.damage
         return iter(()) if damage is None else worst_columns(damage)
 
@@ -131,14 +131,14 @@ class DamageAccount:
         self.events.append(astuple(DamageEvent(tick, kind, bottle, x, y, value, limit, text)))
 
 
-def _column(damage: Damage, kind: str, output: bool = False) -> F8 | None:
+def _column(damage: DamageArrays, kind: str, output: bool = False) -> F8 | None:
     """What a limit holds for, by slot, in the tick or since the last output; None where it is not looked at."""
     if kind == "scuffing_work":
         return None if damage.scuffing is None else damage.scuffing.work
     if kind not in PLACES:
         return None
     group, name = PLACES[kind]
-    worst: Worst | None = getattr(getattr(damage, group), name, None)
+    worst: Maximum | None = getattr(getattr(damage, group), name, None)
     if worst is None:
         return None
     return worst.output if output else worst.tick

@@ -40,6 +40,6 @@ def deepest_overlap(world: World, found: RailContacts) -> float:
 
 def rail_entries(model: Model, types: NDArray[np.int64], rails: NDArray[np.int64]) -> NDArray[np.int64]:
     """Entries in `Model.rail_law` of contacts of bottle types with rails, (n,)."""
-    materials = model.rail_materials
-    material_of = np.array([materials.index(rail.material) for rail in model.rail_shapes], dtype=np.int64)
+    materials = model.plant.rail_materials
+    material_of = np.array([materials.index(rail.material) for rail in model.plant.rails], dtype=np.int64)
     return types * len(materials) + material_of[rails]

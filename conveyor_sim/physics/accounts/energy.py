@@ -19,7 +19,7 @@ class EnergyAccount:
     def __init__(self, state: State) -> None:
         """Open the books with the energy of the bottles that are there; the neighbour lists must hold."""
         self._state = state
-        self._found = workers(1)[0].found
+        self._found = workers(1)[0].rail_contacts
         self.fed = self.removed = self.springs = self.base_springs = 0.0
         self.restart()
 

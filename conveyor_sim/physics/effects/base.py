@@ -5,6 +5,7 @@ from collections.abc import Callable, Collection
 from conveyor_sim.physics.effects.declaration import Cause, Effect
 from conveyor_sim.physics.effects.terms import Meeting, Terms, drag_bound, tightest
 from conveyor_sim.physics.laws.coefficients import base_friction
+from conveyor_sim.physics.plant import Plant
 from conveyor_sim.physics.timestep.bounds import Bound, base_friction_bound, slip_time
 from conveyor_sim.physics.timestep.methods import Share
 from conveyor_sim.physics.timestep.prediction import Term
@@ -15,11 +16,11 @@ MEETING = 0.2
 """Of the fastest speed in a scene: at which most bottles meet, on the scenes of docs/accuracy.md."""
 
 
-def _friction(scene: Scene, on: Collection[str]) -> Cause | None:
-    table = base_friction(scene)
-    if scene.gravity == 0.0 or not table.any():
+def _friction(plant: Plant, on: Collection[str]) -> Cause | None:
+    table = base_friction(plant.scene)
+    if plant.scene.gravity == 0.0 or not table.any():
         return None
-    for row, name in enumerate(scene.belts):
+    for row, name in enumerate(plant.scene.belts):
         if table[row].any():
             return Cause(("belts", name), f"friction {table[row].max():g}")
     return Cause(("floor",), f"friction {table[-1].max():g}")
@@ -91,7 +92,7 @@ def _braked(meeting: Meeting, terms: Terms) -> list[Share]:
     if terms.laws.base_friction is None or terms.method.second_order:
         return []
     braking = float(terms.laws.base_friction.max()) * terms.scene.gravity
-    return [Share("braking by the base", 1.0, 2.0 * MEETING * terms.impact_speed / braking, 1.0)]
+    return [Share("braking by the base", 1.0, 2.0 * MEETING * terms.plant.impact_speed / braking, 1.0)]
 
 
 def _implicit_point(terms: Terms) -> bool:
@@ -99,10 +100,10 @@ def _implicit_point(terms: Terms) -> bool:
     return "implicit_friction" in terms.on and "ring_base" not in terms.on
 
 
-def _ring(scene: Scene, on: Collection[str]) -> Cause | None:
+def _ring(plant: Plant, on: Collection[str]) -> Cause | None:
     # Rotation is decided later, for a ring calls for it; where it is forced off, the ring has nothing to turn.
-    if "base_friction" in on and scene.effects.get("rotation") != "off":
-        for name, kind in scene.bottle_types.items():
+    if "base_friction" in on and plant.scene.effects.get("rotation") != "off":
+        for name, kind in plant.scene.bottle_types.items():
             if kind.base_radius is not None:
                 return Cause(("bottle_types", name, "base_radius"), f"{kind.base_radius:g} m")
     return None
@@ -126,12 +127,12 @@ def _ring_bounds(terms: Terms) -> list[Bound]:
     return [*tightest("spin on the base", stable, stability=True), *tightest("base spin", exact)]
 
 
-def _belts(scene: Scene, on: Collection[str]) -> Cause | None:
-    return Cause(("belts", next(iter(scene.belts)))) if scene.belts and "base_friction" in on else None
+def _belts(plant: Plant, on: Collection[str]) -> Cause | None:
+    return Cause(("belts", next(iter(plant.scene.belts)))) if plant.scene.belts and "base_friction" in on else None
 
 
-def _curved_belts(scene: Scene, on: Collection[str]) -> Cause | None:
-    for name, belt in scene.belts.items():
+def _curved_belts(plant: Plant, on: Collection[str]) -> Cause | None:
+    for name, belt in plant.scene.belts.items():
         if isinstance(belt, CurvedBelt) and "belts" in on:
             return Cause(("belts", name))
     return None

@@ -1,54 +1,50 @@
 """Effects of contact: that bottles touch bottles, and the elastic laws."""
 
+import math
 from collections.abc import Callable, Collection, Iterator
 
 from conveyor_sim.engine.contact.laws import hertz, linear, table
 from conveyor_sim.physics.effects.declaration import Cause, Effect
-from conveyor_sim.physics.effects.load import contact_load
-from conveyor_sim.physics.effects.movers import mover_bounds
 from conveyor_sim.physics.effects.terms import (
     Meeting,
     Terms,
     deepest,
     frequency,
     meetings,
-    most_bottles,
     overlap_at,
     tightest,
 )
-from conveyor_sim.physics.timestep.bounds import Bound, lattice_bound, wedge_bound
+from conveyor_sim.physics.plant import Plant
+from conveyor_sim.physics.timestep.bounds import Bound, lattice_bound, mover_bound, wedge_bound
 from conveyor_sim.physics.timestep.methods import Share
 from conveyor_sim.scene.contacts import Contact
-from conveyor_sim.scene.geometry import rail_shapes
-from conveyor_sim.scene.moving import moving_shapes
-from conveyor_sim.scene.schema import Scene
 
 
-def contacts_in_use(scene: Scene, on: Collection[str]) -> Iterator[tuple[int, Contact]]:
+def contacts_in_use(plant: Plant, on: Collection[str]) -> Iterator[tuple[int, Contact]]:
     """The contacts between materials that can meet here: bottles if there are several, bottles and rails."""
-    bottles = {kind.material for kind in scene.bottle_types.values()}
+    bottles = {kind.material for kind in plant.scene.bottle_types.values()}
     with_rails = "segment_rails" in on or "arc_rails" in on
-    rails = {rail.material for rail in rail_shapes(scene)} if with_rails else set()
+    rails = {rail.material for rail in plant.rails_at_rest} if with_rails else set()
     if "moving_rails" in on:
-        rails |= {shape.material for shape in moving_shapes(scene)}
-    for index, contact in enumerate(scene.contacts):
+        rails |= {shape.material for shape in plant.moving}
+    for index, contact in enumerate(plant.scene.contacts):
         a, b = contact.between
         of_bottles = {a, b} <= bottles and "bottle_contact" in on
         if of_bottles or (a in bottles and b in rails) or (b in bottles and a in rails):
             yield index, contact
 
 
-def _pairs(scene: Scene, on: Collection[str]) -> Cause | None:
-    for path, entry in scene.entries():
+def _pairs(plant: Plant, on: Collection[str]) -> Cause | None:
+    for path, entry in plant.scene.entries():
         if entry.most is None:
             return Cause(path, "without end")
-    most = most_bottles(scene) or 0
-    return Cause(("bottles" if scene.bottles else "infeeds",), f"{most} bottles in all") if most > 1 else None
+    most = plant.most_bottles or 0
+    return Cause(("bottles" if plant.scene.bottles else "infeeds",), f"{most} bottles in all") if most > 1 else None
 
 
-def _elastic(field: str, unit: str) -> Callable[[Scene, Collection[str]], Cause | None]:
-    def called_for(scene: Scene, on: Collection[str]) -> Cause | None:
-        for index, contact in contacts_in_use(scene, on):
+def _elastic(field: str, unit: str) -> Callable[[Plant, Collection[str]], Cause | None]:
+    def called_for(plant: Plant, on: Collection[str]) -> Cause | None:
+        for index, contact in contacts_in_use(plant, on):
             value = getattr(contact, field)
             if value is not None:
                 what = f"{len(value)} points" if isinstance(value, tuple) else f"{value:g} {unit}"
@@ -71,7 +67,7 @@ def _stable(name: str, stiffness: Callable[[Meeting, Terms], tuple[float, str]])
                 lattices.append((lattice_bound(k, 2.0 * meeting.reduced_mass), f"a hexagonal packing at {said}"))
             elif k > 0.0:
                 wedges.append((wedge_bound(k, meeting.reduced_mass), f"a bottle between two rails at {said}"))
-                movers += mover_bounds(meeting, k, terms)
+                movers += _mover_bounds(meeting, k, terms)
         return [
             *tightest(f"{name}lattice stability", lattices, stability=True),
             *tightest(f"{name}rail stability", wedges, stability=True),
@@ -79,6 +75,24 @@ def _stable(name: str, stiffness: Callable[[Meeting, Terms], tuple[float, str]])
         ]
 
     return bounds
+
+
+def _mover_bounds(meeting: Meeting, stiffness: float, terms: Terms) -> list[tuple[float, str]]:
+    """Bounds (s) with their reasons: bottles of a type, as many as find room, against each rail of the material.
+
+    meeting: of a bottle type and a rail material; stiffness: N/m.
+    """
+    materials = terms.plant.rail_materials
+    found = []
+    for shape in terms.plant.moving:
+        if shape.limit is None or shape.material != materials[meeting.entry % len(materials)]:
+            continue
+        most = 2 * (1 + math.floor(shape.length / (2.0 * meeting.first.radius)))
+        # What presses at the end of an arm moves it as easily as a mass of J / L^2.
+        mass = shape.mass / shape.fastest_point**2
+        reason = f"{most} bottles at {shape.name}, a body of {mass:.3g} kg when held up, at k = {stiffness:.3g} N/m"
+        found.append((mover_bound(stiffness, meeting.reduced_mass, mass, most), reason))
+    return found
 
 
 def _linear(meeting: Meeting, terms: Terms) -> tuple[float, str]:
@@ -91,8 +105,8 @@ def _hertz(meeting: Meeting, terms: Terms) -> tuple[float, str]:
     law, k = meeting.elastic
     if law is not hertz.HERTZ:
         return 0.0, ""
-    pressed = overlap_at(meeting, terms, contact_load(terms).force)
-    tangent = law.stiffest(k, max(deepest(meeting, terms, terms.impact_speed)[0], pressed), None)
+    pressed = overlap_at(meeting, terms, terms.load.force)
+    tangent = law.stiffest(k, max(deepest(meeting, terms, terms.plant.impact_speed)[0], pressed), None)
     return tangent, f"dN/d delta = {tangent:.3g} N/m"
 
 
@@ -110,7 +124,7 @@ def _peak(stiffness: Callable[[Meeting, Terms], tuple[float, str]]) -> Callable[
     def shares(meeting: Meeting, terms: Terms) -> list[Share]:
         if stiffness(meeting, terms)[0] == 0.0:
             return []
-        return [terms.method.between_steps(frequency(meeting, terms, terms.impact_speed))]
+        return [terms.method.between_steps(frequency(meeting, terms, terms.plant.impact_speed))]
 
     return shares
 

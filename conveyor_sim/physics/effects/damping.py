@@ -8,14 +8,14 @@ from conveyor_sim.physics.effects.contacts import contacts_in_use
 from conveyor_sim.physics.effects.declaration import Cause, Effect
 from conveyor_sim.physics.effects.terms import Meeting, Terms, deepest, drag_bound, frequency, meetings, tightest
 from conveyor_sim.physics.laws.damping import damping_law
+from conveyor_sim.physics.plant import Plant
 from conveyor_sim.physics.timestep.bounds import Bound, damping_bound
 from conveyor_sim.physics.timestep.methods import Share
-from conveyor_sim.scene.schema import Scene
 
 
-def _called_for(law: DampingLaw) -> Callable[[Scene, Collection[str]], Cause | None]:
-    def called_for(scene: Scene, on: Collection[str]) -> Cause | None:
-        for index, contact in contacts_in_use(scene, on):
+def _called_for(law: DampingLaw) -> Callable[[Plant, Collection[str]], Cause | None]:
+    def called_for(plant: Plant, on: Collection[str]) -> Cause | None:
+        for index, contact in contacts_in_use(plant, on):
             if damping_law(contact) is law:
                 damping = contact.damping
                 if damping.restitution is None:
@@ -31,7 +31,7 @@ def _dashpot(law: DampingLaw, meeting: Meeting, terms: Terms) -> float:
     coefficient = meeting.coefficient(law)
     if coefficient == 0.0:
         return 0.0
-    depth, elastic = deepest(meeting, terms, terms.impact_speed)
+    depth, elastic = deepest(meeting, terms, terms.plant.impact_speed)
     return law.force(coefficient, elastic, depth, 1.0)
 
 
@@ -45,7 +45,7 @@ def _bounds(law: DampingLaw) -> Callable[[Terms], list[Bound]]:
             if c > 0.0:
                 said = f"m_r / (2 {law.rate}) at c = {c:g} kg/s"
                 if law.exponent > 0.0:
-                    speed = terms.impact_speed
+                    speed = terms.plant.impact_speed
                     said = f"m_r / (2 {law.rate}), {c:.3g} kg/s at the deepest of an impact at {speed:g} m/s"
                 found.append(drag_bound(terms, damping_bound(c, meeting.reduced_mass), said))
         return tightest(law.label, found, stability=True)
@@ -60,7 +60,7 @@ def _shares(law: DampingLaw) -> Callable[[Meeting, Terms], list[Share]]:
             return []
         rate = c / meeting.reduced_mass
         if law.exponent > 0.0:
-            return [method.growing(law.exponent, rate, frequency(meeting, terms, terms.impact_speed))]
+            return [method.growing(law.exponent, rate, frequency(meeting, terms, terms.plant.impact_speed))]
         # How fast the force falls behind its jump is known where the spring is linear from there on.
         return method.first_touch(rate, meeting.value(meeting.law.stiffness) / c)
 

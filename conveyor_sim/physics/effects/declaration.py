@@ -4,12 +4,12 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
 from conveyor_sim.physics.effects.terms import Meeting, Terms
+from conveyor_sim.physics.plant import Plant
 from conveyor_sim.physics.timestep.bounds import Bound
 from conveyor_sim.physics.timestep.methods import Share
 from conveyor_sim.physics.timestep.prediction import Term
 from conveyor_sim.scene.effect_names import EffectName
 from conveyor_sim.scene.problems import Path, dotted
-from conveyor_sim.scene.schema import Scene
 
 
 @dataclass(frozen=True)
@@ -31,13 +31,13 @@ class Effect:
     law: str
     source: str
     """Number of the paper's equation, a reference, or "added"."""
-    called_for: Callable[[Scene, Collection[str]], Cause | None]
+    called_for: Callable[[Plant, Collection[str]], Cause | None]
     """What in a scene calls for it, given the effects before it in EFFECTS that are on; None: nothing does."""
     absent: str
     """What is missing when nothing calls for it."""
     needs: str
     """State and parameters that it brings, in words."""
-    absent_here: Callable[[Scene, Collection[str]], str] | None = None
+    absent_here: Callable[[Plant, Collection[str]], str] | None = None
     """What is missing in a scene, given the effects before it that are on; "" or None: as in `absent`."""
     bounds: Callable[[Terms], list[Bound]] | None = None
     """The bounds on dt that it brings when it is on; None: it brings none."""

@@ -6,7 +6,6 @@ from collections.abc import Collection
 from conveyor_sim.engine.contact.laws.linear import contact_time
 from conveyor_sim.physics.effects.contacts import contacts_in_use
 from conveyor_sim.physics.effects.declaration import Cause, Effect
-from conveyor_sim.physics.effects.load import contact_load
 from conveyor_sim.physics.effects.terms import (
     Meeting,
     Terms,
@@ -17,13 +16,14 @@ from conveyor_sim.physics.effects.terms import (
     overlap_at,
     tightest,
 )
+from conveyor_sim.physics.plant import Plant
 from conveyor_sim.physics.timestep.bounds import Bound, contact_friction_bound, damping_bound
 from conveyor_sim.physics.timestep.prediction import Term
-from conveyor_sim.scene.schema import BottleType, Scene
+from conveyor_sim.scene.schema import BottleType
 
 
-def _contact_friction(scene: Scene, on: Collection[str]) -> Cause | None:
-    for index, contact in contacts_in_use(scene, on):
+def _contact_friction(plant: Plant, on: Collection[str]) -> Cause | None:
+    for index, contact in contacts_in_use(plant, on):
         if contact.friction > 0.0:
             return Cause(("contacts", index, "friction"), f"{contact.friction:g}")
     return None
@@ -31,7 +31,7 @@ def _contact_friction(scene: Scene, on: Collection[str]) -> Cause | None:
 
 def _contact_friction_bounds(terms: Terms) -> list[Bound]:
     """At the load that belts can put on a contact."""
-    load = contact_load(terms)
+    load = terms.load
     if load.force == 0.0 or "implicit_friction" in terms.on or not terms.method.explicit:
         return []
     candidates = []
@@ -53,7 +53,7 @@ def _kick(terms: Terms, dt: float) -> list[Term]:
     """
     if "implicit_friction" in terms.on or terms.method.slip == 0.0:
         return []
-    speed = terms.impact_speed
+    speed = terms.plant.impact_speed
     kicks = []
     for meeting in meetings(terms):
         mu = _curve_friction(meeting)
@@ -76,24 +76,24 @@ def _curve_friction(meeting: Meeting) -> float:
     return 0.0 if meeting.has_spring else meeting.value(meeting.law.friction)
 
 
-def _chosen(field: str, value: str, scene: Scene, on: Collection[str]) -> Cause | None:
-    if getattr(scene, field) == value and ("contact_friction" in on or "base_friction" in on):
+def _chosen(field: str, value: str, plant: Plant, on: Collection[str]) -> Cause | None:
+    if getattr(plant.scene, field) == value and ("contact_friction" in on or "base_friction" in on):
         return Cause((field,), value)
     return None
 
 
-def _atan(scene: Scene, on: Collection[str]) -> Cause | None:
-    return _chosen("friction_curve", "atan", scene, on)
+def _atan(plant: Plant, on: Collection[str]) -> Cause | None:
+    return _chosen("friction_curve", "atan", plant, on)
 
 
-def _implicit(scene: Scene, on: Collection[str]) -> Cause | None:
-    return _chosen("friction_solver", "implicit", scene, on)
+def _implicit(plant: Plant, on: Collection[str]) -> Cause | None:
+    return _chosen("friction_solver", "implicit", plant, on)
 
 
-def _spring(scene: Scene, on: Collection[str]) -> Cause | None:
+def _spring(plant: Plant, on: Collection[str]) -> Cause | None:
     if "contact_friction" not in on:
         return None
-    for index, contact in contacts_in_use(scene, on):
+    for index, contact in contacts_in_use(plant, on):
         if contact.tangential is not None:
             stiffness, ratio = contact.tangential.stiffness, contact.tangential.stiffness_ratio
             said = f"{stiffness:g} N/m" if stiffness is not None else f"{ratio:g} of the normal stiffness"
@@ -109,8 +109,8 @@ def _rim_mobility(kind: BottleType | None) -> float:
 def _largest_stiffness(meeting: Meeting, terms: Terms) -> float:
     """N/m, of the tangential spring; Mindlin's at the deepest overlap of an impact or a queue."""
     if (mindlin := meeting.value(meeting.law.tangential_mindlin)) > 0.0:
-        pressed = overlap_at(meeting, terms, contact_load(terms).force)
-        return mindlin * math.sqrt(max(deepest(meeting, terms, terms.impact_speed)[0], pressed))
+        pressed = overlap_at(meeting, terms, terms.load.force)
+        return mindlin * math.sqrt(max(deepest(meeting, terms, terms.plant.impact_speed)[0], pressed))
     return meeting.value(meeting.law.tangential_stiffness)
 
 

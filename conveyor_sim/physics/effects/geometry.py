@@ -3,35 +3,35 @@
 from collections.abc import Collection
 
 from conveyor_sim.physics.effects.declaration import Cause, Effect
-from conveyor_sim.scene.geometry import ArcPiece, rail_shapes
+from conveyor_sim.physics.plant import Plant
+from conveyor_sim.scene.geometry import ArcPiece
 from conveyor_sim.scene.moving import movers_of
-from conveyor_sim.scene.schema import Scene
 
 
-def _rail(scene: Scene, arc: bool) -> Cause | None:
-    for rail in rail_shapes(scene):
+def _rail(plant: Plant, arc: bool) -> Cause | None:
+    for rail in plant.rails_at_rest:
         if any(isinstance(piece, ArcPiece) == arc for piece in rail.pieces):
-            if rail.name in scene.rails:
+            if rail.name in plant.scene.rails:
                 return Cause(("rails", rail.name))
             belt, side = rail.name.rsplit("_", 1)
             return Cause(("belts", belt, "rails", side))
     return None
 
 
-def _segments(scene: Scene, on: Collection[str]) -> Cause | None:
-    return _rail(scene, arc=False)
+def _segments(plant: Plant, on: Collection[str]) -> Cause | None:
+    return _rail(plant, arc=False)
 
 
-def _arcs(scene: Scene, on: Collection[str]) -> Cause | None:
-    return _rail(scene, arc=True)
+def _arcs(plant: Plant, on: Collection[str]) -> Cause | None:
+    return _rail(plant, arc=True)
 
 
-def _moving(scene: Scene, on: Collection[str]) -> Cause | None:
-    return next((Cause(path) for path, _ in movers_of(scene)), None)
+def _moving(plant: Plant, on: Collection[str]) -> Cause | None:
+    return next((Cause(path) for path, _ in movers_of(plant.scene)), None)
 
 
-def _radii(scene: Scene, on: Collection[str]) -> Cause | None:
-    first, *others = scene.bottle_types.items()
+def _radii(plant: Plant, on: Collection[str]) -> Cause | None:
+    first, *others = plant.scene.bottle_types.items()
     for name, kind in others:
         if kind.radius != first[1].radius and "bottle_contact" in on:
             return Cause(("bottle_types", name, "radius"), f"{kind.radius:g} m, {first[0]} has {first[1].radius:g} m")

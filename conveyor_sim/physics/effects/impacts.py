@@ -12,7 +12,7 @@ from conveyor_sim.physics.timestep.prediction import Impact
 def impacts(terms: Terms, effects: Sequence[Effect]) -> tuple[Impact, ...]:
     """One for every pair of types that can touch, and every type and rail material."""
     adding = [effect.shares for effect in effects if effect.shares is not None and effect.name in terms.on]
-    speed = terms.impact_speed
+    speed = terms.plant.impact_speed
     return tuple(
         Impact(
             what=meeting.what,
@@ -40,4 +40,4 @@ def impact_bounds(found: Sequence[Impact], tolerance: float) -> list[Bound]:
 
 def _at(meeting: Meeting, terms: Terms, speed: float) -> str:
     law, k = meeting.elastic
-    return f"{law.said(k, terms.laws.curves)} {speed:g} m/s"
+    return f"{law.coefficient_text(k, terms.laws.curves)} {speed:g} m/s"

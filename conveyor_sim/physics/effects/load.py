@@ -12,8 +12,9 @@ the number of bottles (test/physics/effects/test_load.py). Impacts are not in it
 import math
 from dataclasses import dataclass
 
-from conveyor_sim.physics.effects.terms import Terms, supply
-from conveyor_sim.scene.geometry import BeltShape, belt_shapes
+from conveyor_sim.physics.laws.coefficients import Laws
+from conveyor_sim.physics.plant import Plant
+from conveyor_sim.scene.geometry import BeltShape
 
 NARROW = 1.25
 """Diameters: on a belt up to so wide bottles stand in single file."""
@@ -40,7 +41,7 @@ class Load:
     reason: str
 
 
-def contact_load(terms: Terms) -> Load:
+def contact_load(plant: Plant, laws: Laws) -> Load:
     """The largest that is expected of the bottles and belts of a scene.
 
     The lesser of what full belts press with, one behind the other, and of what all bottles that there can be do.
@@ -48,30 +49,29 @@ def contact_load(terms: Terms) -> Load:
     rule every scene with a gate, for the sake of a bottle that is stuck. The end of a run reports it
     (`force_check.Pressed`).
     """
-    friction, most = terms.laws.friction_under_bottles, supply(terms.scene)
+    friction, most = laws.friction_under_bottles, plant.supply
     if friction is None or not most:
         return Load(0.0, "no friction under the bottles")
     drags = [  # of one bottle on each belt, the floor last, N
-        (friction[:, index] * kind.mass * terms.scene.gravity, kind, most[name])
-        for index, (name, kind) in enumerate(terms.scene.bottle_types.items())
+        (friction[:, index] * kind.mass * plant.scene.gravity, kind, most[name])
+        for index, (name, kind) in enumerate(plant.scene.bottle_types.items())
         if name in most
     ]
-    shapes = belt_shapes(terms.scene)
     count = sum(number for *_, number in drags)
-    if not shapes:
+    if not plant.belts:
         heaviest = max(float(drag.max()) for drag, *_ in drags)
         count = count if math.isfinite(count) else ENDLESS_QUEUE
         return Load(count * heaviest, f"a single-file queue of {count:.0f}")
     narrow = NARROW * 2.0 * min(kind.radius for _, kind, _ in drags)
-    crowded = any(shape.width > narrow for shape in shapes)
+    crowded = any(shape.width > narrow for shape in plant.belts)
     every = (WEDGED if crowded else FILE) * sum(number * float(drag.max()) for drag, _, number in drags)
     along = max(float(drag.max()) for drag, *_ in drags)
-    for row, shape in enumerate(shapes):
+    for row, shape in enumerate(plant.belts):
         per_metre = max(float(drag[row]) / (2.0 * kind.radius) for drag, kind, _ in drags)
         along += (PILE if shape.width > narrow else FILE) * _running_length(shape) * per_metre
     if every <= along:
         return Load(every, f"all {count:.0f} bottles")
-    return Load(along, f"bottles on all {sum(map(_running_length, shapes)):.3g} m of belts")
+    return Load(along, f"bottles on all {sum(map(_running_length, plant.belts)):.3g} m of belts")
 
 
 def _running_length(shape: BeltShape) -> float:

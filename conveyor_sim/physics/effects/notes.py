@@ -3,9 +3,7 @@
 from collections.abc import Collection
 
 from conveyor_sim.physics.effects.contacts import contacts_in_use
-from conveyor_sim.scene.geometry import rail_shapes
-from conveyor_sim.scene.moving import moving_shapes
-from conveyor_sim.scene.schema import Scene
+from conveyor_sim.physics.plant import Plant
 
 CAN = 0.73
 """Base radius over radius of a beverage can, which stacks on the countersink of another's end (docs/base.md)."""
@@ -14,21 +12,18 @@ LEAST, MOST = 0.65, 1.8
 """Scuffing of rails by bottles on rings of CAN over that on points, the extremes of docs/studies/base_radius.csv."""
 
 
-def notes(scene: Scene, on: Collection[str]) -> list[str]:
-    """Sentences about a valid scene with some effects on; none where there is nothing to say."""
-    return [*_rolls_on_points(scene, on)]
+def notes(plant: Plant, on: Collection[str]) -> list[str]:
+    """Return a sentence about bottles on points that may rub along rails, in a list; an empty list without such.
 
-
-def _rolls_on_points(scene: Scene, on: Collection[str]) -> list[str]:
-    """Bottles on points that may rub along rails: nothing but the rail turns them, so they roll (docs/base.md)."""
+    Only the rail turns these bottles, so they roll along it (docs/base.md).
+    """
     if not {"base_friction", "contact_friction", "rotation"} <= set(on) or "static_friction" in on:
         return []
-    rails = {rail.material for rail in rail_shapes(scene)} | {rail.material for rail in moving_shapes(scene)}
-    rub = [set(contact.between) for _, contact in contacts_in_use(scene, on) if contact.friction > 0.0]
+    rub = [set(contact.between) for _, contact in contacts_in_use(plant, on) if contact.friction > 0.0]
     on_points = {
         name: kind
-        for name, kind in scene.bottle_types.items()
-        if kind.base_radius is None and any({kind.material, rail} in rub for rail in rails)
+        for name, kind in plant.scene.bottle_types.items()
+        if kind.base_radius is None and any({kind.material, rail} in rub for rail in plant.rail_materials)
     }
     if not on_points:
         return []

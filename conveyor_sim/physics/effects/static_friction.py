@@ -7,18 +7,18 @@ from conveyor_sim.physics.effects.base import MEETING
 from conveyor_sim.physics.effects.declaration import Cause, Effect
 from conveyor_sim.physics.effects.terms import Meeting, Terms, drag_bound, tightest
 from conveyor_sim.physics.laws.coefficients import base_springs
+from conveyor_sim.physics.plant import Plant
 from conveyor_sim.physics.timestep.bounds import Bound, damping_bound
 from conveyor_sim.physics.timestep.methods import Share
-from conveyor_sim.scene.schema import Scene
 
 
-def _springs(scene: Scene, on: Collection[str]) -> Cause | None:
-    springs = base_springs(scene)
+def _springs(plant: Plant, on: Collection[str]) -> Cause | None:
+    springs = base_springs(plant.scene)
     if "base_friction" not in on or springs is None:
         return None
-    bottles = {kind.material for kind in scene.bottle_types.values()}
-    belts = {belt.material for belt in scene.belts.values()}
-    for index, base in enumerate(scene.base):
+    bottles = {kind.material for kind in plant.scene.bottle_types.values()}
+    belts = {belt.material for belt in plant.scene.belts.values()}
+    for index, base in enumerate(plant.scene.base):
         if base.tangential is not None and base.between[0] in bottles and base.between[1] in belts:
             return Cause(("base", index, "tangential"), f"{base.tangential.stiffness:g} N/m")
     return None
@@ -45,7 +45,7 @@ def _braked(meeting: Meeting, terms: Terms) -> list[Share]:
     if table is None or terms.method.second_order:
         return []
     braking = float(table.friction.max()) * terms.scene.gravity
-    return [Share("braking by the base's spring", 1.0, 2.0 * MEETING * terms.impact_speed / braking, 1.0)]
+    return [Share("braking by the base's spring", 1.0, 2.0 * MEETING * terms.plant.impact_speed / braking, 1.0)]
 
 
 STATIC_FRICTION = Effect(

@@ -6,31 +6,31 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-import numpy as np
-
 from conveyor_sim.engine.arrays.contacts import ContactLaw
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.engine.contact.laws import DAMPING, ELASTIC, DampingLaw, ElasticLaw
+from conveyor_sim.physics.effects.load import Load, contact_load
 from conveyor_sim.physics.laws.coefficients import Laws
+from conveyor_sim.physics.plant import Plant
 from conveyor_sim.physics.timestep.bounds import Bound, least_steps
 from conveyor_sim.physics.timestep.methods import METHODS, STEP_ERROR, Method
-from conveyor_sim.scene.geometry import initial_bottles
-from conveyor_sim.scene.moving import moving_shapes
-from conveyor_sim.scene.schema import BottleType, Scene, Single
-
-SPEED_AT_REST = 1.0
-"""m/s, assumed of impacts where nothing in a scene moves at first."""
+from conveyor_sim.scene.schema import BottleType, Scene
 
 
 @dataclass(frozen=True, eq=False)
 class Terms:
-    """A scene, its coefficients, which effects are on, and how exact it shall be."""
+    """A plant, its coefficients, which effects are on, and how exact it shall be."""
 
-    scene: Scene
+    plant: Plant
     laws: Laws
     on: Collection[str]
     tolerance: float
     """Relative error in contact force to stay below."""
+
+    @property
+    def scene(self) -> Scene:
+        """Scene of the plant."""
+        return self.plant.scene
 
     @property
     def types(self) -> list[BottleType]:
@@ -38,9 +38,9 @@ class Terms:
         return list(self.scene.bottle_types.values())
 
     @cached_property
-    def impact_speed(self) -> float:
-        """Of the hardest impact expected, m/s."""
-        return impact_speed(self.scene)
+    def load(self) -> Load:
+        """Largest expected resting load on a contact."""
+        return contact_load(self.plant, self.laws)
 
     @property
     def method(self) -> Method:
@@ -101,8 +101,8 @@ class Meeting:
 
 def meetings(terms: Terms) -> Iterator[Meeting]:
     """Every pair of types that can touch, then every type and rail material; types that no bottle has are left out."""
-    types, supplied = terms.types, supply(terms.scene)
-    present = [index for index, name in enumerate(terms.scene.bottle_types) if name in supplied]
+    types = terms.types
+    present = [index for index, name in enumerate(terms.scene.bottle_types) if name in terms.plant.supply]
     if terms.laws.pair is not None:
         for a in present:
             for b in present:
@@ -131,39 +131,6 @@ def drag_bound(terms: Terms, dt: float, reason: str) -> tuple[float, str]:
     """Semi-implicit Euler's bound (s) on a drag, a dashpot or friction at rest, as the scene's integrator has it."""
     limit = terms.method.drag_limit
     return limit * dt, reason if limit == 1.0 else f"{limit:g} times {reason}"
-
-
-def supply(scene: Scene) -> dict[str, float]:
-    """How many bottles of each type a run can hold at most, by name; infinite from an infeed without end.
-
-    Types that no bottle has are not in it.
-    """
-    found: dict[str, float] = {}
-    for name, *_ in initial_bottles(scene):
-        found[name] = found.get(name, 0.0) + 1.0
-    for _, entry in scene.entries():
-        found[entry.bottle] = found.get(entry.bottle, 0.0) + (math.inf if entry.most is None else entry.most)
-    return found
-
-
-def most_bottles(scene: Scene) -> int | None:
-    """Bottles that a run can hold at most, None if an infeed has no end."""
-    most = sum(supply(scene).values())
-    return int(most) if math.isfinite(most) else None
-
-
-def impact_speed(scene: Scene) -> float:
-    """The speed of the hardest impact expected, m/s; SPEED_AT_REST if all rest.
-
-    The fastest belt or bottle that enters against something at rest, or the most by which bottles differ at the start;
-    and a rail that comes against that.
-    """
-    speeds = [abs(belt.speed) for belt in scene.belts.values()]
-    speeds += [giver.heading[1] for _, giver in scene.givers()]
-    given = np.array([(0.0, 0.0), *(entry.velocity for entry in scene.bottles if isinstance(entry, Single))])
-    speeds.append(math.hypot(*np.ptp(given, axis=0)))
-    rails = [shape.max_speed * shape.fastest_point for shape in moving_shapes(scene)]
-    return max(speeds) + max(rails, default=0.0) or SPEED_AT_REST
 
 
 def deepest(meeting: Meeting, terms: Terms, speed: float) -> tuple[float, float]:

@@ -14,24 +14,23 @@ from conveyor_sim.engine.arrays.contacts import ContactLaw, Curves
 from conveyor_sim.engine.arrays.lists import StaticGrid
 from conveyor_sim.engine.arrays.rails import Arcs, Segments
 from conveyor_sim.engine.arrays.types import F8
-from conveyor_sim.engine.arrays.world import Settings
+from conveyor_sim.engine.arrays.world import EngineSettings
 from conveyor_sim.engine.compiler.compile import ENGINE_HASH
 from conveyor_sim.engine.integrators import AHEAD, LAG
 from conveyor_sim.errors import SceneError
-from conveyor_sim.physics.effects import EffectChoice, prediction_of
-from conveyor_sim.physics.effects.load import Load, contact_load
+from conveyor_sim.physics.effects.choice import prediction_of
+from conveyor_sim.physics.effects.declaration import EffectChoice
+from conveyor_sim.physics.effects.load import Load
 from conveyor_sim.physics.laws.coefficients import BaseSprings, Laws
-from conveyor_sim.physics.model.mouths import cut_at_mouths
-from conveyor_sim.physics.model.plant import plant_grid, rail_arrays
+from conveyor_sim.physics.model.plant_arrays import plant_grid, rail_arrays
 from conveyor_sim.physics.model.remedies import too_many
 from conveyor_sim.physics.model.step_choice import choose_steps
+from conveyor_sim.physics.plant import Plant
 from conveyor_sim.physics.sources_hash import sources_hash
 from conveyor_sim.physics.timestep.bounds import Bound
 from conveyor_sim.physics.timestep.prediction import Impact, Prediction
 from conveyor_sim.scene.accuracy import MOST_STEPS
 from conveyor_sim.scene.effect_names import EffectName
-from conveyor_sim.scene.geometry import BeltShape, RailShape, belt_shapes, rail_shapes
-from conveyor_sim.scene.moving import MovingShape, moving_shapes
 from conveyor_sim.scene.places import Places
 from conveyor_sim.scene.schema import BottleType, Scene
 
@@ -73,13 +72,8 @@ class Model:
     """(T,), m, of the ring that a bottle stands on, 0 for a point; None if all stand on points."""
     type_heights: F8
     """(T, 2), m, of the contact band and of the centre of gravity; NaN where they are not given."""
-    belt_shapes: tuple[BeltShape, ...]
-    rail_shapes: tuple[RailShape, ...]
-    """By number; those that move are last, as they are at first."""
-    moving_shapes: tuple[MovingShape, ...]
-    rail_materials: tuple[str, ...]
-    """By number in `rail_law`."""
-    settings: Settings
+    plant: Plant
+    settings: EngineSettings
     pair_law: ContactLaw | None
     """(T * T,), bottle and bottle; None where bottles do not touch bottles."""
     rail_law: ContactLaw | None
@@ -104,11 +98,6 @@ class Model:
     versions: tuple[str, ...]
     machine: str
 
-    @property
-    def rails_at_rest(self) -> tuple[RailShape, ...]:
-        """Those of `rail_shapes` that do not move."""
-        return self.rail_shapes[: len(self.rail_shapes) - len(self.moving_shapes)]
-
     def has(self, effect: EffectName) -> bool:
         """Whether an effect is on."""
         return any(choice.on for choice in self.effects if choice.name == effect)
@@ -116,18 +105,15 @@ class Model:
 
 def build_model(scene: Scene) -> Model:
     """Build the Model of a valid scene. Raises SceneError if a tick has more than MOST_STEPS steps."""
-    choice = choose_steps(scene)
-    laws, on, steps = choice.laws, choice.on, choice.steps
+    plant = Plant.of(scene)
+    choice = choose_steps(plant)
+    laws, on, steps = choice.terms.laws, choice.terms.on, choice.steps
     if steps > MOST_STEPS:
         raise SceneError(f"{Places(scene).of(('accuracy',))}: accuracy: {too_many(scene, choice)}")
     types = list(scene.bottle_types.values())
     radius = np.array([kind.radius for kind in types])
-    rails, belts, moving = rail_shapes(scene), belt_shapes(scene), moving_shapes(scene)
-    rails = cut_at_mouths(rails, float(radius.max()))
-    all_rails = [*rails, *(shape.shape(shape.first) for shape in moving)]
-    rail_materials = list(choice.rail_materials)
     skin = SKIN * float(radius.min())
-    segments, arcs = rail_arrays(rails, rail_materials)
+    segments, arcs = rail_arrays(plant.rails_at_rest, plant.rail_materials)
     dt = scene.tick_ns * 1e-9 / steps
     ahead, at_once = AHEAD.get(scene.accuracy.integrator, (1.0, 0.0))
     return Model(
@@ -140,27 +126,24 @@ def build_model(scene: Scene) -> Model:
         accuracy=choice.aim.words if choice.given is None else f"given, {_given_words(scene)}",
         impacts=choice.impacts,
         prediction=prediction_of(choice.terms, choice.impacts, dt),
-        load=contact_load(choice.terms),
+        load=choice.terms.load,
         integrator=scene.accuracy.integrator,
         effects=choice.effects,
         belts=tuple(scene.belts),
-        rails=tuple(rail.name for rail in all_rails),
+        rails=tuple(rail.name for rail in plant.rails),
         bottle_types=tuple(scene.bottle_types),
         type_radius=radius,
         type_mass=np.array([kind.mass for kind in types]),
         type_inertia=np.array([kind.moment_of_inertia for kind in types]),
         type_base_radius=laws.base_radius,
         type_heights=np.array([_heights(kind) for kind in types]),
-        belt_shapes=tuple(belts),
-        rail_shapes=tuple(all_rails),
-        moving_shapes=tuple(moving),
-        rail_materials=tuple(rail_materials),
-        settings=Settings(
+        plant=plant,
+        settings=EngineSettings(
             slip_limit=scene.slip_limit,
             lever=1.0 if scene.lever_arm == "overlap" else 0.0,
             skin=skin,
             cell=2.0 * float(radius.max()) + skin,
-            rail_materials=len(rail_materials),
+            rail_materials=len(plant.rail_materials),
             reach=2.0 * float(radius[0]),
             atan=1 if "atan_friction" in on else None,
             error=choice.terms.step_error,
@@ -175,7 +158,13 @@ def build_model(scene: Scene) -> Model:
         friction_solver="implicit" if "implicit_friction" in on else "explicit",
         segments=segments if "segment_rails" in on else None,
         arcs=arcs if "arc_rails" in on else None,
-        grid=plant_grid(rails, belts if "belts" in on else [], float(radius.max()), _largest(laws.base_radius), skin),
+        grid=plant_grid(
+            plant.rails_at_rest,
+            plant.belts if "belts" in on else (),
+            float(radius.max()),
+            _largest(laws.base_radius),
+            skin,
+        ),
         base_friction=_friction_table(laws),
         base_spring=laws.base_spring,
         largest_base_friction=laws.largest_base_friction,

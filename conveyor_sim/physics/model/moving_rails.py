@@ -6,7 +6,6 @@ import numpy as np
 
 from conveyor_sim.engine.arrays.moving import OFF_PROFILE, PHASES, UNLIMITED, Actuators, MovingRails
 from conveyor_sim.engine.arrays.rails import Ends
-from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.engine.rails.joint import FREE
 from conveyor_sim.engine.threads.workers import UNIT
 from conveyor_sim.scene.moving import MovingShape
@@ -79,28 +78,8 @@ def _actuators(shapes: Sequence[MovingShape], slots: int, ledger: bool) -> Actua
         mode=np.zeros(count, np.int8),
         left=np.zeros(count, np.int8),
         acceleration=np.zeros(count),
-        push=pushes(slots, count, 3 if ledger else 1),
+        push=np.zeros((-(-slots // UNIT), count, 3 if ledger else 1)),
     )
-
-
-def pushes(slots: int, rails: int, columns: int) -> F8:
-    """`Actuators.push` for so many slots of bottles."""
-    return np.zeros((-(-slots // UNIT), rails, columns))
-
-
-def for_slots(moving: MovingRails | None, slots: int) -> MovingRails | None:
-    """The same rails beside more slots of bottles."""
-    if moving is None:
-        return None
-    actuators, springs = moving.actuators, moving.springs
-    if actuators is not None:
-        _, rails, columns = actuators.push.shape
-        actuators = actuators._replace(push=pushes(slots, rails, columns))
-    if springs is not None:
-        elongation = np.zeros((slots, springs.elongation.shape[1]))
-        elongation[: len(springs.elongation)] = springs.elongation
-        springs = springs._replace(elongation=elongation)
-    return moving._replace(actuators=actuators, springs=springs)
 
 
 def fastest_rail(moving: MovingRails | None) -> float:

@@ -9,9 +9,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from conveyor_sim.errors import SceneError
-from conveyor_sim.physics.effects import most_bottles
-from conveyor_sim.physics.effects.terms import impact_speed
 from conveyor_sim.physics.model.step_choice import StepChoice, choose_steps
+from conveyor_sim.physics.plant import Plant
 from conveyor_sim.physics.timestep.bounds import Bound, fewest_steps
 from conveyor_sim.physics.timestep.presets import DEFAULT
 from conveyor_sim.scene.accuracy import MANY_STEPS, MOST_STEPS
@@ -133,7 +132,7 @@ class StepLimit:
 
 def step_limit(scene: Scene, choice: StepChoice | None = None) -> StepLimit:
     """What sets the steps of a valid scene, with the remedies that were tried to help. choice: of this scene."""
-    choice = choose_steps(scene) if choice is None else choice
+    choice = choose_steps(Plant.of(scene)) if choice is None else choice
     tried = (_tried(scene, *candidate) for candidate in _candidates(scene, choice))
     helpful = [one for one in tried if one is not None and max(one.price, one.steps) <= WORTH * choice.steps]
     helpful.sort(key=lambda one: one.price)
@@ -142,7 +141,7 @@ def step_limit(scene: Scene, choice: StepChoice | None = None) -> StepLimit:
         given=choice.given is not None,
         bounds=tuple(sorted(choice.bounds, key=lambda bound: bound.dt)),
         tick=scene.tick,
-        bottles=most_bottles(scene),
+        bottles=choice.terms.plant.most_bottles,
         remedies=tuple(one for one in helpful[:NAMED] if one.price <= NEAR * helpful[0].price),
     )
 
@@ -173,9 +172,10 @@ def _candidates(scene: Scene, choice: StepChoice) -> Iterator[tuple[str, Mapping
             extra = "" if cost <= 1.0 else f", at about {cost:g} times the cost of a step"
             changed = {"accuracy": accuracy | {"integrator": integrator, "error": None}}
             yield f"accuracy: {{integrator: {integrator}}}{extra}", changed, cost
-    onset = _onset(scene)
+    impact_speed = choice.terms.plant.impact_speed
+    onset = _onset(scene, impact_speed)
     if onset is not None:
-        words = f"damping: {{law: onset, speed: {impact_speed(scene):g}}} where a restitution is given"
+        words = f"damping: {{law: onset, speed: {impact_speed:g}}} where a restitution is given"
         yield words, {"contacts": onset}, 1
         if scene.accuracy.integrator in ("leapfrog", "semi_implicit_euler"):
             both = {"contacts": onset, "accuracy": accuracy | {"integrator": "velocity_verlet"}}
@@ -185,7 +185,7 @@ def _candidates(scene: Scene, choice: StepChoice) -> Iterator[tuple[str, Mapping
         yield f"accuracy: {{preset: {coarser}}}, less exact", {"accuracy": accuracy | {"preset": coarser}}, 1
 
 
-def _onset(scene: Scene) -> list[dict[str, Any]] | None:
+def _onset(scene: Scene, speed: float) -> list[dict[str, Any]] | None:
     """The contacts with Hunt and Crossley's damping, which has no jump, in place of dashpots by restitution.
 
     None if no contact has one.
@@ -196,8 +196,7 @@ def _onset(scene: Scene) -> list[dict[str, Any]] | None:
         data = contact.model_dump(mode="json", exclude_none=True)
         choice = DAMPING_CHOICES.get(contact.damping.law)
         if choice is not None and not choice.at_speed and contact.damping.restitution:
-            restitution, speed = contact.damping.restitution, impact_speed(scene)
-            data["damping"] = {"law": "onset", "restitution": restitution, "speed": speed}
+            data["damping"] = {"law": "onset", "restitution": contact.damping.restitution, "speed": speed}
             changed = True
         elif contact.damping.restitution is not None:
             del data["damping"]["coefficient"]  # a scene gives one of the two
@@ -208,7 +207,7 @@ def _onset(scene: Scene) -> list[dict[str, Any]] | None:
 def _tried(scene: Scene, words: str, overrides: Mapping[str, Any], cost: float) -> Remedy | None:
     """A candidate with the steps that it comes to; None if the scene does not allow it."""
     try:
-        steps = choose_steps(with_remedy(scene, overrides)).steps
+        steps = choose_steps(Plant.of(with_remedy(scene, overrides))).steps
     except SceneError:
         return None
     return Remedy(words, overrides, steps, cost) if steps <= MOST_STEPS else None

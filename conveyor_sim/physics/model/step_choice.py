@@ -2,14 +2,14 @@
 
 from dataclasses import dataclass
 
-from conveyor_sim.physics.effects import EffectChoice, Terms, bounds_of, choose_effects, impacts_of
-from conveyor_sim.physics.laws.coefficients import Laws, build_laws
+from conveyor_sim.physics.effects.choice import bounds_of, choose_effects, impacts_of
+from conveyor_sim.physics.effects.declaration import EffectChoice
+from conveyor_sim.physics.effects.terms import Terms
+from conveyor_sim.physics.laws.coefficients import build_laws
+from conveyor_sim.physics.plant import Plant
 from conveyor_sim.physics.timestep.bounds import Bound, fewest_steps, steps_per_tick
 from conveyor_sim.physics.timestep.prediction import Impact
 from conveyor_sim.physics.timestep.presets import Target, target
-from conveyor_sim.scene.effect_names import EffectName
-from conveyor_sim.scene.geometry import rail_shapes
-from conveyor_sim.scene.moving import moving_shapes
 from conveyor_sim.scene.schema import Scene
 
 
@@ -18,9 +18,6 @@ class StepChoice:
     """The steps in a tick of a scene, and why."""
 
     effects: tuple[EffectChoice, ...]
-    on: frozenset[EffectName]
-    laws: Laws
-    rail_materials: tuple[str, ...]
     aim: Target
     terms: Terms
     impacts: tuple[Impact, ...]
@@ -31,20 +28,17 @@ class StepChoice:
     reason: str
 
 
-def choose_steps(scene: Scene) -> StepChoice:
-    """The steps in a tick of a valid scene. SceneError if an effect can't be forced as it says."""
-    effects = choose_effects(scene)
-    on: frozenset[EffectName] = frozenset(effect.name for effect in effects if effect.on)
-    at_rest, moving = rail_shapes(scene), moving_shapes(scene)
-    materials = sorted({rail.material for rail in at_rest} | {rail.material for rail in moving})
-    laws = build_laws(scene, materials, on)
+def choose_steps(plant: Plant) -> StepChoice:
+    """Choose the steps in a tick. Raise SceneError if an effect can't be forced as the scene says."""
+    scene, effects = plant.scene, choose_effects(plant)
+    on = frozenset(effect.name for effect in effects if effect.on)
     aim = target(scene.accuracy)
-    terms = Terms(scene, laws, on, aim.tolerance)
+    terms = Terms(plant, build_laws(scene, plant.rail_materials, on), on, aim.tolerance)
     impacts = impacts_of(terms)
     bounds = bounds_of(terms, impacts)
     given = _given_steps(scene)
     steps, reason = steps_per_tick(scene.tick, bounds, given, aim.words)
-    return StepChoice(effects, on, laws, tuple(materials), aim, terms, impacts, bounds, given, steps, reason)
+    return StepChoice(effects, aim, terms, impacts, bounds, given, steps, reason)
 
 
 def _given_steps(scene: Scene) -> int | None:

@@ -7,11 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conveyor_sim.engine.rails.joint import ANSWERS, FREE, SILENT
+from conveyor_sim.physics.plant import JOINT_TOLERANCE
 from conveyor_sim.scene.geometry import Piece
 from conveyor_sim.scene.overlaps import near_pieces, overlapping
-
-JOINT_TOLERANCE = 1e-6
-"""m; well above the rounding of coordinates, well below anything a bottle can feel."""
 
 
 @dataclass(frozen=True)

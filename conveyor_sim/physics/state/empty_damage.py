@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 from conveyor_sim.engine.arrays.damage import (
     MOST_TOUCHES,
     Crushing,
-    Damage,
+    DamageArrays,
     Impacts,
+    Maximum,
     RailBins,
-    Scuffing,
+    ScuffingWork,
     Tipping,
-    Worst,
 )
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.engine.threads.workers import UNIT
@@ -38,18 +38,18 @@ class RailPlaces:
     """m"""
 
 
-def empty_damage(model: Model, slots: int) -> Damage | None:
+def empty_damage(model: Model, slots: int) -> DamageArrays | None:
     """Room for that many bottles; None where all of it is disabled."""
 
     def reals() -> F8:
         return np.zeros(slots)
 
-    def worst() -> Worst:
-        return Worst(reals(), reals())
+    def worst() -> Maximum:
+        return Maximum(reals(), reals())
 
     touching, touched = np.zeros((2, slots, MOST_TOUCHES), np.int64)
-    damage = Damage(
-        scuffing=Scuffing(reals(), _rail_bins(model, slots)) if model.has("scuffing") else None,
+    damage = DamageArrays(
+        scuffing=ScuffingWork(reals(), _rail_bins(model, slots)) if model.has("scuffing") else None,
         crushing=Crushing(worst(), worst()) if model.has("crushing") else None,
         impacts=Impacts(worst(), worst(), reals(), reals(), touching, touched) if model.has("impacts") else None,
         tipping=Tipping(worst(), reals(), reals(), *_levers(model), reals(), reals(), reals())
@@ -79,7 +79,7 @@ def rail_places(model: Model) -> RailPlaces:
 
 def _pieces(model: Model) -> Iterator[tuple[int, Piece]]:
     """Rail and piece in the order of `plant.rail_arrays`."""
-    pieces = [(index, piece) for index, rail in enumerate(model.rail_shapes) for piece in rail.pieces]
+    pieces = [(index, piece) for index, rail in enumerate(model.plant.rails) for piece in rail.pieces]
     for wanted, there in ((False, model.segments), (True, model.arcs)):
         if there is not None:
             yield from (entry for entry in pieces if isinstance(entry[1], ArcPiece) is wanted)

@@ -4,12 +4,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from conveyor_sim.engine.arrays.bodies import Bottles, Load, Peaks, Spin
+from conveyor_sim.engine.arrays.bodies import Bottles, ForceSums, Peaks, Spin
 from conveyor_sim.engine.arrays.contacts import ContactLaw, Implicit, PairParts, Pairs, PairSprings, Slots
 from conveyor_sim.engine.arrays.integrators import Blocks, Linear, PairTangent, Slopes, Stage, Triple
 from conveyor_sim.engine.arrays.lists import Near, NearSprings, Neighbourhood
 from conveyor_sim.engine.arrays.moving import MovingRails, MovingSprings
-from conveyor_sim.engine.arrays.observers import GuardProbe, Ledger
+from conveyor_sim.engine.arrays.observers import GuardProbe, LedgerArrays
 from conveyor_sim.engine.arrays.riding import Riding
 from conveyor_sim.engine.arrays.support import Footing, Ring, StaticFriction, Surface
 from conveyor_sim.engine.arrays.types import F8
@@ -21,7 +21,7 @@ from conveyor_sim.engine.observers.ledger import BELTS
 from conveyor_sim.engine.threads.workers import UNIT
 from conveyor_sim.physics.model import Model
 from conveyor_sim.physics.model.moving_rails import moving_arrays
-from conveyor_sim.physics.model.plant import belt_arrays, listed
+from conveyor_sim.physics.model.plant_arrays import belt_arrays, listed
 from conveyor_sim.physics.state.empty_damage import empty_damage
 
 
@@ -84,7 +84,7 @@ def empty_world(model: Model, slots: int) -> World:
             packed=np.zeros(4 * slots),
         ),
         spin=Spin(reals(), reals(), reals(), reals()) if model.has("rotation") else None,
-        load=Load(reals(), reals(), reals() if peaks else None, reals() if peaks else None),
+        load=ForceSums(reals(), reals(), reals() if peaks else None, reals() if peaks else None),
         peaks=Peaks(reals(), reals()) if peaks else None,
         stage=Stage(reals(), reals(), reals()) if model.integrator in STAGED else None,
         path=_triple(slots) if model.integrator in ON_PATHS and _has_springs(model) else None,
@@ -113,7 +113,7 @@ def empty_world(model: Model, slots: int) -> World:
         moving=_moving(model, slots),
         railed=listed(slots) if model.rail_law is not None else None,
         rail_law=model.rail_law,
-        belts=belt_arrays(model.belt_shapes, slots, entries) if model.has("belts") else None,
+        belts=belt_arrays(model.plant.belts, slots, entries) if model.has("belts") else None,
         surface=_surface(model),
         footing=_footing(model, slots),
         ring=Ring(reals()) if model.has("ring_base") else None,
@@ -126,12 +126,12 @@ def empty_world(model: Model, slots: int) -> World:
 def _moving(model: Model, slots: int) -> MovingRails | None:
     if not model.has("moving_rails"):
         return None
-    pieces = sum(len(rail.pieces) for rail in model.rails_at_rest)
-    rails, ledger = len(model.rails_at_rest), model.has("energy_ledger")
-    moving = moving_arrays(model.moving_shapes, model.rail_materials, rails, pieces, slots, ledger)
+    pieces = sum(len(rail.pieces) for rail in model.plant.rails_at_rest)
+    rails, ledger = len(model.plant.rails_at_rest), model.has("energy_ledger")
+    moving = moving_arrays(model.plant.moving, model.plant.rail_materials, rails, pieces, slots, ledger)
     if model.rail_law is None or model.rail_law.tangential_stiffness is None:
         return moving
-    count = len(model.moving_shapes)
+    count = len(model.plant.moving)
     return moving._replace(springs=MovingSprings(np.zeros((slots, count)), np.zeros(count)))
 
 
@@ -231,9 +231,9 @@ def _riding(model: Model, slots: int) -> Riding:
     )
 
 
-def _ledger(slots: int, model: Model) -> Ledger:
-    units, surfaces, rails = slots // UNIT + 1, len(model.belts) + 1, len(model.moving_shapes)
-    return Ledger(
+def _ledger(slots: int, model: Model) -> LedgerArrays:
+    units, surfaces, rails = slots // UNIT + 1, len(model.belts) + 1, len(model.plant.moving)
+    return LedgerArrays(
         damping=_triple(slots),
         friction=_triple(slots),
         base=_triple(slots),

@@ -9,39 +9,8 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from conveyor_sim.physics.state.world_arrays import Arrays
-from conveyor_sim.physics.state.world_checks import FIXED
+from conveyor_sim.physics.state.world_arrays import FIXED, LIMITED, OBSERVERS, SCRATCH, Arrays
 from conveyor_sim.scene.limits import Limits
-
-SCRATCH: Mapping[str, str] = {
-    "bottles.packed": "positions and velocities side by side, copied before forces are summed",
-    "spin.moment": "summed anew from zero",
-    "load.": "summed anew from zero",
-    "stage.": "of one step of velocity Verlet or Runge-Kutta",
-    "path.": "of one step",
-    "slopes.": "of one step of a Runge-Kutta method",
-    "linear.": "of one step of the linearly implicit method",
-    "riding.": "of one call of an integrator",
-}
-"""Prefixes of the names of arrays that are written before they are read, with their content."""
-
-OBSERVERS: Mapping[str, str] = {
-    "peaks.": "largest forces since the last output; only outputs read them",
-    "ledger.": "energy ledger; only outputs read it",
-    "damage.scuffing.bins.": "loads on rails; only outputs read them",
-    "damage.crushing.": "largest loads in this tick, which begins at zero, and since the last output",
-    "damage.impacts.speed.": "likewise",
-    "damage.impacts.force.": "likewise",
-    "damage.tipping.ratio.": "likewise",
-    "damage.impacts.touched": "of one step",
-    "damage.tipping.fx": "of one step",
-    "damage.tipping.fy": "of one step",
-    "damage.tipping.moment": "of one step",
-}
-"""Prefixes of the names of arrays that only outputs read."""
-
-LIMITED: Mapping[str, str] = {"damage.": "loads on bottles; only limits of the scene make events and alarms of them"}
-"""Prefixes of the names of arrays that only outputs read in a scene without limits of loads."""
 
 MEMORY: Mapping[tuple[str, ...], str] = {
     ("account",): "energy ledger",

@@ -8,17 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conveyor_sim.engine.arrays.contacts import PairSprings
-from conveyor_sim.engine.arrays.damage import bin_columns, lasting_columns, slot_columns
+from conveyor_sim.engine.arrays.damage import lasting_columns, slot_columns
 from conveyor_sim.engine.arrays.lists import Near, NearSprings
-from conveyor_sim.engine.arrays.moving import present
 from conveyor_sim.engine.lists.near import drop_near_springs
 from conveyor_sim.engine.lists.neighbours import drop_springs, fill_column
 from conveyor_sim.engine.lists.rebuild import rebuild
 from conveyor_sim.engine.world_views import lists_of
 from conveyor_sim.physics.model import Model
-from conveyor_sim.physics.model.moving_rails import for_slots
 from conveyor_sim.physics.state.empty_world import empty_near, empty_pairs, empty_slots, empty_world
-from conveyor_sim.physics.state.world_arrays import Arrays, with_arrays
+from conveyor_sim.physics.state.world_arrays import Arrays, changing_arrays, state_arrays, tick_arrays, with_arrays
 from conveyor_sim.physics.state.world_checks import require_sound
 from conveyor_sim.scene.geometry import RailShape
 
@@ -134,19 +132,14 @@ class State:
         self.world, self.next_id = empty_world(self.model, slots), other.next_id
         none = tuple(0.0 for _ in self._loads())
         self.held = {bottle: (kind, theta, none) for bottle, (kind, theta, _) in other.held.items()}
-        bottles, spin, before = self.world.bottles, self.world.spin, other.world.spin
-        for name in ("x", "y", "vx", "vy", "type", "id"):
-            getattr(bottles, name)[:] = getattr(other.world.bottles, name)
-        if spin is not None and before is not None:
-            spin.theta[:], spin.omega[:] = before.theta, before.omega
+        bottles, theirs = self.world.bottles, other.world.bottles
+        bottles.type[:], bottles.id[:] = theirs.type, theirs.id
+        motion, before = ("bottles.", "spin.", "static_friction.", "moving."), tick_arrays(other.world)
+        for name, array in tick_arrays(self.world).items():
+            if name in before and name.startswith(motion) and ".springs." not in name:
+                array[:] = before[name]
         self._free = np.flatnonzero(bottles.id < 0).tolist()
         self._equip(np.flatnonzero(bottles.id >= 0))
-        if (static := self.world.static_friction) is not None and (kept := other.world.static_friction) is not None:
-            static.x[:], static.y[:], static.belt[:] = kept.x, kept.y, kept.belt
-        if self.world.moving is not None and other.world.moving is not None:
-            # Scenes that differ in force limits share what is there without them.
-            for now, then in zip(present(self.world.moving), present(other.world.moving), strict=False):
-                now[:] = then
         self._note_velocities(slice(None))
         self.make_lists()
 
@@ -214,12 +207,12 @@ class State:
         """The rails that move, where they are now."""
         if self.world.moving is None:
             return ()
-        places = zip(self.model.moving_shapes, self.world.moving.position.tolist(), strict=True)
+        places = zip(self.model.plant.moving, self.world.moving.position.tolist(), strict=True)
         return tuple(shape.shape(position) for shape, position in places)
 
     def rails(self) -> tuple[RailShape, ...]:
         """All rails by number, where they are now."""
-        return (*self.model.rails_at_rest, *self.moving_rails())
+        return (*self.model.plant.rails_at_rest, *self.moving_rails())
 
     def make_lists(self) -> None:
         """Rebuild the neighbour lists if they are stale, growing those that are too short."""
@@ -240,39 +233,16 @@ class State:
 
     def _resize(self, slots: int) -> None:
         """Room for more bottles; lists stay as they are, for tangential springs are remembered by them."""
-        old = self.world
-        new = empty_world(self.model, slots)
-        used = old.bottles.id.size
-        for source, target in [
-            (old.bottles, new.bottles),
-            (old.peaks, new.peaks),
-            (old.spin, new.spin),
-            (old.ring, new.ring),
-            (old.implicit, new.implicit),
-        ]:
-            for name in source._fields if source is not None and target is not None else ():
-                if name != "packed":
-                    getattr(target, name)[:used] = getattr(source, name)
-        if old.surface is not None and new.surface is not None:
-            for name in ("ux", "uy", "turn"):
-                if (before := getattr(old.surface, name)) is not None:
-                    getattr(new.surface, name)[:] = before
-        if old.ledger is not None and new.ledger is not None:
-            new.ledger.work[: len(old.ledger.work)] = old.ledger.work
-        if old.static_friction is not None and new.static_friction is not None:
-            for name in ("x", "y", "belt"):
-                getattr(new.static_friction, name)[:used] = getattr(old.static_friction, name)
-        if old.damage is not None and new.damage is not None:
-            for columns in (slot_columns, bin_columns):
-                for before, after in zip(columns(old.damage), columns(new.damage), strict=True):
-                    after[: len(before)] = before
+        old, new = self.world, empty_world(self.model, slots)
+        used, larger = old.bottles.id.size, changing_arrays(new)
+        for name, array in state_arrays(old).items():
+            larger[name][: len(array)] = array
         # Higher than all there are, and none is free: still a heap.
         self._free += range(used, slots)
         self.world = new._replace(
             pairs=old.pairs,
             near_segments=_for_slots(old.near_segments, slots),
             near_arcs=_for_slots(old.near_arcs, slots),
-            moving=for_slots(old.moving, slots),
         )
 
     def _lengthen_lists(self, pairs: int, more: int, segments: int, arcs: int, belts: int) -> None:

@@ -1,5 +1,10 @@
-"""The arrays of a World that change as it runs, by name, and a World with them put back."""
+"""Arrays of a World by name, the role of each, and a World with arrays put back.
 
+The roles decide what a checkpoint checks, a state hash covers, the guard copies, and more room takes along. They are
+given as beginnings of names such as `pairs.spring.elongation`. An array without a role is state.
+"""
+
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -10,22 +15,117 @@ from conveyor_sim.engine.arrays.world import World
 Arrays = dict[str, NDArray[Any]]
 
 CONSTANT = frozenset({"settings", "pair_law", "curves", "grid", "segments", "arcs", "rail_law"})
-"""Groups that the Model gives and nothing changes. What a new group holds is taken along unless it is named here."""
+"""Groups that belong to the Model. They never change, and no checkpoint holds them."""
+
+FIXED = (
+    *(f"belts.{name}" for name in ("x", "y", "ax", "ay", "length", "width", "sectors.")),
+    *(f"moving.{name}" for name in ("length", "material", "rail", "surface", "home_", "along_", "turning", "sweep")),
+    "moving.ends.joint",
+    *(f"moving.actuators.{name}" for name in ("limit", "mass", "max_", "stroke")),
+    *(f"damage.scuffing.bins.{name}" for name in ("segment_first", "arc_first", "arc_span")),
+    *(f"damage.tipping.{name}" for name in ("contact_lever", "base_lever", "delay")),
+    "surface.friction",
+    *(f"static_friction.{name}" for name in ("stiffness", "damping", "friction")),
+)
+"""Arrays in other groups that follow from the scene and never change."""
+
+SCRATCH: Mapping[str, str] = {
+    "bottles.packed": "positions and velocities side by side, copied before forces are summed",
+    "spin.moment": "summed anew from zero",
+    "load.": "summed anew from zero",
+    "stage.": "of one step of velocity Verlet or Runge-Kutta",
+    "path.": "of one step",
+    "slopes.": "of one step of a Runge-Kutta method",
+    "linear.": "of one step of the linearly implicit method",
+    "riding.": "of one call of an integrator",
+}
+"""Arrays that are written before they are read, with their content."""
+
+UNCHECKED = (
+    *SCRATCH,
+    "moving.springs.path",
+    "implicit.",
+    "probe.depth",
+    *(f"pairs.{name}" for name in ("fx", "fy", "moment", "normal", "touch", "tangent.", "parts.", "law.")),
+    *(f"pairs.{name}" for name in ("reach", "radius_i")),
+    *(f"ledger.{name}" for name in ("damping.", "friction.", "base.", "belt_power", "rail_power", "power")),
+    "damage.impacts.touched",
+    *(f"damage.tipping.{name}" for name in ("fx", "fy", "moment")),
+    "moving.actuators.push",
+)
+"""Arrays that may hold non-finite numbers, because a failed tick can leave them so. No later tick reads these."""
+
+REMADE = (
+    *(f"{name}." for name in ("neighbourhood", "pairs", "slots", "near_segments", "near_arcs", "railed", "belts")),
+    "footing.",
+    "probe.",
+    "moving.actuators.push",
+)
+"""Arrays that follow from the positions: rebuilt with the neighbour lists, or in the next evaluation of forces."""
+
+TIED: Mapping[str, tuple[str, ...]] = {
+    "pairs.spring.": ("pairs.used", "pairs.i", "pairs.j"),
+    "near_segments.springs.": ("near_segments.start", "near_segments.piece"),
+    "near_arcs.springs.": ("near_arcs.start", "near_arcs.piece"),
+}
+"""Arrays of tangential springs, which are state, and the lists whose entries they belong to."""
+
+BETWEEN_TICKS = (
+    *(f"bottles.{name}" for name in ("id", "type", "radius", "inverse_mass", "weight")),
+    "spin.inverse_inertia",
+    "ring.",
+    "surface.",
+)
+"""Arrays that change only between ticks, as bottles come and go or belts change their speed."""
+
+OBSERVERS: Mapping[str, str] = {
+    "peaks.": "largest forces since the last output; only outputs read them",
+    "ledger.": "energy ledger; only outputs read it",
+    "damage.scuffing.bins.": "loads on rails; only outputs read them",
+    "damage.crushing.": "largest loads in this tick, which begins at zero, and since the last output",
+    "damage.impacts.speed.": "likewise",
+    "damage.impacts.force.": "likewise",
+    "damage.tipping.ratio.": "likewise",
+    "damage.impacts.touched": "of one step",
+    "damage.tipping.fx": "of one step",
+    "damage.tipping.fy": "of one step",
+    "damage.tipping.moment": "of one step",
+}
+"""Arrays that only outputs read."""
+
+LIMITED: Mapping[str, str] = {"damage.": "loads on bottles; only limits of the scene make events and alarms of them"}
+"""Arrays that only outputs read in a scene without limits of loads."""
 
 
 def changing_arrays(world: World) -> Arrays:
-    """Every array of a World but the constant ones, by names such as `pairs.spring.elongation`; not copied."""
-    found: Arrays = {}
+    """Return every array of a World outside of CONSTANT groups, by name; not copied."""
+    arrays: Arrays = {}
     for name, group in zip(world._fields, world, strict=True):
         if name not in CONSTANT:
-            _collect(name, group, found)
-    return found
+            _collect(name, group, arrays)
+    return arrays
+
+
+def state_arrays(world: World) -> Arrays:
+    """Return the arrays to carry into a World with more slots, by name. Lists and their springs are carried whole."""
+    left_out = (*FIXED, *SCRATCH, *REMADE)
+    return {name: array for name, array in changing_arrays(world).items() if not name.startswith(left_out)}
+
+
+def tick_arrays(world: World) -> Arrays:
+    """Return the arrays that must be put back to repeat a tick, by name; the neighbour lists are rebuilt then."""
+    arrays = changing_arrays(world)
+    names = {name for name in state_arrays(world) if not name.startswith((*UNCHECKED, *BETWEEN_TICKS))}
+    for prefix, lists in TIED.items():
+        if springs := {name for name in arrays if name.startswith(prefix)}:
+            names |= {*springs, *lists}
+    return {name: array for name, array in arrays.items() if name in names}
 
 
 def with_arrays(world: World, arrays: Arrays) -> World:
-    """The World with other arrays in place of its own, which may be of other lengths.
+    """Return the World with other arrays in place of its own. Their lengths may differ.
 
-    Raises ValueError where names, types or numbers of dimensions are not those of the World's own.
+    Raise ValueError where names, types or numbers of dimensions are not those of the World's own.
     """
     own = changing_arrays(world)
     for name in sorted(own.keys() | arrays.keys()):
@@ -36,12 +136,12 @@ def with_arrays(world: World, arrays: Arrays) -> World:
     return world._replace(**{name: _replaced(name, group, arrays) for name, group in groups if name not in CONSTANT})
 
 
-def _collect(name: str, value: Any, found: Arrays) -> None:
+def _collect(name: str, value: Any, arrays: Arrays) -> None:
     if isinstance(value, np.ndarray):
-        found[name] = value
+        arrays[name] = value
     elif isinstance(value, tuple):
         for field, part in zip(value._fields, value, strict=True):  # type: ignore[attr-defined]
-            _collect(f"{name}.{field}", part, found)
+            _collect(f"{name}.{field}", part, arrays)
 
 
 def _replaced(name: str, value: Any, arrays: Arrays) -> Any:

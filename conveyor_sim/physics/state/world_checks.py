@@ -10,41 +10,7 @@ from conveyor_sim.engine.contact.slots import WIDTH
 from conveyor_sim.engine.lists.riding import PLANNED, STEPPED
 from conveyor_sim.physics.model import Model
 from conveyor_sim.physics.state.empty_world import empty_near, empty_pairs, empty_slots, empty_world
-from conveyor_sim.physics.state.world_arrays import Arrays, changing_arrays
-
-FIXED = (
-    *(f"belts.{name}" for name in ("x", "y", "ax", "ay", "length", "width", "sectors.")),
-    *(f"moving.{name}" for name in ("length", "material", "rail", "surface", "home_", "along_", "turning", "sweep")),
-    "moving.ends.joint",
-    *(f"moving.actuators.{name}" for name in ("limit", "mass", "max_", "stroke")),
-    *(f"damage.scuffing.bins.{name}" for name in ("segment_first", "arc_first", "arc_span")),
-    *(f"damage.tipping.{name}" for name in ("contact_lever", "base_lever", "delay")),
-    "surface.friction",
-    *(f"static_friction.{name}" for name in ("stiffness", "damping", "friction")),
-)
-"""Beginnings of the names of arrays in changing groups that nothing changes."""
-
-SCRATCH = (
-    "bottles.packed",
-    "spin.moment",
-    "load.",
-    "stage.",
-    "path.",
-    "moving.springs.path",
-    "slopes.",
-    "linear.",
-    "implicit.",
-    "riding.",
-    "probe.depth",
-    *(f"pairs.{name}" for name in ("fx", "fy", "moment", "normal", "touch", "tangent.", "parts.", "law.")),
-    *(f"pairs.{name}" for name in ("reach", "radius_i")),
-    *(f"ledger.{name}" for name in ("damping.", "friction.", "base.", "belt_power", "rail_power", "power")),
-    *(f"damage.tipping.{name}" for name in ("fx", "fy", "moment")),
-    "moving.actuators.push",
-)
-"""Beginnings of the names of arrays that are written before they are read, or are no state. They may hold anything
-finite or not: a tick that failed leaves them so.
-"""
+from conveyor_sim.physics.state.world_arrays import FIXED, UNCHECKED, Arrays, changing_arrays
 
 
 def require_sound(world: World, model: Model, next_id: int) -> None:
@@ -61,7 +27,7 @@ def require_sound(world: World, model: Model, next_id: int) -> None:
         if name.startswith(FIXED):
             if array.tobytes() != expected[name].tobytes():
                 raise ValueError(f"array {name} is not that of the scene")
-        elif array.dtype.kind == "f" and not name.startswith(SCRATCH) and not np.isfinite(array).all():
+        elif array.dtype.kind == "f" and not name.startswith(UNCHECKED) and not np.isfinite(array).all():
             raise ValueError(f"array {name} is not finite")
     for name, (low, high) in ranges(world, model, next_id).items():
         array = arrays.get(name, np.zeros(0))
@@ -102,7 +68,7 @@ def ranges(world: World, model: Model, next_id: int) -> dict[str, tuple[int, int
         "neighbourhood.bucket": (0, slots),
         "neighbourhood.order": (0, slots - 1),
         "probe.bottle": (0, slots - 1),
-        "probe.other": (0, max(slots, len(model.rail_shapes)) - 1),
+        "probe.other": (0, max(slots, len(model.plant.rails)) - 1),
         "probe.due": (0, 1),
         "railed.bottle": (0, slots - 1),
         "railed.first": (0, slots),

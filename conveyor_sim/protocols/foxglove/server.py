@@ -1,4 +1,4 @@
-"""`FoxgloveServer`: a line in Foxglove and Lichtblick, by their websocket protocol; messages go there as they come.
+"""`FoxgloveServer`: a line in Foxglove and Lichtblick, by their WebSocket protocol. Messages pass unchanged.
 
 Topics have the names and definitions that recordings have, so that a layout shows both. Clients only read.
 """
@@ -17,10 +17,10 @@ import numpy as np
 from foxglove.websocket import ChannelView, Client, ServerListener, WebSocketServer
 
 from conveyor_sim.bag.channels import schema_of
-from conveyor_sim.bag.markers import bottles_markers, plant_markers
-from conveyor_sim.bag.messages import Header
-from conveyor_sim.bag.topics import TOPICS
-from conveyor_sim.bag.typestore import default_distro
+from conveyor_sim.bag.messages.encode import Header
+from conveyor_sim.bag.messages.markers import bottles_markers, plant_markers
+from conveyor_sim.bag.messages.topics import TOPICS
+from conveyor_sim.bag.messages.typestore import default_distro
 from conveyor_sim.protocols.server.interface import ServerError, Status
 from conveyor_sim.protocols.tags.line_mirror import DRAWING_TOPICS, STATE_TOPICS, DrawableProvider
 from conveyor_sim.scene import parse_overrides, parse_scene
@@ -29,30 +29,30 @@ from conveyor_sim.scene.marks import marks_of
 from conveyor_sim.scene.moving import moving_shapes
 
 PLANT, MARKERS = "plant", "markers"
-"""Made here, of what is heard: the drawing."""
+"""Topics made here from other topics: the drawing."""
 
 KEPT = ("line", "run_state", "readback", "alarm_states")
-"""Topics whose last message a client is sent as it begins to look."""
+"""Topics whose latest message a new subscriber gets at once."""
 
 SHORTEST = 0.04
-"""s of wall time from one message of MARKERS to the next, at least."""
+"""Shortest wall time between two messages of MARKERS, s."""
 
 WAITING = 256
-"""Messages that wait for a client, at most; of one that takes them too slowly the oldest are forgotten."""
+"""Largest number of messages that wait for a client; beyond it the oldest are dropped."""
 
 FRAME = "world"
 
 
 class FoxgloveServer:
-    """Follows a source; what is drawn is asked of it as long as somebody looks at that."""
+    """Foxglove server of one tag provider. It requests drawings only while a client subscribes to them."""
 
     def __init__(self, source: DrawableProvider, host: str, port: int) -> None:
-        """port: 0 for any that is free."""
+        """Prepare the server. port: 0 for any free one."""
         self._source, self._at = source, (host, port)
         self._context = foxglove.Context()  # without it channels are closed
         self._channels: dict[str, foxglove.Channel] = {}
         self._server: WebSocketServer | None = None
-        self._looks: dict[str, set[int]] = defaultdict(set)  # by topic, clients
+        self._looks: dict[str, set[int]] = defaultdict(set)  # clients by topic
         self._ends: list[Callable[[], None]] = []
         self._end_watch: Callable[[], None] | None = None
         self._changed = asyncio.Event()
@@ -62,13 +62,13 @@ class FoxgloveServer:
 
     @property
     def address(self) -> str:
-        """As it is entered in Foxglove: Open connection, Foxglove WebSocket."""
+        """Address to enter in Foxglove: Open connection, Foxglove WebSocket."""
         port = self._at[1] if self._server is None else self._server.port
         host = f"[{self._at[0]}]" if ":" in self._at[0] else self._at[0]
         return f"ws://{host}:{port}"
 
     async def start(self) -> None:
-        """Serve from now on. Raises ServerError if that can't be."""
+        """Serve from now on. Raises ServerError if that is not possible."""
         self._loop = asyncio.get_running_loop()
         distro = default_distro()
         for topic in (*STATE_TOPICS, *DRAWING_TOPICS, PLANT, MARKERS):
@@ -87,7 +87,7 @@ class FoxgloveServer:
                 server_listener=_Listener(self._in_loop, self._look, self._look_away),
                 message_backlog_size=WAITING,
             )
-        except Exception as error:  # the library has no type of its own for it
+        except Exception as error:  # the library raises plain exceptions
             raise ServerError(f"foxglove: {self._at[0]}:{self._at[1]} can't be served ({error})") from error
         self._ends = [self._source.hear(self._heard), self._source.listen(lambda: self._in_loop(self._changed.set))]
         self._task = asyncio.create_task(self._draw_all())
@@ -104,25 +104,25 @@ class FoxgloveServer:
         self._looks.clear()
         self._watch()
         if self._server is not None:
-            await asyncio.to_thread(self._server.stop)  # it waits for threads that may wait for the interpreter
+            await asyncio.to_thread(self._server.stop)  # it waits for threads that may need the interpreter's lock
             self._server = None
 
     def status(self) -> Status:
-        """What it is doing; a client counts as long as it looks at something."""
+        """Return the activity. A client counts while it has a subscription."""
         latency, self._latency = self._latency, 0.0
         looks = [client for clients in self._looks.values() for client in clients]
         return Status(len(set(looks)), len(looks), 0, 0, latency)
 
     def _heard(self, topic: str, data: bytes) -> None:
-        """By the thread of the source."""
+        """Pass a message on. Called by the thread of the tag provider."""
         server = self._server
-        if topic == "line" and server is not None:  # another run or time: they forget what they have
+        if topic == "line" and server is not None:  # another run or a seek: clients discard their data
             server.clear_session()
             self._in_loop(self._draw_plant)
         self._channels[topic].log(data)
 
     def _in_loop(self, function: Callable[..., object], *given: object) -> None:
-        """By any thread."""
+        """Call a function in the event loop. May be called by any thread."""
         with suppress(RuntimeError):  # the loop has ended
             self._loop.call_soon_threadsafe(function, *given)
 
@@ -144,7 +144,7 @@ class FoxgloveServer:
         self._watch()
 
     def _watch(self) -> None:
-        """Have drawn what somebody looks at, and nothing else."""
+        """Request drawings while there are subscriptions to them, and only then."""
         wanted = any(self._looks[topic] for topic in (*DRAWING_TOPICS, MARKERS))
         if wanted and self._end_watch is None:
             self._end_watch = self._source.watch()
@@ -157,12 +157,12 @@ class FoxgloveServer:
             await self._changed.wait()
             self._changed.clear()
             if self._looks[MARKERS]:
-                with suppress(Exception):  # of a damaged recording, messages may be anything; the next may be sound
+                with suppress(Exception):  # messages of a damaged recording may have any content; the next may be valid
                     self._draw()
             await asyncio.sleep(SHORTEST)
 
     def _draw(self) -> None:
-        """What moves, where it is now."""
+        """Publish moving objects at their present positions."""
         picture = self._source.picture
         decode = picture.drawn.get("bottles")
         if decode is None or decode is self._drawn:
@@ -178,7 +178,7 @@ class FoxgloveServer:
         self._latency = max(self._latency, time.time() - picture.at)
 
     def _draw_plant(self) -> None:
-        """What stands, if somebody looks at it."""
+        """Publish static objects if a client subscribes to them."""
         if self._looks[PLANT]:
             scene = self._scene()
             shapes = belt_shapes(scene), rail_shapes(scene), marks_of(scene)
@@ -192,11 +192,11 @@ class FoxgloveServer:
         return self._parsed[1]
 
     _parsed: tuple[Any, Any] = (None, None)
-    """The last message of topic line, and its scene."""
+    """Latest message of topic line, and its scene."""
 
 
 class _Listener(ServerListener):
-    """Called by threads of the library."""
+    """Listener that threads of the library call."""
 
     def __init__(
         self,

@@ -1,4 +1,4 @@
-"""`Frames`: the data of a view, collected in bounded memory for one process that mirrors the view."""
+"""`Frames`: updates of a line mirror, collected in bounded memory for one process that copies it."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ class Frames:
             self._ended = True
             self._wake.notify_all()
 
-    # By the thread of the view
+    # Called by the thread of the mirror
 
     def _hear(self, topic: str, data: bytes) -> None:
         with self._wake:

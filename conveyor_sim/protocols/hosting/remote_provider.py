@@ -130,7 +130,7 @@ class RemoteTagProvider(LineMirror):
         """Show the data of a frame. Messages that can't be decoded make the line lost, with the reason."""
         try:
             self._apply(frame)
-        except Exception as error:  # of a damaged recording, or a node of another version, messages may be anything
+        except Exception as error:  # messages of a damaged recording or another version may have any content
             text = str(error) if isinstance(error, ConveyorError) else f"{type(error).__name__}: {error}"
             self.lose(printable(text, SENTENCE))
 

@@ -6,7 +6,7 @@ import subprocess
 from contextlib import suppress
 from multiprocessing import Pipe
 
-from conveyor_sim.protocols.tags.child import start_child
+from conveyor_sim.support.child_process import start_python
 
 PROCESS = "conveyor_sim.protocols.hosting.server_process"
 
@@ -21,7 +21,7 @@ class ServerChild:
         its_frames, self.frames = Pipe(duplex=False)
         """Frames to it."""
         with its_pipe, its_frames:
-            self.process = start_child(PROCESS, its_frames, its_pipe, name=name)
+            self.process = start_python(PROCESS, its_frames, its_pipe, name=name)
 
     def kill(self, patience: float) -> None:
         """Wait up to `patience` seconds for the end of the process, then kill it."""

@@ -80,9 +80,9 @@ class ServerHost:
         everyone: Callable[[], tuple[Health, ...]],
         ready: ServerChild | None,
     ) -> None:
-        """Return at once; `wait_until_started` waits. place: port or URL. say: takes sentences for people.
-        everyone: returns the health of all protocol servers, for the page. ready: process for the first start; None:
-        it is started here.
+        """Start and return at once; `wait_until_started` waits. place: port or URL. say: takes sentences for the user.
+        everyone: returns the health of all protocol servers, for the page. ready: process for the first start; None: it
+        is started here.
         """
         self.kind = kind
         self._place, self._settings, self._view, self._logins, self._say = place, settings, view, logins, say
@@ -97,7 +97,7 @@ class ServerHost:
         self._address = ""
         self._restarts = 0
         self._before = self._now = _NONE  # counts of earlier processes; status of the present one
-        self._lag = self._latency = 0.0  # s, the longest since the last status
+        self._lag = self._latency = 0.0  # longest since the last status, s
         self._recent: deque[float] = deque(maxlen=RECENT)
         self._silent = 0.0  # s of wall time since the last heartbeat
         self._process: subprocess.Popen[bytes] | None = None
@@ -121,7 +121,7 @@ class ServerHost:
 
     @property
     def pid(self) -> int | None:
-        """The process; None: there is none at present."""
+        """ID of the process; None: there is none at present."""
         return None if self._process is None else self._process.pid
 
     def status(self, fresh: bool = False) -> Status:
@@ -257,7 +257,7 @@ class ServerHost:
         while True:
             message = pipe.recv() if pipe.poll(LOOK) else None
             now = time.monotonic()
-            # Time in which this process did not run itself does not count.
+            # Time in which this process itself was stopped does not count.
             self._silent += min(now - looked, 2 * LOOK)
             looked = now
             if self._ending.is_set():

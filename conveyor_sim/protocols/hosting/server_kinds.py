@@ -1,4 +1,4 @@
-"""The faces that there are: what serves one asks here."""
+"""Table of all protocol servers: how to make each, and what it exposes."""
 
 from __future__ import annotations
 
@@ -24,29 +24,29 @@ class ServerKind:
     """One protocol."""
 
     name: str
-    """Of the option of `serve`, which takes a port; of MQTT the URL of a broker."""
+    """Name of the option of `serve`, which takes a port, for MQTT the URL of a broker."""
     port: int
-    """By default; its usual one may be for root only."""
+    """Default port. The standard one may need root."""
     libraries: tuple[str, ...]
-    """Without which it can't be."""
+    """Python packages that the server needs."""
     module: str
     """Module of the protocol server, which `make` imports."""
     make: Callable[[TagProvider, Any, ServerSettings, SharedState], ProtocolServer]
-    """A face on what its option takes, not started. Raises ConveyorError."""
+    """Function that makes a protocol server for the value of its option, not started. Raises ConveyorError."""
     exposes: Callable[[ServerSettings], str]
-    """What whoever reaches the port can do, for those who let other machines reach it: a half sentence."""
+    """Function that returns what clients can do, for the greeting: a half sentence."""
     by_default: bool = True
-    """Whether it is served where none is named."""
+    """True if it is served when no protocol is chosen."""
     extra: str = "scada"
-    """Of this package, that brings the libraries."""
-    whoever: str = ""
-    """Who can do that, where it is not those who reach its port."""
+    """Extra of this package that installs the libraries."""
+    clients: str = ""
+    """Clients in the greeting, if these are not all clients that reach the port."""
     isolated: bool = True
-    """True if it runs in a separate process, which finds it in FACES by its name and makes it."""
+    """True if it runs in a separate process, which finds it in SERVER_KINDS by its name and makes it."""
 
     @property
     def installed(self) -> bool:
-        """Whether its libraries are here."""
+        """True if its libraries are installed."""
         return not self._missing
 
     @property
@@ -54,12 +54,12 @@ class ServerKind:
         return [name for name in self.libraries if not _is_here(name)]
 
     def require(self) -> None:
-        """Raises ServerError if it can't be here."""
+        """Raise ServerError if a library is missing."""
         if missing := self._missing:
             raise ServerError(f"{self.name}: {missing[0]} is not installed: pip install 'conveyor_sim[{self.extra}]'")
 
     def require_place(self, place: Any, settings: ServerSettings) -> None:
-        """Raises ServerError if it can't be on what its option says: before anything has been compiled for it."""
+        """Raise ServerError if it can't serve at a port or URL, before kernels are compiled for it."""
         if self.name == MQTT:
             _broker(place, settings).require_reachable()
         else:
@@ -69,7 +69,7 @@ class ServerKind:
 def _is_here(library: str) -> bool:
     try:
         return find_spec(library) is not None
-    except ModuleNotFoundError:  # the package that it is in
+    except ModuleNotFoundError:  # its parent package is missing
         return False
 
 
@@ -85,8 +85,8 @@ def _modbus(source: TagProvider, port: int, settings: ServerSettings, shared: Sh
 
 def _modbus_exposes(settings: ServerSettings) -> str:
     if settings.modbus_role is None:
-        return "read all, and write nothing"
-    return f"read all, and write as {settings.modbus_role}, for Modbus asks nobody who they are"
+        return "read everything and write nothing"
+    return f"read everything and write as {settings.modbus_role} (Modbus has no users)"
 
 
 def _opcua(source: TagProvider, port: int, settings: ServerSettings, shared: SharedState) -> ProtocolServer:
@@ -131,8 +131,8 @@ def _mqtt_writes(settings: ServerSettings) -> WriterKind | None:
 
 def _mqtt_exposes(settings: ServerSettings) -> str:
     if _mqtt_writes(settings) is None:
-        return "read all, and write nothing"
-    return f"read all, and write as {settings.mqtt_role}, for commands by Sparkplug say nothing of who gave them"
+        return "read everything and write nothing"
+    return f"read everything and write as {settings.mqtt_role} (Sparkplug commands do not name their users)"
 
 
 def _web(source: TagProvider, port: int, settings: ServerSettings, shared: SharedState) -> ProtocolServer:
@@ -141,7 +141,7 @@ def _web(source: TagProvider, port: int, settings: ServerSettings, shared: Share
     from conveyor_sim.protocols.web.tls import server_context
 
     if not isinstance(source, LineMirror):
-        raise ServerError("web: the line of a test has no page, expected a scene, a recording or a node")
+        raise ServerError("web: the line of a test has no page; expected a scene, a recording or a node")
     secured = settings.host != HERE or settings.web_certificates is not None
     return WebServer(
         source,
@@ -164,8 +164,8 @@ def _foxglove(source: TagProvider, port: int, settings: ServerSettings, shared: 
 
 
 def _users_can(settings: ServerSettings) -> str:
-    readers = "read all" if settings.anonymous else "read nothing without a name and password"
-    return f"{readers}, and write only as one of the users" if settings.users else f"{readers}, and write nothing"
+    readers = "read everything" if settings.anonymous else "read nothing without a name and password"
+    return f"{readers} and write only as one of the users" if settings.users else f"{readers} and write nothing"
 
 
 SERVER_KINDS: tuple[ServerKind, ...] = (
@@ -180,7 +180,7 @@ SERVER_KINDS: tuple[ServerKind, ...] = (
         _mqtt_exposes,
         by_default=False,
         extra="mqtt",
-        whoever="whoever the broker lets in",
+        clients="clients that the broker admits",
     ),
     ServerKind(WEB, 8080, ("aiohttp",), f"{_HERE}.web.server", _web, _users_can, by_default=False),
     ServerKind(
@@ -189,7 +189,7 @@ SERVER_KINDS: tuple[ServerKind, ...] = (
         ("foxglove",),
         f"{_HERE}.foxglove.server",
         _foxglove,
-        lambda _: "read all",
+        lambda _: "read everything",
         by_default=False,
         extra="foxglove",
     ),

@@ -28,7 +28,7 @@ class ServerTask:
     """First message to the process: the protocol server to run."""
 
     kind: str
-    """Name in `faces.FACES`."""
+    """Name in `server_kinds.SERVER_KINDS`."""
     place: Any
     """Port, or URL of a broker."""
     settings: ServerSettings

@@ -35,8 +35,8 @@ from conveyor_sim.protocols.hosting.server_messages import (
 )
 from conveyor_sim.protocols.hosting.shared_state import SharedState
 from conveyor_sim.protocols.server.interface import ProtocolServer
-from conveyor_sim.protocols.tags.child import die_with_parent, pipes_of_child
 from conveyor_sim.protocols.tags.line_mirror import decoded
+from conveyor_sim.support.child_process import die_with_parent, pipes_of_child
 from conveyor_sim.support.garbage import collected_later
 
 

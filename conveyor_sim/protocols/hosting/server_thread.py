@@ -1,4 +1,4 @@
-"""`ServerThread`: servers in an asyncio loop of their own, beside whatever else a process does."""
+"""`ServerThread`: an asyncio loop for protocol servers in a separate thread."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ T = TypeVar("T")
 
 
 class ServerThread(AbstractContextManager["ServerThread"]):
-    """Runs coroutines for other threads."""
+    """Thread that runs coroutines for other threads."""
 
     def __init__(self) -> None:
-        """It runs from now on."""
+        """Start the thread."""
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever, name="servers", daemon=True)
         self._thread.start()
 
     def run(self, coroutine: Coroutine[Any, Any, T]) -> T:
-        """Wait for what a coroutine returns or raises there."""
+        """Run a coroutine in the thread. Return or raise what it does."""
         return asyncio.run_coroutine_threadsafe(coroutine, self._loop).result()
 
     def close(self) -> None:
-        """End it, with all that still runs there."""
+        """Cancel all coroutines and end the thread."""
         if self._loop.is_closed():
             return
         self.run(_cancel_others())

@@ -1,4 +1,4 @@
-"""`Serving`: all protocol servers of one source, and the lines that report on them."""
+"""`Serving`: all protocol servers of one tag provider, with greeting, progress and summary."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from conveyor_sim.protocols.tags.tag_provider import TagProvider
 
 
 class Serving(AbstractContextManager["Serving"]):
-    """Serves from the start to close()."""
+    """Protocol servers that serve from the start to close()."""
 
     def __init__(
         self,
@@ -29,11 +29,11 @@ class Serving(AbstractContextManager["Serving"]):
         say: Callable[[str], object] = lambda sentence: None,
         ready: Mapping[str, ServerChild] = MappingProxyType({}),
     ) -> None:
-        """chosen: protocols and their ports, 0 for any that is free; of MQTT the URL of the broker.
-        say: called with a sentence for people when a protocol server is restarted, by a thread.
-        ready: processes that were started for protocols, by name. They are ended with this.
+        """Start all servers. chosen: protocols and their ports, 0 for any free one; for MQTT the URL of the broker.
+        say: called with a sentence for the user when a protocol server restarts, by a thread.
+        ready: processes that were started in advance, by protocol; they end with this.
 
-        Raises ConveyorError, in one sentence, if one of them can't be served; then none is.
+        Raises ConveyorError, in one sentence, if one of them can't serve; then none does.
         """
         self._source, self._settings, self._ready = source, settings, ready
         self._hosts: list[ServerHost | ThreadHost] = []
@@ -59,27 +59,27 @@ class Serving(AbstractContextManager["Serving"]):
 
     @property
     def faces(self) -> Sequence[ServerHost | ThreadHost]:
-        """All of them, in the order in which they were chosen."""
+        """Hosts of all servers, in the order of `chosen`."""
         return self._hosts
 
     @property
     def greeting(self) -> list[str]:
-        """A sentence for each: where clients find it, and what they can do there."""
-        whoever = "clients" if self._settings.host == HERE else "whoever reaches this machine there"
+        """One sentence per server: its address, and what clients can do there."""
+        clients = "clients" if self._settings.host == HERE else "all clients that reach this address"
         return [
-            f"{host.address}: {host.kind.whoever or whoever} can {host.kind.exposes(self._settings)}"
+            f"{host.address}: {host.kind.clients or clients} can {host.kind.exposes(self._settings)}"
             for host in self._hosts
         ]
 
     def progress(self) -> str:
-        """How the line and its faces are, in one line."""
+        """Return the state of the line and of its servers as one line."""
         shown = self._source.shown
         state = f"lost: {shown.lost}" if shown.lost else shown.run.text
-        told = [_told(host.kind.name, host.status(), host.health(since_asked=True)) for host in self._hosts]
-        return " | ".join([f"{self._time:.1f} s {state}", *told])
+        parts = [_status(host.kind.name, host.status(), host.health(since_asked=True)) for host in self._hosts]
+        return " | ".join([f"{self._time:.1f} s {state}", *parts])
 
     def summary(self) -> str:
-        """What has been served, in one line."""
+        """Return counts of served requests as one line."""
         counts = []
         for host in self._hosts:
             restarts = host.health().restarts
@@ -88,7 +88,7 @@ class Serving(AbstractContextManager["Serving"]):
         return f"served up to {self._time:g} s; {', '.join(counts)}"
 
     def latencies(self) -> dict[str, float]:
-        """s of wall time by protocol, the longest since somebody asked."""
+        """Return the longest latency since the last call by protocol, s of wall time."""
         return {host.kind.name: host.status().latency for host in self._hosts}
 
     def health(self) -> tuple[Health, ...]:
@@ -110,10 +110,10 @@ class Serving(AbstractContextManager["Serving"]):
         return self._source.shown.tick * self._source.about.tick
 
 
-def _told(name: str, status: Status, health: Health) -> str:
-    subscriptions = f", {_many(status.subscriptions, 'subscription')}" if status.subscriptions else ""
+def _status(name: str, status: Status, health: Health) -> str:
+    items = f", {_many(status.monitored_items, 'monitored item')}" if status.monitored_items else ""
     left_out = f", {_many(status.left_out, 'tick')} left out" if status.left_out else ""
-    clients = status.state or f"{_many(status.clients, 'client')}{subscriptions}"
+    clients = status.state or f"{_many(status.clients, 'client')}{items}"
     return f"{name}: {clients}, {_writes(status)}, {status.latency * 1e3:.1f} ms, {health.text}{left_out}"
 
 

@@ -15,38 +15,38 @@ from conveyor_sim.protocols.server.users import Role
 
 @dataclass(frozen=True)
 class ServerSettings:
-    """What is asked of all faces, or of one."""
+    """Settings of all protocol servers."""
 
     host: str = HERE
     """Address to listen on."""
     stamps: Stamps = "wall"
     modbus_role: WriterKind | None = None
-    """In which Modbus clients write; None: they may not."""
+    """Role in which Modbus clients write; None: they may not write."""
     modbus_map: Path | None = None
-    """File that keeps the map of addresses; None: made of the tags, and not kept."""
+    """File that stores the map of addresses; None: the map is derived from the tags and not stored."""
     mqtt_role: Role | None = None
-    """In which hosts command by MQTT; None, viewer: they may not."""
+    """Role in which hosts command by MQTT; None, viewer: they may not."""
     mqtt_password_file: Path | None = None
     """File of the password for the broker; None: an environment variable."""
     mqtt_ca: Path | None = None
-    """File of the certificates by which the broker is known; None: those that this machine trusts."""
+    """File of the certificates that authenticate the broker; None: those that this machine trusts."""
     mqtt_primary_host: str = ""
-    """Id of the host application without which nothing is sent; empty: none."""
+    """ID of the primary host application, without which nothing is sent; empty: none."""
     users: Path | None = None
-    """File of those who may do more than read by OPC UA and on the page; None: nobody may."""
+    """File of the users who may do more than read by OPC UA and on the page; None: there are no users."""
     anonymous: bool = True
-    """Whether clients that give no name may read there."""
+    """True if clients without a user may read there."""
     opcua_certificates: Path | None = None
-    """Folder of the server's certificate and key; None: that of this user."""
+    """Folder of the OPC UA server's certificate and key; None: the default folder of the operating system's user."""
     opcua_history: Sequence[str] = ()
-    """Patterns of the tags whose last values it keeps."""
+    """Patterns of the tags whose latest values OPC UA keeps as history."""
     web_certificates: Path | None = None
-    """Folder of the certificate and key of the page; None: where it needs them, those of the OPC UA face."""
+    """Folder of the certificate and key of the page; None: those of the OPC UA server, where the page needs any."""
     opcua_limits: OpcUaLimits = LIMITS
     """Limits of one OPC UA client."""
     opcua_quota: Quota = QUOTA
-    """Places of the OPC UA connections."""
+    """Quota of the OPC UA connections."""
     modbus_quota: Quota = QUOTA
-    """Places of the Modbus connections."""
+    """Quota of the Modbus connections."""
     web_quota: Quota = QUOTA
-    """Places of the pages."""
+    """Quota of the connections of pages."""

@@ -21,7 +21,7 @@ from conveyor_sim.protocols.tags.tag_provider import TagProvider
 
 
 class ThreadHost:
-    """Serves from its start until `end` and `join`, as a `ServerHost` does."""
+    """Host that serves from its start until `end` and `join`, as a `ServerHost` does."""
 
     def __init__(
         self, kind: ServerKind, place: Any, settings: ServerSettings, source: TagProvider, logins: Logins
@@ -44,7 +44,7 @@ class ThreadHost:
         """Address for clients."""
 
     def wait_until_started(self) -> None:
-        """Return at once: it is started."""
+        """Return at once, because it is started."""
 
     def status(self, fresh: bool = False) -> Status:
         """Return its activity, which is always fresh."""

@@ -26,19 +26,19 @@ from conveyor_sim.support.modbus_rows import (
 from conveyor_sim.support.printable import printable
 
 HANDSHAKE = MOST_ADDRESSES - 2
-"""Address of the two tags of the handshake, behind all others."""
+"""Address of the two tags of the handshake, after all others."""
 
 SET_MODE = "/set_mode"
-"""End of the name of the row by which a device is put into a mode; it has no tag of its own."""
+"""Suffix of the row that sets the control mode of a device; there is no tag of this name."""
 
 
 def modbus_map(tags: Iterable[Tag], kept: Sequence[Row] = (), word_order: WordOrder = "big") -> list[Row]:
-    """The map of a line: what is kept stays where it is, and tags that it lacks are added behind it, in their order.
+    """Return the map of a line: stored rows keep their addresses, and new tags follow them in their order.
 
-    Signals are discrete inputs and input registers, commands coils and holding registers; faults are left out, for
-    Modbus knows no users. word_order: of what is added. A kept tag that the line no longer has keeps its address, and
-    is marked as gone. The two tags of the handshake have the last addresses, always. Raises MapError for a tag that has
-    become of another type or table, and if a table is full.
+    Signals are discrete inputs and input registers, commands are coils and holding registers. Faults are left out,
+    because Modbus has no users. word_order: of new rows. A stored tag that the line no longer has keeps its address and
+    is marked as gone. The two tags of the handshake always have the last addresses. Raises MapError for a tag whose
+    type or table has changed, and if a table is full.
     """
     handshake = _handshake({row.name: row.word_order for row in kept}, word_order)
     kept = [row for row in kept if row.name not in (TICK, TARGET)]
@@ -107,14 +107,14 @@ def _mode_row(tag: Tag, word_order: WordOrder) -> Row:
 
 def _type(tag: Tag) -> Type:
     if tag.kind == "number":
-        return "float64" if tag.unit == "s" else "float32"  # a time of days keeps its microseconds
+        return "float64" if tag.unit == "s" else "float32"  # days with a resolution of microseconds
     if tag.kind == "enumeration":
         return "uint16"
     return "int32" if tag.low < 0.0 else "uint32"
 
 
 def keep_map(path: Path, tags: Iterable[Tag], word_order: WordOrder = "big") -> list[Row]:
-    """The map that a file keeps, grown by what the line has besides; the file is written if that is anything, or new.
+    """Return the map in a file, extended by new tags of the line. Write the file if it changes or is new.
 
     Raises MapError, which leaves the file as it was.
     """

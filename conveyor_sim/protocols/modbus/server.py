@@ -1,10 +1,13 @@
 """`ModbusServer`: a line as a Modbus TCP server, by the addresses of a map.
 
-Modbus identifies nobody: whoever reaches the port can read, and writes are refused unless the server was given a role
-to write in. What is refused gets an exception: 1 if nobody may write, and for a function that is not served; 2 for an
-address that is not in the map, or a value written in part; 3 for a value out of range, or a request that is not as its
-function has it; 6 for a device that is in other hands, or if too much waits already; 11, for reads too, while the line
-behind the server is lost, so that nothing old is taken for new (Modbus Application Protocol 1.1b3, 7).
+Modbus has no users. Every client that reaches the port can read. Writes are refused unless the server has a role for
+them. Refusals are exceptions (Modbus Application Protocol 1.1b3, 7):
+
+1: writes are not allowed, or the function is not supported.
+2: the address is not in the map, or a value would be written in part.
+3: a value is out of range, or the request is malformed.
+6: the device is in another control mode or owned by another client, or too many inputs wait.
+11, for reads as well: the connection to the line is lost, so values would be stale.
 """
 
 from __future__ import annotations
@@ -38,17 +41,17 @@ from conveyor_sim.protocols.tags.tag_provider import MODBUS, TagProvider
 from conveyor_sim.support.modbus_rows import Row, Table, decode, encode
 
 MOST_UNREAD = 64 * 1024
-"""Bytes of answers that a client may leave lying; then its connection ends."""
+"""Largest number of unread bytes of answers; beyond it the connection ends."""
 
 MOST_UNANSWERED = 4096
-"""Bytes of requests that wait for those before them; no more are read of that connection until then."""
+"""Largest number of bytes of unanswered requests; beyond it no more are read from the connection."""
 
 _HEADER = struct.Struct(">HHHB")  # MBAP: transaction, protocol, length from the unit on, unit
 _ONE_COIL, _ONE_REGISTER = 5, 6  # functions
 _ON_OR_OFF = (b"\xff\x00", b"\x00\x00")
 _LENGTHS = range(2, 255)  # of unit, function and data (Modbus Messaging on TCP/IP 1.0b, 3.1.3 and 4.1)
 
-_LOOK = 0.5  # s of wall time between two looks at who is silent
+_LOOK = 0.5  # wall time between two checks for silent holders, s
 _KEEP_ALIVE = {socket.TCP_KEEPIDLE: 10, socket.TCP_KEEPINTVL: 5, socket.TCP_KEEPCNT: 3}  # s, s, 1
 
 _TABLE_OF: dict[int, Table] = {
@@ -57,7 +60,7 @@ _TABLE_OF: dict[int, Table] = {
     4: "input register",
     **dict.fromkeys((3, 6, 16, 22, 23), "holding register"),
 }
-"""By function code; others are not served."""
+"""Table by function code; other functions are not supported."""
 
 _EXCEPTIONS: Mapping[Cause, ExcCodes] = {
     "operation": ExcCodes.ILLEGAL_FUNCTION,
@@ -69,11 +72,11 @@ _EXCEPTIONS: Mapping[Cause, ExcCodes] = {
 """Exception code of an input that no state of the line allows, by the cause of its refusal."""
 
 _writer: ContextVar[str] = ContextVar("writer", default=MODBUS)
-"""Whose request is being answered."""
+"""Writer whose request is being answered."""
 
 
 class ModbusServer:
-    """Serves one source: a Face."""
+    """Protocol server for one tag provider, by Modbus TCP."""
 
     def __init__(
         self,
@@ -85,8 +88,9 @@ class ModbusServer:
         quota: Quota = QUOTA,
         holding: HoldingService | None = None,
     ) -> None:
-        """rows: the map. role: in which clients write; None: they may not. port: 0 for any that is free.
-        quota: places of the connections. A client that is idle for longer than it says no longer holds the line.
+        """Prepare the server. rows: map of addresses. role: role in which clients write; None: they may not write.
+        port: 0 for any free one.
+        quota: limits of the connections; a client that is idle for longer than `quota.idle` no longer holds the line.
         holding: decides which client holds the line; None: a new one.
         """
         self._image = _Image(source, rows, role, holding or Holding(source, MODBUS))
@@ -97,7 +101,7 @@ class ModbusServer:
 
     @property
     def port(self) -> int:
-        """On which it listens. RuntimeError before `start`."""
+        """Port on which it listens. Raises RuntimeError before `start`."""
         if self._server is None or self._server.transport is None:
             raise RuntimeError("the server was not started")
         sockets: Any = self._server.transport
@@ -105,12 +109,12 @@ class ModbusServer:
 
     @property
     def address(self) -> str:
-        """Where clients find it."""
+        """Address for clients."""
         host, port = self._at
         return f"modbus://{host}:{port if self._server is None else self.port}"
 
     def status(self) -> Status:
-        """Connections that are open; requests to write that were passed on, and that got an exception."""
+        """Return the number of open connections, and counts of accepted and refused write requests."""
         server, image = self._server, self._image
         if server is None:
             return Status(0, 0, image.writes, image.refused, 0.0)
@@ -119,10 +123,10 @@ class ModbusServer:
 
     async def start(self) -> None:
         """Listen. Raises ServerError if that is not possible."""
-        logging.getLogger("pymodbus.logging").setLevel(logging.CRITICAL)  # it logs whatever clients send
+        logging.getLogger("pymodbus.logging").setLevel(logging.CRITICAL)  # it logs all input of clients
         host, port = self._at
         require_free(MODBUS, host, port)
-        # The library wants a device of its own; the image takes its place at each request.
+        # The library requires a device; the image replaces it at each request.
         server = _Server(SimDevice(0, simdata=SimData(0, datatype=DataType.REGISTERS)), address=(host, port))
         server.image, server.holding = self._image, self._image.holding
         server.places = ConnectionSlots(self._quota, keeps_active=True)
@@ -146,20 +150,20 @@ class ModbusServer:
 
 class _Server(ModbusTcpServer):
     image: Any
-    """An _Image: to the library, what a request is done to."""
+    """An `_Image`, which the library uses as the memory of a device."""
     holding: HoldingService
     places: ConnectionSlots
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
         self.connected: set[_Handler] = set()
-        self.longest = 0.0  # s of wall time from a request to its answer, since somebody asked
+        self.longest = 0.0  # longest wall time from a request to its answer since the last status, s
 
     def callback_new_connection(self) -> ServerRequestHandler:
         return _Handler(self, self.trace_packet, self.trace_pdu, self.trace_connect)
 
     async def watch(self) -> None:
-        """Have whoever is silent give the line up."""
+        """Release the line repeatedly if its holder is silent or gone."""
         while True:
             await asyncio.sleep(_LOOK)
             now, holder = time.monotonic(), self.holding.holder
@@ -169,16 +173,16 @@ class _Server(ModbusTcpServer):
 
 
 class _Handler(ServerRequestHandler):
-    """One connection, whose client its requests are recorded under."""
+    """One connection. Its client is the writer of its requests."""
 
     server: _Server
     writer = ""
-    """Who its client is on record."""
+    """Writer in recorded inputs."""
     place: ConnectionSlot | None = None
     asked = 0.0
-    """s of wall time, when it asked for something last."""
+    """Wall time of the latest request, s."""
     _received = b""
-    """What has come of requests that are not answered yet."""
+    """Received bytes of unanswered requests."""
     _answering: asyncio.Task[None] | None = None
 
     def callback_connected(self) -> None:
@@ -193,7 +197,7 @@ class _Handler(ServerRequestHandler):
         if peer is not None:
             self.writer = f"{MODBUS} {peer[0]}:{peer[1]}"
         if (connection := self.transport.get_extra_info("socket")) is not None:
-            # A client that is gone without a word is noticed.
+            # Detect clients that vanish without closing the connection.
             connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
             connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, MOST_UNREAD)
             for option, value in _KEEP_ALIVE.items():
@@ -212,12 +216,12 @@ class _Handler(ServerRequestHandler):
         return self.transport
 
     def cut(self) -> None:
-        """End the connection at once; what was not sent is lost."""
+        """End the connection at once; unsent answers are lost."""
         self.server.connected.discard(self)
         self._stream.abort()
 
     def data_received(self, data: bytes) -> None:
-        """Requests that come together are answered in their order; the library would drop all but the first."""
+        """Answer requests in their order. The library would drop all but the first of several in one packet."""
         self._received += data
         if len(self._received) > MOST_UNANSWERED:
             self._stream.pause_reading()
@@ -231,24 +235,24 @@ class _Handler(ServerRequestHandler):
                 if self.place is not None:
                     self.place.touch(GUEST)
                 if self._stream.get_write_buffer_size() > MOST_UNREAD:
-                    self.cut()  # it asks, and does not read what it is answered
+                    self.cut()  # the client does not read its answers
                     return
                 _writer.set(self.writer)
                 self.server_send(await self._answer(*asked), None)
                 self.server.longest = max(self.server.longest, time.perf_counter() - began)
-                await asyncio.sleep(0)  # others, too
+                await asyncio.sleep(0)  # let other tasks run
         finally:
             self._answering = None
         if self.is_active() and not self._stream.is_closing():
             self._stream.resume_reading()
 
     def _next(self) -> tuple[int, int, bytes] | None:
-        """Transaction, unit, and function with data of the next request; None: it is not whole yet, or none."""
+        """Return transaction, unit, and function with data of the next request; None: there is no complete one."""
         if len(self._received) < _HEADER.size:
             return None
         transaction, protocol, length, unit = _HEADER.unpack_from(self._received)
         if protocol != 0 or length not in _LENGTHS:
-            self.cut()  # where a next one would begin, nobody knows
+            self.cut()  # the start of the next request is unknown
             return None
         end = _HEADER.size - 1 + length
         if len(self._received) < end:
@@ -258,7 +262,7 @@ class _Handler(ServerRequestHandler):
 
     async def _answer(self, transaction: int, unit: int, asked: bytes) -> ModbusPDU:
         function = asked[0]
-        # Of the library's own functions some would change how it serves all others.
+        # Some functions of the library would change the server for all clients.
         request = self.framer.decoder.decode(asked) if function in _TABLE_OF else None
         answer: ModbusPDU
         if function not in _TABLE_OF:
@@ -268,17 +272,19 @@ class _Handler(ServerRequestHandler):
         else:
             try:
                 answer = await request.datastore_update(self.server.image, unit)
-            except Exception as error:  # rather an answer than silence
+            except Exception as error:  # the client needs an answer
                 logging.getLogger(__name__).error("modbus: function %d failed: %r", function, error)
                 answer = ExceptionResponse(function, ExcCodes.DEVICE_FAILURE)
             if function in (_ONE_COIL, _ONE_REGISTER) and not answer.isError():
-                answer = request  # by the standard; the library answers with what is in force before the next tick
+                answer = (
+                    request  # required by the standard; the library would answer with the value before the next tick
+                )
         answer.transaction_id, answer.dev_id = transaction, unit
         return answer
 
 
 class _Image:
-    """What the library asks for values, in place of a device's memory."""
+    """Values of the line, in place of the memory of a device that the library expects."""
 
     def __init__(
         self, source: TagProvider, rows: Sequence[Row], role: WriterKind | None, holding: HoldingService
@@ -290,7 +296,7 @@ class _Image:
         self.writes = self.refused = 0
 
     async def async_getValues(self, device: int, function: int, address: int, count: int = 1) -> Any:
-        """Words or bits of one tick, (count,)."""
+        """Return words or bits of one tick, (count,)."""
         table, shown = _TABLE_OF[function], self._source.shown
         if shown.lost:
             return ExcCodes.GATEWAY_NO_RESPONSE
@@ -301,13 +307,13 @@ class _Image:
             if row is None:
                 return ExcCodes.ILLEGAL_ADDRESS
             value = float(shown.tick) if row.name in (TICK, TARGET) else shown.values.get(_shown_as(row), 0.0)
-            words = encode(row, value)  # 0 for one that is gone
+            words = encode(row, value)  # 0 for a tag that the line no longer has
             values += words[at - row.address :]
         values = values[:count]
         return [bool(value) for value in values] if table in ("coil", "discrete input") else values
 
     async def async_setValues(self, device: int, function: int, address: int, values: Sequence[int]) -> Any:
-        """Pass values on to the line together; None if it takes them."""
+        """Pass values on to the line together. Return None if they were accepted, an exception code otherwise."""
         problem = self._write(_TABLE_OF[function], address, list(values))
         self.writes, self.refused = self.writes + (problem is None), self.refused + (problem is not None)
         return problem
@@ -328,7 +334,7 @@ class _Image:
             words, address = words[row.words :], address + row.words
         if any(name.endswith(SET_MODE) for name in names):
             return self._put_into_mode(names, numbers)
-        # It has the last address, so it is the last that one request writes.
+        # It has the last address, so a request writes it last.
         target = numbers.pop() if names[-1] == TARGET and names.pop() else None
         writer = claimant = _writer.get()
         given = Input(MODBUS, writer, self._role, SET, tuple(names), tuple(numbers))
@@ -347,7 +353,7 @@ class _Image:
             return ExcCodes.ILLEGAL_FUNCTION
         if target is not None and not in_lockstep:
             return ExcCodes.DEVICE_BUSY
-        # Whoever attached a PLC that goes in lockstep has said whose the line is.
+        # In lockstep, the attached PLC owns the line.
         if self._role == "controller" and not in_lockstep and self.holding.take(writer):
             return ExcCodes.DEVICE_BUSY
         if names and self._source.give(given):
@@ -357,7 +363,7 @@ class _Image:
         return ExcCodes.ILLEGAL_VALUE if self._source.control("target", target, writer) else None
 
     def _put_into_mode(self, names: list[str], modes: list[float]) -> ExcCodes | None:
-        """Devices, all by one request, which holds nothing else."""
+        """Set the control modes of devices. The request must hold nothing else."""
         if self._role is None or self._role not in MAY[MODE].writers:
             return ExcCodes.ILLEGAL_FUNCTION
         if not all(name.endswith(SET_MODE) for name in names):
@@ -370,5 +376,5 @@ class _Image:
 
 
 def _shown_as(row: Row) -> str:
-    """Name of the tag that a row reads as."""
+    """Return the name of the tag that a row reads."""
     return f"{row.name.removesuffix(SET_MODE)}/mode" if row.name.endswith(SET_MODE) else row.name

@@ -6,17 +6,14 @@ killed process may arrive after the births of the next process, so both must hav
 
 from __future__ import annotations
 
-import fcntl
 import hashlib
 import json
 import logging
 import os
 import secrets
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
+from conveyor_sim.support.file_lock import locked
 from conveyor_sim.support.files import FileError, read_file, write_file
 from conveyor_sim.support.sealed_json import parsed
 
@@ -24,7 +21,6 @@ COUNT = 256
 """Numbers go from 0 to COUNT - 1, and round."""
 
 _MOST_BYTES = 10_000
-_LOCK = "lock"
 _PATIENCE = 2.0
 """Wall time to wait for another process that counts, s."""
 
@@ -55,10 +51,13 @@ class BirthNumbers:
         try:
             folder = state_folder() if self._folder is None else self._folder
             folder.mkdir(parents=True, exist_ok=True)
-            with _locked(folder):
+            with locked(folder, _PATIENCE):
                 number = self._read(folder)
                 content = {**self._node, "bdSeq": number}
                 write_file(self._file, json.dumps(content).encode() + b"\n", folder)
+        except BlockingIOError:
+            self._remark("the folder is locked by another process")
+            number = self._next
         except (FileError, OSError, RuntimeError) as error:
             self._remark(str(error))
             number = self._next
@@ -84,22 +83,3 @@ class BirthNumbers:
             place = self._folder or "$XDG_STATE_HOME/conveyor_sim/mqtt"
             text = "mqtt: %s: %s, expected a folder that keeps bdSeq from run to run; it begins with %d"
             logging.getLogger(__name__).warning(text, place, reason, self._next)
-
-
-@contextmanager
-def _locked(folder: Path) -> Iterator[None]:
-    """Hold the lock of a folder, if its file system has locks. Raises OSError if another process keeps it held."""
-    with (folder / _LOCK).open("ab") as stream:
-        end = time.monotonic() + _PATIENCE
-        while True:
-            try:
-                fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError as error:
-                if time.monotonic() > end:  # another process holds it, and may be stopped
-                    raise OSError(f"{_LOCK} is held by another process") from error
-                time.sleep(_PATIENCE / 100.0)
-                continue
-            except OSError:
-                pass
-            break
-        yield

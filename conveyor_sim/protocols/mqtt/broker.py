@@ -1,4 +1,4 @@
-"""`Broker`: where the MQTT broker of a plant is, as whom the line comes there, and what it is called there."""
+"""`Broker`: address of the MQTT broker of a plant, with the user and the names of the line there."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from conveyor_sim.support.files import MB, FileError, read_file
 from conveyor_sim.support.printable import printable
 
 PASSWORD = "CONVEYOR_SIM_MQTT_PASSWORD"
-"""The environment variable that the password is read from where no file is named."""
+"""Environment variable of the password, if no file is given."""
 
 PATIENCE = 5.0
-"""s of wall time that a broker has to accept a connection."""
+"""Wall time in which a broker must accept a connection, s."""
 
 EXPECTED = "expected mqtt://HOST, or mqtts:// for TLS, as mqtt://USER@HOST:PORT/GROUP/NODE"
 
@@ -29,40 +29,40 @@ _ID = re.compile(r"[A-Za-z0-9_.:-]{1,100}")
 
 @dataclass(frozen=True)
 class Broker:
-    """One of them."""
+    """Address and options of a broker."""
 
     host: str
     port: int
     secured: bool
-    """By TLS."""
+    """True for TLS."""
     user: str = ""
     password: str = ""
     authority: Path | None = None
-    """File of the certificates by which it is known; None: those that this machine trusts."""
+    """File of the certificates that authenticate it; None: those that this machine trusts."""
     group: str = ""
     """Group of the edge node; empty: the line's place, or its name."""
     node: str = ""
     """Edge node; empty: the line's name."""
     primary_host: str = ""
-    """The host application without which there are no births; empty: none."""
+    """ID of the primary host application, without which there are no births; empty: none."""
 
     @property
     def address(self) -> str:
-        """As people write it."""
+        """URL of the broker."""
         host = f"[{self.host}]" if ":" in self.host else self.host
         return f"{'mqtts' if self.secured else 'mqtt'}://{host}:{self.port}"
 
     @property
     def is_here(self) -> bool:
-        """Whether what is sent there stays on this machine."""
+        """True if the broker is on this machine."""
         return self.host in ("localhost", "::1") or self.host.startswith("127.")
 
     def named(self, about: LineInfo) -> tuple[str, str]:
-        """Group and edge node of a line."""
+        """Return the group and edge node of a line."""
         return self.group or about.where.replace("/", ":") or about.name, self.node or about.name
 
     def context(self) -> ssl.SSLContext:
-        """What TLS goes by. Raises ServerError."""
+        """Return the context for TLS. Raises ServerError."""
         try:
             context = ssl.create_default_context(cafile=self.authority)
         except (OSError, ValueError) as error:
@@ -71,7 +71,7 @@ class Broker:
         return context
 
     def require_reachable(self) -> None:
-        """Raises ServerError, with the reason, if nothing can be connected to there."""
+        """Raise ServerError, with the reason, if the address accepts no connection."""
         try:
             socket.create_connection((self.host, self.port), PATIENCE).close()
         except OSError as error:

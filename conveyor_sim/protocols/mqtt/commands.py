@@ -1,7 +1,7 @@
 """`HostCommands`: commands of Sparkplug hosts by NCMD and DCMD, checked at once and passed on as inputs.
 
-A command names nobody, and Sparkplug has no answers: whoever the broker lets publish it gives it, in the role that the
-face was given, and hosts find what came of it in metrics of the edge node.
+Commands do not name their users, and Sparkplug has no answers. All clients that the broker lets publish can command, in
+the role of the edge node. Metrics of the edge node report the results.
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ from conveyor_sim.protocols.tags.tag_provider import MQTT, TagProvider
 from conveyor_sim.support.printable import SENTENCE, printable
 
 REBIRTH = "Node Control/Rebirth"
-"""Metric of the edge node that has all births sent again."""
+"""Metric of the edge node that requests all births again."""
 
 MOST_METRICS = 1000
-"""Of one command."""
+"""Largest number of metrics in a command."""
 
 SILENCE = 30.0
-"""s of wall time without a command after which no controller holds the line by this face."""
+"""Wall time without a command after which controllers release the line, s."""
 
 
 class HostCommands:
-    """Of all hosts of one source, by one broker."""
+    """Commands of all hosts for one tag provider, by one broker."""
 
     def __init__(
         self,
@@ -41,30 +41,31 @@ class HostCommands:
         silence: float = SILENCE,
         holding: HoldingService | None = None,
     ) -> None:
-        """role: in which they command; None: they may not. broker: its address, which inputs are recorded under.
-        holding: decides whether they hold the line; None: a new one.
+        """Prepare the commands. role: role in which hosts command; None: they may not. broker: its address, for
+        recorded inputs.
+        holding: decides whether hosts hold the line; None: a new one.
         """
         self._source, self._role, self._silence = source, role, silence
         self._writer = f"{MQTT} {broker}"
         self._receipt = Receipt(source.about.tags, source.about.where)
         self._holding = holding or Holding(source, MQTT)
-        self._last = 0.0  # s of wall time, of the last command that was taken
+        self._last = 0.0  # wall time of the latest accepted command, s
         self._commands: Mapping[str, Tag] = {tag.name: tag for tag in source.about.tags if tag.role in COMMANDS}
         self._modes: Mapping[str, Tag] = {tag.name: tag for tag in source.about.tags if is_mode(tag)}
         self.before = (0, 0)
         """Commands that were passed on, and commands that were refused, before the edge node was restarted."""
         self.writes = self.refused = 0
-        """Commands so far that were passed on to the line, and that were not."""
+        """Commands that were passed on to the line so far, and commands that were refused."""
         self.refusal = ""
-        """Why the last one was not; empty: none was refused yet."""
+        """Reason of the latest refusal; empty: none was refused yet."""
 
     def refuse(self, reason: str, count: int = 1) -> None:
-        """So many commands more are refused for a reason."""
+        """Count `count` commands as refused for a reason."""
         self.refused += count
         self.refusal = printable(reason, SENTENCE)
 
     def take_node(self, data: bytes) -> bool:
-        """A command to the edge node; whether it asks for all births again."""
+        """Take a command to the edge node. Return True if it requests all births again."""
         metrics = self._metrics(data)
         if isinstance(metrics, str):
             self.refuse(metrics)
@@ -77,7 +78,7 @@ class HostCommands:
         return any(metric.boolean_value for metric in metrics)
 
     def take_line(self, data: bytes) -> None:
-        """A command to the line: all metrics of it act together, or not at all."""
+        """Take a command to the line. All metrics of it act together, or none."""
         metrics = self._metrics(data)
         if reason := metrics if isinstance(metrics, str) else self._give(metrics):
             self.refuse(reason)
@@ -85,17 +86,17 @@ class HostCommands:
             self.writes += 1
 
     def leave(self) -> None:
-        """Have the line given up, if it is held: no host can be heard any more."""
+        """Release the line if it is held, because commands can't arrive any more."""
         self._holding.leave(self._writer)
 
     def look(self) -> None:
-        """Have the line given up after a silence. To be called now and then."""
+        """Release the line after a silence. Call this regularly."""
         if self._holding.holder and time.monotonic() > self._last + self._silence:
             self.leave()
         self._holding.look()
 
     def _metrics(self, data: bytes) -> Any:
-        """Those of a command, or why it is refused."""
+        """Return the metrics of a command, or the reason for its refusal."""
         try:
             metrics = decoded(data).metrics
             names = [metric.name for metric in metrics]
@@ -106,10 +107,10 @@ class HostCommands:
         return metrics
 
     def _give(self, metrics: Any) -> str:
-        """Why a command to the line is refused, "" if it was given to the source."""
+        """Pass a command to the line on. Return the reason for a refusal, "" if it was queued."""
         role, shown = self._role, self._source.shown
         if role is None:
-            return "a command given, expected none: the line is served to be read only"
+            return "a command given, expected none: the line is served read-only"
         if shown.lost or shown.run.state in TAKES_NO_INPUT:
             return f"a command given, expected none: {shown.lost or f'the run is {shown.run.text}'}"
         known = {**self._commands, **self._modes}
@@ -136,7 +137,7 @@ class HostCommands:
         for name, number in zip(names, numbers, strict=True):
             if reason := objection(self._source, self._commands[name], number, role, self._writer):
                 return reason
-        # Whoever attached a PLC that goes in lockstep has said whose the line is.
+        # In lockstep, the attached PLC owns the line.
         if role == "controller" and "target" not in self._source.controls:
             if reason := self._holding.take(self._writer):
                 return reason

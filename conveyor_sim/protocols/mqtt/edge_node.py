@@ -1,8 +1,8 @@
-"""`EdgeNode`: a line as an edge node of MQTT Sparkplug B 3.0, with one device, at a broker that others serve.
+"""`EdgeNode`: a line as an edge node of MQTT Sparkplug B 3.0, with one device, at an external broker.
 
-Whoever the broker lets subscribe can read; commands are refused unless the face was given a role to write in. Values go
-out as they change, and never once more as if they were of now: when the line is lost or has ended its device dies, and
-when this process or its connection does, the broker says so.
+All clients that the broker lets subscribe can read. Commands are refused unless the edge node has a role for them.
+Values are sent as they change, and stale values are never sent as present ones. The device dies when the line is lost
+or has ended. When the process or its connection ends, the broker reports it.
 """
 
 from __future__ import annotations
@@ -38,19 +38,21 @@ from conveyor_sim.protocols.tags.tag_provider import LineSnapshot, TagProvider
 from conveyor_sim.protocols.tags.tick_clock import TickClock
 
 MOST_BEHIND = 200
-"""Ticks that wait to be sent; one more, and the last of them gives way to it."""
+"""Largest number of ticks that wait to be sent; a further one replaces the newest."""
 
 WAITS = MappingProxyType({"first": 1.0, "longest": 60.0})
-"""s of wall time from the end of a connection to the next try: the first, which doubles with each, and the longest."""
+"""Wall time from the end of a connection to the next attempt, s: the first one, which doubles with each, and the
+longest.
+"""
 
 BIRTHS_EVERY = 1.0
-"""s of wall time from births to the next that hosts ask for, at least; in between nothing else is sent either."""
+"""Shortest wall time between births that hosts request, s; in between nothing else is sent."""
 
-_LOOK = 0.5  # s of wall time between two looks at what nobody tells of
+_LOOK = 0.5  # wall time between two checks of silence and postponed messages, s
 
 
 class EdgeNode:
-    """Shows one source: a Face."""
+    """Protocol server for one tag provider, by MQTT."""
 
     def __init__(
         self,
@@ -62,8 +64,8 @@ class EdgeNode:
         holding: HoldingService | None = None,
         before: tuple[int, int] = (0, 0),
     ) -> None:
-        """role: in which hosts command; None: they may not. stamps: what times of values are.
-        silence: s of wall time without a command after which a controller holds nothing any more.
+        """Prepare the edge node. role: role in which hosts command; None: they may not. stamps: kind of time stamps.
+        silence: wall time without a command after which controllers release the line, s.
         holding: decides whether hosts hold the line; None: a new one. before: commands that were passed on, and that
         were refused, before a restart.
         """
@@ -85,19 +87,20 @@ class EdgeNode:
 
     @property
     def address(self) -> str:
-        """The broker, and under which names the line is there."""
+        """Address of the broker, with the group and edge node of the line."""
         return f"{self._broker.address}/{self._names.group}/{self._names.node}"
 
     def status(self) -> Status:
-        """Whether the broker is there; commands that were passed on, and that were refused."""
+        """Return the state of the connection, and counts of accepted and refused commands."""
         commands = self._commands
         longest, self._longest = self._longest, 0.0
         connected = int(self._link is not None and not self._link.lost)
         return Status(connected, 0, commands.writes, commands.refused, longest, self._left_out, self._state)
 
     async def start(self) -> None:
-        """Connect to the broker, and send births, as soon as the primary host is there, if one is waited for. Raises
-        ServerError if it can't be connected to.
+        """Connect to the broker. Send births once the primary host is online, if there is one.
+
+        Raises ServerError if the connection fails.
         """
         self._loop, self._wake = asyncio.get_running_loop(), asyncio.Event()
         try:
@@ -108,7 +111,7 @@ class EdgeNode:
         self._tasks[0].add_done_callback(self._ended)
 
     async def stop(self) -> None:
-        """Have hosts know that it is gone, and disconnect."""
+        """Send the deaths and disconnect."""
         tasks, self._tasks = self._tasks, []
         for task in tasks:
             task.cancel()
@@ -117,7 +120,7 @@ class EdgeNode:
         await self._disconnect()
 
     async def _run(self) -> None:
-        """One connection after the other."""
+        """Serve one connection after another."""
         wait = WAITS["first"]
         while True:
             began = time.monotonic()
@@ -136,7 +139,7 @@ class EdgeNode:
                 self._state = f"not connected: {error}"
 
     async def _watch(self) -> None:
-        """Have a controller that has gone silent give the line up, and what was put off be done."""
+        """Release the line of silent controllers, and wake the loop for postponed messages."""
         while True:
             await asyncio.sleep(_LOOK)
             self._commands.look()
@@ -145,7 +148,7 @@ class EdgeNode:
     async def _connect(self) -> BrokerConnection:
         """Return a connection with the next number, by the newest version of MQTT that the broker accepts.
 
-        Raises LinkError, ServerError.
+        Raises BrokerConnectionError, ServerError.
         """
         version = self._version
         while True:
@@ -166,7 +169,7 @@ class EdgeNode:
                     raise
                 version = OLDEST
                 continue
-            self._version = version  # of later connections, because it has worked
+            self._version = version  # for later connections
             self._births = number
             self._state = "connected"
             return link
@@ -178,11 +181,11 @@ class EdgeNode:
 
     @property
     def _name(self) -> str:
-        """By which the broker knows this client: a newer one of the same name takes its place."""
+        """Client ID; the broker disconnects an earlier client of the same ID."""
         return f"conveyor_sim-{self._names.group}-{self._names.node}"
 
     async def _serve(self, link: BrokerConnection) -> None:
-        """Send and take commands until the connection is lost, or the primary host."""
+        """Send data and take commands until the connection or the primary host is lost."""
         session = SparkplugSession(link, self._names, self._births, self._line, self._commands)
         host = PrimaryHost(self._broker.primary_host)
         hosts = [host.topic] if host.topic else []
@@ -201,7 +204,7 @@ class EdgeNode:
                         host.hear(message.data)
                     else:
                         again += self._take(message)
-                    await asyncio.sleep(0)  # other faces, too
+                    await asyncio.sleep(0)  # let other tasks run
                 if link.dropped > dropped:
                     self._commands.refuse("commands come faster than they can be looked at", link.dropped - dropped)
                     dropped = link.dropped
@@ -217,10 +220,12 @@ class EdgeNode:
             self._waiting.clear()
 
     async def _send(self, session: SparkplugSession, link: BrokerConnection, again: int) -> int:
-        """What there is to send. again: how often births were asked for again; returned is how often they still are."""
+        """Send births, data and state. again: number of requests for births. Return the number of those that still
+        wait.
+        """
         if session.born_at is None or again:
             if session.born_at is not None and time.monotonic() < session.born_at + BIRTHS_EVERY:
-                self._waiting.clear()  # births will have it
+                self._waiting.clear()  # the births will contain it
                 return again
             if link.full:
                 return again
@@ -239,7 +244,7 @@ class EdgeNode:
         return 0
 
     def _take(self, message: MqttMessage) -> int:
-        """A command; 1 if it asks for births again, else 0."""
+        """Take a command. Return 1 if it requests births again, else 0."""
         if message.retained:
             self._commands.refuse("a command kept by the broker, expected one that is sent without retain")
         elif message.size > MOST_BYTES:
@@ -256,7 +261,7 @@ class EdgeNode:
         return "connected, the broker lets no commands come" if link.denied else "connected"
 
     def _hear(self) -> None:
-        """Called by any thread."""
+        """Queue the present snapshot. May be called by any thread."""
         if len(self._waiting) >= MOST_BEHIND:
             with suppress(IndexError):
                 self._waiting.pop()
@@ -265,14 +270,14 @@ class EdgeNode:
         self._notice()
 
     def _notice(self) -> None:
-        """There is something to look at. Called by any thread."""
+        """Wake the loop. May be called by any thread."""
         if not self._told:
             self._told = True
             with suppress(RuntimeError):  # the loop is closed
                 self._loop.call_soon_threadsafe(self._wake.set)
 
     def _ended(self, running: asyncio.Task[None]) -> None:
-        """Rather no edge node than one that shows what is stale."""
+        """Stop the edge node after an error, because its values would be stale."""
         if not running.cancelled() and (error := running.exception()) is not None:
             logging.getLogger(__name__).error("mqtt: the edge node ends: %s", error, exc_info=error)
             self._stopping = asyncio.ensure_future(self.stop())

@@ -1,24 +1,24 @@
-"""`PrimaryHost`: whether the host application is there without which an edge node is not to send anything."""
+"""`PrimaryHost`: state of the primary host application, without which an edge node sends nothing."""
 
 from __future__ import annotations
 
 import json
 
 STATE = "spBv1.0/STATE"
-"""Topic, below which each host application says whether it is online."""
+"""Topic below which each host application publishes whether it is online."""
 
 
 class PrimaryHost:
-    """One of them, as its messages of STATE have it (Sparkplug 3.0, 5.4)."""
+    """State of a host application by its STATE messages (Sparkplug 3.0, 5.4)."""
 
     def __init__(self, name: str) -> None:
-        """name: its id; empty: none is waited for."""
+        """Start offline. name: ID of the host; empty: there is none, and the state is always online."""
         self.topic = f"{STATE}/{name}" if name else ""
         self.online = not name
-        self._stamp = float("-inf")  # ms, of the last message that counted
+        self._stamp = float("-inf")  # time stamp of the latest accepted message, ms
 
     def hear(self, data: bytes) -> None:
-        """A message of its topic; what is none, or older than the one before, changes nothing."""
+        """Take a message of its topic. Malformed and outdated messages have no effect."""
         try:
             said = json.loads(data)
             online, stamp = said["online"], float(said["timestamp"])

@@ -1,4 +1,4 @@
-"""`LineMetrics`: the tags of a line as metrics of Sparkplug B, and what of them has changed since it was sent."""
+"""`LineMetrics`: tags of a line as metrics of Sparkplug B, and their changes since the last message."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from conveyor_sim.protocols.tags.tick_clock import TickClock
 from conveyor_sim.support.rounded_limit import at_limit
 
 FORCED = "forced"
-"""Key of the property of a signal that reads otherwise than it is; it is left out where that is not so."""
+"""Key of the property that marks a forced signal; without it, the signal is not forced."""
 
 TIME = "run/time"
 """Metric: simulated time, s."""
@@ -47,19 +47,19 @@ class _Reading(NamedTuple):
 
 
 def is_there(shown: LineSnapshot) -> bool:
-    """Whether a line is one whose values are those of now, or of a pause: otherwise the device is dead."""
+    """Return True if the values of a line are current or paused; otherwise the device is dead."""
     return not shown.lost and shown.run.state not in (ENDED, STOPPED)
 
 
 def milliseconds(date: datetime) -> int:
-    """Since 1970, UTC."""
+    """Return the milliseconds of a date since 1970, UTC."""
     return int(date.timestamp() * 1e3)
 
 
 def number_of(tag: Tag, metric: Any) -> float | None:
-    """Return the value that a metric gives a tag; None if it has none of the tag's type.
+    """Return the value of a metric for a tag; None if it does not have the tag's type.
 
-    A Double may come as a Float, in which a limit has fewer digits.
+    A Double may arrive as a Float, in which a limit has fewer digits.
     """
     kind = _KINDS[tag.kind]
     field = metric.WhichOneof("value")
@@ -72,10 +72,10 @@ def number_of(tag: Tag, metric: Any) -> float | None:
 
 
 class LineMetrics:
-    """Of one line, as its hosts know it."""
+    """Metrics of one line, and the values that hosts have received."""
 
     def __init__(self, about: LineInfo, clock: TickClock, writes: bool) -> None:
-        """writes: whether hosts may command."""
+        """Prepare the metrics. writes: True if hosts may command."""
         self._tick, self._clock, self._writes = about.tick, clock, writes
         shown = [tag for tag in about.tags if tag.role in (*SIGNALS, *COMMANDS)]
         run = [count(TICK, "run", "Ticks since the start."), seconds(TIME, "run", "Simulated time.")]
@@ -84,7 +84,7 @@ class LineMetrics:
         self._sent: dict[str, _Reading] = {}
 
     def birth(self, shown: LineSnapshot, heard: datetime) -> Any:
-        """All of them, with what stays the same of each, as a payload."""
+        """Return all metrics with their constant properties, as a payload."""
         payload, stamp = Payload(), milliseconds(self._clock.stamp(shown.tick, heard))
         self._sent.clear()
         for tag, reading in self._readings(shown):
@@ -94,10 +94,9 @@ class LineMetrics:
         return payload
 
     def changes(self, shown: LineSnapshot, heard: datetime, passing: bool = True) -> Any:
-        """Those that have changed, as a payload.
+        """Return the metrics that have changed, as a payload.
 
-        passing: whether to say so if that is but how time passes, on a clock or in a state; with others it is always
-        said.
+        passing: False: return an empty payload if only clocks have changed.
         """
         payload, stamp = Payload(), milliseconds(self._clock.stamp(shown.tick, heard))
         changed: list[tuple[Tag, _Reading]] = []

@@ -1,7 +1,7 @@
 """`BrokerConnection`: one connection to a broker, by MQTT 5, or 3.1.1 for an older broker. It does not reconnect.
 
-The library has a thread for each. What arrives waits in a bounded queue for the loop of the faces; `full` says when
-what is sent does not leave fast enough, for the library would keep any amount of it.
+The library has a thread for each connection. Messages wait in a bounded queue for the event loop. `full` reports that
+sent messages do not leave fast enough, because the library would store any number of them.
 """
 
 from __future__ import annotations
@@ -24,19 +24,19 @@ from conveyor_sim.protocols.mqtt.broker import PATIENCE, Broker
 from conveyor_sim.support.printable import printable
 
 MOST_BYTES = 64 * 1024
-"""Of a message that is taken. By MQTT 5 the broker is told, and larger ones never come here."""
+"""Largest accepted message, bytes. By MQTT 5 the broker knows this limit, and larger messages never arrive."""
 
 MOST_WAITING = 200
-"""Messages that have come and wait to be looked at; more are dropped, and counted."""
+"""Largest number of messages that wait to be taken; more are dropped and counted."""
 
 MOST_UNSENT = 20
-"""Messages that the library may keep before it has sent them."""
+"""Largest number of messages that the library may store before it has sent them."""
 
 MOST_UNREAD = 64 * 1024
-"""Bytes that the system keeps for a broker that does not read: what is older than that is better left out."""
+"""Size of the system's send buffer, bytes; if the broker does not read, later messages are left out."""
 
 KEEP_ALIVE = 15
-"""s of wall time after which a side that hears nothing of the other asks whether it is still there."""
+"""Wall time without messages after which a side checks the connection, s."""
 
 _properties: Any = Properties  # not typed
 NEWEST, OLDEST = MQTTProtocolVersion.MQTTv5, MQTTProtocolVersion.MQTTv311
@@ -45,29 +45,31 @@ _WITH_WILL = "Disconnect with will message"
 
 
 class BrokerConnectionError(ConveyorError):
-    """A connection that can't be made, or that is refused: why."""
+    """Error: a connection fails or is refused. States the reason."""
 
 
 class TooNewError(BrokerConnectionError):
-    """The broker does not know that version of MQTT: it refuses it, or closes the connection without an answer."""
+    """Error: the broker does not support the version of MQTT. It refuses it, or closes the connection without an
+    answer.
+    """
 
 
 class MqttMessage(NamedTuple):
-    """One that has come."""
+    """Received message."""
 
     topic: str
     data: bytes
-    """None of it where it is too large."""
+    """Payload; empty if it is too large."""
     size: int
     retained: bool
-    """Sent before this connection, and kept by the broker."""
+    """True if the broker stored it before this connection."""
 
 
 class _Client(Client):
     end: Callable[[str], None]
 
     def loop_forever(self, timeout: float = 1.0, retry_first_connection: bool = False) -> MQTTErrorCode:
-        """What the library's thread does. Whatever comes from the broker ends the connection at worst."""
+        """Run the thread of the library. Any error in messages of the broker only ends the connection."""
         reason = "the connection has ended"
         try:
             return super().loop_forever(timeout, retry_first_connection)
@@ -79,13 +81,13 @@ class _Client(Client):
 
 
 class BrokerConnection:
-    """Used by one thread, but for `wake`."""
+    """Connection that one thread uses, except for `wake`."""
 
     def __init__(
         self, broker: Broker, name: str, will: MqttMessage, version: MQTTProtocolVersion, wake: Callable[[], None]
     ) -> None:
-        """name: by which the broker knows it; of two of one name the newer one stays. will: what the broker sends when
-        it is gone. wake: called by any thread when there is something to look at. Raises ServerError.
+        """Prepare the connection. name: client ID; the newest client of an ID stays connected. will: message that the
+        broker sends when the connection ends. wake: called by any thread when there is news. Raises ServerError.
         """
         self._broker, self._will, self._wake = broker, will, wake
         self._is_new = version == NEWEST
@@ -95,11 +97,11 @@ class BrokerConnection:
         self._answered = False  # by any acknowledgement
         self._published = self._sent = 0
         self.dropped = 0
-        """Messages so far that came too fast."""
+        """Messages that were dropped so far."""
         self.lost = ""
-        """Why it has ended; empty: it has not."""
+        """Reason why it has ended; empty: it has not."""
         self.denied = False
-        """Whether the broker lets nothing be heard."""
+        """True if the broker refuses subscriptions."""
         clean = None if self._is_new else True
         client = _Client(CallbackAPIVersion.VERSION2, name, clean, protocol=version, reconnect_on_failure=False)
         client.connect_timeout = PATIENCE
@@ -115,7 +117,7 @@ class BrokerConnection:
         self._client = client
 
     def open(self) -> None:
-        """Connect; that may take PATIENCE twice. Raises LinkError, TooNewError."""
+        """Connect; this may take twice PATIENCE. Raises BrokerConnectionError, TooNewError."""
         properties = None
         if self._is_new:
             properties = _properties(PacketTypes.CONNECT)
@@ -141,27 +143,28 @@ class BrokerConnection:
 
     @property
     def full(self) -> bool:
-        """Whether what was published already does not leave; `wake` is called once it does."""
+        """True if published messages do not leave; `wake` is called once they do."""
         return self._published - self._sent >= MOST_UNSENT
 
     def subscribe(self, *topics: str) -> None:
-        """Have messages of these come, each at least once."""
+        """Subscribe to topics, with quality of service 1."""
         self._client.subscribe([(topic, 1) for topic in topics])
 
     def publish(self, topic: str, data: bytes) -> None:
-        """Send a message, at most once."""
+        """Send a message, with quality of service 0."""
         self._published += 1
         self._client.publish(topic, data)
 
     def take(self) -> Iterator[MqttMessage]:
-        """What has come, each once."""
+        """Yield the received messages, each once."""
         with suppress(IndexError):
             while True:
                 yield self._arrived.popleft()
 
     def close(self) -> None:
-        """End it, its will being sent. Harmless if it has ended already; it may take a few seconds where the broker is
-        silent.
+        """End the connection and have its will sent. Do nothing if it has ended.
+
+        This may take a few seconds if the broker is silent.
         """
         if not self.lost:
             if self._is_new:

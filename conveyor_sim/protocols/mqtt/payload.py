@@ -1,6 +1,6 @@
-"""The payload of Sparkplug B: its messages, with the field numbers of the specification (3.0, 6.4), and its data types.
+"""Payload of Sparkplug B: messages with the field numbers of the specification (3.0, 6.4), and data types.
 
-Only what a line needs of it is here; a metric of another kind (data set, template, file) decodes without a value.
+Only the parts that a line needs are here. A metric of another kind (data set, template, file) decodes without a value.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ BAD, GOOD, STALE = 0, 192, 500
 """Values of property QUALITY."""
 
 QUALITY = "Quality"
-"""Key of the property that says how good a value is; without it, it is good."""
+"""Key of the property with the quality of a value; without it, the quality is good."""
 
 _FIELDS: dict[str, str] = {
     "Payload": "timestamp=1:uint64 metrics=2:Metric* seq=3:uint64 uuid=4:string body=5:bytes",
@@ -29,14 +29,13 @@ _FIELDS: dict[str, str] = {
     "PropertyValue": "type=1:uint32 is_null=2:bool int_value=3:uint32 long_value=4:uint64 float_value=5:float "
     "double_value=6:double boolean_value=7:bool string_value=8:string",
 }
-"""By message, its fields: name, number and type; * for any number of them. Those that end in `_value` exclude each
-other."""
+"""Fields by message: name, number and type; * for repeated ones. Fields that end in `_value` exclude each other."""
 
 _PACKAGE = "conveyor_sim.sparkplug"
 
 
 def _messages() -> dict[str, Any]:
-    """The class of each message."""
+    """Return the class of each message."""
     file = descriptor_pb2.FileDescriptorProto(name="sparkplug_b.proto", package=_PACKAGE, syntax="proto2")
     for message, fields in _FIELDS.items():
         described = file.message_type.add(name=message)
@@ -54,20 +53,20 @@ def _messages() -> dict[str, Any]:
                 if not described.oneof_decl:
                     described.oneof_decl.add(name="value")
                 added.oneof_index = 0
-    pool = descriptor_pool.DescriptorPool()  # of its own: another package may have these names, too
+    pool = descriptor_pool.DescriptorPool()  # a separate pool, because another package may use these names
     pool.Add(file)
     return {name: message_factory.GetMessageClass(pool.FindMessageTypeByName(f"{_PACKAGE}.{name}")) for name in _FIELDS}
 
 
 Payload: Any = _messages()["Payload"]
-"""A payload; its `metrics` and their parts are made by what it has of them."""
+"""Class of a payload."""
 
 _VALUES = {INT32: "int_value", INT64: "long_value", DOUBLE: "double_value", BOOLEAN: "boolean_value"}
 _BITS = {INT32: 2**32, INT64: 2**64}
 
 
 def decoded(data: bytes) -> Any:
-    """A payload. Raises ValueError if that is none."""
+    """Return a decoded payload. Raises ValueError if it is malformed."""
     try:
         return Payload.FromString(data)
     except (DecodeError, UnicodeDecodeError) as error:
@@ -75,9 +74,9 @@ def decoded(data: bytes) -> Any:
 
 
 def add_metric(payload: Any, name: str, kind: int, value: float | str | None, stamp: int) -> Any:
-    """Another metric of a payload. kind: its data type; value: None for none; stamp: ms since 1970, UTC.
+    """Add a metric to a payload and return it. kind: data type; value: None for no value; stamp: ms since 1970, UTC.
 
-    It states its data type in data, too, which it need not: there are hosts that can't decode it otherwise.
+    The data type is stated in data messages as well, where it is optional, because some hosts need it.
     """
     metric = payload.metrics.add(name=name, timestamp=stamp, datatype=kind)
     if value is None:
@@ -88,13 +87,13 @@ def add_metric(payload: Any, name: str, kind: int, value: float | str | None, st
 
 
 def add_property(metric: Any, key: str, kind: int, value: float | str) -> None:
-    """Another property of a metric."""
+    """Add a property to a metric."""
     metric.properties.keys.append(key)
     _put(metric.properties.values.add(type=kind), kind, value)
 
 
 def whole(field: str, value: int) -> int:
-    """What a field of a whole number says: negative ones are sent as their two's complement."""
+    """Return the value of an integer field, in which negative numbers are two's complements."""
     bits = 2**32 if field == "int_value" else 2**64
     return value - bits if value >= bits // 2 else value
 

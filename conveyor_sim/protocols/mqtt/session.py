@@ -15,10 +15,12 @@ from conveyor_sim.protocols.tags.tag_provider import LineSnapshot
 
 NAMESPACE = "spBv1.0"
 DEVICE = "line"
-"""The device of each edge node: commands act, values change and the connection is lost for the line as a whole."""
+"""Device of each edge node. There is one device, because the line is commanded, changes and is lost as a whole."""
 
 BETWEEN = 0.1
-"""s of wall time, at least, between two messages of the edge node itself, and to one that says but how time passes."""
+"""Shortest wall time between two messages of the edge node itself, and before a message in which only clocks have
+changed, s.
+"""
 
 _NUMBERS = 256
 
@@ -27,43 +29,43 @@ class SparkplugTopics:
     """Topics of an edge node and of its device."""
 
     def __init__(self, group: str, node: str) -> None:
-        """group, node: ids."""
+        """Prepare the topics. group, node: IDs."""
         self.group, self.node = group, node
         self.node_commands, self.line_commands = self.of("NCMD"), self.of("DCMD")
 
     def of(self, kind: str) -> str:
-        """Of a type of message: NBIRTH, DDATA, ..."""
+        """Return the topic of a type of message: NBIRTH, DDATA, ..."""
         topic = f"{NAMESPACE}/{self.group}/{kind}/{self.node}"
         return f"{topic}/{DEVICE}" if kind.startswith("D") else topic
 
 
 def death(number: int) -> bytes:
-    """Payload of NDEATH. number: of the connection."""
+    """Return the payload of NDEATH. number: of the connection."""
     payload = Payload(timestamp=_now())
     add_metric(payload, "bdSeq", INT64, number, payload.timestamp)
     return bytes(payload.SerializeToString())
 
 
 class SparkplugSession:
-    """Of one connection."""
+    """Messages of one connection."""
 
     def __init__(
         self, link: BrokerConnection, names: SparkplugTopics, number: int, line: LineMetrics, commands: HostCommands
     ) -> None:
-        """number: of the connection, as its death has it."""
+        """Start without births. number: number of the connection, which its death has as well."""
         self._link, self._names, self._number, self._line, self._commands = link, names, number, line, commands
         self._next = 0  # sequence number
         self._last: LineSnapshot | None = None
         self._node: dict[str, tuple[int, float | str]] = {}
         self._node_at = 0.0  # s of wall time
         self._alive = False
-        self._line_at = 0.0  # s of wall time, of the last data of the line
+        self._line_at = 0.0  # wall time of the latest data of the line, s
         self._put_off: tuple[LineSnapshot, datetime] | None = None
         self.born_at: float | None = None
-        """s of wall time of the last births; None: there were none yet."""
+        """Wall time of the latest births, s; None: there were none yet."""
 
     def bear(self, shown: LineSnapshot, heard: datetime) -> None:
-        """All births, from the first number on."""
+        """Send all births, from sequence number 0."""
         self._next, self.born_at = 0, time.monotonic()
         payload, stamp = Payload(), _now()
         add_metric(payload, "bdSeq", INT64, self._number, stamp)
@@ -79,12 +81,12 @@ class SparkplugSession:
             self._bear_line(shown, heard)
 
     def bring(self, shown: LineSnapshot, heard: datetime) -> None:
-        """What a line shows: what has changed, or its death, or that it is there again. After `bear`."""
+        """Send the changes of a line, its death, or its new birth. Call it after `bear`."""
         last, self._last = self._last, shown
         back = last is not None and (shown.tick < last.tick or shown.run_id != last.run_id)
         there = is_there(shown)
         if there and (back or not self._alive):
-            # Where time has stepped back, what has stayed the same would be of the future.
+            # After a step back in time, unchanged values would have time stamps in the future.
             self._bear_line(shown, heard)
         elif self._alive and not shown.lost:
             self._say(shown, heard, passing=not there or time.monotonic() >= self._line_at + BETWEEN)
@@ -94,11 +96,11 @@ class SparkplugSession:
 
     @property
     def behind(self) -> bool:
-        """Whether time has passed that was not said."""
+        """True if changes of clocks wait to be sent."""
         return self._alive and self._put_off is not None
 
     def catch_up(self) -> None:
-        """Say how time has passed, where that was put off for long enough."""
+        """Send changes of clocks that have waited for BETWEEN."""
         if self.behind and self._put_off is not None and time.monotonic() >= self._line_at + BETWEEN:
             self._say(*self._put_off, passing=True)
 
@@ -110,7 +112,7 @@ class SparkplugSession:
             self._send("DDATA", changed)
 
     def tell(self, shown: LineSnapshot) -> None:
-        """What has changed of the edge node itself, unless it was told just now. After `bear`."""
+        """Send changes of the edge node itself, unless some were sent within BETWEEN. Call it after `bear`."""
         now, metrics = time.monotonic(), self._of_node(shown)
         if metrics == self._node or now < self._node_at + BETWEEN:
             return
@@ -126,7 +128,7 @@ class SparkplugSession:
         self._send("DBIRTH", self._line.birth(shown, heard))
 
     def _of_node(self, shown: LineSnapshot) -> dict[str, tuple[int, float | str]]:
-        """Always good: it says what has become of the rest."""
+        """Return the metrics of the edge node. They are always good, because they report the state of the others."""
         commands = self._commands
         written, refused = commands.before
         return {

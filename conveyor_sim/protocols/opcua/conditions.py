@@ -1,4 +1,4 @@
-"""`AlarmStates`: every alarm of a line as an object with variables, and as a condition whose changes are events."""
+"""`AlarmStates`: each alarm of a line as an object with variables, and as a condition whose changes are events."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from conveyor_sim.protocols.tags.tag_provider import LineSnapshot
 from conveyor_sim.protocols.tags.tick_clock import TickClock
 
 MOST_OBJECTS = 4000
-"""One for each alarm that there ever was; those that come after so many have events, and no object."""
+"""Largest number of alarm objects over time. Alarms beyond it have events, but no object."""
 
 STATE_TEXTS = [state.name.replace("_", " ").capitalize() for state in AlarmState]
 
@@ -30,7 +30,7 @@ _LATCHED = (AlarmState.LATCHED_UNACKNOWLEDGED, AlarmState.LATCHED_ACKNOWLEDGED)
 
 
 class _Row(NamedTuple):
-    """One alarm, as its variables have it."""
+    """Values of the variables of one alarm."""
 
     state: int
     active: bool
@@ -52,23 +52,25 @@ class _Variable(NamedTuple):
 
 
 _VARIABLES: Mapping[str, _Variable] = {
-    "state": _Variable(ua.VariantType.UInt32, "By ISA-18.2."),
-    "active": _Variable(ua.VariantType.Boolean, "Whether its condition holds."),
-    "acknowledged": _Variable(ua.VariantType.Boolean, "Whether it waits for nobody."),
-    "first_out": _Variable(ua.VariantType.Boolean, "Whether it was the first of its group."),
+    "state": _Variable(ua.VariantType.UInt32, "State by ISA-18.2."),
+    "active": _Variable(ua.VariantType.Boolean, "True while its condition holds."),
+    "acknowledged": _Variable(ua.VariantType.Boolean, "True if it does not wait for an acknowledgement."),
+    "first_out": _Variable(ua.VariantType.Boolean, "True if it was the first of its group."),
     "priority": _Variable(ua.VariantType.UInt16, "1 to 1000."),
     "alarm_class": _Variable(ua.VariantType.String, "error, warning or message."),
-    "text": _Variable(ua.VariantType.String, "What it says."),
-    "tag": _Variable(ua.VariantType.String, "Signal that it is about; empty: none."),
-    "group": _Variable(ua.VariantType.String, "Within which one comes first."),
+    "text": _Variable(ua.VariantType.String, "Text of the alarm."),
+    "tag": _Variable(ua.VariantType.String, "Signal of the alarm; empty: none."),
+    "group": _Variable(ua.VariantType.String, "Group for first-out detection."),
     "since": _Variable(ua.VariantType.DateTime, "Simulated time of the last change of its state."),
     "shelved_until": _Variable(ua.VariantType.DateTime, "Simulated time; 1601: not shelved for a time."),
-    "changed_by": _Variable(ua.VariantType.String, "Who acknowledged, shelved or reset it, ... last."),
+    "changed_by": _Variable(
+        ua.VariantType.String, "Writer of the latest operation, such as acknowledge, shelve or reset."
+    ),
 }
 
 
 class AlarmStates:
-    """Of one line."""
+    """Alarms of one line."""
 
     def __init__(self, nodes: Nodes, emitter: Emitter, clock: TickClock) -> None:
         self._nodes, self._emitter, self._clock = nodes, emitter, clock
@@ -82,11 +84,11 @@ class AlarmStates:
         self._event_ids: dict[str, bytes] = {}
 
     def is_last_event(self, alarm: str, event_id: bytes) -> bool:
-        """Whether that is the id of the last event of an alarm."""
+        """Return True if an ID is that of the last event of an alarm."""
         return self._event_ids.get(alarm) == event_id
 
     async def follow(self, shown: LineSnapshot, heard: datetime, back: bool) -> None:
-        """Bring in what has changed."""
+        """Write the variables that have changed, and emit events."""
         status = status_of(shown)
         every = back or status != self._status
         if shown.alarms is None or (shown.alarms is self._columns and not every):
@@ -152,7 +154,7 @@ class AlarmStates:
             await self._nodes.write(f"{name}/{field}", ua.Variant(value, _VARIABLES[field].kind), stamp, status)
 
     async def _emit(self, id: str, row: _Row, at: datetime) -> None:
-        """An event of AlarmConditionType (OPC 10000-9, 5.8.2)."""
+        """Emit an event of AlarmConditionType (OPC 10000-9, 5.8.2)."""
         if self._template is None:
             kind = Node(self._emitter.session, ua.NodeId(ua.ObjectIds.AlarmConditionType))
             self._template = await get_event_obj_from_type_node(kind)

@@ -1,4 +1,4 @@
-"""`Emitter`: hands events to clients that subscribed to the Server object, and keeps conditions for a refresh."""
+"""`Emitter`: sends events to clients that subscribed to the Server object, and stores conditions for a refresh."""
 
 from __future__ import annotations
 
@@ -15,7 +15,9 @@ _AT_ONCE = 2000
 
 
 class Emitter:
-    """Of one server. Events of other objects than Server do not reach who subscribed there, so all are of it."""
+    """Emitter of one server. All events come from the Server object, because its subscribers do not get those of
+    others.
+    """
 
     def __init__(self, server: InternalServer) -> None:
         self._service = server.subscription_service
@@ -23,7 +25,7 @@ class Emitter:
 
     @property
     def heard(self) -> bool:
-        """Whether there is anybody who could have subscribed."""
+        """True if there are subscriptions."""
         return bool(self._service.subscriptions)
 
     async def emit(self, event: Any, at: datetime) -> None:
@@ -34,7 +36,7 @@ class Emitter:
         condition = getattr(event, "NodeId", None)
         if condition is not None:
             if event.Retain:
-                self._service._conditions[condition] = event
+                self._service.conditions[condition] = event
             else:
                 self.forget(condition)
         event.made_fields = {}
@@ -47,5 +49,5 @@ class Emitter:
                 await asyncio.sleep(0)
 
     def forget(self, condition: ua.NodeId) -> None:
-        """Have it not sent again at a refresh."""
-        self._service._conditions.pop(condition, None)
+        """Leave a condition out of later refreshes."""
+        self._service.conditions.pop(condition, None)

@@ -1,4 +1,4 @@
-"""`OpcUaHistory`: the last values of chosen tags, for clients that draw a trend as soon as they come (OPC 10000-11)."""
+"""`OpcUaHistory`: latest values of selected tags, so that clients can draw a trend at once (OPC 10000-11)."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ from conveyor_sim.protocols.tags.tick_clock import TickClock
 from conveyor_sim.support.printable import printable
 
 MOST_VALUES = 10_000
-"""Of one tag, and in one answer."""
+"""Largest number of stored values of one tag, and of values in one answer."""
 
 
 def require_tags(patterns: Sequence[str], tags: Iterable[Tag]) -> None:
-    """Raises ServerError for a pattern that no tag with a variable fits."""
+    """Raise ServerError for a pattern that matches no tag with a variable."""
     names = [tag.name for tag in tags if is_shown(tag)]
     for pattern in patterns:
         if not any(fnmatchcase(name, pattern) for name in names):
@@ -40,10 +40,12 @@ def require_tags(patterns: Sequence[str], tags: Iterable[Tag]) -> None:
 
 
 class OpcUaHistory(HistoryStorageInterface):
-    """Of one server, from its start on; of a recording with its own times what that holds, up to its present place."""
+    """History of one server from its start on. For a recording with simulated time stamps: its history up to the
+    present position.
+    """
 
     def __init__(self, patterns: Sequence[str], source: TagProvider, clock: TickClock) -> None:
-        """patterns: of names of tags, such as `belts/*/speed`."""
+        """Start to store values. patterns: of names of tags, such as `belts/*/speed`."""
         super().__init__(MOST_VALUES)
         self._source, self._clock = source, clock
         self._past = source.past if clock.is_simulated else None
@@ -57,11 +59,11 @@ class OpcUaHistory(HistoryStorageInterface):
             self._kept = {name: deque(maxlen=MOST_VALUES) for name in self._tags}
 
     def __contains__(self, name: str) -> bool:
-        """Whether values of a tag are kept."""
+        """Return True if values of a tag are stored."""
         return name in self._tags
 
     def note(self, name: str, value: ua.DataValue) -> None:
-        """A tag has a value. What it had at that time, and after it, where time has stepped back, is no longer so."""
+        """Store a value of a tag. Drop values with the same or a later time stamp, because time has stepped back."""
         kept = self._kept.get(name)
         if kept is None:
             return
@@ -72,8 +74,9 @@ class OpcUaHistory(HistoryStorageInterface):
     async def read_node_history(
         self, node_id: ua.NodeId, start: datetime | None, end: datetime | None, nb_values: int
     ) -> tuple[list[ua.DataValue], datetime | None]:
-        """Values from a time to another, backwards if that is the earlier one or no first is given; and the time to go
-        on from, if there are more than were asked for.
+        """Return values between two times, and the time to continue from if there are more.
+
+        They are in reverse order if `end` is earlier than `start`, or there is no `start`.
         """
         first, last = (None if time in (None, NEVER) else time for time in (start, end))
         back = first is None or (last is not None and first > last)
@@ -94,7 +97,7 @@ class OpcUaHistory(HistoryStorageInterface):
     async def _read_past(
         self, past: TagHistory, tag: Tag, low: datetime | None, high: datetime | None, most: int, back: bool
     ) -> tuple[list[ua.DataValue], datetime | None]:
-        """From the files, by a thread, for that may take a while."""
+        """Return values from the files of a recording. A separate thread reads them."""
         present = self._source.shown.tick
         first = 0 if low is None else math.ceil(round(self._clock.tick_at(low), 3))
         last = present if high is None else min(present, math.floor(round(self._clock.tick_at(high), 3)))
@@ -110,4 +113,4 @@ class OpcUaHistory(HistoryStorageInterface):
         return found, None if rest is None else self._clock.simulated(rest)
 
     async def stop(self) -> None:
-        """Nothing is open."""
+        """Do nothing: no resource is open."""

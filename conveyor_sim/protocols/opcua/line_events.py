@@ -1,4 +1,4 @@
-"""`LineEvents`: what happens on a line, as events of OPC UA; alarms have their own."""
+"""`LineEvents`: events of a line as OPC UA events, except alarms."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ FIELDS = (
     ("Bottle", ua.VariantType.Int64),
     ("Tick", ua.VariantType.Int64),
 )
-"""As in conveyor_msgs/Events."""
+"""Fields of the event type, as in conveyor_msgs/Events."""
 
 _BOTTLES, _STATES, _HANDS, _WRONG = 1, 100, 300, 500
 
@@ -39,21 +39,21 @@ SEVERITIES = {
     "signal_forced": _HANDS,
     "signal_unforced": _HANDS,
 }
-"""By kind, so that a client can leave out what it does not want; of others, something is wrong."""
+"""Severity by kind, for filters of clients. All other kinds are errors."""
 
 
 class LineEvents:
-    """Of one source."""
+    """Events of one tag provider."""
 
     def __init__(self, source: TagProvider, nodes: Nodes, emitter: Emitter, clock: TickClock) -> None:
-        """Those from now on."""
+        """Start after the present events."""
         self._source, self._nodes, self._emitter, self._clock = source, nodes, emitter, clock
         self._type = nodes.event_type(TYPE, TYPE, ua.ObjectIds.BaseEventType, FIELDS)
         self._template: Any = None
         self._seen, _ = source.events(0)
 
     async def follow(self, shown: LineSnapshot, heard: datetime, back: bool) -> None:
-        """Send what has happened."""
+        """Send new events."""
         total, new = self._source.events(self._seen)
         self._seen = total
         if not self._emitter.heard:

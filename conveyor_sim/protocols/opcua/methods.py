@@ -1,4 +1,4 @@
-"""Methods of a line, its alarms and its run: which there are, and what a call becomes."""
+"""Methods of a line, its alarms and its run: their nodes, and how calls are carried out."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from conveyor_sim.protocols.opcua.requests import Codes, Requests
 from conveyor_sim.protocols.tags.tag_provider import Control, TagProvider
 
 ALARM_STATES = "alarm_states"
-"""Id of the object that holds an object for each alarm."""
+"""ID of the object that contains an object for each alarm."""
 
 _LONGEST = 200
-"""Characters of an argument."""
+"""Largest number of characters in an argument."""
 _MOST = 1000
-"""Elements of one."""
+"""Largest number of elements in an argument."""
 
 _ACKNOWLEDGE = ua.NodeId(ua.ObjectIds.AcknowledgeableConditionType_Acknowledge)
 
@@ -36,107 +36,123 @@ _NAME_AND_VALUE: Mapping[int, int] = {Codes.BadNodeIdUnknown: 0, Codes.BadOutOfR
 
 
 class MethodParameter(NamedTuple):
-    """What a method is given."""
+    """Input argument of a method."""
 
     name: str
     kind: ua.VariantType
     what: str
     array: bool = False
     optional: bool = False
-    """Whether it may be empty."""
+    """True if the argument may be empty."""
 
     @property
     def as_argument(self) -> ua.Argument:
-        """As InputArguments has it."""
+        """Entry of the property InputArguments."""
         rank = ua.ValueRank.OneDimension if self.array else ua.ValueRank.Scalar
         return ua.Argument(self.name, ua.NodeId(self.kind.value), rank, [], ua.LocalizedText(self.what))
 
 
 @dataclass(frozen=True)
 class OpcUaMethod:
-    """One of them."""
+    """Description and effect of one method."""
 
     description: str
     parameters: tuple[MethodParameter, ...]
     operation: str = ""
-    """What it has the line do; empty: it asks something of the run."""
+    """Operation of the line; empty: the method controls the run."""
     control: Control | None = None
 
 
-_ALARM = MethodParameter("alarm", _TEXT, "Id of the alarm.")
-_ALARM_OR_ALL = MethodParameter("alarm", _TEXT, "Id of the alarm; empty: all that this can be done to.", optional=True)
+_ALARM = MethodParameter("alarm", _TEXT, "ID of the alarm.")
+_ALARM_OR_ALL = MethodParameter("alarm", _TEXT, "ID of the alarm; empty: all.", optional=True)
 _SIGNAL = MethodParameter("signal", _TEXT, "Name of the signal.")
-_SECONDS = MethodParameter("seconds", _NUMBER, "For how long, simulated time; 0: until its condition ends next.")
+_SECONDS = MethodParameter("seconds", _NUMBER, "Duration in simulated time; 0: until its condition ends.")
 
 LINE_METHODS: dict[str, OpcUaMethod] = {
     "acknowledge": OpcUaMethod("Acknowledges an alarm, or all.", (_ALARM_OR_ALL,), "acknowledge"),
     "reset_alarm": OpcUaMethod("Clears a latched alarm, or all.", (_ALARM_OR_ALL,), "reset"),
     "shelve": OpcUaMethod("Shelves an alarm.", (_ALARM, _SECONDS), "shelve"),
-    "unshelve": OpcUaMethod("Ends that, for one alarm or all.", (_ALARM_OR_ALL,), "unshelve"),
+    "unshelve": OpcUaMethod("Ends the shelving of an alarm, or of all.", (_ALARM_OR_ALL,), "unshelve"),
     "remove_from_service": OpcUaMethod("Takes an alarm out of service.", (_ALARM,), "remove_from_service"),
-    "return_to_service": OpcUaMethod("Ends that.", (_ALARM,), "return_to_service"),
+    "return_to_service": OpcUaMethod("Returns an alarm to service.", (_ALARM,), "return_to_service"),
     "set_mode": OpcUaMethod(
-        "Puts a device into a mode: 1 Automatic, 2 Maintenance, 3 Manual.",
+        "Sets the control mode of a device: 1 Automatic, 2 Maintenance, 3 Manual.",
         (MethodParameter("device", _TEXT, "Name of the device."), MethodParameter("mode", _WHOLE, "1, 2 or 3.")),
         MODE,
     ),
     "force": OpcUaMethod(
-        "Has controllers read another value of a signal.",
-        (_SIGNAL, MethodParameter("value", _NUMBER, "What they read.")),
+        "Forces a signal.",
+        (_SIGNAL, MethodParameter("value", _NUMBER, "Value that controllers read.")),
         FORCE,
     ),
     "unforce": OpcUaMethod(
-        "Ends that.", (MethodParameter("signal", _TEXT, "Name of the signal; empty: all.", optional=True),), UNFORCE
+        "Ends the forcing of a signal, or of all.",
+        (MethodParameter("signal", _TEXT, "Name of the signal; empty: all.", optional=True),),
+        UNFORCE,
     ),
     "inject": OpcUaMethod(
-        "Has a fault begin, or end.",
-        (MethodParameter("fault", _TEXT, "Name of the fault."), MethodParameter("value", _NUMBER, "0: it ends.")),
+        "Starts or ends a fault.",
+        (MethodParameter("fault", _TEXT, "Name of the fault."), MethodParameter("value", _NUMBER, "0 ends the fault.")),
         INJECT,
     ),
     "reset_counters": OpcUaMethod(
-        "Counters and times of a device, or of all, begin anew.",
+        "Resets counters and times of a device, or of all.",
         (MethodParameter("device", _TEXT, "Name of the device; empty: all.", optional=True),),
         "reset_counters",
     ),
     "write": OpcUaMethod(
         "Sets commands together: all at one tick, or none.",
         (
-            MethodParameter("commands", _TEXT, "Names.", array=True),
-            MethodParameter("values", _NUMBER, "One for each.", array=True),
+            MethodParameter("commands", _TEXT, "Names of commands.", array=True),
+            MethodParameter("values", _NUMBER, "One value per command.", array=True),
         ),
         SET,
     ),
     "own": OpcUaMethod(
         "Takes the line for this controller.",
-        (MethodParameter("released", _TEXT, "Patterns of devices that it leaves to others.", array=True),),
+        (
+            MethodParameter(
+                "released", _TEXT, "Patterns of devices that are released to other controllers.", array=True
+            ),
+        ),
         OWN,
     ),
-    "disown": OpcUaMethod("Gives it up.", (), DISOWN),
+    "disown": OpcUaMethod("Releases the line.", (), DISOWN),
 }
 
 ALARM_METHODS: dict[str, OpcUaMethod] = {
-    "acknowledge": OpcUaMethod("Acknowledges this alarm; of the object of all alarms: all.", (), "acknowledge"),
-    "reset": OpcUaMethod("Clears it, if it has latched.", (), "reset"),
-    "unshelve": OpcUaMethod("Shelves it no more.", (), "unshelve"),
+    "acknowledge": OpcUaMethod("Acknowledges this alarm; on the object of all alarms: all.", (), "acknowledge"),
+    "reset": OpcUaMethod("Clears this alarm if it has latched.", (), "reset"),
+    "unshelve": OpcUaMethod("Ends the shelving of this alarm.", (), "unshelve"),
 }
-"""Of the object of an alarm, for panels whose buttons give no arguments."""
+"""Methods of the object of an alarm, for panels whose buttons have no arguments."""
 
 RUN_METHODS: dict[str, OpcUaMethod] = {
-    "pause": OpcUaMethod("Time stands.", (), control="pause"),
-    "resume": OpcUaMethod("Time goes on.", (), control="resume"),
-    "step": OpcUaMethod("Lets ticks pass.", (MethodParameter("ticks", _WHOLE, "How many."),), control="step"),
-    "reset": OpcUaMethod("Begins anew.", (), control="reset"),
-    "seek": OpcUaMethod("Goes to a time.", (MethodParameter("time", _NUMBER, "Simulated time, s."),), control="seek"),
-    "speed": OpcUaMethod(
-        "How fast time passes.", (MethodParameter("factor", _NUMBER, "Times real time."),), control="speed"
+    "pause": OpcUaMethod("Pauses the run.", (), control="pause"),
+    "resume": OpcUaMethod("Resumes the run.", (), control="resume"),
+    "step": OpcUaMethod(
+        "Advances the run by ticks.", (MethodParameter("ticks", _WHOLE, "Number of ticks."),), control="step"
     ),
-    "loop": OpcUaMethod("Begins anew at the end, or not.", (MethodParameter("on", _WHOLE, "1 or 0."),), control="loop"),
+    "reset": OpcUaMethod("Restarts the run.", (), control="reset"),
+    "seek": OpcUaMethod(
+        "Moves the playback to a time.", (MethodParameter("time", _NUMBER, "Simulated time, s."),), control="seek"
+    ),
+    "speed": OpcUaMethod(
+        "Sets the speed.",
+        (MethodParameter("factor", _NUMBER, "Factor of real time; 0: as fast as possible."),),
+        control="speed",
+    ),
+    "loop": OpcUaMethod(
+        "Turns repetition of the playback on or off.",
+        (MethodParameter("on", _WHOLE, "1: on; 0: off."),),
+        control="loop",
+    ),
 }
-"""Those that the source can do are there."""
+"""Methods that control the run. Only those that the tag provider supports are added."""
 
 
 def add_methods(nodes: Nodes, source: TagProvider) -> None:
-    """Add those of the line and of its run."""
+    """Add the methods of the line and of its run."""
     for name, method in LINE_METHODS.items():
         _add(nodes, LINE, name, method)
     for name, method in RUN_METHODS.items():
@@ -145,7 +161,7 @@ def add_methods(nodes: Nodes, source: TagProvider) -> None:
 
 
 def add_alarm_methods(nodes: Nodes) -> None:
-    """Add those that all alarms have, to the object of all of them."""
+    """Add the methods that all alarms share to the object of all alarms."""
     for name, method in ALARM_METHODS.items():
         _add(nodes, ALARM_STATES, name, method)
 
@@ -156,10 +172,10 @@ def _add(nodes: Nodes, owner: str, name: str, method: OpcUaMethod) -> None:
 
 
 class Methods:
-    """Calls of them, by clients."""
+    """Calls of methods by clients."""
 
     def __init__(self, source: TagProvider, requests: Requests, is_last_event: Callable[[str, bytes], bool]) -> None:
-        """is_last_event: whether an alarm's last event had that id."""
+        """Prepare the calls. is_last_event: returns True if an ID is that of the last event of an alarm."""
         self._source, self._requests, self._is_last_event = source, requests, is_last_event
         tags = source.about.tags
         self._tags = {tag.name: tag for tag in tags}
@@ -173,7 +189,7 @@ class Methods:
         }
 
     def knows_alarm(self, id: str) -> bool:
-        """Whether there is such an alarm."""
+        """Return True if there is such an alarm."""
         alarms = self._source.shown.alarms
         return alarms is not None and id in alarms.id
 
@@ -213,7 +229,7 @@ class Methods:
         return self._operate(client, method, arguments)
 
     def _acknowledge_event(self, client: User, request: ua.CallMethodRequest) -> ua.CallMethodResult:
-        """The method of conditions: EventId, Comment (OPC 10000-9, 5.7.3); the comment is not kept."""
+        """Call Acknowledge of a condition: EventId, Comment (OPC 10000-9, 5.7.3). The comment is not stored."""
         alarm = name_of(request.ObjectId).removeprefix(f"{ALARM_STATES}/")
         if not self.knows_alarm(alarm):
             return _result(Codes.BadNodeIdInvalid)

@@ -1,4 +1,4 @@
-"""`Nodes`: makes the nodes of a line, with ids that are made of names and stay what they are."""
+"""`Nodes`: adds the nodes of a line, whose IDs are made of names and never change."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from asyncua import ua
 from asyncua.server.internal_server import InternalServer
 
 NAMESPACE = "urn:conveyor_sim:line"
-"""Of all that is here."""
+"""Namespace of all nodes of a line."""
 
 INDEX = 2
-"""Of this namespace, always: clients keep it, with the ids."""
+"""Index of the namespace. It is constant, because clients store it with the IDs."""
 
 LINE = "line"
-"""Id of the object that stands for the line."""
+"""ID of the object that represents the line."""
 
 NEVER = datetime(1601, 1, 1, tzinfo=timezone.utc)
-"""How OPC UA writes no date (OPC 10000-6, 5.2.2.5)."""
+"""Date that stands for no date in OPC UA (OPC 10000-6, 5.2.2.5)."""
 
 READ, WRITE, READ_HISTORY = 1, 2, 4
 """Bits of AccessLevel."""
@@ -28,45 +28,45 @@ READ_AND_WRITE = READ | WRITE
 
 
 def node_id(name: str) -> ua.NodeId:
-    """Of a tag, a device, or whatever else has a name here: `ns=2;s=belts/feeder/speed`."""
+    """Return the ID of a tag, a device or another named node: `ns=2;s=belts/feeder/speed`."""
     return ua.NodeId(name, INDEX, ua.NodeIdType.String)
 
 
 def name_of(node: ua.NodeId) -> str:
-    """What a node's id names; empty if it is not of a line."""
+    """Return the name in the ID of a node; empty if it is not a node of the line."""
     return node.Identifier if node.NamespaceIndex == INDEX and isinstance(node.Identifier, str) else ""
 
 
 class Noted(Protocol):
-    """What wants to know all values that variables get."""
+    """Observer of all values of variables."""
 
     def __contains__(self, name: str) -> bool:
-        """Whether it keeps those of a variable."""
+        """Return True if it stores the values of a variable."""
 
     def note(self, name: str, value: ua.DataValue) -> None:
-        """Called with each."""
+        """Take a new value of a variable."""
 
 
 class Nodes:
-    """The address space, to be added to."""
+    """Address space of a server, to which nodes are added."""
 
     def __init__(self, server: InternalServer, history: Noted) -> None:
-        """Of a server that has the standard's nodes. history: of what has one."""
+        """Add nodes to a server that has the nodes of the standard. history: stores values of variables."""
         self._server, self._history = server, history
 
     def __contains__(self, name: str) -> bool:
-        """Whether there is a node of this name."""
+        """Return True if there is a node of this name."""
         return node_id(name) in self._server.aspace
 
     def folder(self, name: str, shown: str, parent: ua.NodeId) -> ua.NodeId:
-        """An object that holds others."""
+        """Add a folder."""
         attributes = ua.ObjectAttributes(DisplayName=ua.LocalizedText(shown), Description=ua.LocalizedText(shown))
         return self._add(
             name, shown, parent, ua.ObjectIds.Organizes, ua.NodeClass.Object, ua.ObjectIds.FolderType, attributes
         )
 
     def object(self, name: str, shown: str, parent: ua.NodeId, description: str) -> ua.NodeId:
-        """An object with variables and methods."""
+        """Add an object that can have variables and methods."""
         attributes = ua.ObjectAttributes(DisplayName=ua.LocalizedText(shown), Description=ua.LocalizedText(description))
         return self._add(
             name, shown, parent, ua.ObjectIds.HasComponent, ua.NodeClass.Object, ua.ObjectIds.BaseObjectType, attributes
@@ -82,7 +82,7 @@ class Nodes:
         type_id: int = ua.ObjectIds.BaseDataVariableType,
         access: int = READ,
     ) -> ua.NodeId:
-        """A variable with the first value that it has."""
+        """Add a variable with its initial value."""
         attributes = _variable(shown, description, value, ua.NodeId(value.VariantType.value), access)
         if name in self._history:
             attributes.Historizing = True
@@ -92,7 +92,7 @@ class Nodes:
     def property(
         self, name: str, parent: ua.NodeId, value: Any, data_type: int, kind: ua.VariantType, index: int = 0
     ) -> ua.NodeId:
-        """A property `name`, below its parent by its browse name. index: namespace of that; 0: the standard's."""
+        """Add a property `name`; the last part is its browse name. index: namespace of that; 0: the standard's."""
         browse = name.rpartition("/")[2]
         variant = ua.Variant(value, kind, is_array=isinstance(value, list))
         attributes = _variable(browse, browse, variant, ua.NodeId(data_type), READ)
@@ -108,7 +108,7 @@ class Nodes:
         )
 
     def method(self, name: str, parent: ua.NodeId, description: str, arguments: Sequence[ua.Argument]) -> ua.NodeId:
-        """A method; whose calls the session handles."""
+        """Add a method. The session handles its calls."""
         shown = name.rpartition("/")[2]
         attributes = ua.MethodAttributes(
             DisplayName=ua.LocalizedText(shown),
@@ -130,7 +130,7 @@ class Nodes:
         return method
 
     def event_type(self, name: str, shown: str, base: int, fields: Sequence[tuple[str, ua.VariantType]]) -> ua.NodeId:
-        """A type of events, with properties beside those of its base."""
+        """Add a type of events, with properties beside those of its base type."""
         attributes = ua.ObjectTypeAttributes(DisplayName=ua.LocalizedText(shown), Description=ua.LocalizedText(shown))
         made = self._add(
             name,
@@ -146,13 +146,13 @@ class Nodes:
         return made
 
     def refer(self, source: ua.NodeId, target: ua.NodeId, kind: int, target_class: ua.NodeClass) -> None:
-        """Have one node refer to another."""
+        """Add a reference from one node to another."""
         item = ua.AddReferencesItem(source, ua.NodeId(kind), True, "", target, target_class)
         for result in self._server.node_mgt_service.add_references([item]):
             result.check()
 
     async def write(self, name: str, value: ua.Variant, stamp: datetime, status: int = ua.StatusCodes.Good) -> None:
-        """Give a variable a value. stamp: its SourceTimestamp."""
+        """Write a value of a variable. stamp: its SourceTimestamp."""
         given = ua.DataValue(value, ua.StatusCode(status), stamp, datetime.now(timezone.utc))
         self._history.note(name, given)
         await self._server.write_attribute_value(node_id(name), given)
@@ -183,7 +183,7 @@ class Nodes:
 
 
 def nothing(kind: ua.VariantType) -> Any:
-    """What stands for no value of a type."""
+    """Return the value that stands for no value of a type."""
     if kind is ua.VariantType.DateTime:
         return NEVER
     return None if kind is ua.VariantType.String else ua.get_default_value(kind)

@@ -31,13 +31,13 @@ NODESET = Path(__file__).parent / "nodesets" / "Opc.Ua.PackML.NodeSet2.xml"
 NAMESPACE = "http://opcfoundation.org/UA/PackML/"
 
 NAME = "PackML"
-"""Of the object below a machine."""
+"""Name of the object below a machine."""
 
 _TYPE = 6
 """PackMLBaseObjectType."""
 
 _MODES = 11
-"""ProductionMaintenanceModeEnum: the modes are those of it, with its numbers."""
+"""ProductionMaintenanceModeEnum, whose numbers the control modes use."""
 
 _METHODS: Mapping[int, Command] = {
     361: Command.RESET,
@@ -52,7 +52,7 @@ _METHODS: Mapping[int, Command] = {
     363: Command.CLEAR,
     365: Command.COMPLETE,
 }
-"""By the ids of the NodeSet."""
+"""Commands by the IDs of their methods in the NodeSet."""
 
 _BASE, _MACHINE, _EXECUTE = (
     "BaseStateMachine",
@@ -65,7 +65,7 @@ _OF: Mapping[str, tuple[int, ...]] = {
     _MACHINE: (375, 376),
     _EXECUTE: (361, 365, 366, 367, 368, 369, 372),
 }
-"""Methods of each of the three state machines, one in the other."""
+"""Methods of each of the three nested state machines."""
 
 _TYPES: Mapping[str, int] = {_BASE: 3, _MACHINE: 2, _EXECUTE: 1}
 """Types of the state machines."""
@@ -74,7 +74,7 @@ _PARTS: Mapping[str, tuple[int, ...]] = {
     "AvailableStates": (ua.ObjectIds.StateType, ua.ObjectIds.InitialStateType),
     "AvailableTransitions": (ua.ObjectIds.TransitionType,),
 }
-"""Variables of a state machine, and of which types the parts of its own type are that they list."""
+"""Variables of a state machine that list parts of its type, with the types of these parts."""
 
 _CLEARED, _RUNNING = ("Cleared", 71), ("Running", 75)
 
@@ -100,14 +100,14 @@ _STATES: Mapping[str, Mapping[PackMLState, tuple[str, int]]] = {
         PackMLState.COMPLETE: ("Complete", 38),
     },
 }
-"""Names and ids of states, by the state machine that has them."""
+"""Names and IDs of states by state machine."""
 
 _NONE = (ua.LocalizedText(None), ua.NodeId())
 """State of a state machine that is not active, and its id."""
 
 
 class PackMl:
-    """Of one source."""
+    """PackML objects of one tag provider."""
 
     def __init__(self, source: TagProvider, requests: Requests, clock: TickClock) -> None:
         self._source, self._requests, self._clock = source, requests, clock
@@ -120,7 +120,7 @@ class PackMl:
         self._written: dict[tuple[str, str], Any] = {}
 
     async def add(self, server: Server, nodes: Nodes) -> None:
-        """Add the types, and an object for each machine, if there is any."""
+        """Add the types, and an object for each machine, if there are machines."""
         if not self._machines:
             return
         self._nodes = nodes
@@ -151,7 +151,7 @@ class PackMl:
                 await nodes.write(f"{root}.Status.{speed}.EURange", span, now)
 
     async def _parts(self, server: Server) -> dict[str, ua.Variant]:
-        """Ids of the states and transitions of each state machine, by the variables that list them."""
+        """Return the IDs of the states and transitions of each state machine, by the variables that list them."""
         found: dict[str, ua.Variant] = {}
         for state_machine, kind in _TYPES.items():
             parts = await server.get_node(ua.NodeId(kind, self._index)).get_children_descriptions()
@@ -161,7 +161,7 @@ class PackMl:
         return found
 
     async def follow(self, shown: LineSnapshot, heard: datetime, back: bool) -> None:
-        """Bring in what has changed."""
+        """Write the variables that have changed."""
         if self._nodes is None:
             return
         status, stamp = status_of(shown), self._clock.stamp(shown.tick, heard)
@@ -212,14 +212,14 @@ class PackMl:
             return int(Codes.BadUserAccessDenied)
         if objection(command, int(shown[f"{machine}/state"])):
             return int(Codes.BadInvalidState)
-        if shown.get(name) == command:  # it acts as it changes
+        if shown.get(name) == command:  # a command acts when its value changes
             code = self._requests.write_together(client, [name], [0.0])
             if code != Codes.GoodCompletesAsynchronously:
                 return code
         return self._requests.write_together(client, [name], [float(command)])
 
     def _values(self, machine: str, values: Mapping[str, float]) -> dict[str, ua.Variant]:
-        """Of the variables of a machine, by their names below its object."""
+        """Return the values of the variables of a machine, by their names below its object."""
 
         def flag(name: str) -> ua.Variant:
             return ua.Variant(values.get(f"{machine}/{name}", 0.0) != 0.0, ua.VariantType.Boolean)
@@ -243,7 +243,7 @@ class PackMl:
         return found
 
     def _current(self, number: int) -> dict[str, tuple[str | None, int]]:
-        """The present state of each state machine; no text: it has none now."""
+        """Return the present state of each state machine; without a text: it is not active."""
         none: tuple[str | None, int] = (None, 0)
         if number in _STATES[_BASE]:
             return {_BASE: _STATES[_BASE][PackMLState(number)], _MACHINE: none, _EXECUTE: none}

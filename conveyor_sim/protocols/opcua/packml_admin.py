@@ -1,6 +1,7 @@
-"""`Admin`: what a machine has produced, why it stands, its alarms: variables of OPC 30050 that tags have values for.
+"""`Admin`: counters, stop reason and alarms of a machine: the variables of OPC 30050 that have values in tags.
 
-Types and names are those of the NodeSet (R 30050, 6.3.4). A machine counts once, so Count and AccCount are the same.
+Types and names are those of the NodeSet (R 30050, 6.3.4). Counters are never reset separately, so Count and AccCount
+are the same.
 """
 
 from __future__ import annotations
@@ -9,11 +10,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from asyncua import Server, ua
-from asyncua.common.copy_node_util import _copy_node
 
 from conveyor_sim.columns.alarms import AlarmColumns
 from conveyor_sim.line.alarms.alarm import WAITING, AlarmState
 from conveyor_sim.line.tag import Tag
+from conveyor_sim.protocols.opcua.asyncua_internals import copy_node
 from conveyor_sim.protocols.opcua.nodes import NEVER, node_id
 from conveyor_sim.protocols.opcua.values import unit_of
 from conveyor_sim.protocols.tags.tag_provider import LineSnapshot
@@ -22,7 +23,7 @@ from conveyor_sim.protocols.tags.tick_clock import TickClock
 NAME = "Admin"
 
 A_MINUTE = 60.0
-"""PackML counts speed in packages a minute."""
+"""Seconds per minute: PackML states speeds in packages per minute."""
 
 _TYPE = 5
 """PackMLAdminObjectType."""
@@ -32,14 +33,14 @@ _COUNTS: Mapping[str, tuple[str, ...]] = {
     "ProdProcessedCount": ("produced", "taken", "processed"),
     "ProdDefectiveCount": ("taken_bad", "defective"),
 }
-"""Which counter of a machine is which; the first that it has."""
+"""Counter tags of a machine by variable, in order of preference."""
 
 _MOST = 2**31 - 1
 
 
 @dataclass
 class PackMLCountDataType:
-    """How many of one kind of bottles."""
+    """Counter of bottles."""
 
     ID: ua.Int32
     Name: ua.String
@@ -50,7 +51,7 @@ class PackMLCountDataType:
 
 @dataclass
 class PackMLAlarmDataType:
-    """An alarm, or why the machine stands."""
+    """Alarm or stop reason of a machine."""
 
     ID: ua.Int32
     Value: ua.Int32
@@ -62,10 +63,10 @@ class PackMLAlarmDataType:
 
 
 class Admin:
-    """Of one machine."""
+    """Variables of one machine."""
 
     def __init__(self, machine: str, tags: Mapping[str, Tag], clock: TickClock) -> None:
-        """tags: of the line, by name."""
+        """Find the tags of the machine. tags: tags of the line by name."""
         self._machine, self._clock = machine, clock
         self._own = {name for name, tag in tags.items() if tag.device == machine}
         self._reasons = tags[f"{machine}/stop_reason"].texts
@@ -90,11 +91,11 @@ class Admin:
         wanted |= {"MachDesignSpeed"} if self._design is not None else set()
         for each in declared:
             if each.BrowseName.Name in wanted:
-                # Unlike the public one it keeps the kind of reference, HasAlarm and others.
-                await _copy_node(session, parent, each, node_id(f"{root}.{NAME}.{each.BrowseName.Name}"), False)
+                # Unlike the public function, it keeps the type of reference: HasAlarm and others.
+                await copy_node(session, parent, each, node_id(f"{root}.{NAME}.{each.BrowseName.Name}"), False)
 
     def values(self, shown: LineSnapshot) -> dict[str, ua.Variant]:
-        """Of its variables, by name."""
+        """Return the values of the variables by name."""
         found = {name: self._count(tag, shown.values) for name, tag in self._counts.items()}
         if self._design is not None:
             found["MachDesignSpeed"] = ua.Variant(self._design * A_MINUTE, ua.VariantType.Float)
@@ -117,7 +118,7 @@ class Admin:
         return ua.Variant(made, ua.VariantType.ExtensionObject)
 
     def _standing(self, columns: AlarmColumns) -> dict[str, ua.Variant]:
-        """Its alarms that are not normal; those of class message are none of PackML's."""
+        """Return the alarms of the machine that are not normal, without those of class message, which PackML lacks."""
         rows: dict[str, list[PackMLAlarmDataType]] = {"error": [], "warning": []}
         for place, tag in enumerate(columns.tag):
             state, kind = int(columns.state[place]), columns.alarm_class[place]

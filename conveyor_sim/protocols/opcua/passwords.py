@@ -48,7 +48,7 @@ class Passwords:
             if session is None or not isinstance(token, ua.UserNameIdentityToken):
                 return
             name, password = server.decrypt_user_token(session, token)
-        except Exception:  # the library decodes it again, and answers with the status code that fits
+        except Exception:  # the library decodes it again, and answers with the matching status code
             return
         async with self._turn:
             user = await asyncio.to_thread(self._logins.enter, name, password, origin, time.monotonic())

@@ -1,6 +1,6 @@
-"""`Requests`: what clients want of a line, judged at once as far as that is possible, and handed to its source.
+"""`Requests`: requests of clients, checked at once as far as possible and passed on to the tag provider.
 
-Nothing here waits for a tick. What the line makes of it then is in the read-back of each command, and in events.
+Nothing here waits for a tick. The result is in the read-back of each command, and in events.
 """
 
 from __future__ import annotations
@@ -43,24 +43,24 @@ CODES: Mapping[Cause, int] = {
 
 @dataclass
 class Client(User):
-    """Whoever is behind a session."""
+    """User of a session."""
 
     kind: WriterKind | None = None
-    """None: only reads."""
+    """Kind of writer for the line; None: the user only reads."""
 
     @property
     def writer(self) -> str:
-        """As inputs are recorded."""
+        """Name of the writer in recorded inputs."""
         return f"{OPCUA} {self.name}"
 
 
 def reader(name: str = "") -> Client:
-    """One who only reads."""
+    """Return a user who only reads."""
     return Client(UserRole.User, name)
 
 
 class Requests:
-    """Of all clients of one source."""
+    """Requests of all clients of one tag provider."""
 
     def __init__(self, source: TagProvider) -> None:
         self._source = source
@@ -68,10 +68,10 @@ class Requests:
         self._commands: Mapping[str, Tag] = {tag.name: tag for tag in source.about.tags if tag.role in COMMANDS}
         self._modes: Mapping[str, Tag] = {tag.name: tag for tag in source.about.tags if is_mode(tag)}
         self.writes = self.refused = 0
-        """Requests that were passed on to the line, and those that were not."""
+        """Requests that were passed on to the line, and requests that were refused."""
 
     def write(self, client: User, values: Sequence[ua.WriteValue]) -> list[ua.StatusCode]:
-        """What becomes of each. Those that can be given are given together, as one input."""
+        """Return one status per write. Accepted writes are queued together as one input."""
         codes: list[int] = []
         together: dict[str, float] = {}
         places: list[int] = []
@@ -94,7 +94,7 @@ class Requests:
         return [ua.StatusCode(code) for code in codes]
 
     def write_together(self, client: User, names: Sequence[str], values: Sequence[float]) -> int:
-        """Give commands as one input, all or none. Return a status code, not counted. Each name occurs once."""
+        """Queue commands as one input, all or none. Return a status code, not counted. Each name occurs once."""
         tags = [self._commands[name] for name in names]
         codes = [self._judge_number(client, tag, value) for tag, value in zip(tags, values, strict=True)]
         bad = next((code for code in codes if code != Codes.Good), None)
@@ -108,7 +108,7 @@ class Requests:
         values: tuple[float, ...] = (),
         texts: tuple[str, ...] = (),
     ) -> int:
-        """Give the line an operation. Return a status code, which is not counted."""
+        """Queue an operation of the line. Return a status code, which is not counted."""
         return self._give(client, operation, names, values, texts)
 
     def control(self, client: User, what: Control, value: float) -> int:
@@ -128,7 +128,7 @@ class Requests:
         return _kind(client) in MAY_CONTROL
 
     def may(self, client: User, operation: str) -> bool:
-        """Whether this client may ever do that."""
+        """Return True if the role of this client permits an operation."""
         return operation in MAY and _kind(client) in MAY[operation].writers
 
     def counted(self, result: ua.CallMethodResult) -> ua.CallMethodResult:
@@ -138,7 +138,7 @@ class Requests:
         return result
 
     def _go_on(self, client: User, value: ua.WriteValue) -> int:
-        """Have a line in lockstep go on up to a tick."""
+        """Set the target of a line in lockstep."""
         if _kind(client) not in MAY_GO_ON:
             return int(Codes.BadUserAccessDenied)
         if (code := _judge_form(value, ua.VariantType.Int64)) != Codes.Good:
@@ -149,7 +149,7 @@ class Requests:
         return int(Codes.BadOutOfRange if refused else Codes.GoodCompletesAsynchronously)
 
     def _set_mode(self, client: User, value: ua.WriteValue) -> int:
-        """Put a device into a mode, for clients that can only write."""
+        """Set the control mode of a device, for clients that can only write."""
         if not self.may(client, MODE):
             return int(Codes.BadUserAccessDenied)
         tag = self._modes[name_of(value.NodeId)]
@@ -158,7 +158,7 @@ class Requests:
         return self._give(client, MODE, (tag.device,), (float(value.Value.Value.Value),), ())
 
     def _judge(self, client: User, value: ua.WriteValue) -> tuple[int, float]:
-        """Whether a value can be given, and as what number."""
+        """Return the status code of a write, and its value as a number."""
         if not self.may(client, SET):
             return Codes.BadUserAccessDenied, 0.0
         tag = self._commands.get(name_of(value.NodeId))
@@ -204,7 +204,7 @@ class Requests:
 
 
 def _judge_form(value: ua.WriteValue, kind: ua.VariantType) -> int:
-    """Whether that is one value of a type, and nothing but that."""
+    """Return the status code of the form of a write, which must be one complete value of a type."""
     if value.AttributeId != ua.AttributeIds.Value:
         return int(Codes.BadNotWritable)
     if value.IndexRange:

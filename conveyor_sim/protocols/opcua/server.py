@@ -1,4 +1,4 @@
-"""`OpcUaServer`: a line as an OPC UA server, by names that stay."""
+"""`OpcUaServer`: a line as an OPC UA server, with permanent names."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ POLICIES = [
 
 
 class OpcUaServer:
-    """Serves one source: a Face."""
+    """Protocol server for one tag provider, by OPC UA."""
 
     def __init__(
         self,
@@ -63,12 +63,13 @@ class OpcUaServer:
         quota: Quota = QUOTA,
         logins: LoginService | None = None,
     ) -> None:
-        """users: who may do more than read, by name. anonymous: whether those who give no name may read.
-        stamps: what SourceTimestamp is. certificates: folder of the server's own; None: `default_folder()`.
-        history: patterns of the tags whose last values are kept. port: 0 for any that is free.
-        limits: of each client. quota: places of the connections. logins: checks passwords, in place of `users`.
+        """Prepare the server. users: users by name, who may do more than read. anonymous: True if clients without a
+        user may read.
+        stamps: kind of SourceTimestamp. certificates: folder of the server's own; None: `default_folder()`.
+        history: patterns of the tags whose latest values are stored. port: 0 for any free one.
+        limits: of each client. quota: limits of the connections. logins: checks passwords, in place of `users`.
 
-        Raises ServerError for a pattern that no tag fits.
+        Raises ServerError for a pattern that matches no tag.
         """
         require_tags(history, source.about.tags)
         self._source, self._anonymous, self._stamps = source, anonymous, stamps
@@ -84,14 +85,14 @@ class OpcUaServer:
 
     @property
     def port(self) -> int:
-        """On which it listens. RuntimeError before `start`."""
+        """Port on which it listens. Raises RuntimeError before `start`."""
         if self._server is None or self._server.bserver is None:
             raise RuntimeError("the server was not started")
         return self._server.bserver.port
 
     @property
     def address(self) -> str:
-        """Where clients find it."""
+        """Address for clients."""
         host, port = self._at
         return f"opc.tcp://{host}:{port if self._server is None else self.port}"
 
@@ -115,9 +116,9 @@ class OpcUaServer:
         return Status(len(server.bserver.clients), items, requests.writes, refused, longest, left_out)
 
     async def start(self) -> None:
-        """Listen; that takes a second or two. Raises ServerError if it is not possible, CertificateError."""
+        """Listen; this takes one to two seconds. Raises ServerError if it is not possible, CertificateError."""
         for name in ("asyncua.server", "asyncua.common", "asyncua.uaprotocol", "asyncua.crypto"):
-            logging.getLogger(name).setLevel(logging.CRITICAL)  # it logs whatever clients send
+            logging.getLogger(name).setLevel(logging.CRITICAL)  # it logs all input of clients
         host, port = self._at
         require_free(OPCUA, host, port)
         with _without_collection():
@@ -126,21 +127,22 @@ class OpcUaServer:
             await updates.bring_present()
         try:
             await server.listen(host, port)
-        except OSError as error:  # it has been taken since
+        except OSError as error:  # another process has taken the port since
             raise ServerError(f"opcua: {host}:{port} can't be listened on ({error}), expected a free port") from error
         self._server, self._updates = server, updates
         self._following = asyncio.create_task(updates.run())
         self._following.add_done_callback(self._ended)
 
     async def _empty(self) -> BoundedServer:
-        """A server with the standard's nodes, and who may come in."""
+        """Return a server with the nodes of the standard, its security and its identity tokens."""
         host, port = self._at
         own = identity(self._certificates or default_folder())
         internal = SafeServer(self, own.trusted, self._limits, self._logins)
         internal.bind_condition_methods = 1
         server = BoundedServer(internal, self._limits, ConnectionSlots(self._quota))
         server.product_uri, server.name, server.manufacturer_name = NAMESPACE, "conveyor_sim", "conveyor_sim"
-        server.application_type, server._application_uri = ua.ApplicationType.Server, own.application_uri
+        server.application_type = ua.ApplicationType.Server
+        server.state_application(own.application_uri)
         await server.init()
         await server.load_certificate(own.certificate, "der")
         await server.load_private_key(own.key, format="pem")
@@ -151,7 +153,7 @@ class OpcUaServer:
         return server
 
     async def _fill(self, server: BoundedServer) -> Updates:
-        """Add the nodes of the line; what keeps them as the source is."""
+        """Add the nodes of the line. Return what updates them."""
         internal, source, requests = server.iserver, self._source, self._requests
         await publish(internal, self._limits, self._quota)
         if await server.register_namespace(NAMESPACE) != INDEX:
@@ -181,7 +183,7 @@ class OpcUaServer:
             await server.stop()
 
     def _ended(self, following: asyncio.Task[None]) -> None:
-        """Rather no server than one that shows what is stale."""
+        """Stop the server after an error, because its values would be stale."""
         if not following.cancelled() and (error := following.exception()) is not None:
             logging.getLogger(__name__).error("opcua: the server ends: %s", error, exc_info=error)
             self._following = None
@@ -190,7 +192,7 @@ class OpcUaServer:
     def get_user(
         self, iserver: Any, username: str | None = None, password: str | None = None, certificate: Any = None
     ) -> Client | None:
-        """Who begins a session; None: nobody who may. Called by the library."""
+        """Return the user of a new session; None: refused. The library calls it."""
         if username is None:
             return reader() if self._anonymous else None
         result = checked.get()
@@ -201,7 +203,7 @@ class OpcUaServer:
 
 @contextmanager
 def _without_collection() -> Iterator[None]:
-    """While nodes are made: looking through the standard's 6000 again and again takes longer than making them all."""
+    """Collect no garbage while nodes are made. With the standard's 6000 nodes it takes longer than making them."""
     was = gc.isenabled()
     gc.disable()
     try:

@@ -1,7 +1,8 @@
-"""What a client can do in its session: read, browse, subscribe; write and call as its user may; nothing else.
+"""Sessions of clients, limited to reading, browsing and subscribing, and to writes and calls that the user's role
+permits.
 
-The library lets whoever is let in write all variables that are not read-only, call all methods, and as "admin" change
-the address space. Here no write and no call reaches it, but the two that send conditions again.
+The library lets every admitted client write all variables that are not read-only, and call all methods. An "admin" can
+even change the address space. Here the library gets no write, and no call except the two that refresh conditions.
 """
 
 from __future__ import annotations
@@ -35,10 +36,10 @@ from conveyor_sim.protocols.opcua.well_formed import WellFormedSession, require_
 from conveyor_sim.protocols.server.users import LoginService
 
 SHORTEST_INTERVAL, LONGEST_INTERVAL = 10.0, 60_000.0
-"""ms, at which clients are sent what has changed."""
+"""Publishing intervals, ms."""
 
 UNFETCHED = 30.0
-"""s for which a subscription is kept that nobody fetches anything of, or three of its intervals, if that is longer."""
+"""Lifetime of a subscription without Publish requests, s, or three of its intervals, if that is longer."""
 
 _DECRYPTED = {
     "http://www.w3.org/2001/04/xmlenc#rsa-oaep": uacrypto.decrypt_rsa_oaep,
@@ -46,21 +47,22 @@ _DECRYPTED = {
 }
 
 
-_NOBODY = User(role=UserRole.Anonymous)
+_ANONYMOUS = User(role=UserRole.Anonymous)
 
 
 Answer = Callable[[User, ua.CallMethodRequest], ua.CallMethodResult | None]
 
 
 class SafeServer(InternalServer):
-    """The library's server with sessions of this kind."""
+    """Server of the library with limited sessions."""
 
     subscription_service: Subscriptions
 
     def __init__(
         self, user_manager: Any, trusted: Collection[bytes], limits: OpcUaLimits, logins: LoginService
     ) -> None:
-        """trusted: certificates of clients that are let in; empty: all are. limits: of each client.
+        """Prepare the server. trusted: accepted certificates of clients; empty: all are accepted. limits: of each
+        client.
         logins: checks passwords.
         """
         super().__init__(user_manager)
@@ -72,10 +74,10 @@ class SafeServer(InternalServer):
         self.owners = Owners(Refusals(), trusting=bool(trusted))
         self.requests: Requests | None = None
         self.answers: Sequence[Answer] = ()
-        """Who may know a method that is called."""
+        """Functions that carry out calls; each returns None for methods that it does not have."""
 
-    def create_session(self, name: str, user: User = _NOBODY, external: bool = False) -> InternalSession:
-        """One a connection: the library would keep those before it for ever."""
+    def create_session(self, name: str, user: User = _ANONYMOUS, external: bool = False) -> InternalSession:
+        """Create the only session of a connection. The library would keep earlier ones for ever."""
         if not external:
             return super().create_session(name, user, external)
         connection = channel.get()
@@ -87,7 +89,7 @@ class SafeServer(InternalServer):
         return ClientSession(self, self.aspace, self.subscription_service, name, user, peer)
 
     def lookup_external_session(self, auth_token: ua.NodeId) -> InternalSession | None:
-        """For a client that comes back by another connection: who had another certificate is another client."""
+        """Return the session of a client on a new connection; None if its certificate is another one."""
         found, connection = super().lookup_external_session(auth_token), channel.get()
         if not isinstance(found, OpcUaSession) or connection is None or found.peer != connection.peer:
             return None
@@ -106,15 +108,15 @@ class SafeServer(InternalServer):
         return list(super().find_servers(params, sockname))
 
     def register_server(self, *_: Any) -> None:
-        """This is no discovery server; the library asks nobody who they are for this."""
+        """Refuse: this is no discovery server. The library would accept it from clients without a session."""
         raise ServiceError(Codes.BadServiceUnsupported)
 
     def register_server2(self, *_: Any) -> None:
-        """As `register_server`."""
+        """Refuse, as `register_server` does."""
         raise ServiceError(Codes.BadServiceUnsupported)
 
     def decrypt_user_token(self, isession: Any, token: ua.UserNameIdentityToken) -> tuple[str, str]:
-        """Name and password, which came encrypted, by itself or by the channel; a token that was heard is no use.
+        """Return name and password, which the token or the channel must encrypt. A replayed token is refused.
 
         OPC 10000-4, 7.41.2.3.
         """
@@ -141,7 +143,7 @@ class SafeServer(InternalServer):
 
 
 class OpcUaSession(InternalSession):
-    """Of one client."""
+    """Session of one client, with limits."""
 
     iserver: SafeServer
     user: User
@@ -150,10 +152,10 @@ class OpcUaSession(InternalSession):
     def __init__(
         self, server: SafeServer, aspace: Any, subscriptions: Any, name: str, user: User, peer: bytes | None
     ) -> None:
-        """peer: certificate of the client; None: it has shown none.
+        """Create a session with a random token. peer: certificate of the client; None: it has shown none.
 
-        The token that stands for the session is random; the library's are counted, and whoever guesses one acts as
-        its user, even without a password.
+        The tokens of the library are consecutive numbers. A client that guesses one would act as its user, even without
+        a password.
         """
         super().__init__(server, aspace, subscriptions, name, user=user, external=True)
         self.peer = peer
@@ -191,7 +193,7 @@ class OpcUaSession(InternalSession):
         return result
 
     async def write(self, params: ua.WriteParameters) -> list[ua.StatusCode]:
-        """Commands, as `Requests.write` has it."""
+        """Write commands. `Requests.write` describes the status codes."""
         if self.iserver.requests is None:
             raise ServiceError(Codes.BadServerHalted)
         asked = params.NodesToWrite or []
@@ -202,7 +204,7 @@ class OpcUaSession(InternalSession):
         return codes
 
     async def call(self, params: list[ua.CallMethodRequest]) -> list[ua.CallMethodResult]:
-        """Methods of this package; and those of the library that send conditions again."""
+        """Call methods of this package, and those of the library that refresh conditions."""
         results = []
         for request in params or []:
             answers = (answer(self.user, request) for answer in self.iserver.answers)
@@ -213,7 +215,7 @@ class OpcUaSession(InternalSession):
         return results
 
     async def read(self, params: ua.ReadParameters) -> list[ua.DataValue]:
-        """With UserAccessLevel as it is for this user."""
+        """Read attributes, with UserAccessLevel as it is for this user."""
         results = await super().read(params)
         self.bounds.require_answer(results)
         requests = self.iserver.requests
@@ -238,10 +240,10 @@ class OpcUaSession(InternalSession):
         return self.bounds.views.translate(params)
 
     async def create_subscription(self, params: ua.CreateSubscriptionParameters, *others: Any, **named: Any) -> Any:
-        """The library would publish as often as it is asked to, and do nothing else; and keep what nobody fetches.
+        """Create a subscription within the limits.
 
-        A lifetime is at least three times the time after which a client hears that there is nothing new (OPC 10000-4,
-        5.14.2.2).
+        The library would publish as often as requested, and keep subscriptions without Publish requests. A lifetime is
+        at least three times the keep-alive time (OPC 10000-4, 5.14.2.2).
         """
         self.bounds.require_subscription()
         interval = self.subscription_service.interval(self.session_id, _interval(params.RequestedPublishingInterval))
@@ -256,26 +258,26 @@ class OpcUaSession(InternalSession):
         return result
 
     def modify_subscription(self, params: ua.ModifySubscriptionParameters) -> ua.ModifySubscriptionResult:
-        """As when it was created."""
+        """Modify a subscription within the limits."""
         params.RequestedPublishingInterval = _interval(params.RequestedPublishingInterval)
         return super().modify_subscription(params)
 
     async def create_monitored_items(
         self, params: ua.CreateMonitoredItemsParameters
     ) -> list[ua.MonitoredItemCreateResult]:
-        """A bounded number of them, and of what waits for those who do not fetch it."""
+        """Create monitored items within the limits of items and queues."""
         self.bounds.require_new_items(params)
         return await super().create_monitored_items(params)
 
     async def modify_monitored_items(
         self, params: ua.ModifyMonitoredItemsParameters
     ) -> list[ua.MonitoredItemModifyResult]:
-        """As when they were created."""
+        """Modify monitored items within the limits."""
         self.bounds.require_changed_items(params)
         return await super().modify_monitored_items(params)
 
     async def history_read(self, params: ua.HistoryReadParameters) -> list[ua.HistoryReadResult]:
-        """Raw values, of tags that have a history."""
+        """Return raw values of tags that have a history."""
         raw = isinstance(params.HistoryReadDetails, ua.ReadRawModifiedDetails)
         if not raw or params.HistoryReadDetails.IsReadModified:
             raise ServiceError(Codes.BadHistoryOperationUnsupported)
@@ -287,23 +289,23 @@ class OpcUaSession(InternalSession):
         return results
 
     async def history_update(self, params: ua.HistoryUpdateParameters) -> list[ua.HistoryUpdateResult]:
-        """Refused."""
+        """Refuse."""
         raise ServiceError(Codes.BadUserAccessDenied)
 
     async def add_nodes(self, params: list[ua.AddNodesItem]) -> list[ua.AddNodesResult]:
-        """Refused."""
+        """Refuse."""
         raise ServiceError(Codes.BadUserAccessDenied)
 
     async def delete_nodes(self, params: ua.DeleteNodesParameters) -> list[ua.StatusCode]:
-        """Refused."""
+        """Refuse."""
         raise ServiceError(Codes.BadUserAccessDenied)
 
     async def add_references(self, params: list[ua.AddReferencesItem]) -> list[ua.StatusCode]:
-        """Refused."""
+        """Refuse."""
         raise ServiceError(Codes.BadUserAccessDenied)
 
     async def delete_references(self, params: list[ua.DeleteReferencesItem]) -> list[ua.StatusCode]:
-        """Refused."""
+        """Refuse."""
         raise ServiceError(Codes.BadUserAccessDenied)
 
 

@@ -1,4 +1,4 @@
-"""Connections of OPC UA clients: bounded in what they may send, and closed with the reason when it makes no sense."""
+"""Connections of OPC UA clients, with bounded input. Malformed input ends them, with the reason."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ import time
 from contextvars import ContextVar
 from typing import Any
 
-from asyncua import Server, ua
+from asyncua import ua
 from asyncua.common.utils import Buffer, ServiceError
-from asyncua.server.binary_server_asyncio import BinaryServer, OPCUAProtocol
+from asyncua.server.binary_server_asyncio import OPCUAProtocol
 from asyncua.ua.ua_binary import header_from_binary, uatcp_to_binary
 
+from conveyor_sim.protocols.opcua.asyncua_internals import OpenPort, OpenProtocol, OpenServer
 from conveyor_sim.protocols.opcua.client_certificates import without_issuers
 from conveyor_sim.protocols.opcua.limits import OpcUaLimits
 from conveyor_sim.protocols.opcua.processor import CHUNK, ConnectionLimits, Processor
@@ -20,24 +21,24 @@ from conveyor_sim.protocols.server.budget import Budget
 from conveyor_sim.protocols.server.quotas import GREETED, OPENED, ConnectionSlot, ConnectionSlots
 
 ACTIVATION = 30.0
-"""s that a connection has for beginning a session, and may stay without one."""
+"""Time in which a connection must activate a session, and may stay without one, s."""
 
 _SIZE = slice(4, 8)
-"""Bytes of a message that say how long it is (OPC 10000-6, 7.1.2.2)."""
+"""Bytes of a message that hold its length (OPC 10000-6, 7.1.2.2)."""
 
 _WAITING = 16
-"""Messages of a connection that may wait to be answered; meanwhile no more are read."""
+"""Largest number of unanswered messages of a connection; beyond it no more are read."""
 
 
-class Connection(OPCUAProtocol):
-    """One of them."""
+class Connection(OpenProtocol):
+    """Connection of one client."""
 
     longest: list[float]
-    """One element, for all connections: s of wall time from a message to its being done with, the longest."""
+    """Longest wall time from a message to its completion, s; one element, shared by all connections."""
     bounds: OpcUaLimits
     places: ConnectionSlots
     guests: Budget
-    """Work of all sessions without a user."""
+    """Budget of all sessions without a user."""
     turn: asyncio.Lock
     """Held by the session without a user whose request is next, until it is answered."""
     place: ConnectionSlot | None = None
@@ -57,7 +58,7 @@ class Connection(OPCUAProtocol):
         self.processor = Processor(self.iserver, self.transport, self.bounds)
         self.processor.set_policies(self.policies)
         if (connection := transport.get_extra_info("socket")) is not None:
-            # A client that is gone without a word is noticed.
+            # Detect clients that vanish without closing the connection.
             connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
 
     def connection_lost(self, ex: BaseException | None) -> None:
@@ -67,7 +68,7 @@ class Connection(OPCUAProtocol):
 
     @property
     def has_session(self) -> bool:
-        """Whether a client has begun a session here that has not ended."""
+        """True if the connection has a session that is not closed."""
         session = self.processor.session if self.processor else None
         return session is not None and session.state.name != "Closed"
 
@@ -79,14 +80,14 @@ class Connection(OPCUAProtocol):
 
     @property
     def encrypts(self) -> bool:
-        """Whether what comes here can't be read on the way."""
-        policy = self.processor._connection.security_policy if self.processor else None
+        """True if the channel is encrypted."""
+        policy = self.processor.channel.security_policy if self.processor else None
         return policy is not None and policy.Mode == ua.MessageSecurityMode.SignAndEncrypt
 
     @property
     def peer(self) -> bytes | None:
-        """Certificate of the client, which has proved that it is its own; None: the channel is not secured."""
-        policy = self.processor._connection.security_policy if self.processor else None
+        """Certificate of the client, which has proved that it owns the key; None: the channel is not secured."""
+        policy = self.processor.channel.security_policy if self.processor else None
         if policy is None or policy.Mode == ua.MessageSecurityMode.None_:
             return None
         return without_issuers(policy.peer_certificate)
@@ -101,7 +102,7 @@ class Connection(OPCUAProtocol):
             raise ServiceError(ua.StatusCodes.BadTooManySessions)
 
     def leave(self) -> None:
-        """Have nothing more to do with the session."""
+        """Detach the connection from its session."""
         if self.processor is not None:
             self.processor.session = None
         if self.place is not None:
@@ -145,8 +146,10 @@ class Connection(OPCUAProtocol):
         else:
             self.transport.resume_reading()
 
-    async def _activation_watchdog(self) -> None:
-        """Not only at first: a session may time out, and its connection stay."""
+    async def watch_activation(self) -> None:
+        """Close connections without an active session, at any time. The library checks only once, but a session may
+        time out.
+        """
         while True:
             await asyncio.sleep(ACTIVATION)
             session = self.processor.session if self.processor else None
@@ -154,8 +157,8 @@ class Connection(OPCUAProtocol):
                 self._close()
                 return
 
-    async def _process_one_msg(self, header: Any, buf: Any) -> bool:
-        """The library leaves a client without an answer whose message it can't make out."""
+    async def answer_message(self, header: Any, buf: Any) -> bool:
+        """Answer one message within the budgets. The library does not answer messages that it can't decode."""
         channel.set(self)
         await asyncio.sleep(self.work.delay())  # until the work of earlier messages is within the budget
         if not self._is_guest:
@@ -170,7 +173,7 @@ class Connection(OPCUAProtocol):
             return False
         before, began = self.processor.units, time.perf_counter()
         try:
-            goes_on = await super()._process_one_msg(header, buf)
+            goes_on = await super().answer_message(header, buf)
         except Exception as error:
             code = getattr(error, "code", ua.StatusCodes.BadSecurityChecksFailed)
             self._refuse(code, str(error))
@@ -179,7 +182,7 @@ class Connection(OPCUAProtocol):
             self.longest[0] = max(self.longest[0], time.perf_counter() - began)
             self._charge(self.processor.units - before)
         if self.place is not None:
-            self.place.touch(OPENED if self.processor._connection.is_open() else GREETED)
+            self.place.touch(OPENED if self.processor.channel.is_open() else GREETED)
             if not self.has_session:
                 self.places.leave_user(self.place)
         self._take()
@@ -224,28 +227,28 @@ class Connection(OPCUAProtocol):
 
 
 channel: ContextVar[Connection | None] = ContextVar("channel", default=None)
-"""The connection whose message is being answered."""
+"""Connection whose message is being answered."""
 
 
-class _Port(BinaryServer):
+class _Port(OpenPort):
     longest: list[float]
     bounds: OpcUaLimits
     places: ConnectionSlots
     guests: Budget
     turn: asyncio.Lock
 
-    def _make_protocol(self) -> OPCUAProtocol:
-        made = Connection(self.iserver, self._policies, self.clients, self.closing_tasks, self.limits)
+    def make_protocol(self) -> OPCUAProtocol:
+        made = Connection(self.iserver, self.policies, self.clients, self.closing_tasks, self.limits)
         made.longest, made.bounds, made.places = self.longest, self.bounds, self.places
         made.guests, made.turn = self.guests, self.turn
         return made
 
 
-class BoundedServer(Server):
-    """The library's server, listening by connections of this kind."""
+class BoundedServer(OpenServer):
+    """Server of the library with bounded connections."""
 
     def __init__(self, internal: Any, bounds: OpcUaLimits, places: ConnectionSlots) -> None:
-        """bounds: of each client. places: of the connections."""
+        """Prepare the server. bounds: limits of each client. places: slots of the connections."""
         super().__init__(iserver=internal)
         self.longest = [0.0]
         self.bounds, self.places = bounds, places
@@ -257,14 +260,14 @@ class BoundedServer(Server):
         self.iserver.max_unacked_messages_per_subscription = 20
 
     async def listen(self, host: str, port: int) -> int:
-        """Serve from now on; the port. Raises OSError."""
-        await self._setup_server_nodes()
+        """Serve from now on. Return the port. Raises OSError."""
+        await self.set_up_nodes()
         await self.iserver.start()
         rate = self.bounds.guest_units_per_second
         self.bserver = _Port(self.iserver, host, port, self.limits)
         self.bserver.longest, self.bserver.bounds, self.bserver.places = self.longest, self.bounds, self.places
         self.bserver.guests, self.bserver.turn = Budget(rate, 2 * rate), asyncio.Lock()
-        self.bserver.set_policies(self._policies)
+        self.bserver.set_policies(self.policies)
         try:
             await self.bserver.start()
         except BaseException:
@@ -273,7 +276,7 @@ class BoundedServer(Server):
         return self.bserver.port
 
     async def stop(self) -> None:
-        """The library waits for its clock, a second."""
+        """Stop the server, without waiting a second for the clock of the library."""
         clock, self.iserver.time_task = self.iserver.time_task, None
         if clock is not None:
             clock.cancel()

@@ -1,4 +1,4 @@
-"""The nodes of a line: its place in the plant, devices by their classes, and a variable for each tag."""
+"""Nodes of a line: its place in the plant, devices by their classes, and a variable for each tag."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from conveyor_sim.protocols.tags.handshake import TARGET
 from conveyor_sim.protocols.tags.tag_provider import LineInfo
 
 WRITTEN_BY, WRITTEN_AT = "written_by", "written_at"
-"""Below a command: who gave the value that is in force, and since when it has it from them."""
+"""Properties of a command: writer of the value in force, and time of its first write."""
 
 VALUE_AS_TEXT = "ValueAsText"
-"""Below an enumeration whose values are not 0, 1, 2, ..."""
+"""Property of an enumeration whose values are not 0, 1, 2, ..."""
 
 RUN_VARIABLES: dict[str, tuple[ua.VariantType, str]] = {
     "tick": (ua.VariantType.Int64, "Ticks since the start."),
     "time": (ua.VariantType.Double, "Simulated time, s."),
     "date_time": (ua.VariantType.DateTime, "Simulated time as a date, from the start_time of the scene."),
-    "reason": (ua.VariantType.String, "Why it is stopped, or whose lockstep it is."),
-    "lost": (ua.VariantType.String, "Why nothing newer comes; empty: it does."),
+    "reason": (ua.VariantType.String, "Reason for a stop, or owner of the lockstep."),
+    "lost": (ua.VariantType.String, "Reason why no newer values arrive; empty: they do."),
 }
-"""About the run, beside its state."""
+"""Variables of the run, beside its state."""
 
 
 def add_line(nodes: Nodes, about: LineInfo) -> None:
@@ -42,17 +42,17 @@ def add_line(nodes: Nodes, about: LineInfo) -> None:
     for name, (kind, description) in RUN_VARIABLES.items():
         nodes.variable(f"{RUN}/{name}", name, run, ua.Variant(nothing(kind), kind), description)
     first = ua.Variant(0, ua.VariantType.Int64)
-    text = "To which tick a line in lockstep is to go on: what was written before it acts as one set, with it."
+    text = "Target tick of a line in lockstep. All writes before it act as one set with it."
     nodes.variable(TARGET, TARGET.rpartition("/")[2], run, first, text, access=READ_AND_WRITE)
 
 
 def is_shown(tag: Tag) -> bool:
-    """Whether a tag has a variable; faults have none, they are injected by a method."""
+    """Return True if a tag has a variable; faults have none, a method injects them."""
     return tag.role in (*SIGNALS, *COMMANDS, "run")
 
 
 def has_text(tag: Tag) -> bool:
-    """Whether the text of its value has a variable of its own."""
+    """Return True if the text of a tag's value has a separate variable."""
     return tag.kind == "enumeration" and list(tag.texts) != list(range(len(tag.texts)))
 
 

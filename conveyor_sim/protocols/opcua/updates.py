@@ -1,4 +1,4 @@
-"""`Updates`: brings what a source shows into the nodes, tick by tick, and writes only what has changed."""
+"""`Updates`: writes snapshots of a line into the nodes, tick by tick, and only values that have changed."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ from conveyor_sim.protocols.tags.tag_provider import LineSnapshot, TagProvider
 from conveyor_sim.protocols.tags.tick_clock import TickClock
 
 MOST_BEHIND = 200
-"""Ticks that wait to be brought in; one more, and the last of them gives way to it."""
+"""Largest number of ticks that wait to be written; a further one replaces the newest."""
 
 Follower = Callable[[LineSnapshot, datetime, bool], Awaitable[None]]
-"""Called after each tick that was brought in, with when that was heard, and whether it is a step back."""
+"""Function to call after each tick, with the snapshot, its wall time, and True if time stepped back."""
 
 
 class Updates:
-    """Of one source, in one asyncio loop."""
+    """Updates from one tag provider, in one asyncio loop."""
 
     def __init__(self, source: TagProvider, nodes: Nodes, clock: TickClock, *others: Follower) -> None:
-        """others: what follows the source besides."""
+        """Prepare the updates. others: functions to call after each tick."""
         self._source, self._nodes, self._clock, self._others = source, nodes, clock, others
         self._variables = [_Variable(tag) for tag in source.about.tags if is_shown(tag) and tag.role != "run"]
         self._run_tag = next((tag for tag in source.about.tags if tag.name == f"{RUN}/state"), None)
@@ -43,17 +43,17 @@ class Updates:
         self._last: LineSnapshot | None = None
         self._read_back: ReadBackColumns | None = None
         self.longest = 0.0
-        """s of wall time from a change of the source to its being in the nodes, the longest since this was set to 0."""
+        """Longest wall time from a change of the tags to their nodes, s, since this was set to 0."""
         self.left_out = 0
-        """Ticks so far that were not brought in."""
+        """Ticks so far that were not written."""
         self._written: dict[str, tuple[int, str]] = {}
 
     async def bring_present(self) -> None:
-        """Bring in what the source shows now."""
+        """Write the present snapshot."""
         await self._bring(self._source.shown, datetime.now(timezone.utc))
 
     async def run(self) -> None:
-        """Follow the source until this is cancelled."""
+        """Write all snapshots until this is cancelled."""
         end = self._source.listen(self._hear)
         self._hear()
         try:
@@ -65,12 +65,12 @@ class Updates:
                     shown, heard = self._waiting.popleft()
                     await self._bring(shown, heard)
                     self.longest = max(self.longest, (datetime.now(timezone.utc) - heard).total_seconds())
-                    await asyncio.sleep(0)  # clients, too
+                    await asyncio.sleep(0)  # let clients' requests run
         finally:
             end()
 
     def _hear(self) -> None:
-        """Called by any thread."""
+        """Queue the present snapshot. May be called by any thread."""
         if len(self._waiting) >= MOST_BEHIND:
             with suppress(IndexError):
                 self._waiting.pop()
@@ -85,7 +85,7 @@ class Updates:
         last, self._last = self._last, shown
         status = status_of(shown)
         back = last is not None and shown.tick < last.tick
-        # Where time has stepped back, what has stayed the same would be of the future.
+        # After a step back in time, unchanged values would have time stamps in the future.
         every = last is None or back or status != status_of(last)
         stamp = self._clock.stamp(shown.tick, heard)
         good = status == ua.StatusCodes.Good
@@ -108,10 +108,12 @@ class Updates:
             await self._bring_read_back(shown.read_back, stamp, status)
         for follow in self._others:
             await follow(shown, heard, back)
-        await self._bring_run(shown, last, stamp, every)  # at last: who sees the tick finds all else of it
+        await self._bring_run(shown, last, stamp, every)  # last, so that clients that see the tick find all its values
 
     async def _bring_run(self, shown: LineSnapshot, last: LineSnapshot | None, stamp: datetime, every: bool) -> None:
-        """Good even where the rest is not, as it says what has become of that; but for what nobody knows of."""
+        """Write the variables of the run. Their status stays Good when the run stops; it is BadNoCommunication only if
+        the line is lost.
+        """
         tick = shown.tick
         code = ua.StatusCodes.BadNoCommunication if shown.lost else ua.StatusCodes.Good
         if self._run_tag is not None and (last is None or every or last.run.state != shown.run.state):
@@ -147,7 +149,7 @@ class Updates:
 
 
 class _Variable:
-    """A tag, and what was written of it last."""
+    """Tag, and the value that was written last."""
 
     def __init__(self, tag: Tag) -> None:
         self.tag = tag

@@ -1,4 +1,4 @@
-"""Values of tags as OPC UA has them: types, units, status codes."""
+"""Values of tags in OPC UA: types, units, status codes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _UNITS_URI = "http://www.opcfoundation.org/UA/units/un/cefact"
 
 
 def type_of(tag: Tag) -> ua.VariantType:
-    """Which type a tag has; counts are of 32 bits, which all clients know."""
+    """Return the type of a tag; counts have 32 bits, which all clients support."""
     if tag.kind == "bool":
         return ua.VariantType.Boolean
     if tag.kind == "number":
@@ -25,7 +25,7 @@ def type_of(tag: Tag) -> ua.VariantType:
 
 
 def as_variant(tag: Tag, value: float) -> ua.Variant:
-    """A value of a tag; what its type can't hold becomes the nearest that it can, and 0 if it is not a number."""
+    """Return a value of a tag, clipped to the range of its type; NaN as an integer is 0."""
     kind = type_of(tag)
     if kind is ua.VariantType.Boolean:
         return ua.Variant(value != 0.0, kind)
@@ -37,20 +37,20 @@ def as_variant(tag: Tag, value: float) -> ua.Variant:
 
 
 def range_of(tag: Tag) -> ua.Range:
-    """EURange (OPC 10000-8, 5.3.2)."""
+    """Return the EURange (OPC 10000-8, 5.3.2)."""
     low, high = _WHOLE.get(type_of(tag), (-math.inf, math.inf))
     return ua.Range(max(tag.low, low), min(tag.high, high))
 
 
 def unit_of(tag: Tag) -> ua.EUInformation:
-    """EngineeringUnits: the characters of the UNECE code, base 256 (OPC 10000-8, 5.6.4.4)."""
+    """Return the EngineeringUnits: the characters of the UNECE code, base 256 (OPC 10000-8, 5.6.4.4)."""
     number = int.from_bytes(tag.unece.code.encode("ascii"), "big")
     shown = "" if tag.unit == "1" else tag.unit
     return ua.EUInformation(_UNITS_URI, number, ua.LocalizedText(shown), ua.LocalizedText(tag.unece.name))
 
 
 def status_of(shown: LineSnapshot) -> int:
-    """Of all values of a line; those of signals that are forced are `GoodLocalOverride` where this is Good."""
+    """Return the status code of all values of a line. Forced signals have GoodLocalOverride where it is Good."""
     if shown.lost:
         return ua.StatusCodes.BadNoCommunication
     if shown.run.state in (ENDED, STOPPED):

@@ -1,6 +1,6 @@
-"""`Weihenstephan`: the data points of each machine by their names in the Weihenstephan Standards (OPC 40600).
+"""`Weihenstephan`: data points of each machine by their names in the Weihenstephan Standards (OPC 40600).
 
-The types of that NodeSet are not used: they ask for those of two other ones, and for much that a line has not.
+The types of that NodeSet are not used: they depend on two other NodeSets, and on much that a line does not have.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from conveyor_sim.protocols.tags.tag_provider import LineSnapshot, TagProvider
 from conveyor_sim.protocols.tags.tick_clock import TickClock
 
 NAME = "Weihenstephan"
-"""Of the object below a machine."""
+"""Name of the object below a machine."""
 
 
 class Weihenstephan:
-    """Of one source."""
+    """Data points of the machines of one tag provider."""
 
     def __init__(self, source: TagProvider, nodes: Nodes, clock: TickClock) -> None:
-        """Adds an object for each machine that has such data points."""
+        """Add an object for each machine that has data points."""
         self._nodes, self._clock = nodes, clock
         self._tags: Mapping[str, Tag] = {tag.name: tag for tag in source.about.tags}
         self._machines = list(dict.fromkeys(tag.device for tag in source.about.tags if names_of(tag)))
@@ -41,7 +41,7 @@ class Weihenstephan:
                 nodes.variable(f"{root}/{name}", name, node_id(root), _variant(name, value), what)
 
     async def follow(self, shown: LineSnapshot, heard: datetime, back: bool) -> None:
-        """Bring in what has changed."""
+        """Write the data points that have changed."""
         status, stamp = status_of(shown), self._clock.stamp(shown.tick, heard)
         if status != self._status or back:
             self._status = status
@@ -55,7 +55,7 @@ class Weihenstephan:
 
 
 def _variant(name: str, value: float) -> ua.Variant:
-    """Speeds are real, all else whole."""
+    """Return a data point as a Double if it is a speed, as a UInt32 otherwise."""
     if name.endswith("_Spd"):
         return ua.Variant(float(value), ua.VariantType.Double)
     return ua.Variant(int(value), ua.VariantType.UInt32)

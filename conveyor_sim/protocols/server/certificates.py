@@ -1,13 +1,10 @@
-"""The server's certificate and key: made on first use, in a folder that nobody else can read."""
+"""Certificate and key of the servers: made on first use, in a folder that only this user can read."""
 
 from __future__ import annotations
 
-import fcntl
 import os
 import socket
 import stat
-from collections.abc import Iterator
-from contextlib import contextmanager
 from datetime import datetime, timedelta, timezone
 from ipaddress import ip_address
 from pathlib import Path
@@ -19,48 +16,51 @@ from cryptography.hazmat.primitives.asymmetric import rsa
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.support.files import MB, FileError, read_file
+from conveyor_sim.support.file_lock import locked
+from conveyor_sim.support.files import MB, FileError, read_file, write_file
 
 CERTIFICATE, KEY, TRUSTED = "certificate.der", "key.pem", "trusted"
-"""In the folder. TRUSTED: clients' certificates; while there is one, others are refused."""
+"""Names in the folder. TRUSTED: folder of clients' certificates; if it holds any, all others are refused."""
 
 YEARS = 10
 
+_PATIENCE = 30.0
+"""Wall time to wait for another process that makes the certificate, s."""
+
 
 class CertificateError(ConveyorError):
-    """A certificate or key that can't be made or read."""
+    """Error: a certificate or key can't be made or read."""
 
 
 class Identity(NamedTuple):
-    """What the server proves itself by."""
+    """Certificate and private key of the server."""
 
     certificate: bytes
     """DER."""
     key: bytes
     """PEM."""
     application_uri: str
-    """As the certificate has it."""
+    """Application URI of the certificate."""
     trusted: frozenset[bytes]
-    """Certificates of clients that are let in, DER; empty: any is."""
+    """Accepted certificates of clients, DER; empty: all are accepted."""
 
 
 def default_folder() -> Path:
-    """`conveyor_sim/opcua` in the folder for data of this user ($XDG_DATA_HOME, else ~/.local/share)."""
+    """Return `conveyor_sim/opcua` in the folder for data of this user ($XDG_DATA_HOME, else ~/.local/share)."""
     return Path(os.environ.get("XDG_DATA_HOME") or Path.home() / ".local" / "share") / "conveyor_sim" / "opcua"
 
 
 def identity(folder: Path) -> Identity:
-    """What is in a folder; it is made first where it is missing. Raises CertificateError."""
+    """Return the certificate and key in a folder; make them if they are missing. Raises CertificateError."""
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         if (mode := stat.S_IMODE(folder.stat().st_mode)) & 0o077 or folder.stat().st_uid != os.geteuid():
             raise CertificateError(
-                f"{folder}: mode {mode:o} given, expected a folder of this user's own that nobody else can read "
-                f"(chmod 700)"
+                f"{folder}: mode {mode:o} given, expected a folder that only this user can read (chmod 700)"
             )
         (folder / TRUSTED).mkdir(mode=0o700, exist_ok=True)
         if not (folder / KEY).exists():
-            with _alone(folder):  # the servers of a line start at the same time
+            with locked(folder, _PATIENCE):  # the servers of a line start at the same time
                 if not (folder / KEY).exists():
                     _make(folder)
         trusted = frozenset(_der(path) for path in sorted((folder / TRUSTED).iterdir()) if path.is_file())
@@ -78,17 +78,6 @@ def identity(folder: Path) -> Identity:
     return Identity(certificate, _read(folder / KEY), uri, trusted)
 
 
-@contextmanager
-def _alone(folder: Path) -> Iterator[None]:
-    """Hold the lock of a folder. Wait while another process holds it."""
-    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX)
-        yield
-    finally:
-        os.close(descriptor)
-
-
 def _make(folder: Path) -> None:
     key = rsa.generate_private_key(public_exponent=65537, key_size=2048)
     host = socket.gethostname() or "localhost"
@@ -99,7 +88,8 @@ def _make(folder: Path) -> None:
         *(x509.DNSName(known) for known in dict.fromkeys((host, "localhost"))),
         x509.IPAddress(ip_address("127.0.0.1")),
     ]
-    # OPC 10000-6, 6.2.2: what the certificate of an application has to have.
+    # OPC 10000-6, 6.2.2: certificate of an application. asyncua.crypto.cert_gen was considered: its certificates are
+    # those of an authority (CA:TRUE, keyCertSign), which browsers and users should not trust for a server.
     certificate = (
         x509.CertificateBuilder()
         .subject_name(name)
@@ -131,19 +121,16 @@ def _make(folder: Path) -> None:
         .sign(key, hashes.SHA256())
     )
     pem = key.private_bytes(serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, serialization.NoEncryption())
-    # The key comes last: while it is not there, both are made anew.
+    # The key comes last: if it is missing, both are made again.
     _write(folder / CERTIFICATE, certificate.public_bytes(serialization.Encoding.DER))
     _write(folder / KEY, pem)
 
 
 def _write(path: Path, content: bytes) -> None:
-    unfinished = path.with_name(f".{path.name}.{os.getpid()}.unfinished")
     try:
-        with open(os.open(unfinished, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW, 0o600), "wb") as stream:
-            stream.write(content)
-        os.replace(unfinished, path)
-    finally:
-        unfinished.unlink(missing_ok=True)
+        write_file(path, content, mode=0o600)
+    except FileError as error:
+        raise CertificateError(f"{path}: {error}, expected a folder for certificates") from error
 
 
 def _read(path: Path) -> bytes:

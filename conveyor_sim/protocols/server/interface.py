@@ -9,35 +9,37 @@ from typing import Literal, NamedTuple, Protocol
 from conveyor_sim.errors import ConveyorError
 
 HERE = "127.0.0.1"
-"""Where faces listen unless they are told otherwise: only this machine reaches it."""
+"""Default address of protocol servers: only this machine reaches it."""
 
 Stamps = Literal["wall", "simulated"]
-"""What the times of values are: wall time, or simulated time on the scene's start_time."""
+"""Kind of time stamps: wall time, or simulated time relative to the scene's start_time."""
 
 
 class ServerError(ConveyorError):
-    """A face that can't be."""
+    """Error: a protocol server can't start or go on."""
 
 
 @dataclass(frozen=True)
 class Status:
-    """What a face is doing."""
+    """Activity of a protocol server."""
 
     clients: int
-    """That are connected."""
-    subscriptions: int
-    """Values that they have asked to be told of; 0 where a protocol has no such thing."""
+    """Number of connected clients."""
+    monitored_items: int
+    """Number of monitored items; 0 for protocols without them."""
     writes: int
-    """Requests so far that were passed on to the line: writes, and calls of methods."""
+    """Requests passed on to the line so far: writes, and calls of methods."""
     refused: int
-    """Such requests so far that were not."""
+    """Refused requests of this kind so far."""
     latency: float
-    """s of wall time, the longest since the status was last asked for: from a request to its answer, or from a change
-    of the source to its being shown, whichever took longer; 0 without any."""
+    """Longest latency since the last status, s of wall time: from a request to its answer, or from a change of the tags
+    to its publication; 0 without any.
+    """
     left_out: int = 0
-    """Ticks so far that it never showed, being too far behind: their changes are missed by whoever follows all."""
+    """Ticks so far that it never published, because it was too far behind. Clients that follow all changes miss these.
+    """
     state: str = ""
-    """Of a client of a broker: how it is with the broker, in words that stand in place of its clients."""
+    """State of the connection to a broker, shown in place of the number of clients; empty for servers."""
 
 
 class Health(NamedTuple):
@@ -54,31 +56,31 @@ class Health(NamedTuple):
 
     @property
     def text(self) -> str:
-        """Words for people."""
+        """Words for the user."""
         times = "" if not self.restarts else f", restarted {'once' if self.restarts == 1 else f'{self.restarts} times'}"
         silent = f", no answer for {self.silent:.1f} s" if self.silent else ""
         return f"lag {self.lag * 1e3:.0f} ms{silent}{times}"
 
 
 class ProtocolServer(Protocol):
-    """One protocol at one address. All of it is used in one asyncio loop, which it must not hold up."""
+    """One protocol at one address. All methods run in one asyncio loop, which they must not block."""
 
     @property
     def address(self) -> str:
-        """Where clients find it, as they are told: "modbus://127.0.0.1:5020"."""
+        """Address for clients: "modbus://127.0.0.1:5020"."""
 
     async def start(self) -> None:
-        """Serve from now on. Raises ServerError, in one sentence, if that can't be; nothing is left behind then."""
+        """Serve from now on. Raises ServerError, in one sentence, if that is not possible; it leaves nothing behind."""
 
     async def stop(self) -> None:
-        """End all connections. Harmless if it was not started, or is stopped already."""
+        """End all connections. Do nothing if it was not started or is stopped."""
 
     def status(self) -> Status:
-        """What it is doing."""
+        """Return its activity."""
 
 
-def require_free(face: str, host: str, port: int) -> None:
-    """Raises ServerError, with the reason, which libraries don't tell, if a face of that name can't listen there."""
+def require_free(protocol: str, host: str, port: int) -> None:
+    """Raise ServerError, with the reason that libraries leave out, if a server can't listen at an address."""
     expected = "an address of this machine"
     try:
         family = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0][0]
@@ -90,4 +92,4 @@ def require_free(face: str, host: str, port: int) -> None:
             probe.bind((host, port))
     except (OSError, OverflowError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise ServerError(f"{face}: {host}:{port} can't be listened on ({reason}), expected {expected}") from error
+        raise ServerError(f"{protocol}: {host}:{port} can't be listened on ({reason}), expected {expected}") from error

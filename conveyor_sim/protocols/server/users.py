@@ -1,4 +1,4 @@
-"""Who may do what by OPC UA and on the page: a file with a line for each user, and how passwords are checked by it.
+"""Users of OPC UA and of the page: a file with one line per user, and checks of passwords.
 
     jo:operator:scrypt:<salt>:<hash>
 
@@ -23,12 +23,14 @@ from conveyor_sim.support.files import MB, FileError, read_file, write_file
 from conveyor_sim.support.printable import printable
 
 Role = Literal["viewer", "operator", "engineer", "controller", "test"]
-"""A viewer only reads; the others may do what docs/line.md says of them."""
+"""Role of a user. A viewer only reads; docs/line.md describes the others."""
 
 ROLES: tuple[Role, ...] = get_args(Role)
 
 MOST_WRONG, PERIOD = 10, 60.0
-"""Passwords for one name from one machine, and in how many s of wall time; more are refused unseen until then."""
+"""Wrong passwords for one name from one machine after which more are refused unchecked, until PERIOD s of wall time
+have passed since the first one.
+"""
 
 _LONGEST_NAME, _MOST_KEPT = 40, 1000
 _NAME = re.compile(r"[A-Za-z0-9_.-]{1,40}")
@@ -38,11 +40,11 @@ _LONGEST_PASSWORD = 200
 
 
 class UsersError(ConveyorError):
-    """A file of users that can't be read, or a user that can't be: file, line, what was given and expected."""
+    """Error: a file of users can't be read, or a user is not valid. States file, line, value and expectation."""
 
 
 class User(NamedTuple):
-    """One of them."""
+    """Role and password of one user."""
 
     role: Role
     salt: bytes
@@ -50,12 +52,12 @@ class User(NamedTuple):
 
     @property
     def kind(self) -> WriterKind | None:
-        """As what they act on a line; None: they don't."""
+        """Kind of writer for the line; None: the user only reads."""
         return None if self.role == "viewer" else self.role
 
 
 def new_user(role: Role, password: str) -> User:
-    """A user with a password of at least one character."""
+    """Return a user with a password of 1 to 200 characters. Raises UsersError."""
     if not 1 <= len(password) <= _LONGEST_PASSWORD:
         raise UsersError(f"password: {len(password)} characters given, expected 1 to {_LONGEST_PASSWORD}")
     salt = os.urandom(16)
@@ -63,14 +65,14 @@ def new_user(role: Role, password: str) -> User:
 
 
 def line_of(name: str, user: User) -> str:
-    """The line of the file. Raises UsersError for a name that can't be."""
+    """Return the line of the file. Raises UsersError for an invalid name."""
     if not _NAME.fullmatch(name):
         raise UsersError(f"name: {printable(name)} given, expected 1 to 40 letters, digits, or any of _ . -")
     return f"{name}:{user.role}:{_METHOD}:{b64encode(user.salt).decode()}:{b64encode(user.hash).decode()}"
 
 
 def read_users(path: Path) -> dict[str, User]:
-    """Users by name. Empty lines, and those that begin with #, count for nothing. Raises UsersError."""
+    """Return users by name. Empty lines, and lines that begin with #, are ignored. Raises UsersError."""
     try:
         text = read_file(path, MB).decode()
     except FileError as error:
@@ -101,7 +103,7 @@ def read_users(path: Path) -> dict[str, User]:
 
 
 def keep_user(path: Path, name: str, user: User) -> None:
-    """Add a user to a file, in place of one of the same name; all else in it stays. Raises UsersError."""
+    """Add a user to a file, or replace the one of the same name. Raises UsersError."""
     line, lines = line_of(name, user), []
     if path.exists():
         read_users(path)
@@ -113,10 +115,10 @@ def keep_user(path: Path, name: str, user: User) -> None:
 
 
 def authenticate(users: Mapping[str, User], name: str, password: str) -> User | None:
-    """The user of this name, if that is the password. It takes as long whether there is such a user or not."""
-    user = users.get(name, _NOBODY)
+    """Return the user of a name if the password is right. The time does not show whether there is such a user."""
+    user = users.get(name, _UNKNOWN)
     given = _hash(password[: _LONGEST_PASSWORD + 1], user.salt)
-    return user if hmac.compare_digest(given, user.hash) and user is not _NOBODY else None
+    return user if hmac.compare_digest(given, user.hash) and user is not _UNKNOWN else None
 
 
 class LoginService(Protocol):
@@ -140,11 +142,14 @@ class Logins:
         self.has_users = bool(users)
         self._checking = threading.Lock()
         self._users = users
-        self._wrong: dict[tuple[str, str], tuple[int, float]] = {}  # how often, and s when first, the latest at last
+        self._wrong: dict[
+            tuple[str, str], tuple[int, float]
+        ] = {}  # count, and time of the first, s; ordered by the latest
 
     def enter(self, name: str, password: str, origin: str, now: float) -> User | None:
-        """As `authenticate`; who was wrong too often is not even looked at. origin: the client's machine.
-        now: s of any steady clock.
+        """Return the user, or None: wrong name or password, or too many wrong passwords before, which are not checked.
+
+        origin: the client's machine. now: time of any steady clock, s.
         """
         with self._checking:
             return self._enter(name, password, origin, now)
@@ -169,4 +174,4 @@ def _hash(password: str, salt: bytes) -> bytes:
     return hashlib.scrypt(password.encode(errors="surrogatepass"), salt=salt, n=2**14, r=8, p=1, dklen=_BYTES)
 
 
-_NOBODY = User("viewer", b"\0" * 16, b"\0" * _BYTES)
+_UNKNOWN = User("viewer", b"\0" * 16, b"\0" * _BYTES)

@@ -22,11 +22,11 @@ from conveyor_sim.run.player import Player
 from conveyor_sim.support.printable import SENTENCE, printable
 
 SHORTEST = 0.005
-"""s of wall time between two states that are shown, however fast it is played."""
+"""Shortest wall time between two snapshots, s, however fast the playback is."""
 
 
 class BagTagProvider(LineMirror, AbstractContextManager["BagTagProvider"]):
-    """Played from its start until close(). Only what is played of it is read, by its index."""
+    """Playback from the start of a recording until close(). Only what is played is read, by its index."""
 
     takes_inputs = False
     controls: frozenset[Control] = frozenset({"pause", "resume", "seek", "speed", "loop"})
@@ -34,10 +34,10 @@ class BagTagProvider(LineMirror, AbstractContextManager["BagTagProvider"]):
     def __init__(
         self, path: Path, say: Callable[[str], object], *, speed: float = 1.0, loop: bool = False, paused: bool = False
     ) -> None:
-        """speed: recorded seconds per wall second, 0 for as fast as possible. loop: begin anew at the end.
-        say: called with a sentence for people, by a thread of this source.
+        """Open the recording and start to play it. speed: recorded seconds per wall second, 0 for as fast as possible.
+        loop: start again at the end. say: called with a sentence for the user, by a thread of this provider.
 
-        Raises ConveyorError if it can't be read, or holds nothing that can be shown.
+        Raises ConveyorError if the recording can't be read or has no signals.
         """
         super().__init__()
         self.recording = path
@@ -64,27 +64,27 @@ class BagTagProvider(LineMirror, AbstractContextManager["BagTagProvider"]):
 
     @property
     def past(self) -> TagHistory:
-        """All that it holds."""
+        """History of the recording."""
         return self._past
 
     def give(self, given: Input) -> str:
-        """Refused."""
+        """Refuse."""
         return f"{self._path}: a recording can't be commanded"
 
     def control(self, what: Control, value: float, by: str) -> str:
-        """Ask something of the playback, in the name of somebody. Why that can't be, "" if it will be done."""
+        """Control the playback in the name of `by`. Return the reason for a refusal, "" if the request was accepted."""
         first, last = self._player.span
         if what not in self.controls:
             return f"{what}: expected one of {', '.join(sorted(self.controls))} of a recording"
         if what == "seek" and not first <= value <= last:
             return f"seek: {value:g} given, expected a time of the recording, {first:g} to {last:g} (s)"
         if what == "speed" and not 0.0 <= value <= 1e6:
-            return f"speed: {value:g} given, expected times real time from 0, for as fast as it goes, to 1e6"
+            return f"speed: {value:g} given, expected a factor of real time from 0 (as fast as possible) to 1e6"
         asked = self._calls.request(partial(self._do, what, value))
         return str(asked.exception()) if asked.done() and asked.exception() else ""
 
     def close(self) -> None:
-        """End playing, and close the files."""
+        """Stop the playback and close the files."""
         self._calls.end()
         self._thread.join()
         self._bag.close()
@@ -93,7 +93,7 @@ class BagTagProvider(LineMirror, AbstractContextManager["BagTagProvider"]):
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    # The thread that plays
+    # The playback thread
 
     def _play(self) -> None:
         player = self._player
@@ -114,7 +114,7 @@ class BagTagProvider(LineMirror, AbstractContextManager["BagTagProvider"]):
             self._calls.wait(wait)
 
     def _fail(self, error: Exception) -> None:
-        """Stop there, whatever damage makes of what is decoded; another time of the recording may be sound."""
+        """Pause at damaged data and report why; other parts of the recording may be valid."""
         self._player.pause()
         text = str(error) if isinstance(error, ConveyorError) else f"{type(error).__name__}: {error}"
         reason = printable(text if str(self._path) in text else f"{self._path}: {text}", SENTENCE)
@@ -154,7 +154,7 @@ class BagTagProvider(LineMirror, AbstractContextManager["BagTagProvider"]):
             self._states[message.topic] = message.data
 
     def _bring(self) -> None:
-        """Show what was played since the last time, if anything, and what the playback is doing."""
+        """Publish everything that was played since the last call, and the state of the playback."""
         state = ENDED if self._player.ended else PAUSED if self._player.paused else REPLAYING
         run = RunState(state, "" if state == ENDED else printable(self._path))
         if not self._states and not self._new_events and run == self.shown.run:
@@ -162,7 +162,7 @@ class BagTagProvider(LineMirror, AbstractContextManager["BagTagProvider"]):
         states, self._states = self._states, {}
         events, self._new_events = self._new_events, []
         for topic in STATE_TOPICS:
-            if topic in states and topic != "run_state":  # a playback's own, whatever was recorded
+            if topic in states and topic != "run_state":  # the playback has its own state
                 self.take(topic, self._bag.decode(topic, states[topic]))
                 self.pass_on(topic, states[topic])
         for topic in states.keys() & set(DRAWING_TOPICS):
@@ -176,4 +176,4 @@ class BagTagProvider(LineMirror, AbstractContextManager["BagTagProvider"]):
 
 
 def _nothing(stamp_ns: int, now: float) -> None:
-    """Nobody listens to a clock."""
+    """Ignore the clock, which has no subscribers."""

@@ -1,4 +1,4 @@
-"""In whose hands a device is, as a face sees it at once: the line itself decides at the tick."""
+"""Control mode of devices, as protocol servers check it at once; the line itself decides at the tick."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from conveyor_sim.line.tag import Tag
 from conveyor_sim.protocols.tags.tag_provider import Control, TagProvider
 
 TAKES_NO_INPUT = (ENDED, STOPPED, REPLAYING)
-"""States of a run in which nothing that is given would ever act."""
+"""States of a run in which inputs never take effect."""
 
 MAY_CONTROL: tuple[WriterKind, ...] = ("operator", "engineer", "test")
-"""Who may pause a run, have it go on, and so on."""
+"""Roles that may control a run: pause, resume and so on."""
 
 
 CONTROL_RANGES: Mapping[Control, tuple[float, float]] = {"step": (1.0, 2.0**32 - 1.0), "speed": (0.0, 1e6)}
@@ -24,12 +24,12 @@ CONTROL_RANGES: Mapping[Control, tuple[float, float]] = {"step": (1.0, 2.0**32 -
 
 
 def is_mode(tag: Tag) -> bool:
-    """Whether a tag is the mode of a device that takes commands: who may, puts it into another by writing this."""
+    """Return True if a tag is the control mode of a device. An authorised client changes the mode by writing it."""
     return bool(tag.device) and tag.name == f"{tag.device}/mode"
 
 
 def objection(source: TagProvider, command: Tag, value: float, kind: WriterKind, writer: str) -> str:
-    """Why a command is not taken of a writer, as the line was last; "" if it is."""
+    """Return why a command of a writer would be refused in the latest state of the line; "" if it would not."""
     shown, device = source.shown, command.device
     if kind in PEOPLE and stops(command.name, value):
         return ""

@@ -1,9 +1,9 @@
-"""Lockstep by two tags, for a PLC that is a client of a face: it scans, then says how far the line is to go.
+"""Lockstep by two tags, for a PLC that is a client of a protocol server.
 
-The client reads the inputs of the tick `run/tick`, writes its outputs, and writes `run/target_tick` last: with it, all
-that was written since the one before acts as one set, and the line goes on to that tick. `run/tick` changes only once
-it is reached, and all inputs of it are in place by then. To write the same target again does nothing. So a run has the
-same bits however fast either side is.
+The client reads the inputs of tick `run/tick`, writes its outputs, and writes `run/target_tick` last. All writes since
+the previous target then act as one set, and the line advances to the target. `run/tick` changes only at the target,
+when all inputs of that tick are available. Writing the same target again has no effect. So a run has the same bits
+however fast either side is.
 """
 
 from __future__ import annotations
@@ -20,44 +20,44 @@ if TYPE_CHECKING:
     from conveyor_sim.simulation import Simulation
 
 TICK = f"{RUN}/tick"
-"""Tag: the tick that all other tags are of."""
+"""Tag: tick of the values of all other tags."""
 
 TARGET = f"{RUN}/target_tick"
-"""Tag: to which a client has the line go on."""
+"""Tag: tick to which the line advances."""
 
 MAY_GO_ON: tuple[WriterKind, ...] = ("controller", "test")
-"""Who may say how far a line in lockstep goes."""
+"""Roles that may write the target of a line in lockstep."""
 
 HANDSHAKE = "by handshake"
-"""In whose lockstep such a run is, as it shows itself."""
+"""Owner of the lockstep as the run state shows it."""
 
 FURTHEST = 100_000
-"""Ticks that a target may be ahead."""
+"""Largest number of ticks from the present tick to a target."""
 
 
 def problem(what: Control, value: float, tick: int) -> str:
-    """Why something can't be asked of a line in lockstep that is at a tick; "" if it can."""
+    """Return why a request can't be made of a line in lockstep at a tick; "" if it can."""
     if what != "target":
-        return f"{what}: the line is in lockstep, expected {TARGET} alone"
+        return f"{what}: the line is in lockstep, expected only {TARGET}"
     if not float(value).is_integer() or not 0 <= value <= tick + FURTHEST:
         return f"{TARGET}: {value:g} given, expected a whole number from 0 to {tick + FURTHEST}"
     return ""
 
 
 class HandshakeTagProvider(SteppedTagProvider):
-    """A simulation that one thread steps as far as clients have said."""
+    """Tag provider of a simulation that one thread steps up to the target of the clients."""
 
     controls: frozenset[Control] = frozenset({"target"})
 
     def __init__(self, simulation: Simulation) -> None:
-        """From where it stands."""
+        """Start at the present tick."""
         self._target = simulation.tick
-        self._sets: deque[tuple[int, tuple[Input, ...]]] = deque()  # each with the tick at which it acts
+        self._sets: deque[tuple[int, tuple[Input, ...]]] = deque()  # sets of inputs with their ticks
         self._written = threading.Condition()
         super().__init__(simulation)
 
     def control(self, what: Control, value: float, by: str) -> str:
-        """Take a target; one that is reached, or was given before, changes nothing."""
+        """Set the target. A target that was reached or set before has no effect."""
         if reason := problem(what, value, self._shown.tick):
             return reason
         with self._written:
@@ -69,9 +69,10 @@ class HandshakeTagProvider(SteppedTagProvider):
         return ""
 
     def take(self, patience: float) -> tuple[Input, ...] | None:
-        """What acts at the present tick, once a later one is the target; None: nobody said so within so many seconds.
+        """Return the inputs for the present tick once the target is later; None if it is not after `patience` s of wall
+        time.
 
-        By the thread that steps.
+        Called by the stepping thread.
         """
         tick = self._simulation.tick
         with self._written:
@@ -80,10 +81,10 @@ class HandshakeTagProvider(SteppedTagProvider):
             return self._sets.popleft()[1] if self._sets and self._sets[0][0] <= tick else ()
 
     def before_tick(self) -> None:
-        """Nothing: what waits is taken by `take`."""
+        """Do nothing: `take` returns the waiting inputs."""
 
     def after_tick(self) -> None:
-        """Show the line if the target is reached; clients see no tick in between."""
+        """Take a snapshot at the target only; clients see no tick in between."""
         self._look()
         if self._simulation.tick >= self._target:
             self._show()

@@ -38,23 +38,23 @@ class HoldingService(Protocol):
 
 
 class Holding:
-    """Whose the line is, as far as the clients of one face are concerned. What changes is on record as inputs are."""
+    """Ownership of the line among the clients of one protocol server. Changes are recorded as inputs."""
 
-    def __init__(self, source: TagProvider, face: str) -> None:
-        """face: source of the inputs."""
-        self._source, self._face = source, face
+    def __init__(self, source: TagProvider, protocol: str) -> None:
+        """Start without a holder. protocol: source of the inputs."""
+        self._source, self._protocol = source, protocol
         self._holder = ""
-        self._run_id = ""  # in which it took the line
+        self._run_id = ""  # run in which the holder took the line
         self._leaving = False
-        self._away_until = 0.0  # s of wall time, while the holder may come back after a restart; 0: it is not away
+        self._away_until = 0.0  # end of the wait for the holder after a restart, s of wall time; 0: no wait
 
     @property
     def holder(self) -> str:
-        """Who holds it; empty: nobody."""
-        return self._holder if self._run_id == self._source.shown.run_id else ""  # another run is nobody's
+        """Writer that holds the line; empty: none."""
+        return self._holder if self._run_id == self._source.shown.run_id else ""  # another run has no holder
 
     def take(self, writer: str) -> str:
-        """Have the line be a writer's, from the next tick on. Why that can't be, "" if it is or will be."""
+        """Give a writer the line from the next tick on. Return the reason for a refusal, "" if there is none."""
         holder, shown = self.holder, self._source.shown
         if holder == writer:
             self._leaving, self._away_until = False, 0.0
@@ -97,7 +97,7 @@ class Holding:
             self.look()
 
     def look(self) -> None:
-        """Whoever is to give it up does so, as soon as there is room for that among the inputs."""
+        """Release the line if the holder leaves, as soon as there is room among the inputs."""
         if self._away_until and time.monotonic() > self._away_until:
             self._leaving, self._away_until = True, 0.0
         if self._leaving and not (self.holder and self._is_owner(self._source.shown)):
@@ -106,11 +106,11 @@ class Holding:
             self._leaving, self._holder = False, ""
 
     def _is_owner(self, shown: LineSnapshot) -> bool:
-        """Whether the line is its own, or will be once a tick passes; another may have been faster."""
+        """Return True if the holder owns the line, or will own it after a tick unless another client was faster."""
         return shown.owner in ("", self._holder)
 
     def _give(self, writer: str, operation: str) -> str:
-        return self._source.give(Input(self._face, writer, "controller", operation, (), ()))
+        return self._source.give(Input(self._protocol, writer, "controller", operation, (), ()))
 
 
 def _machine(writer: str) -> str:

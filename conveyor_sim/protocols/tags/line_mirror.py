@@ -1,4 +1,4 @@
-"""`LineMirror`: a line as it is heard of by topics, whatever brings them: a process, a recording, a node."""
+"""`LineMirror`: copy of a line made from its topics, which come from a process, a recording or a node."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from numpy.typing import NDArray
 
-from conveyor_sim.bag import messages
-from conveyor_sim.bag.topics import TOPICS
-from conveyor_sim.bag.typestore import typestore
+from conveyor_sim.bag.messages import encode
+from conveyor_sim.bag.messages.topics import TOPICS
+from conveyor_sim.bag.messages.typestore import typestore
 from conveyor_sim.columns.alarms import AlarmColumns
 from conveyor_sim.columns.events import Event, EventColumns
 from conveyor_sim.columns.image import Image
@@ -31,47 +31,47 @@ if TYPE_CHECKING:
     from conveyor_sim.protocols.tags.tag_history import TagHistory
 
 STATE_TOPICS = ("line", "run_state", "signals", "events", "readback", "alarm_states")
-"""Topics that it takes."""
+"""Topics that update the snapshot."""
 
 DRAWING_TOPICS = ("bottles", "contacts", "belts", "counters", "rail_wear")
-"""Topics that only a page shows; it decodes them if somebody looks."""
+"""Topics for drawings only. They are decoded on demand."""
 
-NOTHING = "nothing has been heard of the line yet"
+NOTHING = "no data of the line have arrived yet"
 
 
 class LineMirrorError(ConveyorError):
-    """A line that can't be shown."""
+    """Error: a line can't be mirrored."""
 
 
 @dataclass(frozen=True)
 class DrawableFrame:
-    """What can be drawn of a line, as it was last."""
+    """Latest data for drawing a line."""
 
     line: Any
-    """The decoded message of topic line."""
+    """Decoded message of topic `line`."""
     tick: int
     at: float
     """Wall time of the tick, s since 1970."""
     signals: NDArray[Any]
-    """As controllers read them."""
+    """Values of all signals as controllers read them."""
     forced: NDArray[Any]
-    """Indices of those that are forced."""
+    """Indices of the forced signals."""
     drawn: Mapping[str, Callable[[], Any]]
-    """What decodes the last message of each of DRAWING_TOPICS that there is; another one is another message."""
+    """Decoders of the latest message by topic of DRAWING_TOPICS. A new message has a new decoder."""
 
 
 class DrawableProvider(TagProvider, Protocol):
-    """A source that can be drawn."""
+    """Tag provider with data for drawings."""
 
     takes_inputs: bool
 
     @property
     def picture(self) -> DrawableFrame:
-        """What is drawn of the line as it was last."""
+        """Latest data for drawing the line."""
 
     @property
     def newest(self) -> Mapping[str, bytes]:
-        """By topic, the last message as it came."""
+        """Latest message by topic, serialized."""
 
     servers: tuple[Health, ...]
     """Health of the protocol servers of the line."""
@@ -80,26 +80,26 @@ class DrawableProvider(TagProvider, Protocol):
 
     @property
     def era(self) -> int:
-        """Number that changes when earlier messages no longer hold."""
+        """Number that changes when earlier messages become invalid."""
 
     def watch(self) -> Callable[[], None]:
-        """Have DRAWING_TOPICS be there, too, from now on; what is returned ends that."""
+        """Start to receive DRAWING_TOPICS. Return a function that ends this."""
 
     def hear(self, heard: Callable[[str, bytes], None]) -> Callable[[], None]:
-        """Have a function called with topic and bytes of each message from now on; what is returned ends that.
+        """Call `heard` with the topic and bytes of each message from now on. Return a function that ends this.
 
-        It must not block, and must not raise.
+        `heard` must not block and must not raise.
         """
 
 
 class LineMirror:
-    """The half of a TagProvider that is read. One thread tells it what came, any may look.
+    """Reading half of a `TagProvider`. One thread updates it, any thread may read it.
 
-    What is taken is shown all at once, by `show`. Time may go back, and another run of the same line may begin.
+    `show` publishes all updates at once. Time may go back, and another run of the same line may begin.
     """
 
     takes_inputs = True
-    """Whether anything that is given may ever act."""
+    """True if inputs may ever take effect."""
     recording: Path | None = None
     """Recording that is played back; None: the line is simulated."""
     _run_id: str
@@ -114,7 +114,7 @@ class LineMirror:
     _released: tuple[str, ...]
 
     def __init__(self) -> None:
-        """Nothing is known."""
+        """Start empty."""
         self._about: LineInfo | None = None
         self._signal_names: Sequence[str] = ()
         self._command_names: Sequence[str] = ()
@@ -122,7 +122,7 @@ class LineMirror:
         self._listeners = Listeners()
         self._events = RecentEvents()
         self._known = threading.Event()
-        self._strange = False  # whether it has become another line
+        self._strange = False  # True if the topics describe another line now
         self._shown = LineSnapshot(0, {}, lost=NOTHING)
         self._picture: DrawableFrame | None = None
         self._watchers = 0
@@ -136,61 +136,61 @@ class LineMirror:
 
     @property
     def about(self) -> LineInfo:
-        """What stays the same. RuntimeError before it is known."""
+        """Constant properties. Raises RuntimeError before they are known."""
         if self._about is None:
             raise RuntimeError("the line is not known yet")
         return self._about
 
     @property
     def shown(self) -> LineSnapshot:
-        """The line as it was last."""
+        """Latest snapshot of the line."""
         return self._shown
 
     @property
     def picture(self) -> DrawableFrame:
-        """The same, for a page. RuntimeError before it is known."""
+        """Latest data for drawing. Raises RuntimeError before there are any."""
         if self._picture is None:
-            raise RuntimeError("nothing has been shown yet")
+            raise RuntimeError("there is no snapshot yet")
         return self._picture
 
     @property
     def newest(self) -> Mapping[str, bytes]:
-        """By topic, the last message as it came."""
+        """Latest message by topic, serialized."""
         return self._newest
 
     @property
     def era(self) -> int:
-        """Number that changes when earlier messages no longer hold: after a reset, or a seek in a recording."""
+        """Number that changes when earlier messages become invalid: after a reset, or a seek in a recording."""
         return self._era
 
     def watch(self) -> Callable[[], None]:
-        """Have DRAWING_TOPICS be there, too, from now on, if that costs anything; what is returned ends that."""
+        """Start to receive DRAWING_TOPICS where they are sent on demand only. Return a function that ends this."""
         self._count_watchers(1)
         return lambda: self._count_watchers(-1)
 
     @property
     def past(self) -> TagHistory | None:
-        """Nobody knows."""
+        """No history is available."""
         return None
 
     def hear(self, heard: Callable[[str, bytes], None]) -> Callable[[], None]:
-        """Have a function called with topic and bytes of each message from now on; what is returned ends that."""
+        """Call `heard` with the topic and bytes of each message from now on. Return a function that ends this."""
         return self._hearers.add(heard)
 
     def events(self, after: int) -> tuple[int, Sequence[Event]]:
-        """How many events were heard of, and those after so many."""
+        """Return the number of events so far, and the events after the first `after`."""
         return self._events.after(after)
 
     def listen(self, heard: Callable[[], None]) -> Callable[[], None]:
-        """Have a function called whenever something new is shown; what is returned ends that."""
+        """Call `heard` after each change of `shown`. Return a function that ends this."""
         return self._listeners.add(heard)
 
     def wait(self, seconds: float) -> bool:
-        """Until the line is known and there is something to show, or so long, s of wall time; whether it is."""
+        """Block until there is a first snapshot, or `seconds` (wall time) have passed. Return True if there is one."""
         return self._known.wait(seconds)
 
     def _objection(self, given: Input) -> str:
-        """Why an input can't be handed on to the line as it is, "" if it can."""
+        """Return the reason why an input can't be passed on to the line, "" if it can."""
         shown = self.shown
         if shown.lost:
             return shown.lost
@@ -198,7 +198,7 @@ class LineMirror:
             return f"the run has {shown.run.text}, expected a reset"
         return TOO_LARGE if size_of(given) > MESSAGE_BYTES else ""
 
-    # By the thread that hears
+    # Called by the thread that receives messages
 
     def take(self, topic: str, message: Any) -> None:
         """Take a decoded message of one of STATE_TOPICS.
@@ -213,7 +213,7 @@ class LineMirror:
             case "run_state":
                 self._run = TOPICS[topic].unpack(message)
             case "signals":
-                self._tick, self._image = int(message.tick), messages.to_image(message)
+                self._tick, self._image = int(message.tick), encode.to_image(message)
             case "readback":
                 self._read_back = TOPICS[topic].unpack(message)
             case "alarm_states":
@@ -222,24 +222,24 @@ class LineMirror:
                 self._take_events(TOPICS[topic].unpack(message))
 
     def pass_on(self, topic: str, data: bytes) -> None:
-        """A message as it came, of one of STATE_TOPICS and DRAWING_TOPICS."""
+        """Notify listeners of a serialized message of one of STATE_TOPICS and DRAWING_TOPICS."""
         self._newest[topic] = data
         self._hearers.tell(topic, data)
 
     def keep(self, topic: str, decode: Callable[[], Any]) -> None:
-        """What decodes a message of one of DRAWING_TOPICS, in any thread."""
+        """Store the decoder of a message of one of DRAWING_TOPICS. It may be called by any thread."""
         self._drawn[topic] = decode
 
     def state_run(self, run: RunState) -> None:
-        """What the run is doing, where no message says so."""
+        """Set the state of the run where no message has it."""
         self._run = run
 
     def forget(self) -> None:
-        """Something else follows than what would have: time has been gone through."""
+        """Discard the present state, because time in the recording jumps."""
         self._forget(self._run_id)
 
     def show(self, at: float | None = None) -> None:
-        """Show what was taken, which is here again if it was lost; nothing before there are signals.
+        """Publish a snapshot of all updates, unless no signals have come yet. It is no longer marked as lost.
 
         at: wall time of its tick, s since 1970; None: now.
         """
@@ -267,13 +267,13 @@ class LineMirror:
         self._listeners.tell()
 
     def lose(self, reason: str) -> None:
-        """Nothing newer will come before it is back; what was shown last stays."""
+        """Mark the line as lost, for a reason. The latest snapshot stays."""
         if self._shown.lost != reason:
             self._shown = replace(self._shown, lost=reason)
             self._listeners.tell()
 
     def add(self, event: Event) -> None:
-        """Something happened that no message tells of."""
+        """Add an event that no message has."""
         self._events.add([event])
 
     def _count_watchers(self, more: int) -> None:
@@ -284,7 +284,7 @@ class LineMirror:
                 self._watched(self._watchers > 0)
 
     def _watched(self, on: bool) -> None:
-        """Somebody looks, or nobody any more."""
+        """Start or stop receiving DRAWING_TOPICS."""
 
     def _forget(self, run_id: str) -> None:
         self._newest = {topic: data for topic, data in self._newest.items() if topic == "line"}
@@ -304,7 +304,7 @@ class LineMirror:
             self._forget(message.run_id)
             raise LineMirrorError(
                 f"{about.name}: another line than before, or with other tags; expected {self._about.name} as it was: "
-                "start serving anew"
+                "restart serving"
             )
         if message.run_id != self._run_id or self._about is None:
             self._forget(message.run_id)
@@ -332,7 +332,7 @@ class LineMirror:
         self._events.add(events)
 
     def _commands(self) -> list[float]:
-        """Of all commands: as they were read back, or as they are before anybody sets them."""
+        """Return the values of all commands: read back, or initial before the first read-back."""
         if self._read_back is None:
             return self._initial
         values: list[float] = self._read_back.value.tolist()
@@ -345,7 +345,10 @@ def decoded(topic: str, data: bytes) -> Any:
 
 
 def line_info(message: Any) -> LineInfo:
-    """What a message of topic `line` tells of its tags. Raises LineMirrorError for one from before there were tags."""
+    """Return the constant properties from a message of topic `line`.
+
+    Raises LineMirrorError for a recording from before there were tags.
+    """
     if not len(getattr(message, "tag_names", ())):
         raise LineMirrorError(
             f"{message.scene_name}: recorded without tags, by an older version; expected a newer recording"
@@ -382,7 +385,7 @@ def _tag(
     device: str,
     device_class: str,
 ) -> Tag:
-    said = {int(number): text for number, text in _TEXT.findall(texts)}
+    named = {int(number): text for number, text in _TEXT.findall(texts)}
     return Tag(
         name,
         kind,
@@ -393,7 +396,7 @@ def _tag(
         high,
         initial,
         nominal or None,
-        said,
+        named,
         device=device,
         device_class=device_class,
     )

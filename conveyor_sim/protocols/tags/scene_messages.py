@@ -1,4 +1,4 @@
-"""What a `SceneTagProvider` and its process send each other."""
+"""Messages between a `SceneTagProvider` and its process."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ from conveyor_sim.protocols.tags.tag_provider import Control
 from conveyor_sim.scene import Scene
 
 PATIENCE = 20.0
-"""s of wall time for an orderly end once nobody is there any more."""
+"""Wall time for an orderly end after the other process has gone, s."""
 
 
 @dataclass(frozen=True)
 class SceneTask:
-    """What the process is to do, the first thing that it is sent."""
+    """Task of the process; its first message."""
 
     scene: Scene
     record: Path | None
-    """Folder; None: not recorded."""
+    """Folder of the recordings; None: not recorded."""
     number: int
-    """Of the first run, by which its folder is named, as those after resets are."""
+    """Number of the first run; it and those after resets number the folders of the recordings."""
     real_time_factor: float
     threads: int | None
     playing: bool = True
-    """Whether it runs at once, and does not wait to be resumed."""
+    """True if the run starts at once, False if it starts paused."""
     lockstep: bool = False
-    """Whether it goes as far as it is told, and no further; `playing` counts for nothing then."""
+    """True if the run advances only to the targets that clients set; `playing` then has no effect."""
 
 
 class InputRequest(NamedTuple):
@@ -39,56 +39,56 @@ class InputRequest(NamedTuple):
 
 
 class ControlRequest(NamedTuple):
-    """Sent to the process: something to do with the run."""
+    """Sent to the process: a request to control the run."""
 
     what: Control
     value: float
     by: str
-    """Empty: nobody has to be told."""
+    """Requester, for the log; empty: the request is not logged."""
 
 
 class TargetRequest(NamedTuple):
-    """Sent to a process in lockstep: a tick to go to once the one before is reached, and what acts as it sets off."""
+    """Sent to a process in lockstep: the next target, and the inputs that act when the line leaves the previous one."""
 
     target: int
     inputs: Sequence[Input]
 
 
 class VariablesRequest(NamedTuple):
-    """Sent to the process: what a controller's own variables are, to be recorded."""
+    """Sent to the process: internal variables of a controller, to be recorded."""
 
     names: Sequence[str]
     values: Sequence[float]
 
 
 class DrawingRequest(NamedTuple):
-    """Sent to the process: whether what is drawn is to be copied, too."""
+    """Sent to the process: request to start or stop sending DRAWING_TOPICS."""
 
     on: bool
 
 
-class LineCopy(NamedTuple):
-    """Sent by the process: serialized messages, and how far it is with inputs."""
+class LineUpdate(NamedTuple):
+    """Sent by the process: serialized messages, and the progress with inputs."""
 
     states: Mapping[str, bytes]
-    """By topic, the newest."""
+    """Newest message by topic."""
     events: Sequence[bytes]
     handed: int
-    """Inputs that have reached the stepper so far."""
+    """Number of inputs that have reached the stepper so far."""
     waiting: int
-    """Of these, those that no tick has taken yet."""
+    """Number of these inputs that no tick has taken yet."""
     at: float
-    """Wall time of what it shows, s since 1970."""
+    """Wall time of the messages, s since 1970."""
 
 
 class UserMessage(NamedTuple):
-    """Sent by the process: a sentence for people."""
+    """Sent by the process: a sentence for the user."""
 
     text: str
     bad: bool = False
 
 
 class SimulationFailed(NamedTuple):
-    """Sent by the process, the last thing: why it can't go on."""
+    """Last message of the process: the reason why it can't go on."""
 
     reason: str

@@ -1,7 +1,7 @@
 """Process that simulates a scene for a `SceneTagProvider`: it steps, records and sends copies of the messages.
 
-The stepping thread only leaves copies behind; another one sends them, the newest of each. So whoever receives them,
-slowly or not at all, holds up no tick and fills no memory.
+The stepping thread only stores copies; another thread sends the newest of each topic. So a slow receiver delays no tick
+and fills no memory.
 """
 
 from __future__ import annotations
@@ -17,13 +17,12 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from conveyor_sim.bag.folder import bag_folder
-from conveyor_sim.bag.messages import Header
-from conveyor_sim.bag.topics import TOPICS
-from conveyor_sim.bag.typestore import default_distro
+from conveyor_sim.bag.messages.encode import Header
+from conveyor_sim.bag.messages.topics import TOPICS
+from conveyor_sim.bag.messages.typestore import default_distro
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.commands.inputs import SET
 from conveyor_sim.page.watch import with_forces
-from conveyor_sim.protocols.tags.child import pipes_of_child
 from conveyor_sim.protocols.tags.handshake import HANDSHAKE
 from conveyor_sim.protocols.tags.line_mirror import DRAWING_TOPICS, STATE_TOPICS
 from conveyor_sim.protocols.tags.scene_messages import (
@@ -31,7 +30,7 @@ from conveyor_sim.protocols.tags.scene_messages import (
     ControlRequest,
     DrawingRequest,
     InputRequest,
-    LineCopy,
+    LineUpdate,
     SceneTask,
     SimulationFailed,
     TargetRequest,
@@ -45,22 +44,25 @@ from conveyor_sim.run.lockstep import Refused
 from conveyor_sim.run.session import Session
 from conveyor_sim.run.stepper import Stepper
 from conveyor_sim.simulation import Simulation
+from conveyor_sim.support.child_process import pipes_of_child
 from conveyor_sim.support.stop_request import StopRequest
 
 SHORTEST = 0.005
-"""s of wall time between two copies: twice as often as a line in real time has ticks."""
+"""Shortest wall time between two copies, s: half a tick of a line in real time."""
 
 LIFE_SIGN = 0.5
-"""s of wall time after which a copy is sent though nothing is new, as long as the stepping thread is alive."""
+"""Wall time after which a copy is sent without news, s, while the stepping thread is alive."""
 
 PICTURES = 0.02
-"""s of wall time from one picture to the next, at least, while somebody looks."""
+"""Shortest wall time between two frames for drawing, s."""
 
 SHARE = 0.05
-"""Of the stepping thread's time that pictures take, at most."""
+"""Largest share of the stepping thread's time for frames."""
 
 TAKEN = frozenset({"bottles", "contacts", "belts"})
-"""Of DRAWING_TOPICS, what a picture is taken of, whatever the scene's rates; the others come as they are output."""
+"""Topics of a frame for drawing, independent of the output rates of the scene; others of DRAWING_TOPICS come at their
+rates.
+"""
 
 MOST_NOTES = 100
 
@@ -68,13 +70,13 @@ FRAME = "world"
 
 
 class Copies:
-    """A sink whose messages are sent by a thread of its own."""
+    """Sink whose messages a separate thread sends."""
 
     def __init__(self, pipe: Connection, shortest: float) -> None:
-        """It sends from now on. shortest: s of wall time between two copies, in which it makes one of many."""
+        """Start sending. shortest: wall time between two copies, s; messages of that time are merged into one copy."""
         self._pipe, self._shortest = pipe, shortest
         self.watched = False
-        """Whether somebody looks at what is drawn."""
+        """True if frames for drawing are requested."""
         self._now: dict[str, bytes] = {}
         self._now_events: deque[bytes] = deque(maxlen=MOST_EVENTS)
         self._states: dict[str, bytes] = {}
@@ -89,25 +91,25 @@ class Copies:
         self._thread.start()
 
     def wants(self, topic: str) -> bool:
-        """What faces show; signals are theirs at every tick, whatever the scene's rate."""
+        """Return True for topics of protocol servers, except signals, which they get at every tick."""
         if topic in DRAWING_TOPICS:
             return self.watched and topic not in TAKEN
         return topic in STATE_TOPICS and topic != "signals"
 
     @property
     def sent(self) -> bool:
-        """Whether nothing waits to be sent."""
+        """True if all copies were sent."""
         return not self._new
 
     def write(self, topic: str, data: bytes, stamp_ns: int) -> None:
-        """Keep one message until its tick is whole. By the stepping thread."""
+        """Store one message until its tick is complete. Called by the stepping thread."""
         if topic == "events":
             self._now_events.append(data)
         else:
             self._now[topic] = data
 
     def cut(self, handed: int, waiting: int) -> None:
-        """What was written since the last time belongs together; it may be sent. By the stepping thread."""
+        """Release the messages since the last call as one copy. Called by the stepping thread."""
         counts, now = (handed, waiting), time.monotonic()
         with self._wake:
             if "line" in self._now:  # another run
@@ -121,34 +123,34 @@ class Copies:
         self._now_events.clear()
 
     def live(self) -> None:
-        """Nothing is to be shown yet, but it is at work. By the stepping thread."""
+        """Have a copy sent as a life sign if none was sent for long. Called by the stepping thread."""
         with self._wake:
             if time.monotonic() > self._sent + LIFE_SIGN:
                 self._new = True
                 self._wake.notify()
 
     def tell(self, other: UserMessage | SimulationFailed) -> None:
-        """Send something else. From any thread."""
+        """Send another message. May be called by any thread."""
         with self._wake:
             self._others.append(other)
             self._wake.notify()
 
     def close(self) -> None:
-        """Return once all was sent, or nobody takes it."""
+        """Return once everything was sent, or the receiver has gone."""
         with self._wake:
             self._closed = True
             self._wake.notify()
         self._thread.join(PATIENCE)
 
     def _send(self) -> None:
-        with suppress(OSError):  # nobody is there any more
+        with suppress(OSError):  # the receiver has gone
             while True:
                 with self._wake:
                     while not (self._new or self._others or self._closed):
                         self._wake.wait()
                     done = self._closed
                     others = list(self._others)
-                    copy = LineCopy(self._states, list(self._events), *self._counts, self._at)
+                    copy = LineUpdate(self._states, list(self._events), *self._counts, self._at)
                     self._states, self._new, self._sent = {}, False, time.monotonic()
                     self._events.clear()
                     self._others.clear()
@@ -161,7 +163,7 @@ class Copies:
 
 
 class _Log:
-    """Of the stepper: notes."""
+    """Log of the stepper, sent to the parent."""
 
     def __init__(self, copies: Copies) -> None:
         self._copies = copies
@@ -176,7 +178,7 @@ class _Log:
 
 
 class _Process:
-    """One run after another, until the pipe ends."""
+    """Runs, one after another, until the pipe ends."""
 
     def __init__(self, pipe: Connection, task: SceneTask, stop: StopRequest) -> None:
         self._pipe, self._task, self._stop = pipe, task, stop
@@ -185,12 +187,12 @@ class _Process:
         self._stepper: Stepper | None = None
         self._handed = 0
         self._goals: deque[TargetRequest] = deque()
-        self._goal: TargetRequest | None = None  # where the line is on its way to
-        self._shown = self._pictured = ("", -1)  # run and tick of the signals, and the picture, that were copied last
+        self._goal: TargetRequest | None = None  # target that the line is advancing to
+        self._shown = self._pictured = ("", -1)  # run and tick of the latest copied signals and frame
         self._next_picture = 0.0  # s of wall time
 
     def run(self) -> None:
-        """Until somebody asks for the end."""
+        """Run until the end is requested."""
         threading.Thread(target=self._listen, name="requests", daemon=True).start()
         try:
             self._compilation.run()
@@ -230,7 +232,7 @@ class _Process:
             return
         simulation = stepper.simulation
         if self._goal is not None and simulation.tick < self._goal.target and not stepper.standstill:
-            self._copies.live()  # nobody sees a tick before the target
+            self._copies.live()  # ticks before the target are not shown
             return
         if self._shown != (now := (stepper.run_id, simulation.tick)):
             self._shown = now
@@ -241,7 +243,7 @@ class _Process:
         self._copies.cut(self._handed, stepper.inbox.counts.waiting)
 
     def _take_picture(self, simulation: Simulation, now: tuple[str, int]) -> None:
-        """If it is time for one: what is drawn, as topics have it."""
+        """Write a frame for drawing as messages of topics, if the time for one has come."""
         began = time.monotonic()
         if began < self._next_picture:
             return
@@ -259,7 +261,7 @@ class _Process:
         self._stop.request()
 
     def _listen(self) -> None:
-        """Do what is sent; at None, or the end of the pipe by the parent's death, end in order, or else at once."""
+        """Carry out requests. At None, or the end of the pipe by the parent's death, end in order within PATIENCE."""
         with suppress(EOFError, OSError):
             while (request := self._pipe.recv()) is not None:
                 self._do(request)
@@ -274,7 +276,7 @@ class _Process:
             self._copies.watched = request.on
             return
         stepper = self._stepper
-        if stepper is None:  # nobody knows the line yet
+        if stepper is None:  # the line is not known yet
             return
         if isinstance(request, InputRequest):
             if request.given.operation == SET:  # commands are counted
@@ -300,22 +302,22 @@ class _Process:
 
         def done(future: Future[Any]) -> None:
             error = future.exception()
-            told = f"{what}, asked for by {by}"
+            text = f"{what}, requested by {by}"
             if error is not None:
-                self._copies.tell(UserMessage(f"{told}, refused: {error}", bad=True))
+                self._copies.tell(UserMessage(f"{text}, refused: {error}", bad=True))
             elif by:
-                self._copies.tell(UserMessage(told))
+                self._copies.tell(UserMessage(text))
 
         stepper.call(todo[what]).add_done_callback(done)
 
     def _set_off(self) -> None:
-        """Towards the next target, once the one before is reached. By the stepping thread."""
+        """Advance to the next target once the previous one is reached. Called by the stepping thread."""
         if (stepper := self._stepper) is None or self._goal is not None or not self._goals:
             return
         goal = self._goals.popleft()
         try:
             reached = stepper.step(goal.target - stepper.simulation.tick)
-        except Refused:  # it stands for good, and its state says why
+        except Refused:  # the run has ended, and its state has the reason
             return
         self._goal = goal
         for given in goal.inputs:
@@ -333,11 +335,11 @@ class _Process:
 
 
 def main() -> None:
-    """Be that process; the argument is the descriptor of the pipe."""
+    """Run the process. Its argument is the descriptor of the pipe."""
     (pipe,) = pipes_of_child()
     with StopRequest() as stop:
         try:
             task = pipe.recv()
-        except EOFError:  # the parent was interrupted before it could say
+        except EOFError:  # the parent was interrupted before it sent the task
             return
         _Process(pipe, task, stop).run()

@@ -1,4 +1,4 @@
-"""`SceneTagProvider`: a scene, simulated by a process of its own, as a tag source."""
+"""`SceneTagProvider`: tags of a scene that a separate process simulates."""
 
 from __future__ import annotations
 
@@ -19,7 +19,6 @@ from conveyor_sim.bag.folder import bag_folder
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.commands.inputs import Input
 from conveyor_sim.line.run_state import ENDED, PAUSED, STOPPED
-from conveyor_sim.protocols.tags.child import start_child
 from conveyor_sim.protocols.tags.handshake import TARGET, problem
 from conveyor_sim.protocols.tags.line_mirror import DRAWING_TOPICS, STATE_TOPICS, LineMirror, decoded
 from conveyor_sim.protocols.tags.scene_messages import (
@@ -27,7 +26,7 @@ from conveyor_sim.protocols.tags.scene_messages import (
     ControlRequest,
     DrawingRequest,
     InputRequest,
-    LineCopy,
+    LineUpdate,
     SceneTask,
     SimulationFailed,
     TargetRequest,
@@ -35,36 +34,36 @@ from conveyor_sim.protocols.tags.scene_messages import (
     VariablesRequest,
 )
 from conveyor_sim.protocols.tags.tag_provider import MOST_WAITING, Control
-from conveyor_sim.support.child_process import how_it_ended
+from conveyor_sim.support.child_process import how_it_ended, start_python
 
 RUNNING_FREE: frozenset[Control] = frozenset({"pause", "resume", "step", "reset", "speed"})
 IN_LOCKSTEP: frozenset[Control] = frozenset({"target"})
 
 SILENCE = 5.0
-"""s of wall time without a sign of life after which what is shown is stale."""
+"""Wall time without a message after which the line counts as lost, s."""
 
 LOOK = 0.5
-"""s of wall time between two looks at that."""
+"""Wall time between two checks of that, s."""
 
 ENDED_HERE = "serving has ended"
 
 
 class SceneTagProvider(LineMirror, AbstractContextManager["SceneTagProvider"]):
-    """Simulated from its start until close(). If its process dies, another one begins the scene anew."""
+    """Simulation of a scene until close(). If its process dies, another one starts the scene again."""
 
     def __init__(self, task: SceneTask, say: Callable[[str], object]) -> None:
-        """say: called with a sentence whenever there is something to tell people, by a thread of this source.
+        """Start the process and return at once; `wait_for_line` waits for the line.
 
-        It returns at once; `wait_for_line` says whether it has come to anything.
+        say: called with a sentence for the user, by a thread of this provider.
         """
         super().__init__()
         self._task, self._say = task, say
         self._closing = False
-        self._failure = ""  # why there is nothing to wait for
+        self._failure = ""  # reason why the line can't start
         self._lock = threading.Lock()
         self._given = self._handed = self._waiting = 0
-        self._target = 0  # in lockstep: up to which tick it goes
-        self._set: list[Input] = []  # that acts with the next target
+        self._target = 0  # target of a line in lockstep
+        self._set: list[Input] = []  # inputs for the next target
         self._requests: SimpleQueue[
             SceneTask | InputRequest | TargetRequest | ControlRequest | VariablesRequest | DrawingRequest | None
         ] = SimpleQueue()
@@ -74,9 +73,9 @@ class SceneTagProvider(LineMirror, AbstractContextManager["SceneTagProvider"]):
         self._thread.start()
 
     def wait_for_line(self, given_up: Callable[[], bool] = lambda: False) -> bool:
-        """Return once its tags are known, which takes as long as its kernels take to compile; whether they are.
+        """Wait until the tags are known, which includes the time to compile kernels. Return True if they are.
 
-        given_up: asked now and then whether it is still waited for. Raises ConveyorError if it comes to nothing.
+        given_up: called repeatedly; if it returns True, the wait ends. Raises ConveyorError if the line can't start.
         """
         while not self.wait(LOOK):
             if self._failure:
@@ -87,27 +86,28 @@ class SceneTagProvider(LineMirror, AbstractContextManager["SceneTagProvider"]):
 
     @property
     def controls(self) -> frozenset[Control]:
-        """What `control` can do here."""
+        """Requests that `control` accepts."""
         return IN_LOCKSTEP if self._task.lockstep else RUNNING_FREE
 
     @property
     def pid(self) -> int:
-        """The process that simulates. RuntimeError if there is none."""
+        """ID of the process that simulates. Raises RuntimeError if there is none."""
         if self._process is None:
             raise RuntimeError("no process")
         return self._process.pid
 
     @property
     def recordings(self) -> list[Path]:
-        """The folders of those that there are so far, one for each run."""
+        """Folders of the recordings so far, one for each run."""
         found: list[Path] = []
         while (folder := bag_folder(self._task.record, len(found))) and folder.is_dir() and any(folder.iterdir()):
             found.append(folder)
         return found
 
     def give(self, given: Input) -> str:
-        """Have an input judged and applied as the next tick begins, in lockstep with the next target. Why it can't wait
-        for that, "" if it does.
+        """Queue an input for the next tick, or in lockstep for the next target.
+
+        Return the reason for a refusal, "" if it was queued.
         """
         if reason := self._objection(given):
             return reason
@@ -124,7 +124,7 @@ class SceneTagProvider(LineMirror, AbstractContextManager["SceneTagProvider"]):
         return ""
 
     def control(self, what: Control, value: float, by: str) -> str:
-        """Ask something of the run, in the name of somebody. Why that can't be, "" if it will be done."""
+        """Control the run in the name of `by`. Return the reason for a refusal, "" if the request was accepted."""
         shown = self.shown
         if self._task.lockstep:
             return self._go(what, value)
@@ -139,17 +139,17 @@ class SceneTagProvider(LineMirror, AbstractContextManager["SceneTagProvider"]):
         if what == "step" and not (value >= 1.0 and float(value).is_integer()):
             return f"step: {value:g} given, expected a whole number of ticks of at least 1"
         if what == "speed" and not 0.0 <= value <= 1e6:
-            return f"speed: {value:g} given, expected times real time from 0, for as fast as it goes, to 1e6"
+            return f"speed: {value:g} given, expected a factor of real time from 0 (as fast as possible) to 1e6"
         with self._lock:
-            if self._requests.qsize() >= 2 * MOST_WAITING:  # beside inputs, which may wait as long as it is paused
+            if self._requests.qsize() >= 2 * MOST_WAITING:  # inputs may also wait, while the run is paused
                 return f"{MOST_WAITING} requests wait already"
             if what in ("pause", "resume"):
-                self._task = replace(self._task, playing=what == "resume")  # of one that begins it anew, too
+                self._task = replace(self._task, playing=what == "resume")  # also after a restart of the process
             self._requests.put(ControlRequest(what, value, by))
         return ""
 
     def _go(self, what: Control, value: float) -> str:
-        """Take a target with all that was given before it; one that was given before changes nothing."""
+        """Set the target together with the inputs before it. A target that was set before has no effect."""
         shown, last = self.shown, self._task.scene.duration_ticks
         if reason := problem(what, value, shown.tick) or shown.lost:
             return reason
@@ -165,22 +165,22 @@ class SceneTagProvider(LineMirror, AbstractContextManager["SceneTagProvider"]):
         return ""
 
     def observe(self, values: Mapping[str, float]) -> None:
-        """Have a controller's own variables recorded with the present tick, by name. Where it is far behind, they are
-        left out.
+        """Record internal variables of a controller, by name, with the present tick. They are dropped if the process is
+        far behind.
         """
         with self._lock:
             if self._requests.qsize() < MOST_WAITING:
                 self._requests.put(VariablesRequest(tuple(values), tuple(values.values())))
 
     def discard(self) -> None:
-        """Leave no recording of a line that no tick has passed of. Once it is closed."""
+        """Delete the recording of a line that has not passed a tick. Call it after close()."""
         for folder in self.recordings if self.shown.tick == 0 else ():
             for file in folder.iterdir():
                 file.unlink()
             folder.rmdir()
 
     def close(self) -> None:
-        """End the simulation in order, and its recording."""
+        """End the simulation and its recording in order."""
         self._closing = True
         self._end_process()
         self._thread.join()
@@ -208,26 +208,26 @@ class SceneTagProvider(LineMirror, AbstractContextManager["SceneTagProvider"]):
             self._process.kill()
             self._process.wait()
 
-    # The thread that hears
+    # The thread that receives messages
 
     def _supervise(self) -> None:
         while not self._closing:
             try:
                 reason = self._simulate()
-            except Exception as error:  # whatever it is, nothing may go on looking as if it were there
+            except Exception as error:  # the line must not look alive after any error
                 reason = str(error) if isinstance(error, ConveyorError) else f"{type(error).__name__}: {error}"
                 self._begun = False
                 self._kill()
             self.lose(reason)
             if self._closing or not self._begun:
                 self._failure = reason
-                if self._about is not None and not self._closing:  # else `wait_for_line` says so
-                    self._say(f"{reason}; it is not begun anew again")
+                if self._about is not None and not self._closing:  # otherwise `wait_for_line` raises it
+                    self._say(f"{reason}; the scene is not restarted again")
                 return
-            self._say(f"{reason}; the scene begins anew")
+            self._say(f"{reason}; the scene is restarted")
 
     def _simulate(self) -> str:
-        """Let a process run until it ends; why it did."""
+        """Run one process until it ends. Return the reason."""
         self._begun, failure = False, ""
         here, there = Pipe()
         with here, there:
@@ -239,7 +239,7 @@ class SceneTagProvider(LineMirror, AbstractContextManager["SceneTagProvider"]):
                 self._requests = SimpleQueue()
                 self._requests.put(replace(self._task, number=len(self.recordings)))
                 self._requests.put(DrawingRequest(self._watchers > 0))
-                self._process = process = start_child("conveyor_sim.protocols.tags.scene_process", there)
+                self._process = process = start_python("conveyor_sim.protocols.tags.scene_process", there)
             there.close()
             threading.Thread(target=_pass_on, args=(self._requests, here), name="requests", daemon=True).start()
             with suppress(EOFError, OSError):
@@ -254,16 +254,16 @@ class SceneTagProvider(LineMirror, AbstractContextManager["SceneTagProvider"]):
         return f"the process that simulates {self._task.scene.name} {how_it_ended(code)}"
 
     def _hear(self, pipe: Connection) -> str:
-        """What it sends until it fails, and why that was; EOFError when it ends otherwise."""
+        """Process messages until the process reports a failure, and return that. Raises EOFError at its end."""
         heard = time.monotonic()
         while True:
             if not pipe.poll(LOOK):
                 if self._begun and time.monotonic() > heard + SILENCE:
-                    self.lose(f"nothing was heard of the simulation for {SILENCE:g} s")
+                    self.lose(f"no message of the simulation for {SILENCE:g} s")
                 continue
             message, heard = pipe.recv(), time.monotonic()
             match message:
-                case LineCopy():
+                case LineUpdate():
                     self._take_copy(message)
                 case UserMessage():
                     if message.bad or not self._closing:
@@ -271,7 +271,7 @@ class SceneTagProvider(LineMirror, AbstractContextManager["SceneTagProvider"]):
                 case SimulationFailed():
                     return message.reason
 
-    def _take_copy(self, copy: LineCopy) -> None:
+    def _take_copy(self, copy: LineUpdate) -> None:
         for topic in STATE_TOPICS:
             if (data := copy.states.get(topic)) is not None:
                 self.take(topic, decoded(topic, data))
@@ -291,7 +291,7 @@ class SceneTagProvider(LineMirror, AbstractContextManager["SceneTagProvider"]):
 
 
 def _pass_on(requests: SimpleQueue[Any], pipe: Connection) -> None:
-    """What is asked of the process, the last of it None; it may not read."""
+    """Send requests to the process, which may not read; None is the last one."""
     with suppress(OSError):
         while True:
             request = requests.get()

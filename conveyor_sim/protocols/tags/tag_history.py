@@ -1,4 +1,4 @@
-"""`TagHistory`: what tags of a recording were, read from its files when somebody asks."""
+"""`TagHistory`: values of the tags of a recording, read from its files on request."""
 
 from __future__ import annotations
 
@@ -8,29 +8,29 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from conveyor_sim.bag import messages
+from conveyor_sim.bag.messages import encode
+from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.bag.reader import open_bag
-from conveyor_sim.bag.topics import TOPICS
 
 MOST_READ = 20_000
-"""Messages that are looked at for one answer; whoever wants more goes on from there."""
+"""Largest number of messages read for one answer; the caller continues from the returned tick."""
 
 WINDOW = 1000
-"""Ticks that are read together."""
+"""Number of ticks that are read together."""
 
 
 class TagSample(NamedTuple):
-    """A value, and since which tick."""
+    """Value, and the tick at which it began."""
 
     tick: int
     value: float
 
 
 class TagHistory:
-    """Of one bag. Any thread may ask; one is answered at a time."""
+    """History of one bag. Any thread may call it; one call is answered at a time."""
 
     def __init__(self, path: Path) -> None:
-        """Raises BagError."""
+        """Open the bag. Raises BagError."""
         self._bag = open_bag(path)
         line = self._bag.line
         self._tick_ns = int(line.tick_ns)
@@ -43,10 +43,11 @@ class TagHistory:
     def read(
         self, name: str, first: int, last: int, most: int, back: bool = False
     ) -> tuple[list[TagSample], int | None]:
-        """Where a tag changed at ticks from first to last, backwards if asked for; and the tick to go on from, None if
-        that is all: at most so many changes, from about MOST_READ messages.
+        """Return changes of a tag at ticks from `first` to `last`, and the tick to continue from, None at the end.
 
-        Raises BagError for damage.
+        back: go backwards. At most `most` changes are returned, from about MOST_READ messages.
+
+        Raises BagError for a damaged file.
         """
         first, last = max(first, self._first), min(last, self._last)
         found: list[TagSample] = []
@@ -71,12 +72,12 @@ class TagHistory:
         return found, None
 
     def close(self) -> None:
-        """Close the files, once nobody is being answered."""
+        """Close the files, after a call in progress."""
         with self._lock:
             self._bag.close()
 
     def _before(self, name: str, tick: int) -> TagSample | None:
-        """The last sample of a tag before a tick; None: there is none."""
+        """Return the last sample of a tag before a tick; None: there is none."""
         span = WINDOW
         while True:
             start = max(self._first, tick - span)
@@ -86,16 +87,16 @@ class TagHistory:
             span *= 4
 
     def _samples(self, name: str, start_ns: int, stop_ns: int) -> Iterator[TagSample]:
-        """Of a tag, from a log time on, before another."""
+        """Yield the samples of a tag with log times from `start_ns` on, before `stop_ns`."""
         topic, place = self._places[name]
         for _, _, data in self._bag.raw({topic}, start_ns, stop_ns):
             message = self._bag.decode(topic, data)
-            columns = messages.to_image(message).values if topic == "signals" else TOPICS[topic].unpack(message).value
+            columns = encode.to_image(message).values if topic == "signals" else TOPICS[topic].unpack(message).value
             yield TagSample(int(message.tick), float(columns[place]))
 
 
 def _windows(first: int, last: int, back: bool) -> Iterator[tuple[int, int]]:
-    """Ticks from and to, both of them in it."""
+    """Yield windows as their first and last ticks."""
     starts = range(first, last + 1, WINDOW)
     for start in reversed(starts) if back else starts:
         yield start, min(last, start + WINDOW - 1)

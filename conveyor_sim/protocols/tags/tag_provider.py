@@ -1,4 +1,4 @@
-"""`TagProvider`: what a SCADA face knows of a line, wherever that runs; and the source that a stepped simulation is."""
+"""`TagProvider`: interface between protocol servers and a line; and the provider of a simulation that a test steps."""
 
 from __future__ import annotations
 
@@ -20,100 +20,101 @@ if TYPE_CHECKING:
     from conveyor_sim.simulation import Simulation
 
 MODBUS = "modbus"
-"""Source of inputs that come by Modbus."""
+"""Source of inputs by Modbus."""
 
 OPCUA = "opcua"
-"""Source of inputs that come by OPC UA."""
+"""Source of inputs by OPC UA."""
 
 MQTT = "mqtt"
-"""Source of inputs that come by MQTT."""
+"""Source of inputs by MQTT."""
 
 WEB = "web"
-"""Source of inputs that come by the page."""
+"""Source of inputs from the web page."""
 
 PLC = "plc"
-"""Source of what a PLC commands whose client the line is."""
+"""Source of inputs from a PLC to which the line is the client."""
 
 SCADA_SOURCES = (MODBUS, OPCUA, MQTT, WEB, PLC)
-"""Sources of inputs that SCADA clients give."""
+"""Sources of inputs from SCADA clients."""
 
 MOST_WAITING = 1000
-"""Inputs that wait for a tick at once, from all clients of all faces."""
+"""Largest number of inputs of all clients that wait for a tick."""
 
 MOST_EVENTS = 10_000
-"""That a source keeps, the last ones."""
+"""Largest number of events that a provider retains: the newest."""
 
 Control = Literal["pause", "resume", "step", "reset", "seek", "speed", "loop", "target"]
-"""What can be asked of a run. step: so many ticks; seek: to a simulated time, s; speed: times real time; loop: 1, 0;
-target: the tick up to which a line in lockstep goes (handshake.py)."""
+"""Requests to control a run. step: a number of ticks; seek: a simulated time, s; speed: factor of real time; loop: 1 or
+0; target: the tick to which a line in lockstep advances (handshake.py).
+"""
 
 
 @dataclass(frozen=True)
 class LineInfo:
-    """What stays the same of a line for as long as it is served."""
+    """Constant properties of a line while it is served."""
 
     name: str
-    """Of the scene."""
+    """Name of the scene."""
     where: str
     """Its path in the plant; empty: none."""
     tick: float
     """Length of a tick, s."""
     start_time: str
-    """The wall-clock time that simulated time 0 stands for, ISO 8601."""
+    """Wall-clock time of simulated time 0, ISO 8601."""
     tags: Sequence[Tag]
     """All tags, in the order of the process image."""
 
 
 @dataclass(frozen=True)
 class LineSnapshot:
-    """A line at one tick. It never changes, so any thread may read it."""
+    """Snapshot of a line at one tick. It never changes, so any thread may read it."""
 
     tick: int
     values: Mapping[str, float]
-    """Of all signals as controllers read them, and of all commands as they are in force, by name."""
+    """Values by name: all signals as controllers read them, and all commands in force."""
     forced: frozenset[str] = frozenset()
     """Signals that are forced."""
     run: RunState = field(default_factory=lambda: RunState(RUNNING))
     read_back: ReadBackColumns | None = None
-    """Who set the commands, and when; None: not known yet."""
+    """Read-back of the commands: writers and times; None: not known yet."""
     alarms: AlarmColumns | None = None
-    """None: not known yet."""
+    """States of the alarms; None: not known yet."""
     lost: str = ""
-    """Why nothing newer will come before the source is back; empty: it is there."""
+    """Reason why there are no newer values; empty: the connection to the line is up."""
     run_id: str = ""
-    """Of the run: another one after a reset, to which nothing holds that the one before was told; "": unknown."""
+    """Run ID, which changes on every reset and invalidates all earlier data; "": unknown."""
     owner: str = ""
-    """The controller that owns the line, as far as is known; empty: none."""
+    """Controller that owns the line, as far as known; empty: none."""
     released: tuple[str, ...] = ()
-    """Patterns of the devices that it leaves to others."""
+    """Patterns of the devices that the owner has released to other controllers."""
 
 
 class TagProvider(Protocol):
-    """Tags with their values, and a way in for inputs. Its methods may be called from any thread."""
+    """Tags with their values, and an entry for inputs. Its methods may be called from any thread."""
 
     @property
     def about(self) -> LineInfo:
-        """What stays the same."""
+        """Constant properties of the line."""
 
     @property
     def shown(self) -> LineSnapshot:
-        """The line as it was last."""
+        """Latest snapshot of the line."""
 
     @property
     def controls(self) -> frozenset[Control]:
-        """What `control` can do here."""
+        """Requests that `control` accepts."""
 
     @property
     def past(self) -> TagHistory | None:
-        """What its tags were before now; None: nobody knows but who has listened."""
+        """History of the tags; None: no history is available."""
 
     def events(self, after: int) -> tuple[int, Sequence[Event]]:
-        """How many events there were so far, and those after so many; the oldest may be forgotten."""
+        """Return the number of events so far, and the events after the first `after`, unless they are too old."""
 
     def listen(self, heard: Callable[[], None]) -> Callable[[], None]:
-        """Have a function called after `shown` has changed, by any thread; what is returned ends that.
+        """Call `heard` after each change of `shown`, from any thread. Return a function that ends this.
 
-        It must not block, and must not raise.
+        `heard` must not block and must not raise.
         """
 
     def give(self, given: Input) -> str:
@@ -124,7 +125,7 @@ class TagProvider(Protocol):
 
 
 class Listeners:
-    """Functions that are called when something has changed. From any thread."""
+    """Functions to call when something has changed. May be used from any thread."""
 
     def __init__(self) -> None:
         """Start without functions."""
@@ -132,7 +133,7 @@ class Listeners:
         self._changing = threading.Lock()
 
     def add(self, heard: Callable[..., None]) -> Callable[[], None]:
-        """Call a function from now on. Return another one that ends that."""
+        """Call a function from now on. Return a function that ends this."""
         with self._changing:
             self._all = (*self._all, heard)
 
@@ -149,14 +150,14 @@ class Listeners:
 
 
 class RecentEvents:
-    """The last events of a line. One thread adds, any may read."""
+    """Latest events of a line. One thread adds events, any thread may read them."""
 
     def __init__(self) -> None:
-        """None so far."""
-        self._kept: tuple[int, tuple[Event, ...]] = (0, ())  # one attribute, so that both are of one moment
+        """Start without events."""
+        self._kept: tuple[int, tuple[Event, ...]] = (0, ())  # one attribute, so that both are consistent
 
     def add(self, events: Sequence[Event]) -> None:
-        """They have happened."""
+        """Append events."""
         if events:
             total, last = self._kept
             self._kept = total + len(events), (*last, *events)[-MOST_EVENTS:]
@@ -168,23 +169,23 @@ class RecentEvents:
             self._kept = total, (*last, *newest)[-MOST_EVENTS:]
 
     def after(self, count: int) -> tuple[int, Sequence[Event]]:
-        """How many there were so far, and those after so many."""
+        """Return the number of events so far, and the events after the first `count`."""
         total, last = self._kept
         new = min(max(total - count, 0), len(last))
         return total, last[len(last) - new :]
 
 
 class SteppedTagProvider:
-    """A simulation that one thread steps, as a source.
+    """Tag provider of a simulation that one thread steps.
 
-    That thread hands over the inputs before a tick, and takes a copy of the line after it.
+    That thread passes the inputs on before a tick, and takes a snapshot after it.
     """
 
     controls: frozenset[Control] = frozenset()
-    """None: whoever steps it decides when."""
+    """None: the stepping thread decides when time passes."""
 
     def __init__(self, simulation: Simulation) -> None:
-        """Shows it as it is."""
+        """Start with a snapshot of the simulation."""
         self._simulation = simulation
         self._waiting: deque[Input] = deque()
         self._listeners = Listeners()
@@ -198,25 +199,25 @@ class SteppedTagProvider:
 
     @property
     def about(self) -> LineInfo:
-        """What stays the same."""
+        """Constant properties of the line."""
         return self._about
 
     @property
     def shown(self) -> LineSnapshot:
-        """The line as it was at the end of the last tick."""
+        """Snapshot at the end of the last tick."""
         return self._shown
 
     @property
     def past(self) -> TagHistory | None:
-        """Nobody knows."""
+        """No history is available."""
         return None
 
     def events(self, after: int) -> tuple[int, Sequence[Event]]:
-        """How many events there were since this source began, and those after so many."""
+        """Return the number of events since the start, and the events after the first `after`."""
         return self._events.after(after)
 
     def listen(self, heard: Callable[[], None]) -> Callable[[], None]:
-        """Have a function called after each tick; what is returned ends that."""
+        """Call `heard` after each tick. Return a function that ends this."""
         return self._listeners.add(heard)
 
     def give(self, given: Input) -> str:
@@ -227,16 +228,16 @@ class SteppedTagProvider:
         return ""
 
     def control(self, what: Control, value: float, by: str) -> str:
-        """Refused."""
+        """Refuse."""
         return f"{what}: the test decides when time passes, expected no control of the run"
 
     def before_tick(self) -> None:
-        """Hand over what waits. By the thread that steps."""
+        """Pass waiting inputs on to the simulation. Called by the stepping thread."""
         for _ in range(len(self._waiting)):
             self._simulation.give(self._waiting.popleft())
 
     def after_tick(self) -> None:
-        """Show the line as it is now. By the thread that steps."""
+        """Take a snapshot and notify listeners. Called by the stepping thread."""
         self._look()
         self._show()
         self._listeners.tell()
@@ -246,7 +247,7 @@ class SteppedTagProvider:
         return RunState(RUNNING)
 
     def _look(self) -> None:
-        """Take what is told of a tick only if it changed in it."""
+        """Update alarms and read-back if they changed, and collect events."""
         line = self._simulation.line
         self._alarms = line.alarms.changes() or self._alarms
         self._read_back = line.read_back.changes() or self._read_back

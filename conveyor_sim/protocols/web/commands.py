@@ -1,6 +1,6 @@
-"""`PageCommands`: what pages want of a line, judged at once as far as that is possible, and handed to its source.
+"""`PageCommands`: requests of pages, checked at once as far as possible and passed on to the tag provider.
 
-Nothing here waits for a tick. What the line refuses then is among its events, which the page is told of, too.
+Nothing here waits for a tick. What the line refuses at the tick is among its events, which pages receive as well.
 """
 
 from __future__ import annotations
@@ -21,52 +21,54 @@ from conveyor_sim.protocols.tags.tag_provider import WEB
 OPERATIONS = tuple(operation for operation in MAY if operation != DECLARE)
 
 MOST_NAMES, LONGEST_NAME = 100, 200
-"""Of one request, and characters of each."""
+"""Largest number of names in one request, and of characters in a name."""
 
 LARGEST = sys.float_info.max
-"""Of values."""
+"""Largest absolute value in a request."""
 
 
 class PageUser(NamedTuple):
-    """Who sits before a page."""
+    """User of a page."""
 
     name: str = ""
-    """Empty: nobody who has said so."""
+    """Name; empty: not signed in."""
     role: Role = "viewer"
     kind: WriterKind | None = None
-    """As what they act on a line; None: they don't."""
+    """Kind of writer for the line; None: the user only reads."""
 
     @property
     def writer(self) -> str:
-        """As inputs are recorded."""
+        """Name of the writer in recorded inputs."""
         return f"{WEB} {self.name}"
 
 
-NOBODY = PageUser()
+ANONYMOUS = PageUser()
 
 
 class PageCommands:
-    """Of all pages of one source."""
+    """Requests of all pages of one tag provider."""
 
     def __init__(self, source: DrawableProvider) -> None:
         self._source = source
         tags = source.about.tags
         self._commands: Mapping[str, Tag] = {tag.name: tag for tag in tags if tag.role in COMMANDS}
         self._receipt = Receipt(tags, source.about.where)
-        self.controls = source.controls - {"target"}  # how far a line in lockstep goes is its controller's affair
-        """What can be asked of the run from a page."""
+        self.controls = source.controls - {"target"}  # the controller sets the target of a line in lockstep
+        """Requests to control the run that pages may make."""
         self.writes = self.refused = 0
-        """Requests that were passed on to the line, and those that were not."""
+        """Requests that were passed on to the line, and requests that were refused."""
 
     def do(self, person: PageUser, request: Mapping[str, Any]) -> str:
-        """What a page asks for; why that can't be, "" if it will be done. It may be anything."""
+        """Carry out a request of a page, which may be malformed. Return the reason for a refusal, "" if it was
+        accepted.
+        """
         reason = self._do(person, request)
         self.writes, self.refused = self.writes + (not reason), self.refused + bool(reason)
         return reason
 
     def _do(self, person: PageUser, request: Mapping[str, Any]) -> str:
         if person.kind is None:
-            who = f"{person.name} is a viewer, who only reads" if person.name else "nobody has signed in"
+            who = f"{person.name} is a viewer, who only reads" if person.name else "not signed in"
             return f"{who}; expected an operator, engineer, controller or test"
         what, names, values = request.get("do"), request.get("names", []), request.get("values", [])
         if not (_are(names, str) and _are(values, (int, float)) and all(abs(value) <= LARGEST for value in values)):
@@ -103,7 +105,7 @@ class PageCommands:
         return self._source.give(given)
 
     def _objection(self, given: Input) -> str:
-        """Why commands are refused, as the line was last."""
+        """Return why commands would be refused in the latest state of the line; "" if they would not."""
         if unknown := [name for name in given.names if name not in self._commands]:
             return f"{unknown[0]}: expected a command"
         kind: Any = given.writer_kind
@@ -115,7 +117,7 @@ class PageCommands:
 
 
 def _are(values: Any, kind: Any) -> bool:
-    """Whether it is a list of those, not too long."""
+    """Return True for a list of at most MOST_NAMES values of a kind, bool excluded."""
     if not isinstance(values, list) or len(values) > MOST_NAMES:
         return False
     return all(isinstance(value, kind) and not isinstance(value, bool) for value in values)

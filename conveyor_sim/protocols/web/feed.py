@@ -1,8 +1,8 @@
-"""`Feed`: what the pages that show a line are sent, made once for all of them.
+"""`Feed`: messages to the pages that show a line, made once for all pages.
 
-Messages are bytes. The first one says what follows: TEXT a JSON object, whose "kind" is begin, story, status, locked,
-reply or pong; FRAME a tick (float64), its wall time in s since 1970 (float64), both little-endian, and a block of
-`view.block.pack` that begins at the tick and holds that moment. Read by view/page/live.js.
+Messages are bytes. The first byte is the type. TEXT: a JSON object, whose "kind" is begin, story, status, locked, reply
+or pong. FRAME: a tick (float64), its wall time in s since 1970 (float64), both little-endian, and a block of
+`page.block.pack` that begins at the tick and holds that moment. page/page/live.js reads them.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ import time
 from contextlib import suppress
 from typing import Any
 
-from conveyor_sim.bag.topics import TOPICS
-from conveyor_sim.page.block import Content, block_ticks, pack
+from conveyor_sim.bag.messages.topics import TOPICS
+from conveyor_sim.page.block import BlockContent, block_ticks, pack
 from conveyor_sim.page.head import head
 from conveyor_sim.page.recording import text
 from conveyor_sim.protocols.tags.line_mirror import DrawableFrame, DrawableProvider
@@ -26,23 +26,23 @@ from conveyor_sim.support.printable import SENTENCE, printable
 TEXT, FRAME = 0, 1
 
 SHORTEST = 0.02
-"""s of wall time from one frame to the next, at least."""
+"""Shortest wall time between two frames, s."""
 
 STORY = 0.1
-"""The same for what happened."""
+"""Shortest wall time between two messages of events, s."""
 
 BLOCK = 2.0
-"""s: pieces in which a page keeps what it has received."""
+"""Length of the blocks in which a page stores the data that it received, s."""
 
 MOST_TOLD = 2000
-"""Events that a page is told of which has just been opened."""
+"""Largest number of past events that a newly opened page receives."""
 
 
 class Feed:
-    """Follows a source as long as somebody looks."""
+    """Feed of one tag provider, active while a page is open."""
 
     def __init__(self, source: DrawableProvider, **about: Any) -> None:
-        """about: what pages are told besides, when they begin."""
+        """Prepare the feed. about: more fields of the message `begin`."""
         self._source, self._about = source, about
         self._viewers: set[Viewer] = set()
         self._changed = asyncio.Event()
@@ -51,22 +51,22 @@ class Feed:
         self._picture, self._shown = source.picture, source.shown
         self._story = self._new_story()
         self._told = 0.0
-        self._due = False  # whether those who look are told of something soon
+        self._due = False  # True if a message of events is scheduled
         self._heard = 0
         self._status: dict[str, Any] = {}
         self._frame: tuple[Any, bytes] = None, b""
         self._head: tuple[Any, dict[str, Any]] = None, {}
         self._failure = ""
         self.longest = 0.0
-        """s of wall time from a tick to its frame being on its way to a page, the longest since somebody asked."""
+        """Longest wall time from a tick to the sending of its frame, s, since the last reset by the reader."""
 
     @property
     def viewers(self) -> int:
-        """How many look."""
+        """Number of open pages."""
         return len(self._viewers)
 
     def join(self, viewer: Viewer) -> None:
-        """Show it the line from now on."""
+        """Send the line to a page from now on."""
         if self._task is None:
             loop = asyncio.get_running_loop()
 
@@ -85,13 +85,13 @@ class Feed:
         self._changed.set()
 
     def leave(self, viewer: Viewer) -> None:
-        """It looks no longer."""
+        """Stop sending to a page."""
         self._viewers.discard(viewer)
         if not self._viewers:
             self.close()
 
     def close(self) -> None:
-        """Nobody looks any more."""
+        """Stop following the line."""
         if self._task is not None:
             self._task.cancel()
             self._task = None
@@ -106,19 +106,19 @@ class Feed:
             try:
                 self._follow()
                 self._failure = ""
-            except Exception as error:  # of a damaged recording, or another version, messages may be anything
+            except Exception as error:  # messages of a damaged recording or another version may have any content
                 self._failure = printable(f"it can't be drawn: {error}", SENTENCE)
             await asyncio.sleep(SHORTEST)
 
     def _follow(self) -> None:
         before, self._picture, self._shown = self._shown, self._source.picture, self._source.shown
-        if self._shown.run_id != before.run_id or self._shown.tick < before.tick:  # another run, or time has gone back
+        if self._shown.run_id != before.run_id or self._shown.tick < before.tick:  # another run, or a step back in time
             self._story, (self._heard, _) = self._new_story(), self._source.events(0)
             for viewer in self._viewers:
                 viewer.began = False
         self._look()
         now, new = time.monotonic(), [one for one in self._viewers if not one.began or (one.lagging and one.free)]
-        if new or now > self._told + STORY:  # what happened before is in what a new one begins with
+        if new or now > self._told + STORY:  # a new page's first message includes earlier events
             self._told = now
             self._tell_all()
         elif not self._due:
@@ -133,7 +133,7 @@ class Feed:
                 self.longest = max(self.longest, time.time() - self._picture.at)
 
     def _begin(self, viewer: Viewer) -> None:
-        """All that a page has to know of the line as it is now."""
+        """Send the complete present state of the line to a page."""
         picture, line = self._picture, self._picture.line
         if self._head[0] is not line:
             scene = parse_scene(line.scene_text, "the scene of the line", parse_overrides(line.overrides))
@@ -148,22 +148,24 @@ class Feed:
         about = {**self._head[1], "times": times, "forced": picture.forced.tolist()}
         story = self._new_story()
         total, events = self._source.events(max(0, self._heard - MOST_TOLD))
-        story.look(self._shown, picture, events[: len(events) - (total - self._heard)])  # the others are told of later
+        story.look(
+            self._shown, picture, events[: len(events) - (total - self._heard)]
+        )  # later events follow in messages
         viewer.begin(text_message("begin", head=about, story=story.take(), status=self._status_now(), **self._about))
         viewer.began, viewer.seen = True, None
 
     def _tell_later(self) -> None:
-        """Even if nothing else happens."""
+        """Send pending events even if there is no new tick."""
         self._due = False
         self._changed.set()
 
     def _look(self) -> None:
-        """Note what has happened, at the tick at which it has."""
+        """Collect new events with their ticks."""
         self._heard, events = self._source.events(self._heard)
         self._story.look(self._shown, self._picture, events)
 
     def _tell_all(self) -> None:
-        """Those who look already, what has happened since the last time."""
+        """Send new events and status to the pages that have begun."""
         self._look()
         data = self._story.take()
         is_new = data["events"]["at"] or any(what for name, what in data.items() if name != "events")
@@ -192,7 +194,7 @@ class Feed:
         return LineStory(int(self._picture.line.tick_ns))
 
     def _key(self) -> Any:
-        """Another one is another picture."""
+        """Key of the present frame; it changes with the frame."""
         picture = self._picture
         return self._shown.run_id, picture.tick, *picture.drawn.values()
 
@@ -203,7 +205,7 @@ class Feed:
 
 
 def _packed(picture: DrawableFrame) -> bytes:
-    content = Content(signals=[(picture.tick, picture.signals)])
+    content = BlockContent(signals=[(picture.tick, picture.signals)])
     drawn = {topic: decode() for topic, decode in picture.drawn.items() if topic in ("bottles", "contacts", "belts")}
     if (message := drawn.get("bottles")) is not None:
         content.bottles.append((int(message.tick), TOPICS["bottles"].unpack(message)))
@@ -215,5 +217,5 @@ def _packed(picture: DrawableFrame) -> bytes:
 
 
 def text_message(kind: str, **fields: Any) -> bytes:
-    """A message that is an object."""
+    """Return a TEXT message."""
     return bytes([TEXT]) + text({"kind": kind, **fields})

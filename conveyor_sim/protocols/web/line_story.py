@@ -1,4 +1,4 @@
-"""`LineStory`: what happens on a line that runs, as the page is told of it."""
+"""`LineStory`: events and slow data of a running line, as a page receives them."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from conveyor_sim.protocols.tags.line_mirror import DrawableFrame
 from conveyor_sim.protocols.tags.tag_provider import LineSnapshot
 
 COUNTERS = 0.5
-"""s of simulated time from one entry of the counters to the next, at least."""
+"""Shortest simulated time between two entries of the counters, s."""
 
 
 class LineStory(Story):
-    """Of one run, from a moment on: at first all that is so then."""
+    """Story of one run from a moment on. It starts with the complete state at that moment."""
 
     def __init__(self, tick_ns: int) -> None:
         super().__init__(lambda tick: tick * tick_ns * 1e-9, COUNTERS)
@@ -37,7 +37,7 @@ class LineStory(Story):
                 self.add(topic, what, shown.tick)
 
     def _readback(self, message: Any, time: float) -> None:
-        """With the ticks from which on commands are what they are, which may be before the first look."""
+        """Add the commands with the ticks of their last changes, which may be before the first call."""
         before = len(self.data["readback"])
         super()._readback(message, time)
         rows = self.data["readback"][before:]

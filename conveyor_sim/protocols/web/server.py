@@ -1,4 +1,4 @@
-"""`WebServer`: a line as a page in the browser, by HTTP and one websocket for each that looks."""
+"""`WebServer`: a line as a page in the browser, by HTTP and one WebSocket per page."""
 
 from __future__ import annotations
 
@@ -21,44 +21,44 @@ from conveyor_sim.protocols.server.quotas import GUEST, QUOTA, ConnectionSlot, C
 from conveyor_sim.protocols.server.users import Logins, LoginService, User
 from conveyor_sim.protocols.tags.line_mirror import DrawableProvider
 from conveyor_sim.protocols.tags.tag_provider import WEB
-from conveyor_sim.protocols.web.commands import NOBODY, PageCommands, PageUser
+from conveyor_sim.protocols.web.commands import ANONYMOUS, PageCommands, PageUser
 from conveyor_sim.protocols.web.feed import Feed, text_message
 from conveyor_sim.protocols.web.viewer import Viewer
 
 MOST_CONNECTIONS = 256
-"""At once, of pages and whatever else: for one more the oldest makes room that is no page."""
+"""Largest number of connections at once. For one more, the oldest connection that is not a page is closed."""
 
 HANDSHAKE = 5.0
-"""s of wall time in which a client has to agree on TLS."""
+"""Wall time in which a client must complete the TLS handshake, s."""
 
 LONGEST_REQUEST = 16_384
-"""Bytes that a page sends at once, at most; who sends more is cut off."""
+"""Largest size of a message from a page, bytes; beyond it the connection ends."""
 
 SIGN_IN = 60.0
 """Seconds that a new page has for a sign-in while guests hold all their places."""
 
 MOST_REQUESTS, RATE = 400, 200.0
-"""Of a page: at once, and a second (of wall time) for longer; who sends more is cut off. Of each frame a page says that
-it has shown it.
+"""Largest number of requests of a page at once, and per second of wall time; beyond it the connection ends. A page
+sends one request per frame that it has shown.
 """
 
 WRONG_PASSWORD = 1.0
-"""s of wall time that a page waits for the answer to a wrong one."""
+"""Wall time before the answer to a wrong password, s."""
 
 HEARTBEAT = 20.0
-"""s of wall time after which a page is gone that has not answered."""
+"""Wall time without an answer after which a page counts as gone, s."""
 
 CLOSING = 2.0
-"""s of wall time in which a page may say that it has heard of the end."""
+"""Wall time in which a page may confirm the end of the connection, s."""
 
 _LIVE = '<meta name="line" content="live">'
-"""In the page: by it the page knows that it shows a line that runs."""
+"""Tag in the page that marks it as showing a running line."""
 
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
 class WebServer:
-    """Serves one source: a Face."""
+    """Protocol server for one tag provider, as a web page."""
 
     def __init__(
         self,
@@ -72,9 +72,9 @@ class WebServer:
         quota: Quota = QUOTA,
         logins: LoginService | None = None,
     ) -> None:
-        """users: who may do more than look, by name. anonymous: whether those who give no name may look. secured: for
-        TLS; None: plain, which is for this machine only. port: 0 for any that is free. quota: places of the pages.
-        logins: checks passwords, in place of `users`.
+        """Prepare the server. users: users by name, who may do more than read. anonymous: True if clients without a
+        user may read. secured: context for TLS; None: plain HTTP, for this machine only. port: 0 for any free one.
+        quota: limits of the connections. logins: checks passwords, in place of `users`.
         """
         self._places = ConnectionSlots(quota)
         self._logins, self._anonymous, self._secured = logins or Logins(dict(users or {})), anonymous, secured
@@ -93,14 +93,14 @@ class WebServer:
 
     @property
     def port(self) -> int:
-        """On which it listens. RuntimeError before `start`."""
+        """Port on which it listens. Raises RuntimeError before `start`."""
         if self._listening is None:
             raise RuntimeError("the server was not started")
         return int(self._listening.sockets[0].getsockname()[1])
 
     @property
     def address(self) -> str:
-        """Where the page is."""
+        """Address of the page."""
         host, port = self._at
         where = f"[{host}]" if ":" in host else host
         return f"{self._scheme}://{where}:{port if self._listening is None else self.port}/"
@@ -110,14 +110,14 @@ class WebServer:
         return "https" if self._secured else "http"
 
     def status(self) -> Status:
-        """Pages that look; what was passed on to the line for them, and what was not."""
+        """Return the number of open pages, and counts of their accepted and refused requests."""
         longest, self._feed.longest = self._feed.longest, 0.0
         return Status(len(self._sockets), 0, self._commands.writes, self._commands.refused, longest)
 
     async def start(self) -> None:
         """Listen. Raises ServerError if that is not possible."""
         for name in ("aiohttp.server", "aiohttp.web", "aiohttp.access"):
-            logging.getLogger(name).setLevel(logging.CRITICAL)  # it logs whatever clients send
+            logging.getLogger(name).setLevel(logging.CRITICAL)  # it logs all input of clients
         host, port = self._at
         require_free(WEB, host, port)
         app = web.Application(client_max_size=LONGEST_REQUEST, middlewares=[self._guard])
@@ -152,13 +152,13 @@ class WebServer:
             await runner.cleanup()
 
     def _connection(self) -> asyncio.Protocol:
-        """Of one more client."""
+        """Make the protocol of a new connection."""
         assert self._runner is not None and self._runner.server is not None
-        asyncio.get_running_loop().call_soon(self._make_room)  # then those that come with it are known
+        asyncio.get_running_loop().call_soon(self._make_room)  # then the new connection is counted
         return self._runner.server()
 
     def _make_room(self) -> None:
-        """Have those go that hold a connection open for longest, and are no page, rather than those who come."""
+        """Close the oldest connections that are not pages, if there are too many."""
         known = [] if self._runner is None or self._runner.server is None else self._runner.server.connections
         ways = {one: way for one in known if (way := one.transport) is not None and not way.is_closing()}
         others = [way for one, way in ways.items() if one not in self._pages]
@@ -243,7 +243,7 @@ class WebServer:
                 expiry.cancel()
 
     async def _answer_requests(self, socket: web.WebSocketResponse, viewer: Viewer, place: ConnectionSlot) -> None:
-        person, origin = NOBODY, place.address
+        person, origin = ANONYMOUS, place.address
         if self._anonymous:
             self._feed.join(viewer)
         else:
@@ -251,7 +251,10 @@ class WebServer:
         budget = Budget(RATE, MOST_REQUESTS)
         async for message in socket:
             is_allowed = budget.spend(1.0)
-            if is_allowed and message.type in (WSMsgType.PING, WSMsgType.PONG):  # of which there can be too many, too
+            if is_allowed and message.type in (
+                WSMsgType.PING,
+                WSMsgType.PONG,
+            ):  # these count against the budget as well
                 if message.type is WSMsgType.PING:
                     await socket.pong(message.data)
                 continue
@@ -274,14 +277,14 @@ class WebServer:
                     person = await self._sign_in(request, origin)
                     refused = "" if person.name else "name or password are wrong"
                     if person.name and not self._places.admit_user(place, person.name):
-                        refused, person = f"{person.name} has too many pages open", NOBODY
+                        refused, person = f"{person.name} has too many pages open", ANONYMOUS
                     if not person.name:
                         self._sign_out(socket, place)
                     viewer.tell(_reply(request, refused, person))
                     if not self._anonymous and person.name:
                         self._feed.join(viewer)
                 case "sign_out":
-                    person = NOBODY
+                    person = ANONYMOUS
                     self._sign_out(socket, place)
                     viewer.tell(_reply(request, "", person))
                     if not self._anonymous:
@@ -294,16 +297,16 @@ class WebServer:
         name, password = request.get("name"), request.get("password")
         user = None
         if isinstance(name, str) and isinstance(password, str):
-            async with self._password:  # one at a time: it takes a processor for as long as that is
+            async with self._password:  # one at a time, because each check keeps a processor busy
                 user = await asyncio.to_thread(self._logins.enter, name, password, origin, time.monotonic())
         if user is None or not isinstance(name, str):
             await asyncio.sleep(WRONG_PASSWORD)
-            return NOBODY
+            return ANONYMOUS
         return PageUser(name, user.role, user.kind)
 
 
 def _request(data: str) -> dict[str, Any] | None:
-    """What a page asks for; None: that is none."""
+    """Return a request of a page; None: the message is not a JSON object."""
     try:
         request = json.loads(data)
     except (ValueError, RecursionError):

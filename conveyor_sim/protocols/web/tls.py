@@ -1,4 +1,4 @@
-"""What the page is served by to other machines: TLS, for passwords travel."""
+"""TLS for the page, if other machines can reach it: users send passwords."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ from conveyor_sim.protocols.server.certificates import KEY, default_folder, iden
 from conveyor_sim.protocols.server.interface import ServerError
 
 CHAIN = "certificate.pem"
-"""In a folder, beside KEY: what an authority has signed, and the certificates that lead there."""
+"""Name of the file beside KEY: certificate signed by an authority, and the certificates that lead to it."""
 
 
 def server_context(folder: Path | None, of_opcua: Path | None) -> ssl.SSLContext:
-    """folder: of CHAIN and KEY; None: the certificate that the OPC UA face makes, in of_opcua if that is given.
+    """Return a context for TLS. folder: contains CHAIN and KEY; None: the certificate that the OPC UA server makes, in
+    `of_opcua` if given.
 
     Raises ServerError if it can't be read, CertificateError.
     """
@@ -26,7 +27,7 @@ def server_context(folder: Path | None, of_opcua: Path | None) -> ssl.SSLContext
         return context
     own_folder = of_opcua or default_folder()
     own = identity(own_folder)
-    # The standard library takes certificates by the name of a file only.
+    # The standard library reads certificates from named files only.
     with NamedTemporaryFile("w", suffix=".pem") as chain:
         chain.write(ssl.DER_cert_to_PEM_cert(own.certificate))
         chain.flush()
@@ -39,6 +40,6 @@ def _load(context: ssl.SSLContext, chain: Path, key: Path) -> None:
         if not os.access(path, os.R_OK) or not path.is_file():
             raise ServerError(f"{path}: can't be read, expected a certificate and its key: {CHAIN} and {KEY}")
     try:
-        context.load_cert_chain(chain, key, password=lambda: "")  # rather than to ask at the terminal
+        context.load_cert_chain(chain, key, password=lambda: "")  # instead of asking at the terminal
     except (OSError, ValueError) as error:
         raise ServerError(f"{chain}: {error}, expected a certificate in PEM, and its key in {key.name}") from error

@@ -1,4 +1,4 @@
-"""`Viewer`: a page that looks at a line, and what waits to be sent to it."""
+"""`Viewer`: connection of one page, with the messages that wait for it."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from typing import Any
 from aiohttp import web
 
 UNSEEN = 2
-"""Frames on their way to a page, at most: it says which it has shown, and gets no others before."""
+"""Largest number of frames in transit to a page. The page acknowledges each frame, and gets no more before that."""
 
 MOST_WAITING = 2_000_000
-"""Bytes that wait for a page, at most; of one that takes them too slowly they are forgotten, and it begins anew."""
+"""Largest number of bytes that wait for a page. Beyond it they are dropped, and the page begins anew."""
 
 
 class Viewer:
-    """Of one connection. Nobody waits for it: frames that it has no time for are left out."""
+    """Connection of one page. Frames are dropped while it is busy."""
 
     def __init__(self, socket: web.WebSocketResponse) -> None:
-        """It is told nothing before `send` runs."""
+        """Prepare the connection; `send` must run to send messages."""
         self._socket = socket
         self._waiting: deque[bytes] = deque()
         self._bytes = 0
@@ -29,31 +29,31 @@ class Viewer:
         self._sending = False
         self._news = asyncio.Event()
         self.began = False
-        """Whether it has been told what it looks at."""
+        """True if the page has received the message `begin`."""
         self.lagging = False
-        """Whether something that it should know was forgotten."""
+        """True if messages were dropped that the page needs."""
         self.seen: Any = None
-        """What it was shown last."""
+        """Key of the last frame that was sent."""
         self.on_ready: Callable[[], object] = lambda: None
-        """Called when it has time for a frame."""
+        """Function to call when the page is ready for a frame."""
 
     @property
     def ready(self) -> bool:
-        """Whether it has time for a frame."""
+        """True if the page is ready for a frame."""
         return self._frame is None and self._unseen < UNSEEN
 
     @property
     def waiting(self) -> int:
-        """Bytes that wait for it, but for a frame."""
+        """Number of bytes that wait, frames excluded."""
         return self._bytes
 
     @property
     def free(self) -> bool:
-        """Whether nothing waits for it."""
+        """True if no message waits or is being sent."""
         return not (self._waiting or self._sending)
 
     def begin(self, message: bytes) -> None:
-        """Send this before all else; what waits is as good as said."""
+        """Send a message that replaces everything that waits."""
         self._waiting.clear()
         self._bytes, self.lagging = 0, False
         if self._frame is not None:
@@ -61,7 +61,7 @@ class Viewer:
         self.tell(message)
 
     def tell(self, message: bytes) -> None:
-        """Send this, too."""
+        """Queue a message."""
         if self._waiting and self._bytes + len(message) > MOST_WAITING:
             self._waiting.clear()
             self._bytes, self.lagging = 0, True
@@ -71,18 +71,18 @@ class Viewer:
         self._news.set()
 
     def show(self, frame: bytes) -> None:
-        """Send this, behind what it is told."""
+        """Send a frame after the queued messages."""
         self._frame = frame
         self._unseen += 1
         self._news.set()
 
     def saw(self) -> None:
-        """It has shown a frame."""
+        """Note that the page has shown a frame."""
         self._unseen = max(0, self._unseen - 1)
         self.on_ready()
 
     async def send(self) -> None:
-        """Until the connection ends."""
+        """Send queued messages and frames until the connection ends."""
         while True:
             await self._news.wait()
             self._news.clear()

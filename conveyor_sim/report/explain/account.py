@@ -6,7 +6,7 @@ from rich.table import Table
 
 from conveyor_sim.physics.model import Model
 from conveyor_sim.report.explain.choices import accuracy_rows, note_rows
-from conveyor_sim.scene import Scene, initial_bottles
+from conveyor_sim.scene import Scene
 from conveyor_sim.support.printable import printable_lines
 
 
@@ -15,11 +15,11 @@ def account(scene: Scene, model: Model) -> Table:
     table = Table.grid(padding=(0, 2))
     fed = ["without end" if entry.most is None else str(entry.most) for _, entry in scene.entries()]
     table.add_row("scene", ": ".join(filter(None, (model.name, printable_lines(scene.description)))))
-    table.add_row("bottles", f"{len(initial_bottles(scene))} at the start; fed: {', '.join(fed) or 'none'}")
+    table.add_row("bottles", f"{len(model.plant.bottles)} at the start; fed: {', '.join(fed) or 'none'}")
     table.add_row("belts", ", ".join(model.belts) or "none")
     table.add_row("rails", ", ".join(model.rails) or "none")
     table.add_row("duration", f"{scene.duration:g} s in {scene.duration_ticks} ticks of {scene.tick:g} s")
-    for name, text in [*accuracy_rows(model), *note_rows(scene, model)]:
+    for name, text in [*accuracy_rows(model), *note_rows(model)]:
         table.add_row(name, text)
     for index, bound in enumerate(model.bounds):
         table.add_row("" if index else "bounds", f"{bound.name}: at most {bound.dt:.3g} s, {bound.reason}")

@@ -9,7 +9,7 @@ from rich.console import Group
 from rich.padding import Padding
 from rich.table import Table
 
-from conveyor_sim.physics.effects import EFFECTS
+from conveyor_sim.physics.effects.choice import EFFECTS
 from conveyor_sim.physics.effects.notes import notes
 from conveyor_sim.physics.model import Model
 from conveyor_sim.physics.model.remedies import step_limit
@@ -28,14 +28,14 @@ def explanation(scene: Scene, model: Model) -> Group:
     steps.add_row("scene", f"{model.name} ({scene.source_name})")
     for name, text in [*accuracy_rows(model), *step_rows(scene)]:
         steps.add_row(name, text)
-    for name, text in note_rows(scene, model):
+    for name, text in note_rows(model):
         steps.add_row(name, text)
     return Group(_effects(scene, model), _bounds(scene, model), steps)
 
 
-def note_rows(scene: Scene, model: Model) -> list[tuple[str, str]]:
+def note_rows(model: Model) -> list[tuple[str, str]]:
     """Return notes on the set-up of a scene, each with its name; empty without notes."""
-    return [("note", text) for text in notes(scene, {choice.name for choice in model.effects if choice.on})]
+    return [("note", text) for text in notes(model.plant, {choice.name for choice in model.effects if choice.on})]
 
 
 def accuracy_rows(model: Model) -> list[tuple[str, str]]:

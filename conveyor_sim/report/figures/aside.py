@@ -5,23 +5,19 @@ that it forks: they share what it has read of the bag.
 from __future__ import annotations
 
 import os
-import pickle
-import signal
-import sys
-import threading
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context
+from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import BinaryIO
 
 import numpy as np
 
 from conveyor_sim.bag.channels import metadata_of, schema_of
+from conveyor_sim.bag.messages.topics import OUTPUTS
+from conveyor_sim.bag.messages.typestore import DEFAULT
 from conveyor_sim.bag.reader import Bag, open_bag
-from conveyor_sim.bag.topics import OUTPUTS
-from conveyor_sim.bag.typestore import DEFAULT
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.report.figures import style
 from conveyor_sim.report.figures.data import Velocity
@@ -29,6 +25,8 @@ from conveyor_sim.report.figures.files import PNG, Picture
 from conveyor_sim.report.figures.pictures import Figures, figures_of
 from conveyor_sim.report.figures.series import velocity_figure
 from conveyor_sim.scene import Scene
+from conveyor_sim.support.child_process import end_with, pipes_of_child
+from conveyor_sim.support.garbage import collected_later
 
 LONGEST = ("flow", "table", "damage_rails", "energy", "plant")
 """What takes longest is drawn first, so that no process is left with it at the end."""
@@ -41,20 +39,17 @@ Drawn = dict[str, Picture] | str
 """Pictures by the names of their files, in the order in which they are listed; or a sentence that says why not."""
 
 
-def child() -> None:
-    """Draw for the parent: a pickled Task comes on the standard input, a Drawn goes back.
-
-    It ends with its parent, which closes that input or dies.
-    """
-    requests, answers = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # whatever else is printed
+def main() -> None:
+    """Draw for the parent: a Task comes through the pipe, a Drawn goes back. The process ends with its parent."""
+    (pipe,) = pipes_of_child()
+    with collected_later():
+        get_ready()
     try:
-        task = pickle.load(requests)
+        task = pipe.recv()
     except EOFError:  # there is nothing to draw
         return
-    pickle.dump(side_by_side(task, len(os.sched_getaffinity(0)), requests), answers)
-    answers.flush()
-    os._exit(0)  # without waiting for what nobody needs any more
+    pipe.send(side_by_side(task, len(os.sched_getaffinity(0)), pipe))
+    os._exit(0)  # skip freeing memory
 
 
 def get_ready() -> None:
@@ -68,8 +63,8 @@ def get_ready() -> None:
         style.rendered(velocity_figure(nothing, ("belt",), 1.0), PNG)
 
 
-def side_by_side(task: Task, processes: int, lifeline: BinaryIO | None = None) -> Drawn:
-    """Draw in so many processes. They and this one are killed when the lifeline ends: this one leads their group."""
+def side_by_side(task: Task, processes: int, lifeline: Connection | None = None) -> Drawn:
+    """Draw in `processes` processes. These and this one, which leads their group, are killed when `lifeline` ends."""
     path, times, bottles, suffixes = task
     try:
         with open_bag(path) as bag, bag.sense(), style.look():
@@ -78,7 +73,7 @@ def side_by_side(task: Task, processes: int, lifeline: BinaryIO | None = None) -
                 order = sorted(figures, key=lambda name: LONGEST.index(name) if name in LONGEST else len(LONGEST))
                 drawn = {name: pool.submit(_draw, name, suffixes) for name in order}
                 if lifeline is not None:
-                    threading.Thread(target=_end_with, args=(lifeline,), daemon=True).start()  # threads are not forked
+                    end_with(lifeline)  # after the forks, which have no threads
                 return {name: drawn[name].result() for name in figures}
     except ConveyorError as error:
         return str(error)
@@ -99,8 +94,3 @@ def _draw(name: str, suffixes: Sequence[str]) -> Picture:
     figures, bag = _shared
     with bag.sense():
         return style.rendered(figures[name](), suffixes)
-
-
-def _end_with(lifeline: BinaryIO) -> None:
-    lifeline.read()
-    os.killpg(0, signal.SIGKILL)

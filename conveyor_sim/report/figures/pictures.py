@@ -1,4 +1,4 @@
-"""The pictures of a recording, by name: each can be drawn by itself, in whatever process."""
+"""Figures of a recording by name; each can be drawn separately, in any process."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conveyor_sim.bag.forced import forced_signals
-from conveyor_sim.bag.messages import to_image
+from conveyor_sim.bag.messages.encode import to_image
 from conveyor_sim.bag.reader import Bag
 from conveyor_sim.columns.bottles import BottleColumns, ContactColumns
 from conveyor_sim.columns.damage import DamageColumns, RailWearColumns

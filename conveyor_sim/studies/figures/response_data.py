@@ -1,4 +1,4 @@
-"""What the pictures of a study show, without what they are drawn with."""
+"""Data of the figures of a study, without matplotlib."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ class Response:
     half_width: Floats
     """(n,), of the confidence interval, NaN where it is not known."""
     label: str = ""
-    """What a line stands for, where there are several."""
+    """Label of the line, if there are several."""
     scattered: bool = False
-    """Whether levels are those of single points that lie anywhere: no line joins them."""
+    """True if each level is that of a single, scattered point, so that no line joins them."""
 
 
 @dataclass(frozen=True)
@@ -54,5 +54,5 @@ class Indices:
 
 
 def level_text(level: Any) -> str:
-    """A level of a parameter on an axis or in a legend."""
+    """Return a level of a parameter as text for an axis or a legend."""
     return f"{level:.4g}" if isinstance(level, float) else str(level)

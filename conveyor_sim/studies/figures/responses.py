@@ -1,4 +1,4 @@
-"""What a study has found: metrics against parameters, with confidence bands; maps; effects; Sobol indices."""
+"""Figures of a study: metrics against parameters with confidence bands, maps, effects, Sobol indices."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def _draw(ax: Axes, response: Response, colour: str) -> None:
 
 
 def _places(ax: Axes, levels: Sequence[Any]) -> Floats:
-    """Of levels on the x-axis: numbers where they are, anything else one after the other."""
+    """Return the positions of levels on the x-axis: numbers at their values, other levels evenly spaced."""
     if all(isinstance(level, (int, float)) and not isinstance(level, bool) for level in levels):
         if all(isinstance(level, int) for level in levels):
             ax.xaxis.set_major_locator(MaxNLocator(integer=True))
@@ -65,7 +65,7 @@ def _places(ax: Axes, levels: Sequence[Any]) -> Floats:
 
 
 def map_figure(found: Map, title: str) -> Figure:
-    """A cell for each pair of levels."""
+    """Draw one cell per pair of levels."""
     across, up = (len(levels) for levels in found.levels)
     figure = style.new_figure(3.0 + min(0.9 * across, 9.0), 1.8 + min(0.55 * up, 7.0))
     ax = figure.subplots()
@@ -86,7 +86,7 @@ def map_figure(found: Map, title: str) -> Figure:
 
 
 def indices_figure(found: Sequence[Indices], title: str) -> Figure:
-    """A panel a metric: for each parameter the share of the variance that it explains alone, and with interactions."""
+    """Draw one panel per metric: each parameter's share of the variance, alone and with interactions."""
     figure = style.new_figure(8.0, 1.2 + sum(0.9 + 0.45 * len(one.parameters) for one in found))
     axes = figure.subplots(len(found), 1, squeeze=False)[:, 0]
     for ax, one in zip(axes, found, strict=True):

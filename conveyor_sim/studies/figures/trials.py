@@ -1,4 +1,4 @@
-"""What an optimisation tried: with two goals the front, with one how the best came about."""
+"""Figure of an optimisation: the Pareto front for two goals, the progress of the best for one."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def _intervals(ax: Axes, x: Floats, y: Floats, data: TrialsData, which: NDArray[
 
 
 def _draw_front(ax: Axes, x: Floats, y: Floats, front: Sequence[int]) -> None:
-    """The best of the second goal that is known for at least so much of the first."""
+    """Draw the best known value of the second goal for each minimum of the first."""
     places = list(front)
     ax.step(x[places], y[places], where="pre", color=_BEST, linewidth=1.2, gid="front")
 

@@ -1,4 +1,4 @@
-"""What an optimisation tried, as it is drawn; matplotlib is not needed for that."""
+"""Data of the figure of an optimisation, without matplotlib."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ class TrialsData:
     """Points that were tried, in their order."""
 
     name: str
-    """Of the study."""
+    """Name of the study."""
     objective: str
     labels: tuple[str, ...]
-    """Of one goal or two, with their units."""
+    """Names of one or two goals, with their units."""
     means: Floats
     """(trials, goals), over the seeds; NaN where a run has failed."""
     half_widths: Floats
@@ -26,8 +26,8 @@ class TrialsData:
     kept: NDArray[np.bool_]
     """(trials,) whether it keeps all bounds."""
     front: tuple[int, ...]
-    """Those that no other is better than; with one goal the best."""
+    """Non-dominated trials; with one goal the best trial."""
     maximise: bool
     """The first goal."""
     started: bool
-    """Whether trial 0 is where it started."""
+    """True if trial 0 is the start point."""

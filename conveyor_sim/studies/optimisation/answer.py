@@ -1,4 +1,4 @@
-"""What an optimisation has found, in sentences."""
+"""Result of an optimisation, in sentences."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from conveyor_sim.studies.optimisation.optimise import Optimum
 from conveyor_sim.studies.optimisation.trials import Trial, feasible
 
 Units = Mapping[str, str]
-"""Of metrics, by name; "1" or "": none."""
+"""Units of metrics by name; "1" or "": dimensionless."""
 
 
 def answer(optimum: Optimum, units: Units) -> Iterator[str]:
@@ -37,7 +37,7 @@ def answer(optimum: Optimum, units: Units) -> Iterator[str]:
 
 
 def trials_data(name: str, optimum: Optimum, units: Units) -> TrialsData:
-    """The same for a picture. name: of the study."""
+    """Return the result as data of a figure. name: of the study."""
     objective, trials = optimum.objective, optimum.trials
     metrics = [goal.metric for goal in objective.goals]
     found = [[mean_interval([] if trial.failure else trial.values(metric)) for metric in metrics] for trial in trials]
@@ -84,7 +84,7 @@ def _best(optimum: Optimum, units: Units) -> Iterator[str]:
 
 
 def _kept(constraint: Constraint, trial: Trial) -> str:
-    """Of a bound: in how many runs, and whether the mean, which it is on, can be told to keep it."""
+    """Return text on a constraint: number of runs that meet it, and significance for the mean, which it bounds."""
     values = trial.values(constraint.metric)
     keeps = sum(constraint.violation(value) <= 0.0 for value in values.tolist())
     runs = f"in {keeps} of {len(values)} runs"
@@ -108,7 +108,7 @@ def _seeds(trial: Trial) -> str:
 
 
 def _metrics(trial: Trial, objective: Objective, units: Units) -> str:
-    """Those of goals and bounds, each with its interval over the seeds."""
+    """Return text with the metrics of goals and constraints, each with its interval over the seeds."""
     metrics = [goal.metric for goal in objective.goals] + [bound.metric for bound in objective.constraints]
     shown = (
         f"{metric} {plus_minus(mean_interval(trial.values(metric)), _unit(units, metric))}"

@@ -1,8 +1,8 @@
-"""What an optimisation is after, as one line says it: `maximise efficiency subject to peak_force < 40`.
+"""Objective of an optimisation as one line: `maximise efficiency subject to peak_force < 40`.
 
     maximise|minimise METRIC [and maximise|minimise METRIC] [subject to METRIC <|<=|>|>= NUMBER [and ...]]
 
-Each metric by its name in the study. What counts of a trial is the mean over its seeds.
+A METRIC is a name of the study. Its mean over the seeds of a trial counts.
 """
 
 from __future__ import annotations
@@ -62,16 +62,16 @@ class Objective:
         return goals + (f" subject to {' and '.join(map(str, self.constraints))}" if self.constraints else "")
 
     def violations(self, metrics: Mapping[str, float]) -> list[float]:
-        """Of each constraint."""
+        """Return the violation of each constraint."""
         return [constraint.violation(metrics[constraint.metric]) for constraint in self.constraints]
 
     def feasible(self, metrics: Mapping[str, float]) -> bool:
-        """Whether there is a value for each goal, and every constraint is kept."""
+        """Return True if each goal has a value and all constraints are met."""
         known = all(math.isfinite(metrics[goal.metric]) for goal in self.goals)
         return known and all(violation <= 0.0 for violation in self.violations(metrics))
 
     def dominates(self, one: Mapping[str, float], other: Mapping[str, float]) -> bool:
-        """Whether one is better in a goal, and worse in none."""
+        """Return True if `one` is better in one goal and worse in none."""
         signs = [1.0 if goal.maximise else -1.0 for goal in self.goals]
         gains = [sign * (one[goal.metric] - other[goal.metric]) for sign, goal in zip(signs, self.goals, strict=True)]
         return min(gains) >= 0.0 and max(gains) > 0.0
@@ -105,7 +105,7 @@ class _Reader:
         self._words: list[str] = _WORD.findall(text)
 
     def takes(self, word: str) -> bool:
-        """Whether that is next; then it is read."""
+        """Consume `word` if it comes next; return True if it did."""
         if self._words[:1] != [word]:
             return False
         self._next()
@@ -117,13 +117,13 @@ class _Reader:
             self._refuse(what)
 
     def goal(self) -> Goal:
-        """maximise or minimise, and a metric."""
+        """Parse maximise or minimise, and a metric."""
         if not self._words or self._words[0] not in _MAXIMISE:
             self._refuse("maximise or minimise")
         return Goal(maximise=_MAXIMISE[self._next()], metric=self._metric())
 
     def constraint(self) -> Constraint:
-        """A metric, a relation and a number."""
+        """Parse a metric, a relation and a number."""
         metric = self._metric()
         if not self._words or self._words[0] not in _SIGNS:
             self._refuse(f"{listed(list(_SIGNS))} behind {metric}")

@@ -16,7 +16,7 @@ from conveyor_sim.studies.setup import Setup
 
 @dataclass(frozen=True)
 class Optimum:
-    """What an optimisation has found."""
+    """Result of an optimisation."""
 
     objective: Objective
     trials: tuple[Trial, ...]
@@ -25,7 +25,7 @@ class Optimum:
     as_good: tuple[Trial, ...]
     """With one goal: the best trial and all that can't be told from it."""
     started: bool
-    """Whether trial 0 is the start."""
+    """True if trial 0 is the start point."""
     fresh: tuple[Trial, ...]
     """With one goal: the best point, and behind it the start if it is another, as run with fresh seeds."""
 
@@ -72,14 +72,14 @@ def _in_all(progress: Progress, before: int, total: int) -> Progress:
 
 
 def wanted_of(setup: Setup) -> Optimise:
-    """What a study says of it. Raises StudyError for one that has nothing to optimise."""
+    """Return the optimisation part of a study. Raise StudyError if there is nothing to optimise."""
     if setup.study.optimise is None:
         raise StudyError(f"{setup.path}: optimise: missing, expected an objective and how many trials")
     return setup.study.optimise
 
 
 def _run(runs: Runs, trials: list[Trial], seeds: range, progress: Progress) -> list[Trial]:
-    """The trials' points with these seeds."""
+    """Run the trials' points with these seeds."""
     rows = runs.run([Job(trial.number, trial.parameters, seed) for trial in trials for seed in seeds], progress)
     size = len(seeds)
     return [replace(trial, rows=tuple(rows[i * size : (i + 1) * size])) for i, trial in enumerate(trials)]

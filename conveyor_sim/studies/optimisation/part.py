@@ -18,7 +18,7 @@ class Varied(Protocol):
 
     @property
     def values(self) -> Sequence[Any] | None:
-        """All that it may have; None: those from low to high."""
+        """Return all admissible values; None: the range from low to high."""
 
     @property
     def low(self) -> float | None:
@@ -30,7 +30,7 @@ class Varied(Protocol):
 
     @property
     def whole(self) -> bool:
-        """Whether only whole numbers."""
+        """Return True if only whole numbers are admissible."""
 
 
 class Optimise(Part):
@@ -48,13 +48,13 @@ class Optimise(Part):
     sampler_seed: Seed = quantity("Of what chooses points.", "1", default=0)
 
     def first(self, parameters: Mapping[str, Varied]) -> dict[str, Any]:
-        """The point to try first; without `start` one that may be tried."""
+        """Return the first point to try: `start`, or an admissible point without it."""
         if self.start is not None:
             return dict(self.start)
         return {name: varied.low if varied.values is None else varied.values[0] for name, varied in parameters.items()}
 
     def problems(self, parameters: Mapping[str, Varied], metrics: Sequence[str]) -> Iterator[Problem]:
-        """What is wrong with it in a study of these."""
+        """Yield the problems of this part in a study with these parameters and metrics."""
         try:
             parse_objective(self.objective, metrics)
         except StudyError as error:
@@ -72,7 +72,7 @@ class Optimise(Part):
 
 
 def _expected(parameter: Varied, value: Any) -> str:
-    """What is expected in place of a value; "" for one that can be."""
+    """Return the expectation for an inadmissible value; "" for an admissible one."""
     if parameter.values is not None:
         return "" if value in parameter.values else listed([shown(one) for one in parameter.values])
     if parameter.low is None or parameter.high is None:

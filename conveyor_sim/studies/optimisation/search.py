@@ -27,11 +27,11 @@ class Ranged(Varied, Protocol):
 
     @property
     def log(self) -> bool:
-        """Whether it is."""
+        """Return True if the scale is logarithmic."""
 
 
 class Search:
-    """Which points to try."""
+    """Search strategy: proposes the points to try."""
 
     def __init__(
         self, parameters: Mapping[str, Ranged], objective: Objective, start: Mapping[str, Any] | None, seed: int
@@ -59,13 +59,13 @@ class Search:
             self._study.enqueue_trial(dict(start))
 
     def ask(self, count: int) -> list[dict[str, Any]]:
-        """So many points, by what was told so far."""
+        """Return `count` points to try, based on the reported metrics."""
         asked = [self._study.ask(self._distributions) for _ in range(count)]
         self._asked += asked
         return [dict(trial.params) for trial in asked]
 
     def tell(self, outcomes: Sequence[Mapping[str, float] | None]) -> None:
-        """The metrics of all points that were asked for and not told yet; None: a run has failed."""
+        """Report the metrics of all proposed points; None: a run failed."""
         from optuna.trial import TrialState
 
         for trial, metrics in zip(self._asked, outcomes, strict=True):
@@ -79,7 +79,7 @@ class Search:
 
 
 def require_optuna() -> None:
-    """Raises ConveyorError where it is not installed."""
+    """Raise ConveyorError if Optuna isn't installed."""
     if find_spec("optuna") is None:
         raise ConveyorError("optimise: optuna is not installed, expected it (pip install 'conveyor_sim[optimise]')")
 

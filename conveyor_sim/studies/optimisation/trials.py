@@ -1,4 +1,4 @@
-"""What came of the points that were tried, and which of them are best."""
+"""Trials of an optimisation, and the best of them."""
 
 from __future__ import annotations
 
@@ -31,25 +31,25 @@ class Trial:
 
     @cached_property
     def means(self) -> dict[str, float] | None:
-        """Of each metric over the seeds; NaN where a run has none; None: a run has failed."""
+        """Return the mean of each metric over the seeds, NaN without values; None: a run failed."""
         if self.failure:
             return None
         return {name: float(np.mean(self.values(name))) for name in self.rows[0].metrics}
 
     def values(self, metric: str) -> NDArray[np.float64]:
-        """A metric by seed, (seeds,)."""
+        """Return the values of a metric by seed, (seeds,)."""
         return np.array([row.metrics[metric] for row in self.rows], dtype=np.float64)
 
 
 def feasible(trials: Sequence[Trial], objective: Objective) -> list[Trial]:
-    """Those of which no run failed and that keep all bounds."""
+    """Return the trials without failed runs that meet all constraints."""
     return [trial for trial in trials if trial.means is not None and objective.feasible(trial.means)]
 
 
 def front(trials: Sequence[Trial], objective: Objective) -> list[Trial]:
-    """Those that no other is better than, by the first goal's means from worse to better; of equal ones the first.
+    """Return the non-dominated trials, ordered by the first goal from worse to better; of equal trials the first.
 
-    With one goal, that is the best one.
+    With one goal, that is the best trial.
     """
     candidates = [(trial, trial.means) for trial in feasible(trials, objective) if trial.means is not None]
     found: list[tuple[Trial, dict[str, float]]] = []
@@ -63,7 +63,7 @@ def front(trials: Sequence[Trial], objective: Objective) -> list[Trial]:
 
 
 def as_good(trials: Sequence[Trial], objective: Objective) -> list[Trial]:
-    """Of the trials that keep all bounds, the best by the one goal, and after it all that can't be told from it."""
+    """Return the best feasible trial of one goal, then all that don't differ significantly from it."""
     kept = feasible(trials, objective)
     if not kept:
         return []

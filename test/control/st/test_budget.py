@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 from control.st.conformance import program
+from facts import missing
 
 from conveyor_sim.control.st.compile import compile_text
 from conveyor_sim.control.st.errors import StructuredTextError
@@ -32,7 +33,7 @@ def stops(body: str, budget: int, text: str = "") -> bool:
     try:
         running.run(0)
     except StructuredTextError as error:
-        assert f"watchdog: found more than {budget} statements in one scan" in str(error)
+        assert missing(str(error), ["watchdog", "more than", f"{budget} statements", "one scan"]) == []
         return True
     return False
 
@@ -80,7 +81,7 @@ def test_all_programs_of_a_scan_share_the_budget() -> None:
 
 def test_long_scans_of_few_rounds_are_stopped() -> None:
     body = "FOR i := 1 TO 2000 DO " + "n := n + m;\n" * 2000 + "END_FOR"
-    with pytest.raises(StructuredTextError, match=rf"program.st:\d+:1: watchdog: found more than {BUDGET} statements"):
+    with pytest.raises(StructuredTextError, match=rf"program\.st:\d+:1: watchdog: .*more than {BUDGET} statements"):
         Program(compile_text(program(TYPES, DECLARED, body))).run(0)
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from facts import missing
 
 from conveyor_sim.cli import main
 from conveyor_sim.control.scan import ControlError
@@ -29,7 +30,8 @@ def test_run_has_a_program_control_the_line_and_the_recording_replays(tmp_path: 
         "run", TABLE, "--duration", 2, "--controller", program, "--out", tmp_path / "bag", "--no-pictures"
     )
     assert code == 0, output
-    assert "table.st: no variable for these commands: machines/packer/" in output
+    (sentence,) = (line for line in output.splitlines() if "table.st: " in line)
+    assert missing(sentence, ["commands", "not", "machines/packer"]) == []
     code, output = command("replay", tmp_path / "bag")
     assert code == 0, output
     code, output = command("events", tmp_path / "bag")
@@ -41,10 +43,10 @@ def test_run_says_what_is_wrong_with_a_controller(tmp_path: Path) -> None:
     program.write_text("PROGRAM p VAR x : INT; END_VAR\nx := TRUE;\nEND_PROGRAM\n")
     code, output = command("run", TABLE, "--no-record", "--controller", program)
     assert code == 1
-    assert "wrong.st:2:6: found BOOL True, expected INT; BOOL_TO_INT converts" in output
+    assert missing(output, ["wrong.st:2:6", "BOOL True", "INT", "BOOL_TO_INT"]) == []
     code, output = command("run", "two_bottles", "--no-record", "--controller", PROGRAMS / "table.st")
     assert code == 1
-    assert "found photo_eyes/high/blocked, expected a tag of this line" in output
+    assert missing(output, ["photo_eyes/high/blocked", "tag of this line"]) == []
 
 
 def test_a_controller_in_python_runs_too(tmp_path: Path) -> None:
@@ -56,7 +58,8 @@ def test_a_controller_in_python_runs_too(tmp_path: Path) -> None:
     assert code == 0, output
     controller.write_text("class Mine:\n    def scan(self, inputs):\n        return None\n")
     code, output = command("run", TABLE, "--duration", 0.1, "--no-record", "--controller", f"{controller}:Mine")
-    assert code == 1 and "at 0.00 s: scan: None returned, expected a mapping of commands" in output
+    assert code == 1
+    assert missing(output, ["at 0.00 s", "scan", "None", "mapping", "commands"]) == []
 
 
 def test_parameters_of_a_program_are_tags_and_a_map(tmp_path: Path) -> None:
@@ -82,4 +85,5 @@ def test_a_program_as_a_node_gives_the_bits_that_it_gives_attached(tmp_path: Pat
             plant.run_for(2.0)
             hashes.append(plant.simulation.state_hash())
     assert hashes[0] == hashes[1]
-    assert "table.st: no variable for these commands: machines/packer/" in (tmp_path / "log").read_text()
+    (sentence,) = (line for line in (tmp_path / "log").read_text().splitlines() if "table.st: " in line)
+    assert missing(sentence, ["commands", "not", "machines/packer"]) == []

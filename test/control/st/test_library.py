@@ -146,7 +146,7 @@ def test_a_real_at_a_limit_is_the_limit(tmp_path: Path) -> None:
 def says(text: str) -> str:
     """Return C code that writes to the pipe of the simulator, beside the standard streams."""
     text = text.replace('"', '\\"').replace("\n", "\\n")
-    return f'for (int way = 3; way < 10; way++) if (write(way, "{text}", sizeof "{text}" - 1) < 0) {{}}'
+    return f'for (int way = 3; way < 1024; way++) if (write(way, "{text}", sizeof "{text}" - 1) < 0) {{}}'
 
 
 @pytest.mark.parametrize(

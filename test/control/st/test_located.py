@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 
 import pytest
+from facts import stating
 
 from conveyor_sim.control.line_tags import LineTags
 from conveyor_sim.control.scan import Inputs
@@ -70,7 +71,7 @@ def test_a_snapshot_without_the_memory_is_refused(tmp_path: Path) -> None:
     plc = bound(tmp_path, SHARED)
     kept = plc.snapshot()
     del kept["globals"]["located"]
-    with pytest.raises(StructuredTextError, match="found a snapshot without shared memory"):
+    with pytest.raises(StructuredTextError, match=stating("snapshot", "without", "shared memory")):
         plc.restore(kept)
 
 

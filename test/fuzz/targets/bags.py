@@ -23,10 +23,10 @@ from mcap.writer import CompressionType, Writer
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as StockWriter
 
+from conveyor_sim.bag.messages.typestore import typestore
 from conveyor_sim.bag.reader import Bag, open_bag
 from conveyor_sim.bag.recover import RecoverReport, recover
 from conveyor_sim.bag.replay import replay
-from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.errors import BagError, ConveyorError, SceneError
 from conveyor_sim.report.figures.recording import Recording
 from conveyor_sim.run.playback import Playback

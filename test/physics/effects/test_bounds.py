@@ -11,8 +11,8 @@ from conveyor_sim.engine.contact.laws.hertz import hertz_contact_time
 from conveyor_sim.engine.contact.laws.linear import contact_time
 from conveyor_sim.engine.contact.laws.onset import onset_damping
 from conveyor_sim.engine.contact.laws.tsuji import tsuji_damping
-from conveyor_sim.physics.effects.terms import impact_speed
 from conveyor_sim.physics.model import Model, build_model
+from conveyor_sim.physics.plant import Plant
 from conveyor_sim.physics.timestep.bounds import (
     base_friction_bound,
     contact_friction_bound,
@@ -213,12 +213,12 @@ ENTERING = {"bottle": "bottle", "position": [3.0, 0.0], "direction": 0.0, "gap":
 
 def test_impact_speed_is_the_fastest_at_the_start() -> None:
     fields: dict[str, Any] = {"bottles": [bottle(0.0, 0.0, 0.3, 0.4)], "base": base(0.1), "contacts": [contact(1e3)]}
-    assert impact_speed(scene(**fields)) == 0.5
-    assert impact_speed(scene(**fields, belts={"back": belt(-0.7)})) == 0.7
-    assert impact_speed(scene(**fields, infeeds={"in": {**ENTERING, "speed": 0.9}})) == 0.9
-    assert impact_speed(scene(bottles=[bottle(0.0, 0.0)])) == 1.0
+    assert Plant.of(scene(**fields)).impact_speed == 0.5
+    assert Plant.of(scene(**fields, belts={"back": belt(-0.7)})).impact_speed == 0.7
+    assert Plant.of(scene(**fields, infeeds={"in": {**ENTERING, "speed": 0.9}})).impact_speed == 0.9
+    assert Plant.of(scene(bottles=[bottle(0.0, 0.0)])).impact_speed == 1.0
 
 
 def test_impact_speed_of_bottles_that_run_against_each_other() -> None:
     two = [bottle(0.0, 0.0, 0.3), bottle(1.0, 0.0, -0.5)]
-    assert impact_speed(scene(bottles=two, contacts=[contact(1e3)])) == pytest.approx(0.8)
+    assert Plant.of(scene(bottles=two, contacts=[contact(1e3)])).impact_speed == pytest.approx(0.8)

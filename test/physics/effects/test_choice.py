@@ -6,8 +6,9 @@ import pytest
 from scenes import NO_FLOOR, NO_OUTPUTS, arc, base, belt, bottle, contact, kind, line, scene, segment
 
 from conveyor_sim.errors import SceneError
-from conveyor_sim.physics.effects import EFFECTS, choose_effects, most_bottles
+from conveyor_sim.physics.effects.choice import EFFECTS, choose_effects
 from conveyor_sim.physics.model import build_model
+from conveyor_sim.physics.plant import Plant
 from conveyor_sim.scene import parse_overrides, parse_scene
 from conveyor_sim.scene.effect_names import EFFECT_NAMES
 
@@ -24,7 +25,7 @@ PAIR = {"bottle_contact": "bottles: 2 bottles in all", "linear": "contacts[0].st
 
 def choices(**fields: Any) -> dict[str, str]:
     """Effects that are on, with why."""
-    return {choice.name: choice.why for choice in choose_effects(scene(**fields)) if choice.on}
+    return {choice.name: choice.why for choice in choose_effects(Plant.of(scene(**fields))) if choice.on}
 
 
 @pytest.mark.parametrize(
@@ -189,11 +190,11 @@ def test_what_calls_for_an_effect(fields: dict[str, Any], expected: dict[str, st
 
 
 def test_every_effect_is_decided_and_says_why_not() -> None:
-    found = choose_effects(scene(bottles=TWO[:1], **NO_FLOOR))
+    found = choose_effects(Plant.of(scene(bottles=TWO[:1], **NO_FLOOR)))
     assert [choice.name for choice in found] == [effect.name for effect in EFFECTS]
     assert [choice.why for choice in found] == [effect.absent for effect in EFFECTS]
     assert not any(choice.on or choice.forced or choice.path for choice in found)
-    off = [choice.name for choice in choose_effects(scene(**line())) if not choice.on]
+    off = [choice.name for choice in choose_effects(Plant.of(scene(**line()))) if not choice.on]
     assert off == [
         "moving_rails", "hertz", "table", "tsuji_damping", "onset_damping", "viscoelastic_damping",
         "atan_friction", "implicit_friction",
@@ -214,11 +215,11 @@ def test_every_effect_is_decided_and_says_why_not() -> None:
 def test_where_nobody_can_ride_it_says_why(fields: dict[str, Any], why: str) -> None:
     """Also where it is forced on, which is refused."""
     given = {"belts": {"one": belt(0.1)}, "base": base(0.4), **fields}
-    (choice,) = (choice for choice in choose_effects(scene(**given)) if choice.name == "riding")
+    (choice,) = (choice for choice in choose_effects(Plant.of(scene(**given))) if choice.name == "riding")
     assert not choice.on
     assert choice.why.startswith(why)
     with pytest.raises(SceneError, match=f'effects.riding: "on" given, expected "off": {why}'):
-        choose_effects(scene(**given, effects={"riding": "on"}))
+        choose_effects(Plant.of(scene(**given, effects={"riding": "on"})))
 
 
 def test_every_name_that_a_scene_may_force_is_one_effect() -> None:
@@ -235,9 +236,9 @@ def test_most_bottles() -> None:
     """Those of the start and of every infeed; none if one has no end."""
     grid = {"grid": {"type": "bottle", "origin": [3.0, 3.0], "rows": 2, "columns": 5, "pitch": 0.2}}
     fields: dict[str, Any] = {"contacts": GLASS, "bottles": [bottle(0.0, 1.0), grid]}
-    assert most_bottles(scene(**fields)) == 11
-    assert most_bottles(scene(infeeds={"in": {**ENTERING, "count": 4}}, **fields)) == 15
-    assert most_bottles(scene(infeeds={"in": ENTERING}, **fields)) is None
+    assert Plant.of(scene(**fields)).most_bottles == 11
+    assert Plant.of(scene(infeeds={"in": {**ENTERING, "count": 4}}, **fields)).most_bottles == 15
+    assert Plant.of(scene(infeeds={"in": ENTERING}, **fields)).most_bottles is None
 
 
 # ---------------------------------------------------------------- forced
@@ -246,7 +247,7 @@ ROUGH: dict[str, Any] = {"contacts": [contact(1000.0, friction=0.2)], "bottles":
 
 
 def test_forced_off() -> None:
-    (rotation,) = (choice for choice in choose_effects(scene(**ROUGH, effects={"rotation": "off"}))
+    (rotation,) = (choice for choice in choose_effects(Plant.of(scene(**ROUGH, effects={"rotation": "off"})))
                    if choice.name == "rotation")  # fmt: skip
     assert not rotation.on
     assert rotation.forced

@@ -7,9 +7,10 @@ import pytest
 from pressing import DRAG, felt, hopper, lane
 from scenes import MASS, RADIUS, base, belt, bottle, contact, kind, scene
 
-from conveyor_sim.physics.effects.load import FILE, PILE, WEDGED, Load, contact_load
+from conveyor_sim.physics.effects.load import FILE, PILE, WEDGED, Load
 from conveyor_sim.physics.model import build_model
 from conveyor_sim.physics.model.step_choice import choose_steps
+from conveyor_sim.physics.plant import Plant
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.resources import scene_path
@@ -21,7 +22,7 @@ ENDLESS = {"in": {"bottle": "bottle", "position": [0.5, 0.5], "direction": 0.0, 
 
 def load_of(**fields: Any) -> Load:
     defaults = {"contacts": [contact(5e3, friction=0.1)], "base": base(0.4)}
-    return contact_load(choose_steps(scene(**{**defaults, **fields})).terms)
+    return choose_steps(Plant.of(scene(**{**defaults, **fields}))).terms.load
 
 
 def table(length: float, width: float, **more: Any) -> dict[str, Any]:
@@ -109,4 +110,4 @@ The combiner's end was left open, the plant ran for 70 s. It is 1.1 to 1.5 times
 
 @pytest.mark.parametrize("name", FELT)
 def test_shipped_scenes_were_never_pressed_harder(name: str) -> None:
-    assert FELT[name] < contact_load(choose_steps(load_scene(scene_path(name))).terms).force
+    assert FELT[name] < choose_steps(Plant.of(load_scene(scene_path(name)))).terms.load.force

@@ -26,7 +26,8 @@ RUBS: dict[str, Any] = {
 
 def noted(**fields: Any) -> list[str]:
     given = scene(**{**RUBS, **fields})
-    return notes(given, {choice.name for choice in build_model(given).effects if choice.on})
+    model = build_model(given)
+    return notes(model.plant, {choice.name for choice in model.effects if choice.on})
 
 
 @pytest.mark.parametrize("fields", [{}, {"rails": {}, "gates": {"stop": GATE}}], ids=["rail", "gate"])

@@ -42,8 +42,8 @@ from conveyor_sim.engine.arrays.world import World
 from conveyor_sim.errors import CheckpointError
 from conveyor_sim.physics.state.checkpoint import FORMAT, sealed, versions
 from conveyor_sim.physics.state.snapshot import snapshot
-from conveyor_sim.physics.state.world_arrays import CONSTANT, changing_arrays
-from conveyor_sim.physics.state.world_checks import FIXED, SCRATCH, indices, ranges
+from conveyor_sim.physics.state.world_arrays import CONSTANT, FIXED, UNCHECKED, changing_arrays
+from conveyor_sim.physics.state.world_checks import indices, ranges
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
 
@@ -446,7 +446,7 @@ CAPACITIES = {"near_segments.piece", "near_arcs.piece", "belts.candidate"}
 def spoilt(name: str, array: Any) -> list[tuple[Any, str]]:
     """An array as it can't be, and why: cut short, not finite, pointing out of bounds."""
     wrong = [(array[:-1], "has the shape")] if array.size and name not in CAPACITIES else []
-    if array.dtype.kind == "f" and array.size and not name.startswith((*SCRATCH, *FIXED)):
+    if array.dtype.kind == "f" and array.size and not name.startswith((*UNCHECKED, *FIXED)):
         wrong += [(np.full_like(array, value), "is not finite") for value in (np.nan, np.inf)]
     if name in indices({name: array}) and array.size:
         wrong.append((np.full_like(array, np.iinfo(array.dtype).max), f"array {name} holds"))

@@ -14,9 +14,8 @@ from line.machines.test_station import LOADED, stationed
 from physics.state.test_checkpoint import INTEGRATORS, queue, run
 from scenes import SPRINGS_AND_RINGS, line, scene
 
-from conveyor_sim.physics.state.full_state_hash import LIMITED, MEMORY, OBSERVERS, SCRATCH, full_state_hash
-from conveyor_sim.physics.state.world_arrays import changing_arrays
-from conveyor_sim.physics.state.world_checks import FIXED
+from conveyor_sim.physics.state.full_state_hash import MEMORY, full_state_hash
+from conveyor_sim.physics.state.world_arrays import FIXED, LIMITED, OBSERVERS, SCRATCH, changing_arrays
 from conveyor_sim.scene import Scene
 from conveyor_sim.scene.limits import Limits
 from conveyor_sim.simulation import Simulation
@@ -92,8 +91,8 @@ def test_what_is_left_out_does_not_change_the_future(saved: Path) -> None:
     other.take_outcomes()
     other.take_guard_events()
     other.take_damage_events()
-    other._integration._guard.deepest = 0.9
-    other._integration.shortened_ticks = 7
+    other._integration._memory.deepest = 0.9
+    other._integration._memory.shortened_ticks = 7
     for _ in range(AHEAD):
         assert other.full_state_hash() == sim.full_state_hash()
         sim.advance()

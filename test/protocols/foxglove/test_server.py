@@ -182,7 +182,7 @@ def test_another_time_begins_another_session_with_all_that_is_latched(source: Ba
 def test_clients_that_look_are_counted(serving: Serving, address: str) -> None:
     async def look(client: Client) -> None:
         await client.messages("/bottles", until=lambda found: len(found["/bottles"]) > 0)
-        await asyncio.to_thread(until, lambda: "foxglove: 1 client, 1 subscription" in serving.progress(), "a client")
+        await asyncio.to_thread(until, lambda: "foxglove: 1 client, 1 monitored item" in serving.progress(), "a client")
 
     connected(address, look)
     until(lambda: "foxglove: 0 clients" in serving.progress(), "that it has left")
@@ -204,5 +204,5 @@ def test_a_scene_is_served_to_foxglove(command: Callable[..., Served]) -> None:
         ),
     )
     assert found["/line"][0].scene_name == "zoned_line"
-    assert "clients can read all" in served.told
+    assert "clients can read everything" in served.told
     assert served.end().startswith("served up to ")

@@ -43,9 +43,9 @@ def test_a_scene_is_served_until_ctrl_c_and_what_clients_wrote_replays(
         until(lambda: speed_of(client) == 0.5, "the line")
         give(client, 0.25)
         until(lambda: speed_of(client) == 0.25, "the speed")
-    page = re.search(r"(http://127\.0\.0\.1:\d+/): clients can read all, and write nothing", served.told)
+    page = re.search(r"(http://127\.0\.0\.1:\d+/): clients can read everything and write nothing", served.told)
     assert page and b'<meta name="line" content="live">' in urlopen(page.group(1), timeout=PATIENCE).read()
-    assert "clients can read all, and write as controller" in served.told
+    assert "clients can read everything and write as controller" in served.told
     out = served.end()
     assert re.fullmatch(
         r"served up to [\d.]+ s; modbus 1 written, 0 refused, web 0 written, 0 refused; recorded to bag\n", out
@@ -102,7 +102,7 @@ def test_the_process_that_simulates_may_die(command: Callable[..., Served], tmp_
         os.kill(served.simulator, signal.SIGKILL)
         until(lambda: speed_of(client) is None, "exception 11")
         until(lambda: speed_of(client) == 0.5, "another process")
-    assert "was killed by signal 9; the scene begins anew" in served.told
+    assert "was killed by signal 9; the scene is restarted" in served.told
     assert served.end().endswith("; recorded to bag_1\n")
     assert served.process.returncode == 1 and "not recorded up to the end: bag: " in served.told
 

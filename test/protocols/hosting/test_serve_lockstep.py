@@ -84,7 +84,7 @@ def test_a_plc_gives_the_bits_of_its_program(
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (["--modbus", "0"], "--lockstep: nobody may say how far the line goes, expected --modbus-role controller, or"),
+        (["--modbus", "0"], "--lockstep: no client may advance the line, expected --modbus-role controller, or"),
         (
             ["--modbus", "0", "--modbus-role", "controller", "--real-time-factor", "1"],
             "--real-time-factor: given with --lockstep, expected none: the PLC says when",

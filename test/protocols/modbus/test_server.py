@@ -26,9 +26,9 @@ from protocols.modbus.modbus_line import (
     serving,
 )
 
-from conveyor_sim.bag.messages import Header, line_message
-from conveyor_sim.bag.topics import TOPICS
-from conveyor_sim.bag.typestore import typestore
+from conveyor_sim.bag.messages.encode import Header, line_message
+from conveyor_sim.bag.messages.topics import TOPICS
+from conveyor_sim.bag.messages.typestore import typestore
 from conveyor_sim.line.commands.inputs import DISOWN, OWN
 from conveyor_sim.protocols.hosting.server_thread import ServerThread
 from conveyor_sim.protocols.modbus.address_map import HANDSHAKE

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import json
 import logging
 import os
@@ -15,6 +14,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from conveyor_sim.protocols.mqtt.birth_numbers import COUNT, BirthNumbers, state_folder
+from conveyor_sim.support.file_lock import locked
 
 if TYPE_CHECKING:
     from test.protocols.mqtt.kit import Line
@@ -76,11 +76,9 @@ def test_without_a_folder_they_begin_anywhere_with_one_remark(tmp_path: Path, ca
 
 def test_a_lock_that_is_not_let_go_holds_up_nobody_for_long(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     """A stopped process may hold it."""
-    with (tmp_path / "lock").open("ab") as stream:
-        fcntl.flock(stream, fcntl.LOCK_EX)
-        with caplog.at_level(logging.WARNING):
-            assert 0 <= numbers(folder=tmp_path).take() < COUNT
-    assert "is held by another process" in caplog.text and not kept(tmp_path)
+    with locked(tmp_path), caplog.at_level(logging.WARNING):
+        assert 0 <= numbers(folder=tmp_path).take() < COUNT
+    assert "is locked by another process" in caplog.text and not kept(tmp_path)
 
 
 def test_a_link_in_its_place_is_replaced_and_not_followed(tmp_path: Path) -> None:

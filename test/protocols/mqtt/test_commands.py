@@ -31,7 +31,7 @@ def controlled(serve: Callable[..., Line]) -> Line:
 def test_without_a_role_nobody_commands(serve: Callable[..., Line]) -> None:
     line = serve()
     line.host.set(SETPOINT, 0.1)
-    assert line.refused(1) == "a command given, expected none: the line is served to be read only"
+    assert line.refused(1) == "a command given, expected none: the line is served read-only"
     line.advance()
     assert line.outcomes() == [] and line.node.status().writes == 0
     assert properties_of(line.host.last("DBIRTH").metrics[SETPOINT])["readOnly"] is True

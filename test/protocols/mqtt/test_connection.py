@@ -173,7 +173,8 @@ def test_a_password_comes_from_the_environment_or_a_file(
     monkeypatch.setenv(PASSWORD, WORD)
     with serving(url) as served:
         assert served.greeting == [
-            f"mqtt://127.0.0.1:{strict.port}/plant/a: whoever the broker lets in can read all, and write nothing"
+            f"mqtt://127.0.0.1:{strict.port}/plant/a: "
+            "clients that the broker admits can read everything and write nothing"
         ]
         until(lambda: "mqtt: connected, 0 written" in served.progress(), "the broker")
     monkeypatch.delenv(PASSWORD)

@@ -44,7 +44,9 @@ def test_a_scene_is_served_until_ctrl_c_and_what_an_operator_did_replays(
     until(lambda: host.values["belts/zone1/mode"] == MANUAL, "the mode")
     host.set(SETPOINT, 0.25)
     until(lambda: host.values[SPEED] == 0.25, "the speed")
-    greeting = f"{broker.url}/zoned_line/zoned_line: whoever the broker lets in can read all, and write as operator"
+    greeting = (
+        f"{broker.url}/zoned_line/zoned_line: clients that the broker admits can read everything and write as operator"
+    )
     assert greeting in served.told
     out = served.end()
     until(lambda: not host.alive["node"], "its death")

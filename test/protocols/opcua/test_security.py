@@ -196,7 +196,7 @@ def test_certificate_and_key_are_made_once_and_are_nobody_elses(tmp_path: Path) 
     assert stat.S_IMODE(folder.stat().st_mode) == 0o700 and stat.S_IMODE((folder / KEY).stat().st_mode) == 0o600
     assert identity(folder) == first and first.application_uri.endswith(":conveyor_sim")
     folder.chmod(0o755)
-    with pytest.raises(CertificateError, match="expected a folder of this user's own that nobody else can read"):
+    with pytest.raises(CertificateError, match="expected a folder that only this user can read"):
         identity(folder)
     folder.chmod(0o700)
     (folder / CERTIFICATE).write_bytes(b"none")

@@ -74,4 +74,4 @@ def test_a_target_that_can_t_be_is_refused(source: HandshakeTagProvider, target:
 
 
 def test_nothing_else_is_asked_of_the_run(source: HandshakeTagProvider) -> None:
-    assert "expected run/target_tick alone" in source.control("pause", 0, "plc")
+    assert "expected only run/target_tick" in source.control("pause", 0, "plc")

@@ -256,7 +256,7 @@ def test_in_lockstep_time_passes_up_to_the_target_with_what_was_written_before_i
     assert {value for tick, value in seen if tick == 6} <= {0.2}
     assert source.shown.values[SETPOINT] == 0.3
     assert "expected at most 10, the end of the run" in source.control("target", 11, "a test")
-    assert "expected run/target_tick alone" in source.control("pause", 0, "a test")
+    assert "expected only run/target_tick" in source.control("pause", 0, "a test")
     assert source.control("target", 10, "a test") == ""
     until(lambda: source.shown.run.state == ENDED, "the end")
     assert source.shown.tick == 10
@@ -317,7 +317,7 @@ def test_a_process_that_is_killed_is_told_of_and_followed_by_another(served: Ser
     assert "the process that simulates zoned_line was killed by signal 9" in [shown.lost for shown in seen]
     until(lambda: any(shown.run_id != run and not shown.lost for shown in seen), "another one")
     assert next(shown.tick for shown in seen if shown.run_id != run) < 20
-    assert any("begins anew" in sentence for sentence in served.said)
+    assert any("is restarted" in sentence for sentence in served.said)
     source.close()
     assert source.recordings == [tmp_path / "bag", tmp_path / "bag_1"]
     assert replay(tmp_path / "bag_1").difference is None
@@ -329,7 +329,7 @@ def test_a_process_that_hangs_is_stale_until_it_goes_on(running: SceneTagProvide
     os.kill(source.pid, signal.SIGSTOP)
     try:
         until(lambda: source.shown.lost, "silence")
-        assert source.shown.lost == "nothing was heard of the simulation for 5 s"
+        assert source.shown.lost == "no message of the simulation for 5 s"
         assert source.give(setpoint(0.1)) == source.shown.lost == source.control("pause", 0, "a test")
     finally:
         os.kill(source.pid, signal.SIGCONT)

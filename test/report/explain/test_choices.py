@@ -1,10 +1,11 @@
-"""What `explain` tells: each effect with the line that decides, the bounds and the one that rules, prices."""
+"""Output of `explain`: each effect with the line that decides it, bounds of the time step, prices."""
 
 import math
 import re
 
 import pytest
 from click.testing import CliRunner
+from facts import missing
 from rich.console import Console
 
 from conveyor_sim.cli import main
@@ -93,7 +94,8 @@ def test_the_errors_to_expect_are_told_with_their_reasons() -> None:
     parts = f"braking by the base {percent(BRAKED)}, peak between steps {percent(MISSED)},"
     impact = f"impact of two bottles, 14 steps a contact, {parts}"
     assert f"predicted error {EXPECTED} in the peak force of impacts: {impact}" in " ".join(lines)
-    assert "resting load does not depend on the time step" in lines
+    (resting,) = (line for line in lines if line.startswith("resting load"))
+    assert missing(resting, ["not", "time step"]) == []
     slipped = re.compile(rf"{SLIPPED} in tangential speed after an impact: 14 steps an impact")
     assert any(slipped.match(line) for line in lines)
 
@@ -109,7 +111,7 @@ def test_a_setting_in_one_line() -> None:
 
 def test_a_scene_without_bounds() -> None:
     text = TEXT.split("contacts:")[0] + "bottle_types:\n  jar: {radius: 0.05, mass: 0.2, material: glass}\n"
-    assert "nothing in the scene bounds the time step" in explained(text)
+    assert any(not missing(line, ["nothing", "bounds", "time step"]) for line in explained(text))
 
 
 @pytest.mark.parametrize("width", [60, 80])
@@ -137,7 +139,8 @@ def test_prices_tell_what_is_noise() -> None:
         "not measured, as they can't be forced off: linear, curved_belts",
     ):
         assert line in lines
-    assert "In ns per bottle and step, of 50.0 with all effects: 7 bottles at 1.5 s, on one thread" in " ".join(lines)
+    facts = ["ns per bottle and step", "50.0", "all effects", "7 bottles", "1.5 s", "one thread"]
+    assert missing(" ".join(lines), facts) == []
     assert "…" not in "".join(shown(price_table(prices), 80))
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 import pytest
+from facts import stating
 
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.report.figures import style
@@ -41,7 +42,7 @@ def test_files_carry_no_date_and_no_program(scene: Scene, tmp_path: Path) -> Non
 
 def test_a_folder_that_is_a_file_is_a_clear_error(scene: Scene, tmp_path: Path) -> None:
     (tmp_path / "taken").write_text("")
-    with pytest.raises(ConveyorError, match=r"taken/scene\.png and \.svg can't be written: "):
+    with pytest.raises(ConveyorError, match=stating("taken/scene.png", ".svg", "can't be written")):
         plot_scene(scene, tmp_path / "taken" / "scene")
 
 

@@ -1,1 +1,1 @@
-"""All contact with internals of numba and llvmlite; the README of the engine says what they are."""
+"""All contact with internals of numba and llvmlite; see the README of the engine."""

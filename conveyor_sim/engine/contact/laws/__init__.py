@@ -1,7 +1,8 @@
-"""The laws along the normal of a contact, a file each: elastic ones and damping ones, and the lists of both.
+"""Laws along the normal of a contact, one file each: elastic and damping laws, and the lists of both.
 
-A law is plain functions of numbers and a declaration of them. The kernels add up those of the lists (`law_sums.py`);
-columns, effects, bounds and predictions are made from the same declarations. Order decides that of columns and effects.
+A law is plain functions of numbers and a declaration of them. The kernels add up the laws in the lists (`law_sums.py`);
+columns, effects, bounds and predictions derive from the same declarations. The order of columns and effects is that of
+the lists.
 """
 
 from conveyor_sim.engine.contact.laws.declaration import DampingLaw, ElasticLaw

@@ -1,10 +1,10 @@
-"""Where a function is 0, to the last digits."""
+"""Root of a function, to the last digits."""
 
 from collections.abc import Callable
 
 
 def root(rising: Callable[[float], float], below: float, above: float) -> float:
-    """Where a function that is negative at `below` and positive at `above` is 0, by bisection."""
+    """Return a root of a function that is negative at `below` and positive at `above`, by bisection."""
     while True:
         middle = 0.5 * (below + above)
         if not below < middle < above:

@@ -7,23 +7,23 @@ from conveyor_sim.engine.contact.laws.declaration import ElasticLaw
 
 
 def force(k: float, depth: float, curves: Any) -> float:
-    """N at an overlap in m."""
+    """Return the force in N at an overlap in m."""
     return k * depth
 
 
 def energy(k: float, depth: float, curves: Any) -> float:
-    """J at an overlap in m."""
+    """Return the energy in J at an overlap in m."""
     return 0.5 * k * depth * depth
 
 
 def deepest(k: float, stored: float, curves: Any) -> tuple[float, float]:
-    """Overlap (m) and force (N) at an energy in J."""
+    """Return the overlap (m) and force (N) at an energy in J."""
     overlap = math.sqrt(2.0 * stored / k)
     return overlap, k * overlap
 
 
 def contact_time(stiffness: float, reduced_mass: float) -> float:
-    """Duration of an undamped linear contact, pi sqrt(m_r / k), in s. N/m, kg."""
+    """Return the duration of an undamped linear contact, pi sqrt(m_r / k), in s. N/m, kg."""
     return math.pi * math.sqrt(reduced_mass / stiffness)
 
 
@@ -38,5 +38,5 @@ LINEAR = ElasticLaw(
     overlap_at=lambda k, force, curves: force / k,
     stiffest=lambda k, depth, curves: float(k),
     duration=lambda k, reduced_mass, speed, curves: contact_time(k, reduced_mass),
-    said=lambda k, curves: f"at k = {k:g} N/m and",
+    coefficient_text=lambda k, curves: f"at k = {k:g} N/m and",
 )

@@ -8,14 +8,14 @@ from conveyor_sim.engine.contact.laws.paper import damping_ratio, dashpot_power
 
 
 def force(c: float, elastic: float, depth: float, closing: float) -> float:
-    """c v_n in N, not without contact."""
+    """Return c v_n in N, 0 without contact."""
     return (c if depth > 0.0 else 0.0) * closing
 
 
 def clamped_restitution(zeta: float) -> float:
-    """e of a linear spring and dashpot that never pull: the contact ends when its force does.
+    """Return e of a linear spring and dashpot that never pull: the contact ends when its force does.
 
-    The force is gone at the angle 2 acos(zeta) of the damped oscillation (Schwager and Poeschel, Granular Matter 9,
+    The force vanishes at the angle 2 acos(zeta) of the damped oscillation (Schwager and Poeschel, Granular Matter 9,
     2007), where e = exp(-2 zeta acos(zeta) / sqrt(1 - zeta^2)); beyond critical damping acosh and zeta^2 - 1.
     """
     if abs(zeta - 1.0) < 1e-9:
@@ -26,7 +26,7 @@ def clamped_restitution(zeta: float) -> float:
 
 
 def clamped_damping_ratio(restitution: float) -> float:
-    """zeta at which `clamped_restitution` is e."""
+    """Return zeta for which `clamped_restitution` is e."""
     above = 1.0
     while clamped_restitution(above) > restitution:
         above *= 2.0
@@ -34,7 +34,7 @@ def clamped_damping_ratio(restitution: float) -> float:
 
 
 def normal_damping(restitution: float, stiffness: float, reduced_mass: float) -> float:
-    """c of N = max(0, k delta + c v), in kg/s, from k in N/m and m_r in kg."""
+    """Return c of N = max(0, k delta + c v), in kg/s, from k in N/m and m_r in kg."""
     return 2.0 * math.sqrt(stiffness * reduced_mass) * clamped_damping_ratio(restitution)
 
 
@@ -61,6 +61,6 @@ NORMAL = DampingLaw(
     order=lambda smooth: 1.0,
     stiffness_power=dashpot_power,
     ratio=damping_ratio,
-    # Its restitution on a Hertz contact depends on the speed: there it is Tsuji's.
+    # On a Hertz contact its restitution would depend on the speed; Tsuji's law applies there.
     applies=lambda elastic, by_restitution: not (by_restitution and elastic == "hertz"),
 )

@@ -1,6 +1,6 @@
-"""Hunt and Crossley's damping in proportion to the elastic force, so that it sets in at zero; lambda in s/m.
+"""Hunt and Crossley's damping in proportion to the elastic force, which starts at zero; lambda in s/m.
 
-N = max(0, N_elastic (1 + lambda v_n)) (Hunt and Crossley 1975), whatever the elastic law.
+N = max(0, N_elastic (1 + lambda v_n)) (Hunt and Crossley 1975), for any elastic law.
 """
 
 import math
@@ -10,12 +10,12 @@ from conveyor_sim.engine.contact.laws.declaration import DampingLaw
 
 
 def force(c: float, elastic: float, depth: float, closing: float) -> float:
-    """N_elastic lambda v_n in N."""
+    """Return N_elastic lambda v_n in N."""
     return elastic * (c * closing)
 
 
 def onset_damping(restitution: float, speed: float) -> float:
-    """lambda of N = N_elastic (1 + lambda v), in s/m, at an impact speed in m/s; whatever the elastic law.
+    """Return lambda of N = N_elastic (1 + lambda v), in s/m, at an impact speed in m/s, for any elastic law.
 
     a (1 + e) = ln((1 + a) / (1 - e a)) with a = lambda v. Besides 0 it has one root, between (1 - e) / e and 1 / e.
     """
@@ -26,17 +26,17 @@ def onset_damping(restitution: float, speed: float) -> float:
 
 
 def onset_restitution(a: float) -> float:
-    """e of N (1 + lambda v) at a = lambda v: the root of a (1 + e) = ln((1 + a) / (1 - e a))."""
+    """Return e of N (1 + lambda v) at a = lambda v: the root of a (1 + e) = ln((1 + a) / (1 - e a))."""
 
     def rising(e: float) -> float:
-        # By log1p, for a e and a are small where hardly anything is lost.
+        # Uses log1p, because a e and a are small if hardly any energy is lost.
         return math.log1p(a) - math.log1p(-e * a) - a * (1.0 + e) if e * a < 1.0 else math.inf
 
     return root(rising, 0.0, min(1.0, 1.0 / a))
 
 
 def _bend(x: float) -> float:
-    """(ln(1 + x) - x) / x^2, by its series near 0, where the difference cancels."""
+    """Return (ln(1 + x) - x) / x^2, by its series near 0, where the difference cancels."""
     if x <= -1.0:
         return -math.inf
     if abs(x) < 1e-3:
@@ -60,7 +60,7 @@ ONSET = DampingLaw(
     exponent=1.0,
     coefficient=lambda e, speed, stiffness, reduced_mass: onset_damping(e, speed),
     rebound=lambda elastic, stiffness, c, reduced_mass, speed: onset_restitution(c * speed),
-    # Semi-implicit Euler's first-order error, dt/2 (da/dv) a, is that of another elastic law: e is the same.
+    # Semi-implicit Euler's first-order error, dt/2 (da/dv) a, is that of another elastic law, which has the same e.
     order=lambda smooth: max(2.0, smooth),
     stiffness_power=lambda elastic: 0.0,
     rate="lambda N",

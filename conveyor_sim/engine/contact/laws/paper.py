@@ -1,4 +1,4 @@
-"""The paper's linear dashpot against the whole relative velocity of the contact points, -c v* (eq. 22); c in kg/s."""
+"""The paper's linear dashpot against the full relative velocity of the contact points, -c v* (eq. 22); c in kg/s."""
 
 import math
 
@@ -6,21 +6,22 @@ from conveyor_sim.engine.contact.laws.declaration import DampingLaw
 
 
 def force(c: float, elastic: float, depth: float, closing: float) -> float:
-    """c v in N, not without contact: a dashpot alone does not know that the surfaces are apart."""
+    """Return c v in N, 0 without contact: a dashpot by itself acts on separate surfaces, too."""
     return (c if depth > 0.0 else 0.0) * closing
 
 
 def paper_damping(restitution: float, stiffness: float, reduced_mass: float) -> float:
-    """c of N = k delta + c v, in kg/s, from k in N/m and m_r in kg. The contact may pull, and ends at no overlap.
+    """Return c of N = k delta + c v, in kg/s, from k in N/m and m_r in kg.
 
-    e = exp(-pi zeta / sqrt(1 - zeta^2)) with zeta = c / (2 sqrt(k m_r)).
+    The contact may pull, and ends at zero overlap. e = exp(-pi zeta / sqrt(1 - zeta^2)) with zeta = c / (2 sqrt(k
+    m_r)).
     """
     log = -math.log(restitution)
     return 2.0 * math.sqrt(stiffness * reduced_mass) * log / math.hypot(math.pi, log)
 
 
 def damping_ratio(stiffness: float, c: float, reduced_mass: float, speed: float = 0.0) -> float:
-    """zeta = c / (2 sqrt(k m_r)) of a linear spring; N/m, kg/s, kg. It is the same at any speed."""
+    """Return zeta = c / (2 sqrt(k m_r)) of a linear spring; N/m, kg/s, kg. It is the same at any speed."""
     return c / (2.0 * math.sqrt(stiffness * reduced_mass))
 
 
@@ -34,7 +35,7 @@ def _rebound(elastic: str, stiffness: float, c: float, reduced_mass: float, spee
 
 
 def dashpot_power(elastic: str) -> float:
-    """Power of the stiffness with which a dashpot goes: a Hertz contact lasts k^-0.4, the others k^-0.5."""
+    """Return the power of the stiffness that scales a dashpot: a Hertz contact lasts k^-0.4, the others k^-0.5."""
     return 0.4 if elastic == "hertz" else 0.5
 
 

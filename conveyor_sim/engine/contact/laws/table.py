@@ -1,6 +1,7 @@
 """Normal force from a table of overlap and force, for contacts whose law was measured or computed elsewhere.
 
-Straight between the points; the last slope goes on. A table has at least two points, the first of them (0, 0).
+The force is linear between the points; the last slope continues. A table has at least two points, the first of them (0,
+0).
 """
 
 import math
@@ -14,7 +15,7 @@ from conveyor_sim.engine.contact.laws.linear import contact_time
 
 
 def force(c: int, depth: float, curves: Any) -> float:
-    """N of curve c at an overlap in m; 0 for c = -1 and without contact."""
+    """Return the force of curve c in N at an overlap in m; 0 for c = -1 and without contact."""
     if c < 0 or depth <= 0.0:
         return 0.0
     low, high = curves.start[c], curves.start[c + 1] - 1
@@ -29,7 +30,7 @@ def force(c: int, depth: float, curves: Any) -> float:
 
 
 def energy(c: int, depth: float, curves: Any) -> float:
-    """Area (J) under curve c up to an overlap in m; 0 for c = -1 and without contact."""
+    """Return the area (J) under curve c up to an overlap in m; 0 for c = -1 and without contact."""
     if c < 0 or depth <= 0.0:
         return 0.0
     area = 0.0
@@ -46,26 +47,26 @@ def energy(c: int, depth: float, curves: Any) -> float:
 
 
 def points_of(c: int, curves: Any) -> tuple[F8, F8]:
-    """Overlaps (m) and forces (N) of curve c."""
+    """Return overlaps (m) and forces (N) of curve c."""
     points = slice(int(curves.start[c]), int(curves.start[c + 1]))
     return curves.overlap[points], curves.force[points]
 
 
 def deepest(c: int, stored: float, curves: Any) -> tuple[float, float]:
-    """Overlap (m) and force (N) at an energy in J."""
+    """Return the overlap (m) and force (N) at an energy in J."""
     overlap, known = points_of(c, curves)
     steps = np.diff(overlap)
     areas = np.concatenate([[0.0], np.cumsum(0.5 * (known[1:] + known[:-1]) * steps)])
     piece = min(int(np.searchsorted(areas, stored, side="right")) - 1, len(steps) - 1)
     slope = float((known[piece + 1] - known[piece]) / steps[piece])
     left, start = stored - float(areas[piece]), float(known[piece])
-    # start d + slope d^2 / 2 = left, in the form that does not divide by a slope of 0.
+    # start d + slope d^2 / 2 = left, solved without a division by the slope, which may be 0.
     deeper = 2.0 * left / (start + math.sqrt(start * start + 2.0 * slope * left))
     return float(overlap[piece]) + deeper, start + slope * deeper
 
 
 def overlap_at(c: int, pressed: float, curves: Any) -> float:
-    """Overlap (m) at a force in N; inf where the table never comes to it."""
+    """Return the overlap (m) at a force in N; inf if the table never reaches it."""
     overlap, known = points_of(c, curves)
     if pressed > known[-1]:
         slope = float((known[-1] - known[-2]) / (overlap[-1] - overlap[-2]))
@@ -74,7 +75,7 @@ def overlap_at(c: int, pressed: float, curves: Any) -> float:
 
 
 def stiffest(c: int, depth: float, curves: Any) -> float:
-    """The largest slope of curve c, N/m, wherever it is."""
+    """Return the largest slope of curve c at any overlap, N/m."""
     overlap, known = points_of(c, curves)
     return float(((known[1:] - known[:-1]) / (overlap[1:] - overlap[:-1])).max())
 
@@ -90,6 +91,6 @@ TABLE = ElasticLaw(
     overlap_at=overlap_at,
     stiffest=stiffest,
     duration=lambda c, reduced_mass, speed, curves: contact_time(stiffest(c, 0.0, curves), reduced_mass),
-    said=lambda c, curves: f"on the table of {len(points_of(c, curves)[0])} points at",
+    coefficient_text=lambda c, curves: f"on the table of {len(points_of(c, curves)[0])} points at",
     none=-1.0,
 )

@@ -1,4 +1,4 @@
-"""Tsuji's dashpot on a Hertz contact, of the same restitution at any speed; c in kg/(s m^0.25).
+"""Tsuji's dashpot on a Hertz contact, with the same restitution at any speed; c in kg/(s m^0.25).
 
 N = max(0, k delta^1.5 + c delta^0.25 v_n) (Tsuji, Tanaka and Ishida 1992).
 """
@@ -11,14 +11,14 @@ from conveyor_sim.engine.contact.laws.paper import damping_ratio
 
 
 def force(c: float, elastic: float, depth: float, closing: float) -> float:
-    """c delta^0.25 v_n in N."""
+    """Return c delta^0.25 v_n in N."""
     return c * math.sqrt(math.sqrt(depth)) * closing
 
 
 def tsuji_damping(restitution: float, stiffness: float, reduced_mass: float) -> float:
-    """c of N = max(0, k delta^1.5 + c delta^0.25 v), in kg/(s m^0.25), from k in N/m^1.5 and m_r in kg.
+    """Return c of N = max(0, k delta^1.5 + c delta^0.25 v), in kg/(s m^0.25), from k in N/m^1.5 and m_r in kg.
 
-    With x = 0.8 delta^1.25 and time counted in delta^0.25 dt, it is the linear contact of stiffness 1.25 k, with the
+    With x = 0.8 delta^1.25 and time in units of delta^0.25 dt, it is the linear contact of stiffness 1.25 k, with the
     same speeds and the same end (Antypov and Elliott, EPL 94, 2011): e is the clamped one, at any speed.
     """
     return normal_damping(restitution, 1.25 * stiffness, reduced_mass)

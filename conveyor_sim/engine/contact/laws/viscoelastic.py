@@ -15,27 +15,27 @@ FIRST_ORDER = 1.15344
 """(1 - e) / a at low speeds; e is never lower than that."""
 
 CREEPING = 1e5
-"""Of a: from there on the contact only creeps back, and e is 1.5^(2/3) a^(-5/3) to 1e-7 of it."""
+"""From this a on the contact only creeps back, and e is 1.5^(2/3) a^(-5/3) to within 1e-7 of it."""
 
 STEP = 0.01
-"""Of `restitution_at`, that leaves an error of 1e-8."""
+"""Step of `restitution_at`, which leaves an error of 1e-8."""
 
 
 def force(c: float, elastic: float, depth: float, closing: float) -> float:
-    """c sqrt(delta) v_n in N."""
+    """Return c sqrt(delta) v_n in N."""
     return c * math.sqrt(depth) * closing
 
 
 def strength(stiffness: float, c: float, reduced_mass: float, speed: float) -> float:
-    """a of an impact; k in N/m^1.5, c in kg/(s m^0.5), m_r in kg, m/s."""
+    """Return a of an impact; k in N/m^1.5, c in kg/(s m^0.5), m_r in kg, m/s."""
     return c * math.pow(speed, 0.2) * math.pow(reduced_mass, -0.4) * math.pow(stiffness, -0.6)
 
 
 def restitution_at(a: float) -> float:
-    """e of an impact that ends when its force does, as a contact that never pulls (Schwager and Poeschel 2008).
+    """Return e of an impact that ends when its force does, because contacts never pull (Schwager and Poeschel 2008).
 
-    With q the root of the overlap, and time counted in 2 q dt, it is q' = v, v' = -2 q^2 (q^2 + a v) from q = 0 and
-    v = 1 on: a polynomial, which the fourth-order Runge-Kutta method meets in full. No power of a has a closed form.
+    With q the root of the overlap, and time in units of 2 q dt, q' = v, v' = -2 q^2 (q^2 + a v) from q = 0 and v = 1.
+    That is a polynomial, which the fourth-order Runge-Kutta method follows in full. No power of a has a closed form.
     """
     if a > CREEPING:
         return math.pow(1.5, 2.0 / 3.0) * math.pow(a, -5.0 / 3.0)
@@ -60,7 +60,7 @@ def restitution_at(a: float) -> float:
 
 @lru_cache(maxsize=1000)
 def strength_for(restitution: float) -> float:
-    """a at which `restitution_at` is e."""
+    """Return a for which `restitution_at` is e."""
     if restitution == 1.0:
         return 0.0
     below = (1.0 - restitution) / FIRST_ORDER
@@ -71,7 +71,7 @@ def strength_for(restitution: float) -> float:
 
 
 def viscoelastic_damping(restitution: float, speed: float, stiffness: float, reduced_mass: float) -> float:
-    """c in kg/(s m^0.5) from e at a speed in m/s, k in N/m^1.5 and m_r in kg."""
+    """Return c in kg/(s m^0.5) from e at a speed in m/s, k in N/m^1.5 and m_r in kg."""
     return strength_for(restitution) / strength(stiffness, 1.0, reduced_mass, speed)
 
 
@@ -98,7 +98,7 @@ VISCOELASTIC = DampingLaw(
     rebound=_rebound,
     order=lambda smooth: min(smooth, 1.5),
     stiffness_power=lambda elastic: 0.6,
-    # Its loss is that of a linear contact of as large a 1 - e = pi zeta.
+    # Its loss is that of a linear contact with the same 1 - e = pi zeta.
     ratio=lambda *impact: strength(*impact) * FIRST_ORDER / math.pi,
     rate="c delta^0.5",
     rate_at="delta the deepest of an impact at v (as for hertz)",

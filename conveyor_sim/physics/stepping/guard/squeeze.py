@@ -41,16 +41,16 @@ def squeeze_of(model: Model, world: World, found: RailContacts, slot: int) -> Sq
     kind, (a, b), values = closed_contacts(world, found)
     normal = values[2:4].T
     cluster = _cluster(slot, kind, a, b)
-    fixed, pushers = len(model.rails_at_rest), []
+    fixed, pushers = len(model.plant.rails_at_rest), []
     for c in np.flatnonzero((kind == BOTTLE_RAIL) & (b >= fixed)).tolist():
         q = int(b[c]) - fixed
         if int(a[c]) in cluster and _moves(moving, q):
-            pushers.append((model.moving_shapes[q].limit is not None, int(a[c]) != slot, c))
+            pushers.append((model.plant.moving[q].limit is not None, int(a[c]) != slot, c))
     if not pushers:
         return None
     _, _, c = min(pushers)
     q, bottle = int(b[c]) - fixed, int(a[c])
-    shape = model.moving_shapes[q]
+    shape = model.plant.moving[q]
     section, name = shape.name.split("/")
     what = f"{ACTIONS[section].format(name)} bottle {int(world.bottles.id[bottle])}"
     held = _held_by(model, world, bottle, c, kind, a, b, normal)
@@ -101,5 +101,5 @@ def _held_by(
             facing = along
             other = int(a[c] if second else b[c])
             on_rail = kind[c] == BOTTLE_RAIL
-            held = f"rail {model.rail_shapes[other].name}" if on_rail else f"bottle {int(world.bottles.id[other])}"
+            held = f"rail {model.plant.rails[other].name}" if on_rail else f"bottle {int(world.bottles.id[other])}"
     return held

@@ -79,7 +79,7 @@ class Words:
         """Energy (J) that came from nowhere; slot: of the fastest bottle."""
         rise = f"from {before:.3g} to {after:.3g} J"
         what = f"bottle {self._id(slot)} is the fastest while the energy of all rises {rise}"
-        what_works = "belts and rails" if self._model.moving_shapes else "belts"
+        what_works = "belts and rails" if self._model.plant.moving else "belts"
         why = f"{what_works} explain {explained:.3g} J of it at most, so it comes of the time step: {self._too_long()}"
         return self._unstable(slot, what, self._forced() or why)
 
@@ -99,7 +99,7 @@ class Words:
     def rail(self, slot: int, rail: int, depth: float) -> Violation:
         """A bottle that has sunk too deep into a rail; depth: over the radius."""
         model, bottles, kind = self._model, self._bottles, int(self._bottles.type[slot])
-        shape = model.rail_shapes[rail]
+        shape = model.plant.rails[rail]
         entry = int(rail_entries(model, np.array([kind]), np.array([rail]))[0])
         ux, uy = self._velocity_of_rail(rail, slot)
         speed = float(np.hypot(bottles.vx[slot] - ux, bottles.vy[slot] - uy))
@@ -114,7 +114,7 @@ class Words:
 
     def _velocity_of_rail(self, rail: int, slot: int) -> tuple[float, float]:
         """m/s, at a bottle's axis."""
-        moving, q = self._world.moving, rail - len(self._model.rails_at_rest)
+        moving, q = self._world.moving, rail - len(self._model.plant.rails_at_rest)
         if moving is None or q < 0:
             return 0.0, 0.0
         dx, dy = self._bottles.x[slot] - moving.x[q], self._bottles.y[slot] - moving.y[q]

@@ -11,11 +11,11 @@ from click.testing import CliRunner
 from rosbags.highlevel import AnyReader
 from scenes import MASS, NO_FLOOR, RADIUS, bottle, contact, scene, segment, stiffness_for
 
+from conveyor_sim.bag.messages.topics import TOPICS
+from conveyor_sim.bag.messages.typestore import typestore
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recover import recover
 from conveyor_sim.bag.replay import replay
-from conveyor_sim.bag.topics import TOPICS
-from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.report.summarize import summarize
 from conveyor_sim.report.summary_table import render

@@ -33,7 +33,7 @@ def found(slot: int, points: Any, moves: tuple[int, ...], **fields: Any) -> Sque
     moving = state.world.moving
     assert moving is not None
     moving.speed[list(moves)] = 0.1
-    return squeeze_of(state.model, state.world, ALONE.found, slot)
+    return squeeze_of(state.model, state.world, ALONE.rail_contacts, slot)
 
 
 @pytest.mark.parametrize("slot", [0, 1, 2])

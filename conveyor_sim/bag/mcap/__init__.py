@@ -1,0 +1,1 @@
+"""The MCAP file format: writing, indexes, and verification of damaged files. Independent of message types."""

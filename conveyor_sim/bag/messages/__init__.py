@@ -1,0 +1,1 @@
+"""Message types of ROS 2 without ROS: topics, qualities of service, and serialization of columns as CDR."""

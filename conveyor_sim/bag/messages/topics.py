@@ -1,0 +1,386 @@
+"""The topics, one row each: all that publishes, records, reads, replays, compares or lists topics asks here."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from conveyor_sim.bag.messages import encode
+from conveyor_sim.bag.messages.encode import Header, Outcome
+from conveyor_sim.bag.messages.entries import bin_name, bottle_name, command_name, contact_name
+from conveyor_sim.bag.messages.markers import bottles_markers, plant_markers
+from conveyor_sim.bag.messages.qos import ALARMS, CLOCK, DATA, EVENTS, LATCHED, OUTCOMES, Qos
+from conveyor_sim.columns.alarms import AlarmColumns
+from conveyor_sim.columns.bottles import BeltColumns, BottleColumns, ContactColumns
+from conveyor_sim.columns.counters import CounterColumns
+from conveyor_sim.columns.damage import DamageColumns, DamageEvent, RailWearColumns
+from conveyor_sim.columns.events import EventColumns, event_columns
+from conveyor_sim.columns.ledger import Ledger
+from conveyor_sim.columns.read_back import ReadBackColumns
+from conveyor_sim.columns.variables import VariableColumns
+from conveyor_sim.line.run_state import RunState
+from conveyor_sim.scene.marks import marks_of
+
+if TYPE_CHECKING:
+    from conveyor_sim.simulation import Simulation
+
+
+class Snapshot:
+    """A simulation at one tick: its bottles are observed at most once, however many topics show them."""
+
+    def __init__(self, sim: Simulation, run_id: str = "") -> None:
+        self.sim = sim
+        self.run_id = run_id
+
+    @cached_property
+    def bottles(self) -> BottleColumns:
+        """The bottles present."""
+        return self.sim.bottles()
+
+
+@dataclass(frozen=True)
+class Compare:
+    """How a replay compares a topic's messages with those that were recorded, field by field."""
+
+    entry: Callable[[Any, Any, int], str] = lambda line, message, index: ""
+    """Entry i of a message in words, such as "belt feeder", from Line, message and i."""
+    bottle: str | None = None
+    """The field that holds the ids of the bottles, where entries belong to bottles."""
+    within: Mapping[str, float] = field(default_factory=dict)
+    """By field, the tolerance on another machine or with other versions: absolute, in the unit of the field, plus
+    compare.RELATIVE of the value; other fields exactly. Empty: compared bit for bit on the same machine, else not.
+
+    Wide against rounding, narrow against a collision that went another way: a dense line is chaotic, so runs on
+    different machines do part in the end.
+    """
+
+
+NOT_COMPARED = Compare()
+"""Of topics that say nothing else."""
+
+
+@dataclass(frozen=True)
+class Topic:
+    """One topic. It has a `state` or `events` if the simulation makes it."""
+
+    name: str
+    """Relative to the node's namespace, unless it begins with /. <...> stands for a name of the scene."""
+    type: str
+    what: str
+    """For docs/ros.md, as `when`."""
+    when: str = ""
+    """In words; "": as its rate says."""
+    qos: Qos = DATA
+    rate: str | None = None
+    """The key of Scene.outputs whose rate it has; None: sent at the start (`once`), or when there is something."""
+    state: Callable[[Snapshot], Any] | None = None
+    """What it shows of a tick; None: nothing, and no message is sent."""
+    events: Callable[[Simulation], Sequence[Any]] | None = None
+    """What has happened since the last call, each with a tick of its own and sent as a message of its own."""
+    write: Callable[[Any, Header], bytes] | None = None
+    """A message from what `state` or `events` gave; None: field by field."""
+    columns: Callable[..., Any] | None = None
+    """The dataclass that a message is read back as, field by field."""
+    read: Callable[[Any], Any] | None = None
+    """The same where it is not field by field."""
+    recorded: bool = True
+    """By default."""
+    once: bool = False
+    """Latched and sent at the start of a run only, though it has a `state`."""
+    compare: Compare = NOT_COMPARED
+    """By a replay."""
+    subscribed: bool = False
+    """Whether it is sent to the line, and not by it."""
+    by_controller: bool = False
+    """Whether it comes from a controller beside the line, and not from the node."""
+
+    @property
+    def each_counts(self) -> bool:
+        """Whether each message counts for its own moment only, and none shows a state."""
+        return self.qos is EVENTS
+
+    def pack(self, data: Any, header: Header) -> bytes:
+        """The message of what `state` or `events` gave."""
+        return encode.columns_message(self.type, data, header) if self.write is None else self.write(data, header)
+
+    def unpack(self, message: Any) -> Any:
+        """What a decoded message is read back as; itself where nothing is said."""
+        if self.read is not None:
+            return self.read(message)
+        return message if self.columns is None else to_columns(self.columns, message)
+
+    @property
+    def fields(self) -> tuple[str, ...]:
+        """Those of its messages that are compared."""
+        return ("values",) if self.columns is None else tuple(field.name for field in fields(self.columns))  # type: ignore[arg-type]
+
+
+def to_columns(kind: Callable[..., Any], message: Any) -> Any:
+    """The dataclass that a message holds field by field."""
+    return kind(**{field.name: getattr(message, field.name) for field in fields(kind)})  # type: ignore[arg-type]
+
+
+_MOTION = {"x": 1e-6, "y": 1e-6, "theta": 1e-5, "vx": 1e-4, "vy": 1e-4, "omega": 1e-3}
+"""m, m, rad, m/s, m/s, rad/s."""
+
+_ROWS = (
+    Topic(
+        "line",
+        encode.LINE,
+        "names behind the indices, limits, scene text, seed, versions, time step",
+        "once a run, latched",
+        LATCHED,
+        once=True,
+        state=lambda now: (now.sim, now.run_id),
+        write=lambda data, header: encode.line_message(data[0], data[1], header),
+    ),
+    Topic(
+        "plant",
+        encode.MARKERS,
+        "belts, rails, directions of travel, and every device that has a place",
+        "once a run, latched",
+        LATCHED,
+        once=True,
+        state=lambda now: (now.sim.model.plant.belts, now.sim.model.plant.rails_at_rest, marks_of(now.sim.scene)),
+        write=lambda data, header: plant_markers(data[0], data[1], data[2], header),
+    ),
+    Topic(
+        "outcomes",
+        encode.OUTCOME,
+        "what became of an input: who gave it, tick, accepted or the reason",
+        "when it happens",
+        OUTCOMES,
+        events=lambda sim: sim.take_outcomes(),
+        write=encode.outcome_message,
+        read=encode.to_outcome,
+        columns=Outcome,
+    ),
+    Topic(
+        "guard",
+        "conveyor_msgs/msg/GuardEvent",
+        "what the [guard](stability.md) noticed: which bottle, where, why, and what helps",
+        "when it happens",
+        EVENTS,
+        events=lambda sim: sim.take_guard_events(),
+    ),
+    Topic(
+        "damage_events",
+        "conveyor_msgs/msg/DamageEvent",
+        "a limit of the scene (`limits`) was passed: which bottle, what, where",
+        "when it happens",
+        EVENTS,
+        events=lambda sim: sim.take_damage_events(),
+        columns=DamageEvent,
+    ),
+    Topic(
+        "bottles",
+        "conveyor_msgs/msg/Bottles",
+        "position, velocity, belt, peak force and impulse since the last message",
+        rate="bottles",
+        state=lambda now: now.bottles,
+        columns=BottleColumns,
+        compare=Compare(bottle_name, "id", {**_MOTION, "peak_force": 1e-2, "impulse": 1e-4}),
+    ),
+    Topic(
+        "poses",
+        encode.POSES,
+        "the same bottles as poses, in the same order",
+        rate="poses",
+        state=lambda now: now.bottles,
+        write=encode.poses_message,
+    ),
+    Topic(
+        "markers",
+        encode.MARKERS,
+        "bottles for RViz and Foxglove",
+        "as `poses`, at most `marker_rate` a wall second",
+        rate="poses",
+        state=lambda now: (now.bottles, now.sim.model.type_radius, now.sim.moving_rails()),
+        write=lambda data, header: bottles_markers(data[0], data[1], data[2], header),
+    ),
+    Topic(
+        "contacts",
+        "conveyor_msgs/msg/Contacts",
+        "every closed contact with its forces at that tick",
+        rate="contacts",
+        state=lambda now: now.sim.contacts(),
+        columns=ContactColumns,
+        compare=Compare(contact_name, "a"),
+    ),
+    Topic(
+        "belts",
+        "conveyor_msgs/msg/Belts",
+        "commanded and actual speeds",
+        rate="belts",
+        state=lambda now: now.sim.belts(),
+        columns=BeltColumns,
+        compare=Compare(lambda line, _, index: f"belt {line.belts[index]}", within={"commanded": 1e-9, "actual": 1e-9}),
+    ),
+    Topic(
+        "signals",
+        "conveyor_msgs/msg/Signals",
+        "the process image, in the order of `line`; which signals are forced",
+        rate="signals",
+        state=lambda now: now.sim.line.signals(),
+        read=lambda message: message.values,
+        compare=Compare(lambda line, _, index: f"signal {line.signal_names[index]}", within={"values": 1e-4}),
+    ),
+    Topic(
+        "counters",
+        "conveyor_msgs/msg/Counters",
+        "bottles, times and efficiency of each machine and of the line since their last reset",
+        rate="counters",
+        state=lambda now: now.sim.line.counters(),
+        columns=CounterColumns,
+        compare=Compare(lambda line, message, index: f"counters of {message.name[index]}"),
+    ),
+    Topic(
+        "ledger",
+        "conveyor_msgs/msg/Ledger",
+        "the energy ledger: work of each belt, dissipated, stored, and what does not close",
+        rate="ledger",
+        state=lambda now: now.sim.ledger(),
+        columns=Ledger,
+        compare=Compare(),
+    ),
+    Topic(
+        "damage",
+        "conveyor_msgs/msg/Damage",
+        "loads on every bottle: sliding work so far; largest forces, impacts and index of tipping since the last "
+        "message",
+        rate="damage",
+        state=lambda now: now.sim.damage(),
+        columns=DamageColumns,
+        compare=Compare(bottle_name, "id"),
+    ),
+    Topic(
+        "rail_wear",
+        "conveyor_msgs/msg/RailWear",
+        "sliding work and impulse in each bin of the rails, of at most 5 cm, since the start",
+        "as `damage`",
+        rate="damage",
+        state=lambda now: now.sim.rail_wear(),
+        columns=RailWearColumns,
+        compare=Compare(bin_name),
+    ),
+    Topic(
+        "events",
+        "conveyor_msgs/msg/Events",
+        "what happened: bottles fed, removed, rejected, alarms, states of machines, faults, refusals, limits",
+        "each tick at which something did",
+        EVENTS,
+        state=lambda now: event_columns(now.sim.happened, now.sim.line.happened_so_far),
+        columns=EventColumns,
+        compare=Compare(lambda line, message, index: f"{message.kind[index]} of {message.name[index]}"),
+    ),
+    Topic(
+        "readback",
+        "conveyor_msgs/msg/ReadBack",
+        "what each command is set to, who set it, and when",
+        "latched, each tick at which something of it changed",
+        LATCHED,
+        state=lambda now: now.sim.line.read_back.changes(),
+        columns=ReadBackColumns,
+        compare=Compare(command_name, within={"value": 1e-9}),
+    ),
+    Topic(
+        "alarm_states",
+        "conveyor_msgs/msg/AlarmStates",
+        "all [alarms](alarms.md), with what was declared of them and their states by ISA-18.2",
+        "latched, each tick at which something of it changed",
+        LATCHED,
+        state=lambda now: now.sim.line.alarms.changes(),
+        columns=AlarmColumns,
+        compare=Compare(lambda line, message, index: f"alarm {message.id[index]}"),
+    ),
+    Topic(
+        "variables",
+        "conveyor_msgs/msg/Variables",
+        "a PLC program's variables that were to be [recorded](structured_text.md#variables-in-recordings); as a node, "
+        "by `controller_node`",
+        "each scan of the program",
+        columns=VariableColumns,
+        by_controller=True,
+    ),
+    Topic(
+        "run_state",
+        "conveyor_msgs/msg/RunState",
+        "what the run is doing: running, paused, lockstep, ended, stopped with the reason, replaying",
+        "latched, when it changes",
+        LATCHED,
+        write=encode.run_state_message,
+        read=lambda message: RunState(int(message.state), message.reason),
+    ),
+    Topic(
+        "photo_eyes/<eye>",
+        encode.BOOL,
+        "whether a photo-eye is blocked: for the simplest controllers; not recorded, `signals` has it",
+        "latched, when it changes",
+        LATCHED,
+        write=encode.bool_message,
+        recorded=False,
+    ),
+    Topic(
+        "alarms",
+        "diagnostic_msgs/msg/DiagnosticArray",
+        "a controller's alarms, by `controller_node`: a status each, ERROR while it stands",
+        "latched, when one comes or goes",
+        ALARMS,
+        recorded=False,
+        by_controller=True,
+    ),
+    Topic(
+        "/clock",
+        "rosgraph_msgs/msg/Clock",
+        "simulated time, while paused too",
+        "each tick, at most `clock_rate` a wall second",
+        CLOCK,
+        recorded=False,
+    ),
+    Topic(
+        "/diagnostics",
+        "diagnostic_msgs/msg/DiagnosticArray",
+        "state of the simulation, warnings and errors",
+        "once a wall second",
+        recorded=False,
+    ),
+    Topic(
+        "commands",
+        encode.COMMANDS,
+        "setpoints by name (`line.command_names`), applied together or refused together; alarms",
+        qos=EVENTS,
+        recorded=False,
+        subscribed=True,
+    ),
+    Topic(
+        "belts/<belt>/cmd_speed",
+        encode.SPEED,
+        "speed of one belt, m/s, positive forward: the easy one to send by hand",
+        qos=EVENTS,
+        recorded=False,
+        subscribed=True,
+    ),
+)
+
+TOPICS: dict[str, Topic] = {topic.name: topic for topic in _ROWS}
+"""By name; within a tick, messages are written in this order."""
+
+CMD_SPEED = TOPICS["belts/<belt>/cmd_speed"]
+"""The row that stands for the speed commands of all belts."""
+
+OUTPUTS = {name: topic for name, topic in TOPICS.items() if topic.recorded}
+"""Those that the simulation makes and that are recorded."""
+
+COMPARED = {name: topic for name, topic in TOPICS.items() if topic.compare is not NOT_COMPARED}
+"""In the order in which a replay looks for differences of one tick."""
+
+STATES = {name: topic for name, topic in COMPARED.items() if topic.rate is not None}
+"""Those of which a recording needs one at least, to be replayed or drawn."""
+
+
+def photo_eye_topics(names: Iterable[str]) -> dict[str, Topic]:
+    """A topic for each photo-eye, by name."""
+    row = TOPICS["photo_eyes/<eye>"]
+    return {topic.name: topic for topic in (replace(row, name=f"photo_eyes/{name}") for name in names)}

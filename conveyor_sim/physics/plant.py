@@ -1,0 +1,139 @@
+"""Scene -> Plant: the scene with its geometry, built once and handed down to effects, laws, arrays and the run."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from conveyor_sim.scene.geometry import (
+    ArcPiece,
+    BeltShape,
+    InitialBottle,
+    Piece,
+    RailShape,
+    belt_shapes,
+    initial_bottles,
+    is_full_turn,
+    rail_shapes,
+)
+from conveyor_sim.scene.moving import MovingShape, moving_shapes
+from conveyor_sim.scene.overlaps import near_pieces
+from conveyor_sim.scene.schema import Scene, Single
+
+JOINT_TOLERANCE = 1e-6
+"""m; well above the rounding of coordinates, well below any distance that matters to a bottle."""
+
+SPEED_AT_REST = 1.0
+"""m/s, assumed impact speed where nothing in a scene moves at first."""
+
+
+@dataclass(frozen=True, eq=False)
+class Plant:
+    """A scene with its geometry. Build it with `Plant.of`."""
+
+    scene: Scene
+    belts: tuple[BeltShape, ...]
+    rails_at_rest: tuple[RailShape, ...]
+    """Rails in the scene's order, then those of curved belts; arcs with narrow mouths are cut in halves."""
+    moving: tuple[MovingShape, ...]
+    """Rails that move; their numbers follow those of `rails_at_rest`."""
+    bottles: tuple[InitialBottle, ...]
+    """Bottles at the start of a run."""
+
+    @classmethod
+    def of(cls, scene: Scene) -> "Plant":
+        """Build the plant of a valid scene."""
+        largest = max(kind.radius for kind in scene.bottle_types.values())
+        return cls(
+            scene=scene,
+            belts=tuple(belt_shapes(scene)),
+            rails_at_rest=tuple(cut_at_mouths(rail_shapes(scene), largest)),
+            moving=tuple(moving_shapes(scene)),
+            bottles=tuple(initial_bottles(scene)),
+        )
+
+    @cached_property
+    def rails(self) -> tuple[RailShape, ...]:
+        """All rails by number, moving ones at their initial positions."""
+        return (*self.rails_at_rest, *(shape.shape(shape.first) for shape in self.moving))
+
+    @cached_property
+    def rail_materials(self) -> tuple[str, ...]:
+        """Materials of all rails, sorted: a material's number is its index."""
+        return tuple(sorted({rail.material for rail in self.rails}))
+
+    @cached_property
+    def supply(self) -> dict[str, float]:
+        """Largest number of bottles of each type in a run, by type name; infinite for an infeed without end.
+
+        Types without bottles are left out.
+        """
+        supply: dict[str, float] = {}
+        for name, *_ in self.bottles:
+            supply[name] = supply.get(name, 0.0) + 1.0
+        for _, entry in self.scene.entries():
+            supply[entry.bottle] = supply.get(entry.bottle, 0.0) + (math.inf if entry.most is None else entry.most)
+        return supply
+
+    @property
+    def most_bottles(self) -> int | None:
+        """Largest number of bottles in a run; None if an infeed has no end."""
+        most = sum(self.supply.values())
+        return int(most) if math.isfinite(most) else None
+
+    @cached_property
+    def impact_speed(self) -> float:
+        """Speed of the hardest expected impact, m/s; SPEED_AT_REST if everything rests.
+
+        The fastest belt or entering bottle against something at rest, or the largest difference between initial
+        velocities; plus the fastest moving rail.
+        """
+        speeds = [abs(belt.speed) for belt in self.scene.belts.values()]
+        speeds += [giver.heading[1] for _, giver in self.scene.givers()]
+        single = (entry.velocity for entry in self.scene.bottles if isinstance(entry, Single))
+        speeds.append(math.hypot(*np.ptp(np.array([(0.0, 0.0), *single]), axis=0)))
+        rails = [shape.max_speed * shape.fastest_point for shape in self.moving]
+        return max(speeds) + max(rails, default=0.0) or SPEED_AT_REST
+
+
+def cut_at_mouths(rails: Sequence[RailShape], radius: float) -> list[RailShape]:
+    """Cut C-shaped arcs in halves where a bottle of a radius (m) can touch both tips at once.
+
+    An arc piece pushes at its nearest point only. On an uncut arc that point would jump between the tips and push the
+    bottle to one side. Arcs with wider mouths, and arcs with both ends joined to other rails, stay as they are.
+    """
+    pieces = [piece for rail in rails for piece in rail.pieces]
+    narrow = [place for place, piece in enumerate(pieces) if isinstance(piece, ArcPiece) and _is_narrow(piece, radius)]
+    cut = _with_a_free_end(pieces, narrow)
+    place, result = 0, []
+    for rail in rails:
+        parts = [_halves(piece) if place + n in cut else (piece,) for n, piece in enumerate(rail.pieces)]
+        place += len(rail.pieces)
+        result.append(replace(rail, pieces=tuple(half for part in parts for half in part)))
+    return result
+
+
+def _is_narrow(arc: ArcPiece, radius: float) -> bool:
+    """Return True if an axis beyond the centre, as seen from the arc, can be within a radius (m) of both ends."""
+    if is_full_turn(arc.span):
+        return False
+    return (arc.radius * math.sin(0.5 * arc.span) if arc.span > math.pi else arc.radius) < radius
+
+
+def _with_a_free_end(pieces: Sequence[Piece], some: Sequence[int]) -> set[int]:
+    """Return those of the piece numbers `some` that have an end without another piece."""
+    ends = np.array([end for index in some for end in pieces[index].ends]).reshape(-1, 2)
+    joined = np.zeros(len(ends), dtype=bool)
+    for index, near, apart in near_pieces(ends, pieces, JOINT_TOLERANCE):
+        own = np.array([some[end // 2] == index for end in near])
+        joined[near[(apart <= JOINT_TOLERANCE) & ~own]] = True
+    return {index for index, (first, last) in zip(some, joined.reshape(-1, 2), strict=True) if not (first and last)}
+
+
+def _halves(piece: Piece) -> tuple[Piece, ...]:
+    if not isinstance(piece, ArcPiece):
+        return (piece,)
+    half = 0.5 * piece.span
+    return replace(piece, span=half), replace(piece, start_angle=piece.start_angle + half, span=piece.span - half)
