@@ -60,8 +60,8 @@ stability: set-up
 numba-next: set-up-test
 	@rm -rf build/numba-next
 	@$(PYTHON) -m pip install --quiet --pre --target build/numba-next numba
-	@PYTHONPATH=build/numba-next $(PYTHON) -c "import numba, llvmlite; print('numba', numba.__version__, 'llvmlite', llvmlite.__version__)"
-	@PYTHONPATH=$(CURDIR)/build/numba-next $(PYTHON) -m pytest test/engine $(ARGS)
+	@PYTHONPATH="$(CURDIR)/build/numba-next" $(PYTHON) -c "import numba, llvmlite; print('numba', numba.__version__, 'llvmlite', llvmlite.__version__)"
+	@PYTHONPATH="$(CURDIR)/build/numba-next" $(PYTHON) -m pytest test/engine $(ARGS)
 
 lint: set-up-test
 	@$(PYTHON) -m ruff check .

@@ -21,7 +21,7 @@ def patterns(record: str | Iterable[str]) -> tuple[str, ...]:
     return (record,) if isinstance(record, str) else tuple(record)
 
 
-class Recorded:
+class RecordedVariables:
     """The variables of a controller that are recorded."""
 
     names: tuple[str, ...]

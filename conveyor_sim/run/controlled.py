@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.control.line_tags import LineTags, bind
-from conveyor_sim.control.recorded import Recorded
+from conveyor_sim.control.recorded import RecordedVariables
 from conveyor_sim.control.scan import AlarmChanges, ControlError, Controller, Inputs, commands_of, declared_alarms
 from conveyor_sim.errors import CommandError, ConveyorError
 from conveyor_sim.line.commands.inputs import DECLARE, CommandOutcome, Input
@@ -20,7 +20,7 @@ class Controlled:
     """A simulation with a controller: `before_tick`, then the tick, then `after_tick` with what became of inputs."""
 
     def __init__(self, simulation: Simulation, controller: Controller, record: Sequence[str] = ()) -> None:
-        """record: patterns of its variables that are recorded, beside those that it has itself (`Recorded`).
+        """record: patterns of its variables that are recorded, beside those that it has itself (`RecordedVariables`).
 
         Raises ConveyorError for a controller that does not fit the line, and for such a pattern.
         """
@@ -34,7 +34,7 @@ class Controlled:
         try:
             bind(controller, LineTags(signals, commands, image.command_limits))
             declared = declared_alarms(controller)
-            self._recorded = Recorded(controller, record)
+            self._recorded = RecordedVariables(controller, record)
         except ControlError as error:
             raise ConveyorError(str(error)) from error
         if declared:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from conveyor_sim.control.line_tags import LineTags, bind
 from conveyor_sim.control.memory import restore, snapshot
-from conveyor_sim.control.recorded import Recorded
+from conveyor_sim.control.recorded import RecordedVariables
 from conveyor_sim.control.scan import (
     ALARMS,
     AlarmChanges,
@@ -51,7 +51,7 @@ class ScanCycle:
         self._plc: AttachedPlc | ServedPlc | None = None
         self._answer: Mapping[str, float] = {}
         self._changes = AlarmChanges()
-        self.recorded = Recorded(None)
+        self.recorded = RecordedVariables(None)
         """The controller's variables that are recorded."""
         self.read: dict[str, None] = {}
         """Names of the signals that were read, in the order of the first reading."""
@@ -79,7 +79,7 @@ class ScanCycle:
         image = self._simulation.process_image
         signals, commands = ({tag.name: tag.kind for tag in tags} for tags in (image.signals, image.commands))
         bind(controller, LineTags(signals, commands, image.command_limits))
-        self.recorded = Recorded(controller)
+        self.recorded = RecordedVariables(controller)
         self._controller = controller
         if declared := declared_alarms(controller):
             ids, texts = tuple(alarm.id for alarm in declared), tuple(alarm.as_text() for alarm in declared)
@@ -116,7 +116,7 @@ class ScanCycle:
         self.close()
         image = self._simulation.process_image
         self._plc = self._controller = ServedPlc(image, url, tags, user, password, patience)
-        self.recorded = Recorded(self._plc)
+        self.recorded = RecordedVariables(self._plc)
 
     def snapshot(self) -> dict[str, Any] | None:
         """What the controller remembers and has answered last; None without one, or for a node or PLC."""
@@ -139,7 +139,7 @@ class ScanCycle:
             if outsider is not None:
                 outsider.close()
         self._node = self._plc = None
-        self.recorded = Recorded(None)
+        self.recorded = RecordedVariables(None)
 
     def answers_for(self, outcome: CommandOutcome) -> bool:
         """Whether that was of the PLC which is attached, and not of another client of a server."""

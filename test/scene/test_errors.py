@@ -112,7 +112,10 @@ MANDATORY = ["mapping", "name", "duration", "bottle_types"]
         ("a: 1\n---\nb: 2\n", 2, ["not valid YAML", "single document"]),
         ("a: \x01\n", 1, ["not valid YAML", "control character"]),
         ("a: &a [*a]\n", 1, ["nested too deeply"]),
-        ("[" * 5000, 1, ["nested too deeply"]),
+        ("[" * 5000, 1, ["not valid YAML", "maximum nesting depth"]),
+        ("- " * 5000, 1, ["nested too deeply"]),
+        ("é: µµµ\n\n# ééé\nb: \x01\n\n\n", 4, ["not valid YAML", "control character"]),
+        ("a: 1\nb: \ud800\n", 2, ["not valid YAML", "half of a character"]),
         ("a: *nowhere\n", 1, ["not valid YAML", "undefined alias", "'nowhere'"]),
     ],
 )

@@ -22,6 +22,7 @@ class ContactLaw(_with_columns()):  # type: ignore[misc]
     As a table by type: (T * T,), entry a * T + b, or (T * M,), entry type * M + material. By pair: (P,). A contact
     without a law has 0 in its column, because the laws are added up. First the columns of the laws in `contact/laws/`,
     then
+
     - friction: mu
     - tangential_stiffness: N/m, of the spring with history; 0, not None, if there are only Mindlin springs
     - tangential_mindlin: N/m^1.5, times sqrt(delta): stiffness added by the overlap

@@ -1,9 +1,8 @@
 """Coulomb friction, regularised at low slip so that it has a direction at rest (paper eqs. 7-10).
 
-The force is -mu N p(s) v/s, s =
-v
-. There are two curves p, both with slope 2/v_lim at rest: the paper's polynomial 2 s/v_lim - (s/v_lim)^2, 1 from v_lim
-on, and (2/pi) atan(pi s/v_lim). `atan`: None selects the polynomial, anything else the arctangent.
+The force is -mu N p(s) v/s, s = |v|. There are two curves p, both with slope 2/v_lim at rest: the paper's polynomial 2
+s/v_lim - (s/v_lim)^2, 1 from v_lim on, and (2/pi) atan(pi s/v_lim). `atan`: None selects the polynomial, anything else
+the arctangent.
 
 Implicit: the force is that of the slip *after* the step, s + b v_lim p(s) = s_0 with b = dt mu N/(m_t v_lim), where
 1/m_t is the slip per unit of impulse. It never reverses the slip, at any step size.

@@ -12,17 +12,17 @@ from conveyor_sim.engine.compiler.compile import part
 
 
 @part
-def phase_at(course: F8, q: int, time: float) -> int:
+def phase_at(profiles: F8, q: int, time: float) -> int:
     """Return the phase of profile q at a time (s)."""
     k = 0
-    while k + 1 < PHASES and course[q, k + 1, 0] <= time:
+    while k + 1 < PHASES and profiles[q, k + 1, 0] <= time:
         k += 1
     return k
 
 
 @part
 def plan_profile(
-    course: F8,
+    profiles: F8,
     q: int,
     begin: float,
     position: float,
@@ -37,7 +37,7 @@ def plan_profile(
     """
     if speed == 0.0 and target == position:
         for k in range(PHASES):
-            course[q, k, 0], course[q, k, 1], course[q, k, 2], course[q, k, 3] = 0.0, position, 0.0, 0.0
+            profiles[q, k, 0], profiles[q, k, 1], profiles[q, k, 2], profiles[q, k, 3] = 0.0, position, 0.0, 0.0
         return
     braked = position + 0.5 * speed * abs(speed) / acceleration
     sign = 1.0 if target >= braked else -1.0
@@ -49,11 +49,15 @@ def plan_profile(
     rest = distance - 0.5 * (top + sign * speed) * speeding - 0.5 * top * braking
     going = max(0.0, rest / top) if top > 0.0 else 0.0
     begin_brake = target - sign * 0.5 * top * braking
-    course[q, 0, 0], course[q, 0, 1], course[q, 0, 2] = begin, position, speed
-    course[q, 1, 0], course[q, 1, 1], course[q, 1, 2] = begin + speeding, begin_brake - sign * top * going, sign * top
-    course[q, 2, 0], course[q, 2, 1], course[q, 2, 2] = begin + (speeding + going), begin_brake, sign * top
-    course[q, 3, 0], course[q, 3, 1], course[q, 3, 2] = begin + (speeding + going + braking), target, 0.0
-    course[q, 0, 3], course[q, 1, 3], course[q, 2, 3], course[q, 3, 3] = (
+    profiles[q, 0, 0], profiles[q, 0, 1], profiles[q, 0, 2] = begin, position, speed
+    profiles[q, 1, 0], profiles[q, 1, 1], profiles[q, 1, 2] = (
+        begin + speeding,
+        begin_brake - sign * top * going,
+        sign * top,
+    )
+    profiles[q, 2, 0], profiles[q, 2, 1], profiles[q, 2, 2] = begin + (speeding + going), begin_brake, sign * top
+    profiles[q, 3, 0], profiles[q, 3, 1], profiles[q, 3, 2] = begin + (speeding + going + braking), target, 0.0
+    profiles[q, 0, 3], profiles[q, 1, 3], profiles[q, 2, 3], profiles[q, 3, 3] = (
         sign * acceleration,
         0.0,
         -sign * acceleration,

@@ -40,4 +40,4 @@ def impact_bounds(found: Sequence[Impact], tolerance: float) -> list[Bound]:
 
 def _at(meeting: Meeting, terms: Terms, speed: float) -> str:
     law, k = meeting.elastic
-    return f"{law.said(k, terms.laws.curves)} {speed:g} m/s"
+    return f"{law.coefficient_text(k, terms.laws.curves)} {speed:g} m/s"

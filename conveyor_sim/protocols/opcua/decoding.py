@@ -11,7 +11,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from asyncua import ua
-from asyncua.common.utils import Buffer, NotEnoughData, ServiceError
+from asyncua.common.utils import NotEnoughData, ServiceError
+
+from conveyor_sim.protocols.opcua.asyncua_internals import OpenBuffer
 
 _ARRAYS_OF_NULL = (b"\x80", b"\xc0")
 """First byte of a variant that holds an array of null values, without and with dimensions (OPC 10000-6, 5.2.2.16)."""
@@ -50,7 +52,7 @@ class Allowance:
         raise ServiceError(ua.StatusCodes.BadEncodingLimitsExceeded)
 
 
-class BoundedBuffer(Buffer):
+class BoundedBuffer(OpenBuffer):
     """A buffer whose copies share one allowance."""
 
     def __init__(self, data: bytes, allowance: Allowance, start: int = 0, size: int = -1) -> None:
@@ -85,5 +87,5 @@ class BoundedBuffer(Buffer):
 
     def copy(self, size: int = -1) -> BoundedBuffer:
         """Return a buffer over the next `size` bytes with the same allowance; -1: over all that is left."""
-        size = self._size if size == -1 or size > self._size else size
-        return BoundedBuffer(self._data, self.allowance, self._cur_pos, size)
+        data, start, size = self.window(size)
+        return BoundedBuffer(data, self.allowance, start, size)

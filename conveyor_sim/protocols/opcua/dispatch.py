@@ -13,9 +13,9 @@ from asyncua.common.utils import ServiceError
 from asyncua.crypto.permission_rules import ADMIN_TYPES, USER_TYPES
 from asyncua.crypto.security_policies import SecurityPolicyNone
 from asyncua.crypto.uacrypto import InvalidSignature
-from asyncua.server.uaprocessor import UaProcessor
 from asyncua.ua.ua_binary import struct_from_binary
 
+from conveyor_sim.protocols.opcua.asyncua_internals import OpenProcessor
 from conveyor_sim.protocols.opcua.client_certificates import require_usable
 from conveyor_sim.protocols.opcua.ownership import OwnedSession
 
@@ -61,14 +61,14 @@ REQUESTS = {
 """Request types by encoding id: all services that the library can answer, and BrowseNext."""
 
 
-class Dispatcher(UaProcessor):
+class Dispatcher(OpenProcessor):
     """Decodes, checks and dispatches the requests of one connection."""
 
     _message: Any = None
 
     def open_secure_channel(self, algohdr: Any, seqhdr: Any, body: Any) -> None:
         """Open or renew the channel. Raise ServiceError for a client certificate that must be refused."""
-        policy = self._connection.security_policy
+        policy = self.channel.security_policy
         if policy.URI != SecurityPolicyNone.URI:
             require_usable(policy.peer_certificate)
         super().open_secure_channel(algohdr, seqhdr, body)
@@ -85,13 +85,13 @@ class Dispatcher(UaProcessor):
         except Exception as error:
             raise ServiceError(Codes.BadDecodingError) from error
 
-    async def _process_message(self, typeid: Any, requesthdr: Any, seqhdr: Any, body: Any) -> Any:
+    async def answer_request(self, typeid: Any, requesthdr: Any, seqhdr: Any, body: Any) -> Any:
         joining = self.session is None
         try:
             self._require_session(typeid, requesthdr)
             if typeid in (_REGISTER, _UNREGISTER, _BROWSE_NEXT):
                 return await self._serve(typeid, requesthdr, seqhdr, body)
-            return await super()._process_message(typeid, requesthdr, seqhdr, body)
+            return await super().answer_request(typeid, requesthdr, seqhdr, body)
         except BaseException as error:
             if typeid == _ACTIVATE and joining:
                 self._step_back(requesthdr)
@@ -140,8 +140,7 @@ class Dispatcher(UaProcessor):
         The library joins a session, and redirects its subscriptions, before it checks the client.
         """
         session, self.session = self.iserver.lookup_external_session(requesthdr.AuthenticationToken), None
-        if self._session_watchdog_task is not None:
-            self._session_watchdog_task.cancel()
+        self.stop_session_watchdog()
         if isinstance(session, OwnedSession):
             session.return_notifications()
 

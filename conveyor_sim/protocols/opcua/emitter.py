@@ -36,7 +36,7 @@ class Emitter:
         condition = getattr(event, "NodeId", None)
         if condition is not None:
             if event.Retain:
-                self._service._conditions[condition] = event
+                self._service.conditions[condition] = event
             else:
                 self.forget(condition)
         event.made_fields = {}
@@ -50,4 +50,4 @@ class Emitter:
 
     def forget(self, condition: ua.NodeId) -> None:
         """Leave a condition out of later refreshes."""
-        self._service._conditions.pop(condition, None)
+        self._service.conditions.pop(condition, None)

@@ -8,8 +8,9 @@ from contextlib import suppress
 from typing import Any
 
 from asyncua import ua
-from asyncua.server.monitored_item_service import MonitoredItemService, WhereClauseEvaluator
+from asyncua.server.monitored_item_service import WhereClauseEvaluator
 
+from conveyor_sim.protocols.opcua.asyncua_internals import OpenItems
 from conveyor_sim.protocols.opcua.filter_codes import filter_code
 from conveyor_sim.protocols.opcua.filters import filter_units
 from conveyor_sim.protocols.opcua.limits import OpcUaLimits
@@ -21,7 +22,7 @@ _AT_ONCE = 100
 """Items that are created, or whose values are sent again, before other tasks run."""
 
 
-class Items(MonitoredItemService):
+class Items(OpenItems):
     """Monitored items of one subscription.
 
     The library compares a value with the one before it, not with the last one that was sent. So a dead band hides a
@@ -38,7 +39,7 @@ class Items(MonitoredItemService):
         """Work units of one event, fields and operands of all event filters, and room in all queues."""
 
     def __len__(self) -> int:
-        return len(self._monitored_items)
+        return len(self.by_id)
 
     def fields_of(self, ids: Collection[int]) -> int:
         """Return the fields and operands of the event filters of some items; ids without an item count 0."""
@@ -61,8 +62,8 @@ class Items(MonitoredItemService):
         if error is not None:
             await self.trigger_statuschange(error)
             return
-        id = self._monitored_datachange.get(handle)
-        item = None if id is None else self._monitored_items.get(id)
+        id = self.ids_by_handle.get(handle)
+        item = None if id is None else self.by_id.get(id)
         if id is None or item is None or item.mode == ua.MonitoringMode.Disabled or not self.isub.spend(CHANGE_UNITS):
             return
         last = item.mvalue.current_dvalue  # the last value sent, not one that the filter held back
@@ -70,7 +71,7 @@ class Items(MonitoredItemService):
             return
         item.mvalue.old_dvalue, item.mvalue.current_dvalue = last, value
         trigger = item.filter.Trigger if item.filter else ua.DataChangeTrigger.StatusValue
-        if self._is_data_changed(item.mvalue, trigger):
+        if self.is_changed(item.mvalue, trigger):
             notification = ua.MonitoredItemNotification(item.client_handle, value)
             await self.isub.enqueue_datachange_event(id, notification, item.queue_size)
 
@@ -79,8 +80,8 @@ class Items(MonitoredItemService):
 
         That is work like a change of each value, and other tasks run in between.
         """
-        for place, mid in enumerate(list(self._monitored_datachange.values())):
-            item = self._monitored_items.get(mid)
+        for place, mid in enumerate(list(self.ids_by_handle.values())):
+            item = self.by_id.get(mid)
             if item is None or item.mode != ua.MonitoringMode.Reporting or item.read_value_id is None:
                 continue
             if not self.isub.spend(CHANGE_UNITS):
@@ -91,8 +92,8 @@ class Items(MonitoredItemService):
             if place % _AT_ONCE == _AT_ONCE - 1:
                 await asyncio.sleep(0)
 
-    async def _trigger_event(self, event: Any, mid: int) -> None:
-        item = self._monitored_items.get(mid)
+    async def notify(self, event: Any, mid: int) -> None:
+        item = self.by_id.get(mid)
         if item is None or item.mode == ua.MonitoringMode.Disabled or not self.isub.spend(self._units[mid]):
             return
         with suppress(Exception):  # invalid fields of one client do not affect others
@@ -100,14 +101,14 @@ class Items(MonitoredItemService):
                 fields = ua.EventFieldList(item.client_handle, _fields(event, self._names[mid]))
                 await self.isub.enqueue_event(mid, fields, item.queue_size)
 
-    def _commit_monitored_item(self, result: ua.MonitoredItemCreateResult, mdata: Any) -> None:
-        super()._commit_monitored_item(result, mdata)
-        if result.MonitoredItemId in self._monitored_items:
-            self._count(mdata, 1)
+    def commit(self, result: ua.MonitoredItemCreateResult, item: Any) -> None:
+        super().commit(result, item)
+        if result.MonitoredItemId in self.by_id:
+            self._count(item, 1)
 
-    def _modify_monitored_item(self, params: ua.MonitoredItemModifyRequest) -> ua.MonitoredItemModifyResult:
+    def modify(self, params: ua.MonitoredItemModifyRequest) -> ua.MonitoredItemModifyResult:
         """Change an item, its event filter included, which the library would go on evaluating as it was before."""
-        item = self._monitored_items.get(params.MonitoredItemId)
+        item = self.by_id.get(params.MonitoredItemId)
         if item is None:
             return ua.MonitoredItemModifyResult(ua.StatusCode(ua.StatusCodes.BadMonitoredItemIdInvalid))
         asked, of_events = params.RequestedParameters, item.callback_handle is None
@@ -121,22 +122,22 @@ class Items(MonitoredItemService):
         self._count(item, 1)
         return ua.MonitoredItemModifyResult(ua.StatusCode(), asked.SamplingInterval, asked.QueueSize)
 
-    def _delete_monitored_items(self, mid: int) -> ua.StatusCode:
+    def delete(self, mid: int) -> ua.StatusCode:
         """Delete one item. The library searches all items of the subscription for it."""
-        item = self._monitored_items.pop(mid, None)
+        item = self.by_id.pop(mid, None)
         if item is None:
             return ua.StatusCode(ua.StatusCodes.BadMonitoredItemIdInvalid)
         self._count(item, -1)
         if item.callback_handle is not None:
             self.aspace.delete_datachange_callback(item.callback_handle)
-            self._monitored_datachange.pop(item.callback_handle, None)
+            self.ids_by_handle.pop(item.callback_handle, None)
             return ua.StatusCode()
         node = item.read_value_id.NodeId
-        same = self._monitored_events.get(node, [])
+        same = self.ids_by_node.get(node, [])
         if mid in same:
             same.remove(mid)
         if not same:
-            self._monitored_events.pop(node, None)
+            self.ids_by_node.pop(node, None)
         return ua.StatusCode()
 
     def _count(self, item: Any, sign: int) -> None:

@@ -15,8 +15,8 @@ from weakref import WeakKeyDictionary
 from asyncua import ua
 from asyncua.common.utils import ServiceError
 from asyncua.server.internal_session import InternalSession
-from asyncua.server.internal_subscription import InternalSubscription
 
+from conveyor_sim.protocols.opcua.asyncua_internals import OpenSubscription, forget_publish
 from conveyor_sim.protocols.opcua.client_certificates import application_uris, public_key
 from conveyor_sim.protocols.opcua.items import Items
 from conveyor_sim.protocols.opcua.refusals import Refusals
@@ -37,7 +37,7 @@ class Owners:
     def __init__(self, refusals: Refusals, *, trusting: bool) -> None:
         """trusting: True if the server accepts only listed certificates, so application URIs in them are proved."""
         self.refusals, self.trusting = refusals, trusting
-        self.of: WeakKeyDictionary[InternalSubscription, OwnedSession] = WeakKeyDictionary()
+        self.of: WeakKeyDictionary[OpenSubscription, OwnedSession] = WeakKeyDictionary()
 
 
 class OwnedSession(InternalSession):
@@ -125,7 +125,7 @@ class OwnedSession(InternalSession):
         Raise BadSubscriptionIdInvalid unless the subscription is owned, BadMessageNotAvailable without the message.
         """
         subscription = self._require("Republish", params.SubscriptionId)
-        retained = subscription._not_acknowledged_results.get(params.RetransmitSequenceNumber)
+        retained = subscription.unacknowledged.get(params.RetransmitSequenceNumber)
         if retained is None:
             raise ServiceError(Codes.BadMessageNotAvailable)
         return retained.NotificationMessage
@@ -159,7 +159,7 @@ class OwnedSession(InternalSession):
         if self._processor is not None:
             self.bind(self._processor)
 
-    def _find(self, service: str, number: int) -> InternalSubscription | None:
+    def _find(self, service: str, number: int) -> OpenSubscription | None:
         """Return an owned subscription; report the attempt on one of another session."""
         subscription = self.subscription_service.subscriptions.get(number)
         if subscription is None or subscription.session_id == self.session_id:
@@ -170,7 +170,7 @@ class OwnedSession(InternalSession):
     def _owns(self, service: str, number: int) -> bool:
         return self._find(service, number) is not None
 
-    def _require(self, service: str, number: int) -> InternalSubscription:
+    def _require(self, service: str, number: int) -> OpenSubscription:
         subscription = self._find(service, number)
         if subscription is None:
             raise ServiceError(Codes.BadSubscriptionIdInvalid)
@@ -185,7 +185,7 @@ class OwnedSession(InternalSession):
         subscription = self._find("Publish", ack.SubscriptionId)
         if subscription is None:
             return _invalid()
-        if ack.SequenceNumber not in subscription._not_acknowledged_results:
+        if ack.SequenceNumber not in subscription.unacknowledged:
             return ua.StatusCode(Codes.BadSequenceNumberUnknown)
         subscription.publish([ack.SequenceNumber])
         return ua.StatusCode()
@@ -207,10 +207,10 @@ class OwnedSession(InternalSession):
             subscription.session_id = self.session_id
             self.owners.of[subscription] = self
             self.bind(self._processor)
-            subscription._publish_cycles_count = 0
+            subscription.renew_lifetime()
         if send and isinstance(subscription.monitored_item_srv, Items):
             await subscription.monitored_item_srv.resend()
-        return ua.TransferResult(ua.StatusCode(), sorted(subscription._not_acknowledged_results))
+        return ua.TransferResult(ua.StatusCode(), sorted(subscription.unacknowledged))
 
     def _stands_for(self, owner: OwnedSession) -> bool:
         """Return True if both sessions act for one user; without a user name, for one proved application.
@@ -227,16 +227,15 @@ class OwnedSession(InternalSession):
         return stated and proved and (self.owners.trusting or public_key(self.peer) == public_key(owner.peer))
 
 
-async def _notify(subscription: InternalSubscription) -> None:
+async def _notify(subscription: OpenSubscription) -> None:
     """Notify the session that loses a subscription, if it has a publish request waiting (OPC 10000-4, 5.14.7)."""
     ask = subscription.pub_request_callback
     number = subscription.data.SubscriptionId
     request = None if ask is None else ask(number)
-    waiting = getattr(getattr(ask, "__self__", None), "_publish_results_subs", {})
-    waiting.pop(number, None)  # else the next publish request of that session would fetch values of this one
+    forget_publish(ask, number)
     if request is not None:
         change = ua.StatusChangeNotification(ua.StatusCode(Codes.GoodSubscriptionTransferred))
-        message = ua.NotificationMessage(SequenceNumber=subscription._notification_seq, NotificationData=[change])
+        message = ua.NotificationMessage(SequenceNumber=subscription.next_number, NotificationData=[change])
         await subscription.pub_result_callback(ua.PublishResult(number, NotificationMessage=message), request)
 
 

@@ -10,11 +10,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from asyncua import Server, ua
-from asyncua.common.copy_node_util import _copy_node
 
 from conveyor_sim.columns.alarms import AlarmColumns
 from conveyor_sim.line.alarms.alarm import WAITING, AlarmState
 from conveyor_sim.line.tag import Tag
+from conveyor_sim.protocols.opcua.asyncua_internals import copy_node
 from conveyor_sim.protocols.opcua.nodes import NEVER, node_id
 from conveyor_sim.protocols.opcua.values import unit_of
 from conveyor_sim.protocols.tags.tag_provider import LineSnapshot
@@ -92,7 +92,7 @@ class Admin:
         for each in declared:
             if each.BrowseName.Name in wanted:
                 # Unlike the public function, it keeps the type of reference: HasAlarm and others.
-                await _copy_node(session, parent, each, node_id(f"{root}.{NAME}.{each.BrowseName.Name}"), False)
+                await copy_node(session, parent, each, node_id(f"{root}.{NAME}.{each.BrowseName.Name}"), False)
 
     def values(self, shown: LineSnapshot) -> dict[str, ua.Variant]:
         """Return the values of the variables by name."""

@@ -78,7 +78,7 @@ class Processor(Dispatcher):
         """Start without a session."""
         super().__init__(server, transport, ConnectionLimits.of(limits))
         self._bounds = limits
-        self._connection = SecureConnection(SecurityPolicyNone(), self._limits)
+        self.channel = SecureConnection(SecurityPolicyNone(), self._limits)
         self.units = 0
         """Work units so far."""
 
@@ -92,11 +92,9 @@ class Processor(Dispatcher):
         response.ResponseHeader.RequestHandle = requesthandle
         content = struct_to_binary(response)
         self.units += len(content) // ANSWER_BYTES
-        self._transport.write(
-            self._connection.message_to_binary(content, message_type=msgtype, request_id=seqhdr.RequestId)
-        )
-        if self._transport.get_write_buffer_size() > self._bounds.answer_bytes:
-            self._transport.abort()
+        self.stream.write(self.channel.message_to_binary(content, message_type=msgtype, request_id=seqhdr.RequestId))
+        if self.stream.get_write_buffer_size() > self._bounds.answer_bytes:
+            self.stream.abort()
 
     async def process(self, header: Any, body: Any) -> bool:
         """Process one part of a message. Raise ServiceError, after which the connection ends."""
@@ -120,7 +118,7 @@ class Processor(Dispatcher):
             raise ServiceError(Codes.BadEncodingLimitsExceeded)
         return goes_on
 
-    async def _process_message(self, typeid: Any, requesthdr: Any, seqhdr: Any, body: Any) -> Any:
+    async def answer_request(self, typeid: Any, requesthdr: Any, seqhdr: Any, body: Any) -> Any:
         try:
             self._require_session(typeid, requesthdr)
             if self._is_active:
@@ -129,7 +127,7 @@ class Processor(Dispatcher):
                 self.units += LOGIN_UNITS
                 session = self.session or self.iserver.lookup_external_session(requesthdr.AuthenticationToken)
                 await self.iserver.passwords.check(self.iserver, session, body, str(self.name[0]))
-            return await super()._process_message(typeid, requesthdr, seqhdr, body)
+            return await super().answer_request(typeid, requesthdr, seqhdr, body)
         except ServiceError as error:
             if error.code == Codes.BadEncodingLimitsExceeded:  # also nesting deeper than the interpreter allows
                 body.allowance.exceeded = True

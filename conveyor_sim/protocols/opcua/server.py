@@ -141,7 +141,8 @@ class OpcUaServer:
         internal.bind_condition_methods = 1
         server = BoundedServer(internal, self._limits, ConnectionSlots(self._quota))
         server.product_uri, server.name, server.manufacturer_name = NAMESPACE, "conveyor_sim", "conveyor_sim"
-        server.application_type, server._application_uri = ua.ApplicationType.Server, own.application_uri
+        server.application_type = ua.ApplicationType.Server
+        server.state_application(own.application_uri)
         await server.init()
         await server.load_certificate(own.certificate, "der")
         await server.load_private_key(own.key, format="pem")

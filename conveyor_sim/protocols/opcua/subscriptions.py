@@ -15,9 +15,8 @@ from typing import Any
 from asyncua import ua
 from asyncua.common import uamethod
 from asyncua.common.utils import ServiceError
-from asyncua.server.internal_subscription import InternalSubscription
-from asyncua.server.subscription_service import SubscriptionService
 
+from conveyor_sim.protocols.opcua.asyncua_internals import OpenSubscription, OpenSubscriptions, sessions_of
 from conveyor_sim.protocols.opcua.items import Items, size_of
 from conveyor_sim.protocols.opcua.limits import OpcUaLimits
 from conveyor_sim.protocols.server.budget import Budget
@@ -41,7 +40,7 @@ _LEFT = 0.1
 """Share of the burst that a session has after its costliest subscription was ended."""
 
 
-class Subscription(InternalSubscription):
+class Subscription(OpenSubscription):
     """One subscription of a client."""
 
     limits: OpcUaLimits
@@ -98,7 +97,7 @@ class Subscription(InternalSubscription):
 
     async def _publish_end(self, request: Any) -> None:
         result = ua.PublishResult(SubscriptionId=self.data.SubscriptionId)
-        result.NotificationMessage.SequenceNumber = self._notification_seq
+        result.NotificationMessage.SequenceNumber = self.next_number
         result.NotificationMessage.NotificationData = [ua.StatusChangeNotification(ua.StatusCode(self._code))]
         self._delete()
         await self.pub_result_callback(result, request)
@@ -116,35 +115,35 @@ class Subscription(InternalSubscription):
             return True
         self.spend(1)
         published = again = await super().publish_results(requestdata)
-        while again and self._publishing_enabled and self._waits:
+        while again and self.is_publishing and self._waits:
             await asyncio.sleep(0)
             again = await super().publish_results()
         return published
 
     @property
     def _waits(self) -> bool:
-        return bool(self._triggered_datachanges or self._triggered_events)
+        return bool(self.waiting_changes or self.waiting_events)
 
-    def _pop_publish_result(self) -> ua.PublishResult:
-        result = super()._pop_publish_result()
-        result.MoreNotifications = self._publishing_enabled and self._waits
+    def next_answer(self) -> ua.PublishResult:
+        result = super().next_answer()
+        result.MoreNotifications = self.is_publishing and self._waits
         message = result.NotificationMessage
-        if message.SequenceNumber in self._not_acknowledged_results:
+        if message.SequenceNumber in self.unacknowledged:
             self._sizes[message.SequenceNumber] = sum(map(size_of, message.NotificationData))
-        kept = {number: size for number, size in self._sizes.items() if number in self._not_acknowledged_results}
+        kept = {number: size for number, size in self._sizes.items() if number in self.unacknowledged}
         while len(kept) > 1 and sum(kept.values()) > self.limits.unacknowledged:
             oldest = next(iter(kept))
-            del kept[oldest], self._not_acknowledged_results[oldest]
+            del kept[oldest], self.unacknowledged[oldest]
         self._sizes = kept
-        result.AvailableSequenceNumbers = list(self._not_acknowledged_results)
+        result.AvailableSequenceNumbers = list(self.unacknowledged)
         return result
 
-    def _pop_triggered_datachanges(self, result: ua.PublishResult) -> None:
-        if changes := _take(self._triggered_datachanges, self._room(result)):
+    def add_changes(self, result: ua.PublishResult) -> None:
+        if changes := _take(self.waiting_changes, self._room(result)):
             result.NotificationMessage.NotificationData.append(ua.DataChangeNotification(changes))
 
-    def _pop_triggered_events(self, result: ua.PublishResult) -> None:
-        if events := _take(self._triggered_events, self._room(result)):
+    def add_events(self, result: ua.PublishResult) -> None:
+        if events := _take(self.waiting_events, self._room(result)):
             result.NotificationMessage.NotificationData.append(ua.EventNotificationList(events))
 
     def _room(self, result: ua.PublishResult) -> int:
@@ -167,7 +166,7 @@ def _take(queues: dict[int, list[Any]], most: int) -> list[Any]:
     return taken
 
 
-class Subscriptions(SubscriptionService):
+class Subscriptions(OpenSubscriptions):
     """All subscriptions of one server."""
 
     subscriptions: dict[int, Any]
@@ -192,8 +191,8 @@ class Subscriptions(SubscriptionService):
         result = ua.CreateSubscriptionResult(
             self._sub_id_counter,
             params.RequestedPublishingInterval,
-            self._clamp_lifetime_count(params.RequestedLifetimeCount),
-            self._clamp_keep_alive_count(params.RequestedMaxKeepAliveCount),
+            self.lifetime(params.RequestedLifetimeCount),
+            self.keep_alive(params.RequestedMaxKeepAliveCount),
         )
         made = Subscription(
             result,
@@ -215,7 +214,7 @@ class Subscriptions(SubscriptionService):
 
     def _budget_of(self, session_id: ua.NodeId) -> Budget:
         rate = self._limits.subscription_units_per_second
-        same = (one for one in self.iserver._external_sessions.values() if one.session_id == session_id)
+        same = (one for one in sessions_of(self.iserver) if one.session_id == session_id)
         return next((one.bounds.subscription_work for one in same), Budget(rate, rate))
 
     def _exceeded(self, last: Subscription) -> None:
@@ -245,14 +244,14 @@ class Subscriptions(SubscriptionService):
         if subscription is None:
             return ua.StatusCode(Codes.BadSubscriptionIdInvalid)
         items = subscription.monitored_item_srv
-        if mid is not None and mid not in items._monitored_items:
+        if mid is not None and mid not in items.by_id:
             return ua.StatusCode(Codes.BadMonitoredItemIdInvalid)
         if time.monotonic() < subscription.refreshed + REFRESH_PERIOD:
             return ua.StatusCode(Codes.BadRefreshInProgress)
         subscription.refreshed = time.monotonic()
         units = 0
         await self.standard_events[ua.ObjectIds.RefreshStartEventType].trigger(subscription_id=subscription_id)
-        for event in list(self._conditions.values()):
+        for event in list(self.conditions.values()):
             if subscription.ended:
                 break
             await items.trigger_event(event, mid)

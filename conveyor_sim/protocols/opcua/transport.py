@@ -8,11 +8,12 @@ import time
 from contextvars import ContextVar
 from typing import Any
 
-from asyncua import Server, ua
+from asyncua import ua
 from asyncua.common.utils import Buffer, ServiceError
-from asyncua.server.binary_server_asyncio import BinaryServer, OPCUAProtocol
+from asyncua.server.binary_server_asyncio import OPCUAProtocol
 from asyncua.ua.ua_binary import header_from_binary, uatcp_to_binary
 
+from conveyor_sim.protocols.opcua.asyncua_internals import OpenPort, OpenProtocol, OpenServer
 from conveyor_sim.protocols.opcua.client_certificates import without_issuers
 from conveyor_sim.protocols.opcua.limits import OpcUaLimits
 from conveyor_sim.protocols.opcua.processor import CHUNK, ConnectionLimits, Processor
@@ -29,7 +30,7 @@ _WAITING = 16
 """Largest number of unanswered messages of a connection; beyond it no more are read."""
 
 
-class Connection(OPCUAProtocol):
+class Connection(OpenProtocol):
     """Connection of one client."""
 
     longest: list[float]
@@ -80,13 +81,13 @@ class Connection(OPCUAProtocol):
     @property
     def encrypts(self) -> bool:
         """True if the channel is encrypted."""
-        policy = self.processor._connection.security_policy if self.processor else None
+        policy = self.processor.channel.security_policy if self.processor else None
         return policy is not None and policy.Mode == ua.MessageSecurityMode.SignAndEncrypt
 
     @property
     def peer(self) -> bytes | None:
         """Certificate of the client, which has proved that it owns the key; None: the channel is not secured."""
-        policy = self.processor._connection.security_policy if self.processor else None
+        policy = self.processor.channel.security_policy if self.processor else None
         if policy is None or policy.Mode == ua.MessageSecurityMode.None_:
             return None
         return without_issuers(policy.peer_certificate)
@@ -145,7 +146,7 @@ class Connection(OPCUAProtocol):
         else:
             self.transport.resume_reading()
 
-    async def _activation_watchdog(self) -> None:
+    async def watch_activation(self) -> None:
         """Close connections without an active session, at any time. The library checks only once, but a session may
         time out.
         """
@@ -156,7 +157,7 @@ class Connection(OPCUAProtocol):
                 self._close()
                 return
 
-    async def _process_one_msg(self, header: Any, buf: Any) -> bool:
+    async def answer_message(self, header: Any, buf: Any) -> bool:
         """Answer one message within the budgets. The library does not answer messages that it can't decode."""
         channel.set(self)
         await asyncio.sleep(self.work.delay())  # until the work of earlier messages is within the budget
@@ -172,7 +173,7 @@ class Connection(OPCUAProtocol):
             return False
         before, began = self.processor.units, time.perf_counter()
         try:
-            goes_on = await super()._process_one_msg(header, buf)
+            goes_on = await super().answer_message(header, buf)
         except Exception as error:
             code = getattr(error, "code", ua.StatusCodes.BadSecurityChecksFailed)
             self._refuse(code, str(error))
@@ -181,7 +182,7 @@ class Connection(OPCUAProtocol):
             self.longest[0] = max(self.longest[0], time.perf_counter() - began)
             self._charge(self.processor.units - before)
         if self.place is not None:
-            self.place.touch(OPENED if self.processor._connection.is_open() else GREETED)
+            self.place.touch(OPENED if self.processor.channel.is_open() else GREETED)
             if not self.has_session:
                 self.places.leave_user(self.place)
         self._take()
@@ -229,21 +230,21 @@ channel: ContextVar[Connection | None] = ContextVar("channel", default=None)
 """Connection whose message is being answered."""
 
 
-class _Port(BinaryServer):
+class _Port(OpenPort):
     longest: list[float]
     bounds: OpcUaLimits
     places: ConnectionSlots
     guests: Budget
     turn: asyncio.Lock
 
-    def _make_protocol(self) -> OPCUAProtocol:
-        made = Connection(self.iserver, self._policies, self.clients, self.closing_tasks, self.limits)
+    def make_protocol(self) -> OPCUAProtocol:
+        made = Connection(self.iserver, self.policies, self.clients, self.closing_tasks, self.limits)
         made.longest, made.bounds, made.places = self.longest, self.bounds, self.places
         made.guests, made.turn = self.guests, self.turn
         return made
 
 
-class BoundedServer(Server):
+class BoundedServer(OpenServer):
     """Server of the library with bounded connections."""
 
     def __init__(self, internal: Any, bounds: OpcUaLimits, places: ConnectionSlots) -> None:
@@ -260,13 +261,13 @@ class BoundedServer(Server):
 
     async def listen(self, host: str, port: int) -> int:
         """Serve from now on. Return the port. Raises OSError."""
-        await self._setup_server_nodes()
+        await self.set_up_nodes()
         await self.iserver.start()
         rate = self.bounds.guest_units_per_second
         self.bserver = _Port(self.iserver, host, port, self.limits)
         self.bserver.longest, self.bserver.bounds, self.bserver.places = self.longest, self.bounds, self.places
         self.bserver.guests, self.bserver.turn = Budget(rate, 2 * rate), asyncio.Lock()
-        self.bserver.set_policies(self._policies)
+        self.bserver.set_policies(self.policies)
         try:
             await self.bserver.start()
         except BaseException:

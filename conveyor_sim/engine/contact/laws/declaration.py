@@ -33,7 +33,7 @@ class ElasticLaw:
     duration: Callable[[Any, float, float, Any], float]
     """Lower bound of the duration of an undamped head-on impact, s, from k, reduced mass (kg), speed (m/s) and curves.
     """
-    said: Callable[[Any, Any], str]
+    coefficient_text: Callable[[Any, Any], str]
     """Its coefficient in words, after `at` or `on`."""
     none: float = 0.0
     """Value in the column of a contact that has another law."""

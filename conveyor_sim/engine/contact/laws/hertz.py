@@ -46,5 +46,5 @@ HERTZ = ElasticLaw(
     overlap_at=lambda k, force, curves: math.pow(force / k, 2.0 / 3.0),
     stiffest=lambda k, depth, curves: 1.5 * k * math.sqrt(depth),
     duration=lambda k, reduced_mass, speed, curves: hertz_contact_time(k, reduced_mass, speed),
-    said=lambda k, curves: f"at k = {k:g} N/m^1.5 and",
+    coefficient_text=lambda k, curves: f"at k = {k:g} N/m^1.5 and",
 )

@@ -38,5 +38,5 @@ LINEAR = ElasticLaw(
     overlap_at=lambda k, force, curves: force / k,
     stiffest=lambda k, depth, curves: float(k),
     duration=lambda k, reduced_mass, speed, curves: contact_time(k, reduced_mass),
-    said=lambda k, curves: f"at k = {k:g} N/m and",
+    coefficient_text=lambda k, curves: f"at k = {k:g} N/m and",
 )

@@ -91,6 +91,6 @@ TABLE = ElasticLaw(
     overlap_at=overlap_at,
     stiffest=stiffest,
     duration=lambda c, reduced_mass, speed, curves: contact_time(stiffest(c, 0.0, curves), reduced_mass),
-    said=lambda c, curves: f"on the table of {len(points_of(c, curves)[0])} points at",
+    coefficient_text=lambda c, curves: f"on the table of {len(points_of(c, curves)[0])} points at",
     none=-1.0,
 )
