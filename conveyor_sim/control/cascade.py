@@ -17,7 +17,7 @@ from conveyor_sim.control.scan import Inputs, eye_signal, require, speed_command
 
 
 @dataclass(frozen=True)
-class Zone:
+class CascadeZone:
     """A belt that stops by itself.
 
     eye: the full-eye, near the belt's upstream end: the zone is full once bottles stand there.
@@ -39,7 +39,7 @@ class Cascade:
     room ahead before a zone that was held starts.
     """
 
-    zones: tuple[Zone, ...]
+    zones: tuple[CascadeZone, ...]
     takes: str
     full_delay: float = 0.3
     clear_delay: float = 0.2

@@ -6,15 +6,14 @@ from typing import Any
 
 from conveyor_sim.columns.damage import DamageEvent
 from conveyor_sim.errors import SceneError
-from conveyor_sim.line.alarm_conditions import Measured, Signals
-from conveyor_sim.line.alarm_device import AlarmsDevice
+from conveyor_sim.line.alarm_conditions import LimitConditions, MeasuredConditions, Signals, limit_alarms, scene_alarms
 from conveyor_sim.line.alarms import memory, operations
 from conveyor_sim.line.alarms.alarms import Alarms, Note
-from conveyor_sim.line.alarms.declaration import parse
-from conveyor_sim.line.alarms.own import LimitConditions, limit_alarms, scene_alarms
+from conveyor_sim.line.alarms.declaration import MOST_ALARMS, parse
 from conveyor_sim.line.commands.inputs import DECLARE, Input
 from conveyor_sim.line.commands.operation import Operation
 from conveyor_sim.line.device import Device, ScanContext
+from conveyor_sim.line.tag import count, switch
 from conveyor_sim.scene.parts.alarm import PREFIX
 from conveyor_sim.scene.places import Places
 from conveyor_sim.scene.schema import Scene
@@ -37,7 +36,7 @@ class AlarmSystem:
         self.alarms.declare(0, given, "scene", own=True)
         self.device = AlarmsDevice(self.alarms)
         """What controllers read of them."""
-        self._measured = Measured(self.alarms, sources)
+        self._measured = MeasuredConditions(self.alarms, sources)
         self._limits = LimitConditions(self.alarms)
 
     def operations(self) -> dict[str, Operation]:
@@ -133,3 +132,34 @@ def _alarms_among(names: tuple[str, ...]) -> tuple[tuple[int, str], ...]:
     """Places and ids of alarms; a controller gives the same names in every scan."""
     given = [(place, name.removeprefix(PREFIX)) for place, name in enumerate(names) if name.startswith(PREFIX)]
     return tuple((place, id) for place, id in given if id)
+
+
+NAME = "alarms"
+COUNTS = "alarm_counts"
+"""What the names of its counts begin with: those of alarms may be anything."""
+
+
+class AlarmsDevice(Device):
+    """Which alarms of line and scene stand, and how many in all. What it remembers, the alarms themselves do."""
+
+    def __init__(self, alarms: Alarms) -> None:
+        """alarms: with those of line and scene, and no others yet."""
+        most = len(alarms) + MOST_ALARMS
+        standing = "alarms that stand, of controllers too."
+        super().__init__(
+            NAME,
+            [
+                count(f"{COUNTS}/errors", "alarm", f"Errors among the {standing}", high=most),
+                count(f"{COUNTS}/warnings", "alarm", f"Warnings among the {standing}", high=most),
+                count(f"{COUNTS}/messages", "alarm", f"Messages among the {standing}", high=most),
+                count(f"{COUNTS}/unacknowledged", "alarm", "Alarms that wait to be acknowledged.", high=most),
+                count(f"{COUNTS}/first_out", "alarm", "Number of the alarm that came first, 0 without one."),
+                *(switch(PREFIX + alarm.id, "alarm", "It is active or latched, and not hidden.") for alarm in alarms),
+            ],
+        )
+        self.classify(NAME)
+        self._alarms = alarms
+
+    def values(self, now: ScanContext) -> Sequence[float]:
+        """The counts, then 1 for each that stands."""
+        return self._alarms.tag_values()

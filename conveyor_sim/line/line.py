@@ -26,7 +26,7 @@ from conveyor_sim.line.devices.belt import BeltDevice
 from conveyor_sim.line.devices.belt_surfaces import BeltSurfaces
 from conveyor_sim.line.devices.photo_eye import PhotoEyeDevice
 from conveyor_sim.line.event_log import EventLog
-from conveyor_sim.line.machines.counters import RESET_COUNTERS, Counters
+from conveyor_sim.line.machines.counters import RESET_COUNTERS, ProductionCounters
 from conveyor_sim.line.process_image import ProcessImage
 from conveyor_sim.line.run_state import RUN_TAGS
 from conveyor_sim.line.tag import Adds
@@ -98,7 +98,7 @@ class Line:
         self._faults = {tag.name: tag for tag in self.image.faults}
         objecting = [device for device in devices if type(device).objection is not Device.objection]
         self._objecting = {command.name: device for device in objecting for command in device.commands}
-        self._counters = Counters(devices)
+        self._counters = ProductionCounters(devices)
         self._operations = {
             SET: Operation(self._set_refusal, self._set),
             INJECT: Operation(self._inject_refusal, self._set),

@@ -5,9 +5,34 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Literal, NamedTuple
 
-from conveyor_sim.line.units import UNITS, Unit
+
+class UnitOfMeasure(NamedTuple):
+    """A unit."""
+
+    code: str
+    """The common code of UNECE Recommendation 20."""
+    name: str
+    """As it is called there."""
+
+
+UNITS: Mapping[str, UnitOfMeasure] = {
+    "1": UnitOfMeasure("C62", "one"),
+    "m": UnitOfMeasure("MTR", "metre"),
+    "m/s": UnitOfMeasure("MTS", "metre per second"),
+    "s": UnitOfMeasure("SEC", "second"),
+    "Hz": UnitOfMeasure("HTZ", "hertz"),
+    "1/s": UnitOfMeasure("C97", "reciprocal second"),
+    "1/min": UnitOfMeasure("C94", "reciprocal minute"),
+    "1/h": UnitOfMeasure("H10", "reciprocal hour"),
+    "1/m^2": UnitOfMeasure("C93", "reciprocal square metre"),
+    "N": UnitOfMeasure("NEW", "newton"),
+    "J": UnitOfMeasure("JOU", "joule"),
+    "%": UnitOfMeasure("P1", "percent"),
+}
+"""By how a tag writes them."""
+
 
 Kind = Literal["bool", "count", "number", "enumeration"]
 """bool: 0 or 1; count: a whole number; enumeration: a whole number that stands for a text."""
@@ -72,7 +97,7 @@ class Tag:
         return replace(self, low=-math.inf, high=math.inf) if self.kind in ("number", "count") else self
 
     @property
-    def unece(self) -> Unit:
+    def unece(self) -> UnitOfMeasure:
         """Its unit in UNECE Recommendation 20."""
         return UNITS[self.unit]
 

@@ -18,7 +18,7 @@ MOST_CALLS = 100
 """Calls one within the other: far from the limit of Python, which depends on who calls the program."""
 
 
-class Calls:
+class CallCompiler:
     """Of one file: notes who calls whom, for recursion is not allowed (IEC 61131-3:2003, 2.5)."""
 
     def __init__(self, trace: bool) -> None:

@@ -10,13 +10,13 @@ from pathlib import Path
 from types import CodeType
 
 from conveyor_sim.control.st import tree
-from conveyor_sim.control.st.calls import PASSED, Calls
+from conveyor_sim.control.st.calls import PASSED, CallCompiler
 from conveyor_sim.control.st.declarations import Declarations, require_small
 from conveyor_sim.control.st.errors import Position, SourceError, StructuredTextError
 from conveyor_sim.control.st.expressions import Expressions
 from conveyor_sim.control.st.located import NOTHING_SHARED, Layout, laid_out
 from conveyor_sim.control.st.parse import parse
-from conveyor_sim.control.st.statements import Lines, Statements
+from conveyor_sim.control.st.statements import CodeLines, Statements
 from conveyor_sim.control.st.types import TIME, BlockType, Member, Structure, Type
 from conveyor_sim.control.st.work import statements
 from conveyor_sim.support.files import MB, FileError, read_file
@@ -94,10 +94,10 @@ def _compile(text: str, file: str, trace: bool) -> Compiled:
     if len(source.units) > MOST_UNITS:
         at, count = source.units[MOST_UNITS].at, len(source.units)
         raise SourceError(at, f"found {count} programs, functions and blocks, expected at most {MOST_UNITS}")
-    calls = Calls(trace)
+    calls = CallCompiler(trace)
     declared = calls.declarations = Declarations(source, calls)
     declared.resolve()
-    lines = Lines()
+    lines = CodeLines()
     for one in source.types:
         declared.named(one.at, one.name)
     units = [(unit, _type_of(unit, declared)) for unit in source.units]
@@ -133,13 +133,13 @@ def _compile(text: str, file: str, trace: bool) -> Compiled:
     )
 
 
-def _layout(source: tree.Source, declared: Declarations) -> Layout:
+def _layout(source: tree.SourceFile, declared: Declarations) -> Layout:
     """Return the memory that located variables share."""
     programs = [f"_P_{one.type.lower()}" for configured in source.configurations for one in configured.instances]
     return laid_out(declared.located, Counter(programs))
 
 
-def _require_few(declared: Declarations, units: list[tuple[tree.Unit, BlockType]]) -> None:
+def _require_few(declared: Declarations, units: list[tuple[tree.ProgramUnit, BlockType]]) -> None:
     """Raise SourceError for more elements or text than a file may declare in all."""
     shared: list[Type] = [declared.names.globals, *declared.structures]
     elements, characters = sum(one.size for one in shared), sum(one.characters for one in shared)
@@ -148,14 +148,19 @@ def _require_few(declared: Declarations, units: list[tuple[tree.Unit, BlockType]
         require_small(elements, characters, unit.at, f" with those of {unit.name}")
 
 
-def _type_of(unit: tree.Unit, declared: Declarations) -> BlockType:
+def _type_of(unit: tree.ProgramUnit, declared: Declarations) -> BlockType:
     kind = declared.function(unit.name) if unit.kind == "FUNCTION" else declared.named(unit.at, unit.name)
     assert isinstance(kind, BlockType)
     return kind
 
 
 def _unit(
-    unit: tree.Unit, kind: BlockType, expressions: Expressions, lines: Lines, calls: Calls, layout: Layout
+    unit: tree.ProgramUnit,
+    kind: BlockType,
+    expressions: Expressions,
+    lines: CodeLines,
+    calls: CallCompiler,
+    layout: Layout,
 ) -> None:
     """The class of a unit, whose `run` is its body."""
     members = [one for one in kind.members.values() if one.section != "VAR_EXTERNAL"]
@@ -171,7 +176,7 @@ def _unit(
         _function(kind, lines)
 
 
-def _function(kind: BlockType, lines: Lines) -> None:
+def _function(kind: BlockType, lines: CodeLines) -> None:
     """What a call calls: a new frame, its arguments in, its body, its result out."""
     passed = kind.of(*PASSED)
     lines.add(f"def _f_{kind.name.lower()}({', '.join(one.slot for one in passed)}):")
@@ -188,7 +193,7 @@ def _function(kind: BlockType, lines: Lines) -> None:
             lines.add(f"return self.v_{kind.name.lower()}")
 
 
-def _class(lines: Lines, name: str, base: str, members: list[Member], layout: Layout = NOTHING_SHARED) -> None:
+def _class(lines: CodeLines, name: str, base: str, members: list[Member], layout: Layout = NOTHING_SHARED) -> None:
     """Write a class with a slot for each variable, and a descriptor for each one that shares memory."""
     places = {one.slot: place for one in members if (place := layout.places.get((name, one.slot))) is not None}
     memory = "located" if name == "_Globals" and layout.size else ""
@@ -209,7 +214,7 @@ def _class(lines: Lines, name: str, base: str, members: list[Member], layout: La
 
 
 def _schedule(
-    source: tree.Source, programs: dict[str, BlockType], declared: Declarations, calls: Calls
+    source: tree.SourceFile, programs: dict[str, BlockType], declared: Declarations, calls: CallCompiler
 ) -> list[Scheduled]:
     if len(source.configurations) > 1:
         raise SourceError(source.configurations[1].at, "found a second CONFIGURATION, expected one")

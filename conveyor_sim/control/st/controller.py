@@ -13,7 +13,7 @@ from conveyor_sim.control.recorded import PREFIX, patterns
 from conveyor_sim.control.scan import ControlError, Inputs
 from conveyor_sim.control.st.compile import compile_file
 from conveyor_sim.control.st.errors import StructuredTextError
-from conveyor_sim.control.st.mapping import Addresses, Mapped, mapped, read_addresses
+from conveyor_sim.control.st.mapping import Addresses, TagMapping, mapped, read_addresses
 from conveyor_sim.control.st.program import BUDGET, Program, python_value
 from conveyor_sim.control.st.types import TIME, Type
 from conveyor_sim.control.st.variables import Variable, load
@@ -47,7 +47,7 @@ class StructuredText:
         self.program = Program(compile_file(Path(path), trace), budget)
         self.record = patterns(record)
         """Of variables that are recorded."""
-        self.mapping: Mapped | None = None
+        self.mapping: TagMapping | None = None
         """Set by `bind`, before the first scan."""
         self._ins: list[tuple[Variable, str]] = []
         self._outs: list[tuple[Variable, str]] = []

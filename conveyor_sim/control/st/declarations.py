@@ -46,7 +46,7 @@ MOST_CONSTANTS = 50
 class Declarations:
     """Of one file: what is named is resolved when it is first needed, so the order in the file is free."""
 
-    def __init__(self, source: tree.Source, calls: Any) -> None:
+    def __init__(self, source: tree.SourceFile, calls: Any) -> None:
         """calls: as `Expressions` takes it."""
         self.names = Names(types={name.lower(): block for name, block in STANDARD.items()})
         self.structures: list[Structure] = []
@@ -54,14 +54,14 @@ class Declarations:
         self.located: list[Located] = []
         """Variables with addresses."""
         self._calls = calls
-        self._pending: dict[str, tree.TypeDeclaration | tree.Unit] = {}
-        self._functions: dict[str, tree.Unit] = {}
+        self._pending: dict[str, tree.TypeDeclaration | tree.ProgramUnit] = {}
+        self._functions: dict[str, tree.ProgramUnit] = {}
         self._open: list[str] = []
         self._levels: dict[str, int] = {}
-        everything: list[tree.TypeDeclaration | tree.Unit] = [*source.types, *source.units]
+        everything: list[tree.TypeDeclaration | tree.ProgramUnit] = [*source.types, *source.units]
         for declared in everything:
             where: dict[str, Any] = self._pending
-            if isinstance(declared, tree.Unit) and declared.kind == "FUNCTION":
+            if isinstance(declared, tree.ProgramUnit) and declared.kind == "FUNCTION":
                 where = self._functions
             key = declared.name.lower()
             taken = key in self._pending or key in self._functions or key in self.names.types
@@ -85,9 +85,9 @@ class Declarations:
         for key in order:
             members[key] = members.pop(key)
 
-    def _by_name(self, sections: Iterable[tree.Variables]) -> dict[str, tree.Variables]:
+    def _by_name(self, sections: Iterable[tree.VariableSection]) -> dict[str, tree.VariableSection]:
         """Global variables by name, each as a section of its own."""
-        found: dict[str, tree.Variables] = {}
+        found: dict[str, tree.VariableSection] = {}
         for section in sections:
             for declared in section.declarations:
                 if declared.name.lower() in found:
@@ -121,7 +121,7 @@ class Declarations:
             raise SourceError(at, f"found {name} inside of itself, expected another type")
         self._open.append(key)
         try:
-            kind = self._unit(declared) if isinstance(declared, tree.Unit) else self._declared(declared)
+            kind = self._unit(declared) if isinstance(declared, tree.ProgramUnit) else self._declared(declared)
         finally:
             self._open.pop()
         self.names.types[key] = kind
@@ -233,7 +233,7 @@ class Declarations:
             return kind
         return replace(kind, start=self._initial(declared.initial, kind, known))
 
-    def _unit(self, unit: tree.Unit) -> BlockType:
+    def _unit(self, unit: tree.ProgramUnit) -> BlockType:
         prefix = {"FUNCTION": "_F_", "FUNCTION_BLOCK": "_B_", "PROGRAM": "_P_"}[unit.kind]
         result = self.type(unit.result) if unit.result is not None else None
         kind = BlockType(
@@ -252,7 +252,7 @@ class Declarations:
         self._bound(kind, unit.at)
         return kind
 
-    def _members(self, kind: BlockType, sections: Iterable[tree.Variables], unit: str) -> None:
+    def _members(self, kind: BlockType, sections: Iterable[tree.VariableSection], unit: str) -> None:
         """Add the variables of a unit; unit: its kind, as `sections.py` has it."""
         known = Expressions(self.scope(None if kind is self.names.globals else kind), self._calls)
         for section in sections:

@@ -82,7 +82,7 @@ class Expressions:
             if found.type.kind == "void":
                 raise SourceError(node.at, "found a call without a result, expected a value")
             return found
-        if isinstance(node, (tree.Name, tree.Member, tree.EnumValue)):
+        if isinstance(node, (tree.Name, tree.MemberAccess, tree.EnumValue)):
             return self._named(node)
         if isinstance(node, (tree.Item, tree.Bit)):
             return self.place(node)
@@ -110,7 +110,7 @@ class Expressions:
             if isinstance(found, Place):
                 return replace(found, at=node.at)
             raise SourceError(node.at, f"found {node.name}, {found.what}, expected a variable")
-        if isinstance(node, tree.Member):
+        if isinstance(node, tree.MemberAccess):
             return self._member(node)
         if isinstance(node, tree.Item):
             return self._item(node)
@@ -148,7 +148,7 @@ class Expressions:
             target = replace(target, high=plain.type.high)
         return constant(node.at, target, eval(converted(plain, target)))
 
-    def _named(self, node: tree.Name | tree.Member | tree.EnumValue) -> Value:
+    def _named(self, node: tree.Name | tree.MemberAccess | tree.EnumValue) -> Value:
         """A variable, a constant, or a value of an enumeration in any of the ways in which it is written."""
         if isinstance(node, tree.Name):
             return replace(self.scope.value(node.at, node.name), at=node.at)
@@ -168,7 +168,7 @@ class Expressions:
             raise SourceError(node.at, f"found {name}, expected a value of {kind.name}: {listed}")
         return constant(node.at, kind, value)
 
-    def _member(self, node: tree.Member) -> Place:
+    def _member(self, node: tree.MemberAccess) -> Place:
         base = self.place(node.base)
         kind = base.type
         if not isinstance(kind, Structure):

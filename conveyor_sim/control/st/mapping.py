@@ -30,7 +30,7 @@ Addresses = Mapping[tuple[str, int], tuple[str, object]]
 
 
 @dataclass(frozen=True)
-class Bound:
+class TagBinding:
     """A variable that is a tag."""
 
     variable: str
@@ -43,10 +43,10 @@ class Bound:
 
 
 @dataclass(frozen=True)
-class Mapped:
+class TagMapping:
     """All of a program's; and what is left over on either side."""
 
-    bound: tuple[Bound, ...]
+    bound: tuple[TagBinding, ...]
     variables: tuple[str, ...]
     """Inputs, outputs and located variables without a tag."""
     commands: tuple[str, ...]
@@ -78,7 +78,7 @@ def read_addresses(path: Path) -> Addresses:
     }
 
 
-def mapped(compiled: Compiled, tags: LineTags, given: Mapping[str, str], addresses: Addresses) -> Mapped:
+def mapped(compiled: Compiled, tags: LineTags, given: Mapping[str, str], addresses: Addresses) -> TagMapping:
     """The mapping of a program on a line.
 
     given: tags by variable. Raises StructuredTextError for a variable or tag that there is not, for a type that does
@@ -95,7 +95,7 @@ def mapped(compiled: Compiled, tags: LineTags, given: Mapping[str, str], address
             )
     wanted = {name.lower(): tag for name, tag in given.items()}
     by_identifier = _by_identifier(tags)
-    bound: list[Bound] = []
+    bound: list[TagBinding] = []
     left: list[str] = []
     for name, member, shared in ((one.name, one.member, one.is_global) for one in candidates):
         where = f"{file}:{member.at[0]}:{member.at[1]}: {member.name}"
@@ -121,7 +121,7 @@ def mapped(compiled: Compiled, tags: LineTags, given: Mapping[str, str], address
         _require_apart(file, candidates, bound)
     tagged = {groups[one.variable] for one in bound if one.variable in groups}
     left = [name for name in left if groups.get(name) not in tagged]
-    return Mapped(tuple(bound), tuple(left), tuple(name for name in tags.commands if name not in given_by))
+    return TagMapping(tuple(bound), tuple(left), tuple(name for name in tags.commands if name not in given_by))
 
 
 @dataclass(frozen=True)
@@ -170,16 +170,16 @@ def _located(where: str, member: Member, addresses: Addresses) -> str:
     return tag
 
 
-def _require_one_tag(file: str, bound: list[Bound], groups: Mapping[str, int]) -> None:
+def _require_one_tag(file: str, bound: list[TagBinding], groups: Mapping[str, int]) -> None:
     """Raise StructuredTextError for two tags of variables that share memory."""
-    tags: dict[int, Bound] = {}
+    tags: dict[int, TagBinding] = {}
     for one in bound:
         if one.variable in groups and (other := tags.setdefault(groups[one.variable], one)).tag != one.tag:
             found = f"{one.tag} for {one.variable}, and {other.tag} for {other.variable}"
             raise StructuredTextError(f"{file}: found {found}, expected one tag, because they share memory")
 
 
-def _require_apart(file: str, candidates: Iterable[Candidate], bound: list[Bound]) -> None:
+def _require_apart(file: str, candidates: Iterable[Candidate], bound: list[TagBinding]) -> None:
     """Raise StructuredTextError for variables of %I or %Q that a PLC would overlap. Used without a Modbus map."""
     tagged = {one.variable for one in bound}
     spans = []
@@ -198,7 +198,7 @@ def _require_apart(file: str, candidates: Iterable[Candidate], bound: list[Bound
             raise StructuredTextError(f"{file}: found {found}, expected {expected}")
 
 
-def _checked(where: str, name: str, member: Member, tag: str, how: str, tags: LineTags) -> Bound:
+def _checked(where: str, name: str, member: Member, tag: str, how: str, tags: LineTags) -> TagBinding:
     inward = member.section == "VAR_INPUT" or member.address.startswith("%I")
     outward = member.section == "VAR_OUTPUT" or member.address.startswith("%Q")
     is_alarm = tag.startswith(ALARMS) and not inward
@@ -221,7 +221,7 @@ def _checked(where: str, name: str, member: Member, tag: str, how: str, tags: Li
     if not _suits(member.type, kind):
         wanted = {"bool": "BOOL", "number": "REAL or LREAL (TIME for seconds)"}.get(kind, "an integer type")
         raise StructuredTextError(f"{where}: found {member.type.name} for {tag}, a {kind}, expected {wanted}")
-    return Bound(name, tag, member.type, is_input, how)
+    return TagBinding(name, tag, member.type, is_input, how)
 
 
 def _suits(kind: Type, tag: str) -> bool:

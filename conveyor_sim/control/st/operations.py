@@ -162,8 +162,8 @@ def guarded(name: str, function: Callable[..., float]) -> Callable[..., float]:
 def copied(value: Any) -> Any:
     """An array or a structure, as a value of its own."""
     if isinstance(value, list):
-        return [copied(one) for one in value] if value and isinstance(value[0], (list, Record)) else value[:]
-    if isinstance(value, Record):
+        return [copied(one) for one in value] if value and isinstance(value[0], (list, StructureValue)) else value[:]
+    if isinstance(value, StructureValue):
         return value.copy()
     return value
 
@@ -176,7 +176,7 @@ def rows(values: list[Any], length: int) -> list[list[Any]]:
 def overwrite(target: Any, value: Any) -> None:
     """Give an array or a structure what another holds."""
     if isinstance(target, list):
-        if target and isinstance(target[0], (list, Record)):
+        if target and isinstance(target[0], (list, StructureValue)):
             for one, other in zip(target, value, strict=True):
                 overwrite(one, other)
         else:
@@ -184,18 +184,18 @@ def overwrite(target: Any, value: Any) -> None:
         return
     for slot in type(target).__slots__:
         now, new = getattr(target, slot), getattr(value, slot)
-        if isinstance(now, (list, Record)):
+        if isinstance(now, (list, StructureValue)):
             overwrite(now, new)
         else:
             setattr(target, slot, new)
 
 
-class Record:
+class StructureValue:
     """A structure's value; those of a program derive from it."""
 
     __slots__: tuple[str, ...] = ()
 
-    def copy(self) -> Record:
+    def copy(self) -> StructureValue:
         """Another one with the same values."""
         new = type(self)()
         for slot in type(self).__slots__:
@@ -319,7 +319,7 @@ NAMES: dict[str, Any] = {
     "_overwrite": overwrite,
     "_with": with_values,
     "_rows": rows,
-    "_Record": Record,
+    "_Record": StructureValue,
     "_Attribute": Attribute,
     "_Element": Element,
     "_Traced": Traced,

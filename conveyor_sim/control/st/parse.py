@@ -46,7 +46,7 @@ MOST_OPERANDS = 1000
 _ONE_AT_A_TIME = threading.Lock()
 
 
-def parse(text: str) -> tree.Source:
+def parse(text: str) -> tree.SourceFile:
     """The syntax tree of a file. Raises SourceError."""
     text = selected(text)
     try:
@@ -62,7 +62,7 @@ def parse(text: str) -> tree.Source:
         at, char = Position(error.line, error.column), text[error.pos_in_stream]
         hint = "; pointers are not supported" if char == "^" else ""
         raise SourceError(at, f"found {char!r}, expected Structured Text{hint}") from None
-    assert isinstance(source, tree.Source)
+    assert isinstance(source, tree.SourceFile)
     return source
 
 
@@ -111,14 +111,14 @@ class _Tree(Transformer[Any]):
         self.depths: dict[int, tuple[object, int]] = {}
         """Of nodes, by the id of each, which is kept."""
 
-    def start(self, items: list[Any]) -> tree.Source:
-        source = tree.Source()
+    def start(self, items: list[Any]) -> tree.SourceFile:
+        source = tree.SourceFile()
         for item in items:
-            if isinstance(item, tree.Unit):
+            if isinstance(item, tree.ProgramUnit):
                 source.units.append(item)
             elif isinstance(item, tree.Configuration):
                 source.configurations.append(item)
-            elif isinstance(item, tree.Variables):
+            elif isinstance(item, tree.VariableSection):
                 source.globals.append(item)
             else:
                 source.types.extend(item)
@@ -165,22 +165,22 @@ class _Tree(Transformer[Any]):
         return self._deep(tree.StructureType(at_of(items[0]), fields), *(one.type for one in fields))
 
     # Units and their variables
-    def function(self, items: list[Any]) -> tree.Unit:
+    def function(self, items: list[Any]) -> tree.ProgramUnit:
         name, result, *sections, body = items
-        return tree.Unit(at_of(name), "FUNCTION", str(name), result, tuple(sections), body)
+        return tree.ProgramUnit(at_of(name), "FUNCTION", str(name), result, tuple(sections), body)
 
-    def block(self, items: list[Any]) -> tree.Unit:
+    def block(self, items: list[Any]) -> tree.ProgramUnit:
         name, *sections, body = items
-        return tree.Unit(at_of(name), "FUNCTION_BLOCK", str(name), None, tuple(sections), body)
+        return tree.ProgramUnit(at_of(name), "FUNCTION_BLOCK", str(name), None, tuple(sections), body)
 
-    def program(self, items: list[Any]) -> tree.Unit:
+    def program(self, items: list[Any]) -> tree.ProgramUnit:
         name, *sections, body = items
-        return tree.Unit(at_of(name), "PROGRAM", str(name), None, tuple(sections), body)
+        return tree.ProgramUnit(at_of(name), "PROGRAM", str(name), None, tuple(sections), body)
 
-    def variables(self, items: list[Any]) -> tree.Variables:
+    def variables(self, items: list[Any]) -> tree.VariableSection:
         qualifiers = tuple(item.upper() for item in items[1:] if isinstance(item, Token))
         declared = tuple(one for item in items[1:] if not isinstance(item, Token) for one in item)
-        return tree.Variables(at_of(items[0]), items[0].upper(), qualifiers, declared)
+        return tree.VariableSection(at_of(items[0]), items[0].upper(), qualifiers, declared)
 
     def variable_declaration(self, items: list[Any]) -> list[tree.VariableDeclaration]:
         tag, *names, address, spec, initial = items
@@ -225,7 +225,8 @@ class _Tree(Transformer[Any]):
         return tree.Configuration(
             at_of(name),
             str(name),
-            tuple(i for i in items if isinstance(i, tree.Variables)) + tuple(g for one in inner for g in one.globals),
+            tuple(i for i in items if isinstance(i, tree.VariableSection))
+            + tuple(g for one in inner for g in one.globals),
             tuple(i for i in items if isinstance(i, tree.Task)) + tuple(t for one in inner for t in one.tasks),
             tuple(i for i in items if isinstance(i, tree.Instance)) + tuple(p for one in inner for p in one.instances),
         )
@@ -353,7 +354,7 @@ class _Tree(Transformer[Any]):
         return tree.Name(_of(items[0]), str(items[0]))
 
     def member(self, items: list[Any]) -> tree.Expression:
-        return self._deep(tree.Member(_of(items[0]), items[0], str(items[1])), items[0])
+        return self._deep(tree.MemberAccess(_of(items[0]), items[0], str(items[1])), items[0])
 
     def item(self, items: list[Any]) -> tree.Expression:
         return self._deep(tree.Item(_of(items[0]), items[0], tuple(items[1:])), *items)

@@ -45,7 +45,7 @@ _PAIRS = ({"RETAIN", "PERSISTENT"},)
 """Qualifiers that go together."""
 
 
-def meaning(section: tree.Variables, unit: str) -> tuple[str, ...]:
+def meaning(section: tree.VariableSection, unit: str) -> tuple[str, ...]:
     """Return the qualifiers that apply to the variables of a section in a kind of unit.
 
     PERSISTENT is RETAIN. CONSTANT of an input has no effect, because no unit writes its inputs: the caller's value

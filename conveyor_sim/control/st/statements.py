@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from conveyor_sim.control.st import tree
-from conveyor_sim.control.st.calls import Calls
+from conveyor_sim.control.st.calls import CallCompiler
 from conveyor_sim.control.st.errors import Position, SourceError
 from conveyor_sim.control.st.expressions import Expressions
 from conveyor_sim.control.st.types import BlockType, Subrange, Type, register
@@ -28,7 +28,7 @@ MOST_CODE = 32_000_000
 """Characters of Python that a file may become: long constants stand where they are used."""
 
 
-class Lines:
+class CodeLines:
     """Python source as it grows; `positions[n]` is where line n + 1 comes from, None for what is not of the program."""
 
     def __init__(self) -> None:
@@ -62,7 +62,7 @@ class Lines:
 class Statements:
     """Of one unit."""
 
-    def __init__(self, lines: Lines, expressions: Expressions, calls: Calls) -> None:
+    def __init__(self, lines: CodeLines, expressions: Expressions, calls: CallCompiler) -> None:
         self._lines = lines
         self._expressions = expressions
         self._calls = calls

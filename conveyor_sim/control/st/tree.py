@@ -47,7 +47,7 @@ class EnumValue(Expression):
 
 
 @dataclass(frozen=True)
-class Member(Expression):
+class MemberAccess(Expression):
     """A field of a structure, a variable of a block, or Color.Red."""
 
     base: Expression
@@ -250,7 +250,7 @@ class VariableDeclaration(Node):
 
 
 @dataclass(frozen=True)
-class Variables(Node):
+class VariableSection(Node):
     """A section of variables. section: VAR, VAR_INPUT, ...; qualifiers: CONSTANT, RETAIN, ..."""
 
     section: str
@@ -268,13 +268,13 @@ class TypeDeclaration(Node):
 
 
 @dataclass(frozen=True)
-class Unit(Node):
+class ProgramUnit(Node):
     """A program organisation unit."""
 
     kind: OneOf["FUNCTION", "FUNCTION_BLOCK", "PROGRAM"]
     name: str
     result: TypeSpec | None
-    sections: tuple[Variables, ...]
+    sections: tuple[VariableSection, ...]
     body: Block
 
 
@@ -303,16 +303,16 @@ class Configuration(Node):
     """What runs, with the resources' tasks and programs taken together."""
 
     name: str
-    globals: tuple[Variables, ...]
+    globals: tuple[VariableSection, ...]
     tasks: tuple[Task, ...]
     instances: tuple[Instance, ...]
 
 
 @dataclass(frozen=True)
-class Source:
+class SourceFile:
     """A whole file."""
 
     types: list[TypeDeclaration] = field(default_factory=list)
-    globals: list[Variables] = field(default_factory=list)
-    units: list[Unit] = field(default_factory=list)
+    globals: list[VariableSection] = field(default_factory=list)
+    units: list[ProgramUnit] = field(default_factory=list)
     configurations: list[Configuration] = field(default_factory=list)

@@ -8,7 +8,7 @@ from typing import Any
 
 from conveyor_sim.control.st.errors import StructuredTextError
 from conveyor_sim.control.st.located import identity
-from conveyor_sim.control.st.operations import Attribute, Element, Record
+from conveyor_sim.control.st.operations import Attribute, Element, StructureValue
 from conveyor_sim.control.st.types import Array, BlockType, Structure, Type
 
 Step = str | int
@@ -40,7 +40,7 @@ class Variable:
         """The innermost instance of a unit on the way, and the variable of it that this is part of."""
         owner, found = self._owner, (0, "")
         for step in (*self._way, self._last):
-            if isinstance(step, str) and not isinstance(owner, Record):
+            if isinstance(step, str) and not isinstance(owner, StructureValue):
                 found = identity(owner, step)
             owner = owner[step] if isinstance(step, int) else getattr(owner, step)
         return found

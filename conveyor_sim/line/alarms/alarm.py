@@ -61,7 +61,7 @@ NEVER = -1
 """A tick that does not come."""
 
 
-class Alarm:
+class LineAlarm:
     """One alarm. `settle` after any change of `active`, `suppressed`, `shelved` and `out_of_service`."""
 
     def __init__(self, id: str, number: int, fields: AlarmFields, declared_by: str, own: bool, tick: float) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from conveyor_sim.columns.alarms import AlarmColumns
 from conveyor_sim.columns.events import Kind
-from conveyor_sim.line.alarms.alarm import ACKNOWLEDGED, NEVER, Alarm, AlarmState
+from conveyor_sim.line.alarms.alarm import ACKNOWLEDGED, NEVER, AlarmState, LineAlarm
 from conveyor_sim.line.alarms.declaration import MOST_ALARMS, Declared, ranks
 from conveyor_sim.scene.parts.alarm import CLASSES, PREFIX, AlarmFields
 from conveyor_sim.support.printable import printable
@@ -38,28 +38,28 @@ class Alarms:
     def __init__(self, tick: float, note: Note, signals: Collection[str]) -> None:
         """tick: its length, s. signals: names of those that can be measured."""
         self.tick, self._note, self._signals = tick, note, signals
-        self._all: dict[str, Alarm] = {}
-        self._groups: dict[str, list[Alarm]] = {}
-        self._follow: dict[str, list[Alarm]] = {}  # of each id, whom it suppresses
+        self._all: dict[str, LineAlarm] = {}
+        self._groups: dict[str, list[LineAlarm]] = {}
+        self._follow: dict[str, list[LineAlarm]] = {}  # of each id, whom it suppresses
         self._next: float = np.inf  # no deadline is before this tick
         self._tags: tuple[float, ...] | None = None
         self.numbered = 0
         """Alarms so far, those that were forgotten too."""
         self.first: dict[str, str] = {}
         """Of each group in which not all is normal, the id of the alarm that came first; in the order of coming."""
-        self.measured: tuple[Alarm, ...] = ()
+        self.measured: tuple[LineAlarm, ...] = ()
         """Those whose conditions the line is to find out."""
         self.changed = True
         """Whether anything to be seen of them has changed since the tick before."""
 
-    def __getitem__(self, id: str) -> Alarm:
+    def __getitem__(self, id: str) -> LineAlarm:
         """Raises KeyError."""
         return self._all[id]
 
     def __contains__(self, id: object) -> bool:
         return id in self._all
 
-    def __iter__(self) -> Iterator[Alarm]:
+    def __iter__(self) -> Iterator[LineAlarm]:
         """In the order of their numbers."""
         return iter(self._all.values())
 
@@ -114,7 +114,7 @@ class Alarms:
             self._arrange()
             self.settle(tick, changed)
 
-    def restored(self, alarms: Iterable[Alarm], numbered: int, first: dict[str, str]) -> None:
+    def restored(self, alarms: Iterable[LineAlarm], numbered: int, first: dict[str, str]) -> None:
         """Have these in place of all that there were."""
         self._all = {alarm.id: alarm for alarm in alarms}
         self.numbered, self.first = numbered, first
@@ -182,7 +182,7 @@ class Alarms:
         if due:
             self.settle(tick, due)
 
-    def watch(self, alarm: Alarm) -> None:
+    def watch(self, alarm: LineAlarm) -> None:
         """Have its deadlines kept."""
         for deadline in (alarm.due, alarm.shelved_until):
             if NEVER < deadline < self._next:
@@ -190,14 +190,14 @@ class Alarms:
 
     # What follows
 
-    def settle(self, tick: int, touched: Iterable[Alarm]) -> None:
+    def settle(self, tick: int, touched: Iterable[LineAlarm]) -> None:
         """Bring alarms that were changed, and those that follow from them, to their states: causes first, then by
         priority.
         """
         waiting: list[tuple[int, int, int, str]] = []
         queued: set[str] = set()
 
-        def queue(alarm: Alarm) -> None:
+        def queue(alarm: LineAlarm) -> None:
             if alarm.id not in queued:
                 queued.add(alarm.id)
                 heappush(waiting, (alarm.rank, -alarm.fields.severity, alarm.number, alarm.id))
@@ -228,7 +228,7 @@ class Alarms:
         self._tags = None
         self.changed = True
 
-    def note(self, tick: int, kind: Kind, alarm: Alarm, text: str) -> None:
+    def note(self, tick: int, kind: Kind, alarm: LineAlarm, text: str) -> None:
         """Something has happened to an alarm."""
         self._note(tick, kind, PREFIX + alarm.id, float(alarm.stands), text)
 
@@ -280,9 +280,9 @@ class Alarms:
             changed_by=[alarm.changed_by for alarm in alarms],
         )
 
-    def _add(self, id: str, fields: AlarmFields, by: str, own: bool) -> Alarm:
+    def _add(self, id: str, fields: AlarmFields, by: str, own: bool) -> LineAlarm:
         self.numbered += 1
-        self._all[id] = Alarm(id, self.numbered, fields, by, own, self.tick)
+        self._all[id] = LineAlarm(id, self.numbered, fields, by, own, self.tick)
         return self._all[id]
 
     def _arrange(self) -> None:
@@ -315,10 +315,10 @@ class Alarms:
             return True
         return False
 
-    def _caused(self, alarm: Alarm) -> bool:
+    def _caused(self, alarm: LineAlarm) -> bool:
         return any(self._all[cause].suppressing for cause in alarm.fields.suppressed_by)
 
-    def _why(self, kind: str, alarm: Alarm) -> str:
+    def _why(self, kind: str, alarm: LineAlarm) -> str:
         if kind == "alarm_raised":
             return alarm.fields.text
         if kind == "alarm_suppressed":
@@ -326,7 +326,7 @@ class Alarms:
             return printable(f"follows from {', '.join(causes)}")
         return "its condition has ended" if kind == "alarm_unshelved" else ""
 
-    def _spare(self, alarm: Alarm, said: bool | None = None) -> bool:
+    def _spare(self, alarm: LineAlarm, said: bool | None = None) -> bool:
         """Whether it can be forgotten: nobody declared it, it does not stand, and nobody has hidden it.
         said: its condition, if another one than now is meant.
         """

@@ -3,7 +3,7 @@
 from graphlib import CycleError
 from typing import Any, NamedTuple
 
-from conveyor_sim.line.alarms.alarm import NEVER, Alarm, AlarmState, Shelving, ticks
+from conveyor_sim.line.alarms.alarm import NEVER, AlarmState, LineAlarm, Shelving, ticks
 from conveyor_sim.line.alarms.alarms import UNDECLARED, Alarms
 from conveyor_sim.line.alarms.declaration import MOST_ALARMS, as_text, fields_of
 from conveyor_sim.physics.state.snapshot import entries, typed
@@ -89,7 +89,7 @@ def restore(alarms: Alarms, tick: int, memory: Any) -> None:
         _require(any(main is not AlarmState.NORMAL for main in here), "have a first-out of nothing")
 
 
-def _made(one: _Kept, tick: int, alarms: Alarms) -> Alarm:
+def _made(one: _Kept, tick: int, alarms: Alarms) -> LineAlarm:
     """An alarm of a file."""
     what = f"have one, {printable(one.id, 50)}, that"
     texts = (one.id, one.declared_by, one.changed_by)
@@ -101,7 +101,7 @@ def _made(one: _Kept, tick: int, alarms: Alarms) -> Alarm:
         if isinstance(read, str) or bool(one.declared_by) != bool(one.declared):
             raise ValueError(f"line.alarms {what} is declared wrong")
         fields = read
-    alarm = Alarm(one.id, one.number, fields, one.declared_by, one.own, alarms.tick)
+    alarm = LineAlarm(one.id, one.number, fields, one.declared_by, one.own, alarms.tick)
     alarm.condition, alarm.active, alarm.due = one.condition, one.active, one.due
     alarm.shelved, alarm.shelved_until, alarm.out_of_service = one.shelved, one.shelved_until, one.out_of_service
     alarm.since, alarm.changed_by = one.since, one.changed_by

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from conveyor_sim.columns.events import Kind
-from conveyor_sim.line.alarms.alarm import ACKNOWLEDGED, NEVER, RESET, Alarm, ticks
+from conveyor_sim.line.alarms.alarm import ACKNOWLEDGED, NEVER, RESET, LineAlarm, ticks
 from conveyor_sim.line.alarms.alarms import Alarms
 from conveyor_sim.scene.parts.alarm import LONGEST_DELAY, PREFIX
 from conveyor_sim.support.printable import printable
@@ -14,66 +14,66 @@ LISTED = 20
 
 
 @dataclass(frozen=True)
-class Operation:
+class AlarmOperation:
     """One of them."""
 
     kind: Kind
     """Of the event."""
-    can: Callable[[Alarm], bool]
+    can: Callable[[LineAlarm], bool]
     expected: str
     """What it can be done to."""
-    do: Callable[[Alarm], None]
+    do: Callable[[LineAlarm], None]
     all_of_them: bool = False
     """Whether no name at all means all alarms that it can be done to."""
 
 
-def _acknowledge(alarm: Alarm) -> None:
+def _acknowledge(alarm: LineAlarm) -> None:
     alarm.main = ACKNOWLEDGED[alarm.main]
 
 
-def _reset(alarm: Alarm) -> None:
+def _reset(alarm: LineAlarm) -> None:
     alarm.main = RESET[alarm.main]
 
 
-def _unshelve(alarm: Alarm) -> None:
+def _unshelve(alarm: LineAlarm) -> None:
     alarm.shelved, alarm.shelved_until = "", NEVER
 
 
-def _remove(alarm: Alarm) -> None:
+def _remove(alarm: LineAlarm) -> None:
     alarm.out_of_service = True
 
 
-def _return(alarm: Alarm) -> None:
+def _return(alarm: LineAlarm) -> None:
     alarm.out_of_service = False
 
 
-def _shelve(alarm: Alarm) -> None:
+def _shelve(alarm: LineAlarm) -> None:
     alarm.shelved, alarm.shelved_until = "one_shot", NEVER
 
 
 OPERATIONS = {
-    "acknowledge": Operation(
+    "acknowledge": AlarmOperation(
         "alarm_acknowledged",
         lambda alarm: alarm.main in ACKNOWLEDGED,
         "one that waits to be acknowledged",
         _acknowledge,
         all_of_them=True,
     ),
-    "reset": Operation(
+    "reset": AlarmOperation(
         "alarm_reset",
         lambda alarm: alarm.main in RESET,
         "one that has latched, whose condition is gone and that is acknowledged",
         _reset,
         all_of_them=True,
     ),
-    "shelve": Operation("alarm_shelved", lambda alarm: not alarm.out_of_service, "one in service", _shelve),
-    "unshelve": Operation(
+    "shelve": AlarmOperation("alarm_shelved", lambda alarm: not alarm.out_of_service, "one in service", _shelve),
+    "unshelve": AlarmOperation(
         "alarm_unshelved", lambda alarm: bool(alarm.shelved), "one that is shelved", _unshelve, all_of_them=True
     ),
-    "remove_from_service": Operation(
+    "remove_from_service": AlarmOperation(
         "alarm_out_of_service", lambda alarm: not alarm.out_of_service, "one in service", _remove
     ),
-    "return_to_service": Operation(
+    "return_to_service": AlarmOperation(
         "alarm_in_service", lambda alarm: alarm.out_of_service, "one that is out of service", _return
     ),
 }
@@ -133,7 +133,7 @@ def _bare(ids: Sequence[str]) -> list[str]:
     return [id.removeprefix(PREFIX) for id in ids]
 
 
-def _words(alarm: Alarm) -> str:
+def _words(alarm: LineAlarm) -> str:
     return alarm.state.name.lower().replace("_", " ")
 
 

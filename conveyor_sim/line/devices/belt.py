@@ -2,17 +2,46 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from conveyor_sim.line.alarms.declaration import Declared, error
 from conveyor_sim.line.commands.authority import AUTOMATIC
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.devices.region import most_inside
-from conveyor_sim.line.devices.setup import Setup
-from conveyor_sim.line.devices.watchdog import Watchdog
+from conveyor_sim.line.devices.setup import DeviceSetup
 from conveyor_sim.line.process_image import speed_command
 from conveyor_sim.line.tag import Tag, count, number
 from conveyor_sim.scene.belts import CurvedBelt, StraightBelt
 from conveyor_sim.scene.geometry import belt_shape
+
+
+@dataclass
+class Watchdog:
+    """Stops one belt when no command for it was accepted for `timeout` s of simulated time."""
+
+    timeout_ticks: int
+    last: int = 0
+    """Tick of the last accepted command."""
+    tripped: bool = False
+    rests: bool = False
+    """While no controller is to command the belt."""
+
+    def command(self, tick: int) -> None:
+        """A command was accepted."""
+        self.last = tick
+        self.tripped = False
+
+    def rest(self, tick: int, rests: bool) -> None:
+        """The belt has left its controller's hands, or comes back into them, with all of the time before it."""
+        self.rests = rests
+        self.command(tick)
+
+    def trips(self, tick: int) -> bool:
+        """Whether the belt must stop now: once, at the first tick past the time-out."""
+        if self.rests or self.tripped or tick - self.last < self.timeout_ticks:
+            return False
+        self.tripped = True
+        return True
 
 
 class BeltDevice(Device):
@@ -22,7 +51,7 @@ class BeltDevice(Device):
         self,
         name: str,
         belt: StraightBelt | CurvedBelt,
-        setup: Setup,
+        setup: DeviceSetup,
         more: Sequence[Tag] = (),
         backward: bool = False,
     ) -> None:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.devices.crossing import CrossingLine
-from conveyor_sim.line.devices.setup import Setup
+from conveyor_sim.line.devices.setup import DeviceSetup
 from conveyor_sim.line.tag import count
 from conveyor_sim.scene.parts.counter import Counter
 
@@ -12,7 +12,7 @@ from conveyor_sim.scene.parts.counter import Counter
 class CounterDevice(Device):
     """One counter while it runs."""
 
-    def __init__(self, name: str, counter: Counter, setup: Setup) -> None:
+    def __init__(self, name: str, counter: Counter, setup: DeviceSetup) -> None:
         super().__init__(
             name,
             [

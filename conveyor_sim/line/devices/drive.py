@@ -2,13 +2,13 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from conveyor_sim.line.alarms.declaration import Declared, error
 from conveyor_sim.line.device import ScanContext
 from conveyor_sim.line.devices.belt import BeltDevice
 from conveyor_sim.line.devices.edge import RisingEdge
-from conveyor_sim.line.devices.ramp import Ramp
-from conveyor_sim.line.devices.setup import Setup
+from conveyor_sim.line.devices.setup import DeviceSetup
 from conveyor_sim.line.tag import MOST_COUNT, count, switch
 from conveyor_sim.scene.belts import CurvedBelt, StraightBelt
 from conveyor_sim.scene.drives import Drive
@@ -17,13 +17,44 @@ AT_SPEED = 1e-9
 """m/s, between setpoint and speed."""
 
 
+@dataclass
+class Ramp:
+    """A speed on its way: no overshoot from rest, and what jerk allows where the setpoint changes on the way."""
+
+    value: float
+    """m/s"""
+    acceleration: float = 0.0
+    """m/s^2, in the last interval."""
+
+    def approach(self, setpoint: float, limit: float, jerk: float | None, interval: float) -> float:
+        """The speed (m/s) after an interval (s); limit: m/s^2, jerk: m/s^3 or None for no limit."""
+        left = setpoint - self.value
+        if left == 0.0 and self.acceleration == 0.0:
+            return self.value
+        wanted = min(limit, abs(left) / interval)
+        if jerk is not None:
+            # The sum of a, a - j dt, ... down to 0, each for dt, is a^2 / (2 j) + a dt / 2.
+            wanted = min(wanted, jerk * (math.sqrt(0.25 * interval**2 + 2.0 * abs(left) / jerk) - 0.5 * interval))
+        wanted = math.copysign(wanted, left)
+        if jerk is not None:
+            most = jerk * interval
+            wanted = min(max(wanted, self.acceleration - most), self.acceleration + most)
+        change = wanted * interval
+        arrived = abs(left - change) <= 1e-12 * max(1.0, abs(setpoint))
+        self.acceleration = wanted
+        self.value = setpoint if arrived else self.value + change
+        if arrived and (jerk is None or abs(wanted) <= jerk * interval):
+            self.acceleration = 0.0
+        return self.value
+
+
 class DriveDevice(BeltDevice):
     """One belt with a drive while it runs. It runs at the start, at the speed of the scene.
 
     A trip stops it, at its ramp, until the fault is gone and `reset` has risen since.
     """
 
-    def __init__(self, name: str, belt: StraightBelt | CurvedBelt, drive: Drive, setup: Setup) -> None:
+    def __init__(self, name: str, belt: StraightBelt | CurvedBelt, drive: Drive, setup: DeviceSetup) -> None:
         tags = [
             switch(f"{name}/running", "status", "Commanded to run, and not tripped.", 1.0, "state"),
             switch(f"{name}/at_speed", "status", "At the end of its ramp, also of one to standstill.", 1.0),
@@ -104,6 +135,6 @@ class DriveDevice(BeltDevice):
         return -setpoint if self.reverse else setpoint
 
 
-def belt_device(name: str, belt: StraightBelt | CurvedBelt, setup: Setup) -> BeltDevice:
+def belt_device(name: str, belt: StraightBelt | CurvedBelt, setup: DeviceSetup) -> BeltDevice:
     """A belt, with a drive if it has one."""
     return BeltDevice(name, belt, setup) if belt.drive is None else DriveDevice(name, belt, belt.drive, setup)

@@ -14,7 +14,7 @@ CLEAR = 1e-9
 
 
 @dataclass(frozen=True)
-class Entry:
+class BottleEntry:
     """Bottles of one type that enter in one direction, at one speed."""
 
     kind: int

@@ -7,7 +7,7 @@ from conveyor_sim.line.alarms.declaration import Declared, error
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.devices.belt import BeltDevice
 from conveyor_sim.line.devices.counter import CounterDevice
-from conveyor_sim.line.devices.setup import Setup
+from conveyor_sim.line.devices.setup import DeviceSetup
 from conveyor_sim.line.devices.zone import ZoneDevice
 from conveyor_sim.line.tag import number, switch
 from conveyor_sim.scene.parts.indicator import Indicator
@@ -25,7 +25,7 @@ class IndicatorDevice(Device):
     recent: list[int]
     """Ticks of the passages within the window."""
 
-    def __init__(self, name: str, indicator: Indicator, setup: Setup) -> None:
+    def __init__(self, name: str, indicator: Indicator, setup: DeviceSetup) -> None:
         downstream, backup, tick = indicator.downstream, indicator.backup, setup.scene.tick
         self._can_block = downstream is not None or backup is not None
         most = setup.fastest_flow(indicator.belt) * HOUR

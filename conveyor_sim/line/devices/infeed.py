@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.devices.entry import CLEAR, Quality
-from conveyor_sim.line.devices.setup import BAD, JITTER, Setup
+from conveyor_sim.line.devices.setup import BAD, JITTER, DeviceSetup
 from conveyor_sim.line.tag import MOST_COUNT, count, switch
 from conveyor_sim.physics.state import State
 from conveyor_sim.scene.parts.infeed import Infeed
@@ -23,7 +23,7 @@ LATE = 2.0
 class InfeedDevice(Device):
     """One infeed while it runs."""
 
-    def __init__(self, name: str, infeed: Infeed, setup: Setup) -> None:
+    def __init__(self, name: str, infeed: Infeed, setup: DeviceSetup) -> None:
         most = MOST_COUNT if infeed.count is None else infeed.count
         super().__init__(
             name,

@@ -1,11 +1,15 @@
 """Gates, pushers and diverters: rails that go to and fro on command, with end switches."""
 
 from collections.abc import Sequence
+from typing import Any
 
-from conveyor_sim.engine.arrays.moving import HELD, OFF_PROFILE, ON_PROFILE, MovingRails
+import numpy as np
+
+from conveyor_sim.engine.arrays.moving import HELD, OFF_PROFILE, ON_PROFILE, PHASES, MovingRails
+from conveyor_sim.engine.arrays.types import F8
+from conveyor_sim.engine.rails.motion_profile import plan_profile
 from conveyor_sim.line.device import Device, ScanContext
-from conveyor_sim.line.devices.course import course_to, later, position_at, resting
-from conveyor_sim.line.devices.setup import Setup
+from conveyor_sim.line.devices.setup import DeviceSetup
 from conveyor_sim.line.tag import number, switch
 from conveyor_sim.scene.parts.movers import Mover as MoverPart
 
@@ -27,7 +31,7 @@ class Mover(Device):
     drive, it is held up or goes back, and goes on from where it is.
     """
 
-    def __init__(self, name: str, part: MoverPart, setup: Setup) -> None:
+    def __init__(self, name: str, part: MoverPart, setup: DeviceSetup) -> None:
         shapes = setup.model.plant.moving
         index = [shape.name for shape in shapes].index(name)
         shape = shapes[index]
@@ -113,3 +117,37 @@ class Mover(Device):
         moving = now.state.world.moving
         assert moving is not None
         return moving
+
+
+_plan: Any = plan_profile.py_func  # type: ignore[attr-defined]
+
+
+def resting(position: float) -> F8:
+    """At rest at a position for ever."""
+    course = np.zeros((PHASES, 4))
+    course[:, 1] = position
+    return course
+
+
+def course_to(position: float, speed: float, target: float, max_speed: float, acceleration: float) -> F8:
+    """The fastest way from a position and speed, at most `max_speed`, to rest at the target; it may turn round first.
+
+    All in m and s, or rad and s; times since now.
+    """
+    course = np.zeros((1, PHASES, 4))
+    _plan(course, 0, 0.0, position, speed, target, max_speed, acceleration)
+    return np.asarray(course[0])
+
+
+def position_at(course: F8, seconds: float) -> float:
+    """Where a course is so many seconds after it began."""
+    k = max(0, int(np.searchsorted(course[:, 0], seconds, side="right")) - 1)
+    since = seconds - course[k, 0]
+    return float(course[k, 1] + (course[k, 2] + 0.5 * course[k, 3] * since) * since)
+
+
+def later(course: F8, seconds: float) -> F8:
+    """The same course with its times since so many seconds later."""
+    shifted = course.copy()
+    shifted[:, 0] -= seconds
+    return shifted

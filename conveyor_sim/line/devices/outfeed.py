@@ -2,7 +2,7 @@
 
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.devices.region import Region
-from conveyor_sim.line.devices.setup import Setup
+from conveyor_sim.line.devices.setup import DeviceSetup
 from conveyor_sim.line.tag import count
 from conveyor_sim.scene.parts.outfeed import Outfeed
 
@@ -10,7 +10,7 @@ from conveyor_sim.scene.parts.outfeed import Outfeed
 class OutfeedDevice(Device):
     """One outfeed while it runs."""
 
-    def __init__(self, name: str, outfeed: Outfeed, setup: Setup) -> None:
+    def __init__(self, name: str, outfeed: Outfeed, setup: DeviceSetup) -> None:
         super().__init__(
             name, [count(f"{name}/removed", "counter", "Bottles taken away.", adds_to="removed").of("removed")]
         )

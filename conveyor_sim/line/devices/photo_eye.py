@@ -5,13 +5,54 @@ from collections.abc import Sequence
 from conveyor_sim.engine.sensors.beams import ROUNDING
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.devices.beam import Beams, Span
-from conveyor_sim.line.devices.setup import CHATTER, Setup
-from conveyor_sim.line.devices.timer import Edge, Timer
+from conveyor_sim.line.devices.setup import CHATTER, DeviceSetup
 from conveyor_sim.line.tag import count, number, seconds, switch
 from conveyor_sim.scene.parts.photo_eye import PhotoEye
 
 FASTEST_CHATTER, LONGEST_DELAY = 1000.0, 60.0
 """Hz and s, that can be injected."""
+
+
+Edge = tuple[float, bool]
+"""When (s) a signal changes, and whether it comes on."""
+
+
+class Timer:
+    """Its output comes on once the input has been on for `on` s, and goes off once that has been off for `off` s.
+
+    TON and TOF of IEC 61131-3 in one, with edges at any time between ticks.
+    """
+
+    def __init__(self, on: float, off: float) -> None:
+        self._on, self._off = on, off
+        self.input = self.output = False
+        self.since = 0.0
+        """s: when the input last changed."""
+
+    def start(self, level: bool) -> None:
+        """Begin as if the input had always been so."""
+        self.input = self.output = level
+
+    @property
+    def runs(self) -> bool:
+        """Whether its output is still to follow its input."""
+        return self.input != self.output
+
+    def follow(self, edges: Sequence[Edge], until: float) -> list[Edge]:
+        """The output's edges up to a time (s), after the input's up to then, which are in order."""
+        made: list[Edge] = []
+        for at, level in edges:
+            self._ripen(at, made)
+            if level != self.input:
+                self.input, self.since = level, at
+        self._ripen(until, made)
+        return made
+
+    def _ripen(self, now: float, made: list[Edge]) -> None:
+        due = self.since + (self._on if self.input else self._off)
+        if self.input != self.output and due <= now + ROUNDING:
+            self.output = self.input
+            made.append((due, self.output))
 
 
 class PhotoEyeDevice(Device):
@@ -20,7 +61,7 @@ class PhotoEyeDevice(Device):
     late: tuple[Edge, ...]
     """Edges that have not come through yet."""
 
-    def __init__(self, name: str, eye: PhotoEye, setup: Setup) -> None:
+    def __init__(self, name: str, eye: PhotoEye, setup: DeviceSetup) -> None:
         eyes = setup.scene.photo_eyes
         beams = setup.shared(Beams, lambda: Beams([(each.from_, each.to) for each in eyes.values()]))
         index = setup.index("photo_eyes", name.rpartition("/")[2])

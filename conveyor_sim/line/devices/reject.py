@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.devices.edge import RisingEdge
 from conveyor_sim.line.devices.region import Region
-from conveyor_sim.line.devices.setup import Setup
+from conveyor_sim.line.devices.setup import DeviceSetup
 from conveyor_sim.line.tag import count, switch
 from conveyor_sim.scene.parts.reject import Reject
 
@@ -16,7 +16,7 @@ class RejectDevice(Device):
     strokes: tuple[float, ...]
     """s, when the strokes that are still to hit began or begin."""
 
-    def __init__(self, name: str, reject: Reject, setup: Setup) -> None:
+    def __init__(self, name: str, reject: Reject, setup: DeviceSetup) -> None:
         super().__init__(
             name,
             [

@@ -1,13 +1,13 @@
-"""`Setup`: what a device is made from, beside its part of the scene."""
+"""`DeviceSetup`: what a device is made from, beside its part of the scene."""
 
 from collections.abc import Callable
+from hashlib import blake2b
 from typing import TypeVar
 
 import numpy as np
 
 from conveyor_sim.line.device import Device
-from conveyor_sim.line.devices.entry import Entry
-from conveyor_sim.line.devices.streams import random_stream
+from conveyor_sim.line.devices.entry import BottleEntry
 from conveyor_sim.physics.model import Model
 from conveyor_sim.scene.schema import Scene
 
@@ -20,7 +20,7 @@ BRANCHES = {(JITTER, "infeeds"): (), (BAD, "infeeds"): (1,), (BAD, "machines"): 
 D = TypeVar("D", bound=Device)
 
 
-class Setup:
+class DeviceSetup:
     """A scene, its model, and the devices made so far."""
 
     def __init__(self, scene: Scene, model: Model) -> None:
@@ -47,10 +47,10 @@ class Setup:
         """The place of a part in its field of the scene, from 0."""
         return list(getattr(self.scene, field)).index(name)
 
-    def entry(self, bottle: str, direction: float, speed: float) -> Entry:
+    def entry(self, bottle: str, direction: float, speed: float) -> BottleEntry:
         """Where bottles of a type enter in a direction (rad) at a speed (m/s)."""
         kind = self.model.bottle_types.index(bottle)
-        return Entry(kind, float(self.model.type_radius[kind]), direction, speed)
+        return BottleEntry(kind, float(self.model.type_radius[kind]), direction, speed)
 
     def fastest_flow(self, belt: str) -> float:
         """Bottles a second that a belt can bring at most: the smallest ones, touching in as many lanes as there are."""
@@ -65,3 +65,18 @@ class Setup:
             key = (*BRANCHES[purpose, field], self.index(field, name))
             return np.random.Generator(np.random.PCG64(np.random.SeedSequence(self.scene.seed, spawn_key=key)))
         return random_stream(self.scene.seed, device, purpose)
+
+
+WORDS = 4
+"""Of 32 bits, that stand for a device and a purpose in the key of its stream."""
+
+
+def random_stream(seed: int, device: str, purpose: str) -> np.random.Generator:
+    """The stream of one purpose ("jitter") of a device, by its name ("infeeds/inlet"), from the seed of a scene.
+
+    Keyed by names and not by places in a list: what else is on the line changes nothing. A hash of both is the spawn
+    key of NumPy's SeedSequence, which makes independent streams of one seed.
+    """
+    digest = blake2b(f"{device}\0{purpose}".encode(), digest_size=4 * WORDS).digest()
+    key = tuple(int.from_bytes(digest[4 * n : 4 * n + 4], "little") for n in range(WORDS))
+    return np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed, spawn_key=key)))

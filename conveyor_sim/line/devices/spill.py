@@ -2,7 +2,7 @@
 
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.devices.edge import RisingEdge
-from conveyor_sim.line.devices.setup import Setup
+from conveyor_sim.line.devices.setup import DeviceSetup
 from conveyor_sim.line.tag import count, switch
 from conveyor_sim.scene.parts.spill import Spill
 
@@ -10,7 +10,7 @@ from conveyor_sim.scene.parts.spill import Spill
 class SpillDevice(Device):
     """One place of spills: each rise of its fault drops a bottle, as soon as there is room."""
 
-    def __init__(self, name: str, spill: Spill, setup: Setup) -> None:
+    def __init__(self, name: str, spill: Spill, setup: DeviceSetup) -> None:
         super().__init__(
             name,
             [

@@ -7,7 +7,7 @@ import numpy as np
 
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.devices.region import Region, most_inside
-from conveyor_sim.line.devices.setup import Setup
+from conveyor_sim.line.devices.setup import DeviceSetup
 from conveyor_sim.line.tag import count, number, switch
 from conveyor_sim.scene.parts.zone import Zone
 
@@ -21,7 +21,7 @@ DENSEST = 1.0 / (2.0 * math.sqrt(3.0))
 class ZoneDevice(Device):
     """One zone while it runs."""
 
-    def __init__(self, name: str, zone: Zone, setup: Setup) -> None:
+    def __init__(self, name: str, zone: Zone, setup: DeviceSetup) -> None:
         self._region, self._full_at = Region(zone.region), zone.full_at
         x, y = self._region.corners.T
         self._area = 0.5 * abs(float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))))

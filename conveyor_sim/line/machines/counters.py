@@ -95,7 +95,7 @@ class LineCounter:
         """Bottles since then: those that left by a sink or an outfeed, defective ones among them; those thrown out."""
 
 
-class Counters:
+class ProductionCounters:
     """Of all devices of a line that count bottles, and of the line."""
 
     def __init__(self, devices: Sequence[Device]) -> None:

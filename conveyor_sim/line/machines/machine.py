@@ -6,14 +6,14 @@ from types import SimpleNamespace
 
 from conveyor_sim.line.alarms.declaration import Declared, error
 from conveyor_sim.line.device import Device, ScanContext
-from conveyor_sim.line.devices.setup import Setup
+from conveyor_sim.line.devices.setup import DeviceSetup
 from conveyor_sim.line.machines.failures import Draws, FailureClock, PlannedTimes
 from conveyor_sim.line.machines.packml import (
     CNTRL_CMD,
     COMMAND_TEXTS,
     STATE_TEXTS,
     Command,
-    State,
+    PackMLState,
     StateMachine,
     mode_objection,
     objection,
@@ -42,7 +42,7 @@ from conveyor_sim.scene.parts.machine import PackmlPart
 ROUNDING = 1e-9
 """Of a cycle: sums of rate x tick must not miss the tick they fall on."""
 
-EXECUTE, SUSPENDED, HELD = int(State.EXECUTE), int(State.SUSPENDED), int(State.HELD)
+EXECUTE, SUSPENDED, HELD = int(PackMLState.EXECUTE), int(PackMLState.SUSPENDED), int(PackMLState.HELD)
 
 Watcher = Callable[[int, Category, int], None]
 """Told the tick, where the machine's time goes from then on, and its stop reason."""
@@ -52,12 +52,17 @@ class MachineDevice(Device):
     """A machine that works in cycles, one bottle each, and follows the PackML state model. It runs at the start."""
 
     def __init__(
-        self, name: str, part: PackmlPart, setup: Setup, own: Sequence[Tag], conditional: Collection[State] = ()
+        self,
+        name: str,
+        part: PackmlPart,
+        setup: DeviceSetup,
+        own: Sequence[Tag],
+        conditional: Collection[PackMLState] = (),
     ) -> None:
         """own: signals of its kind. conditional: acting states that are left only when it is `ready`."""
         rate, most = part.rate, part.rate if part.rate_limit is None else part.rate_limit
         reasons = reason_texts(part)
-        first = State.STARTING if State.STARTING in conditional else State.EXECUTE
+        first = PackMLState.STARTING if PackMLState.STARTING in conditional else PackMLState.EXECUTE
         time = CATEGORIES.index(category_of(first, NONE, NONE, False))
         super().__init__(
             name,
@@ -89,7 +94,7 @@ class MachineDevice(Device):
         self.cntrl_cmd = 0
         self.packml = StateMachine(
             first,
-            {State[field.upper()]: self._ticks(time) for field, time in part.acting_times},
+            {PackMLState[field.upper()]: self._ticks(time) for field, time in part.acting_times},
             conditional,
         )
         self.speed = rate
@@ -198,7 +203,7 @@ class MachineDevice(Device):
             self.restart = False
             self._stand(Command.STOP, RUN + BY_HAND * by_hand)
         elif run and not before:
-            self.restart = self.state not in (State.ABORTING, State.ABORTED, State.CLEARING)
+            self.restart = self.state not in (PackMLState.ABORTING, PackMLState.ABORTED, PackMLState.CLEARING)
 
     def _take(self, command: int, by_hand: bool) -> None:
         """Take a command of PackML, unless what was commanded beside it has led elsewhere."""
@@ -260,7 +265,7 @@ class MachineDevice(Device):
         """A planned stop is over: stand for another one that is on, or be reset and started."""
         self.planned = next((FIRST_PLANNED + index for index, plan in enumerate(self._plans) if plan.on(tick)), NONE)
         if not self.planned:
-            self.restart = self.run and self.state in (State.STOPPING, State.STOPPED)
+            self.restart = self.run and self.state in (PackMLState.STOPPING, PackMLState.STOPPED)
         elif self.reason >= FIRST_PLANNED:
             self.reason = self.planned
 
@@ -339,7 +344,7 @@ class MachineDevice(Device):
     def _show(self) -> None:
         """Make its status anew."""
         self._changed = False
-        fault = bool(self._failed) or self.state == State.ABORTED
+        fault = bool(self._failed) or self.state == PackMLState.ABORTED
         self._shown = self.state, CATEGORIES.index(self._category), self.reason, fault
 
     @property
@@ -356,5 +361,5 @@ class MachineDevice(Device):
         """The first tick at which so much time has passed."""
         return math.ceil(seconds / self._tick - 1e-9)
 
-    def _draws(self, setup: Setup, times: Times, purpose: str) -> Draws:
+    def _draws(self, setup: DeviceSetup, times: Times, purpose: str) -> Draws:
         return Draws(times, setup.random(self.name, purpose), self._tick)

@@ -9,7 +9,7 @@ from enum import IntEnum
 from typing import Literal
 
 
-class State(IntEnum):
+class PackMLState(IntEnum):
     """States of a machine, as StateCurrent has them; 0, Undefined, is none."""
 
     CLEARING = 1
@@ -52,65 +52,73 @@ StateNumber = Literal[1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17]
 CNTRL_CMD = "/cntrl_cmd"
 """Ending of the names of commands that take PackML commands."""
 
-FROM: Mapping[Command, frozenset[State]] = {
-    Command.RESET: frozenset({State.STOPPED, State.COMPLETE}),
-    Command.START: frozenset({State.IDLE}),
-    Command.STOP: frozenset(State) - {State.CLEARING, State.STOPPED, State.STOPPING, State.ABORTING, State.ABORTED},
+FROM: Mapping[Command, frozenset[PackMLState]] = {
+    Command.RESET: frozenset({PackMLState.STOPPED, PackMLState.COMPLETE}),
+    Command.START: frozenset({PackMLState.IDLE}),
+    Command.STOP: frozenset(PackMLState)
+    - {PackMLState.CLEARING, PackMLState.STOPPED, PackMLState.STOPPING, PackMLState.ABORTING, PackMLState.ABORTED},
     Command.HOLD: frozenset(
-        {State.EXECUTE, State.STARTING, State.SUSPENDED, State.UNHOLDING, State.SUSPENDING, State.UNSUSPENDING}
+        {
+            PackMLState.EXECUTE,
+            PackMLState.STARTING,
+            PackMLState.SUSPENDED,
+            PackMLState.UNHOLDING,
+            PackMLState.SUSPENDING,
+            PackMLState.UNSUSPENDING,
+        }
     ),
-    Command.UNHOLD: frozenset({State.HELD}),
-    Command.SUSPEND: frozenset({State.EXECUTE}),
-    Command.UNSUSPEND: frozenset({State.SUSPENDED}),
-    Command.ABORT: frozenset(State) - {State.ABORTING, State.ABORTED},
-    Command.CLEAR: frozenset({State.ABORTED}),
-    Command.COMPLETE: frozenset({State.EXECUTE}),
+    Command.UNHOLD: frozenset({PackMLState.HELD}),
+    Command.SUSPEND: frozenset({PackMLState.EXECUTE}),
+    Command.UNSUSPEND: frozenset({PackMLState.SUSPENDED}),
+    Command.ABORT: frozenset(PackMLState) - {PackMLState.ABORTING, PackMLState.ABORTED},
+    Command.CLEAR: frozenset({PackMLState.ABORTED}),
+    Command.COMPLETE: frozenset({PackMLState.EXECUTE}),
 }
 """The states in which a command is taken."""
 
-TO: Mapping[Command, State] = {
-    Command.RESET: State.RESETTING,
-    Command.START: State.STARTING,
-    Command.STOP: State.STOPPING,
-    Command.HOLD: State.HOLDING,
-    Command.UNHOLD: State.UNHOLDING,
-    Command.SUSPEND: State.SUSPENDING,
-    Command.UNSUSPEND: State.UNSUSPENDING,
-    Command.ABORT: State.ABORTING,
-    Command.CLEAR: State.CLEARING,
-    Command.COMPLETE: State.COMPLETING,
+TO: Mapping[Command, PackMLState] = {
+    Command.RESET: PackMLState.RESETTING,
+    Command.START: PackMLState.STARTING,
+    Command.STOP: PackMLState.STOPPING,
+    Command.HOLD: PackMLState.HOLDING,
+    Command.UNHOLD: PackMLState.UNHOLDING,
+    Command.SUSPEND: PackMLState.SUSPENDING,
+    Command.UNSUSPEND: PackMLState.UNSUSPENDING,
+    Command.ABORT: PackMLState.ABORTING,
+    Command.CLEAR: PackMLState.CLEARING,
+    Command.COMPLETE: PackMLState.COMPLETING,
 }
 """The acting state that a command leads to."""
 
-COMPLETES: Mapping[State, State] = {
-    State.CLEARING: State.STOPPED,
-    State.STARTING: State.EXECUTE,
-    State.STOPPING: State.STOPPED,
-    State.ABORTING: State.ABORTED,
-    State.HOLDING: State.HELD,
-    State.UNHOLDING: State.EXECUTE,
-    State.SUSPENDING: State.SUSPENDED,
-    State.UNSUSPENDING: State.EXECUTE,
-    State.RESETTING: State.IDLE,
-    State.COMPLETING: State.COMPLETE,
+COMPLETES: Mapping[PackMLState, PackMLState] = {
+    PackMLState.CLEARING: PackMLState.STOPPED,
+    PackMLState.STARTING: PackMLState.EXECUTE,
+    PackMLState.STOPPING: PackMLState.STOPPED,
+    PackMLState.ABORTING: PackMLState.ABORTED,
+    PackMLState.HOLDING: PackMLState.HELD,
+    PackMLState.UNHOLDING: PackMLState.EXECUTE,
+    PackMLState.SUSPENDING: PackMLState.SUSPENDED,
+    PackMLState.UNSUSPENDING: PackMLState.EXECUTE,
+    PackMLState.RESETTING: PackMLState.IDLE,
+    PackMLState.COMPLETING: PackMLState.COMPLETE,
 }
 """The acting states, each with the state that it leads to once it is complete."""
 
-MODE_STATES = (State.STOPPED, State.IDLE, State.ABORTED, State.COMPLETE)
+MODE_STATES = (PackMLState.STOPPED, PackMLState.IDLE, PackMLState.ABORTED, PackMLState.COMPLETE)
 """In which a machine's unit mode may change: it works on nothing, and does not go on by itself. PackML leaves it to the
 machine which these are (PML_UnitModeConfig of Beckhoff Tc3_PackML_V3).
 """
 
-STATE_TEXTS: Mapping[int, str] = {0: "Undefined", **{state: state.name.capitalize() for state in State}}
+STATE_TEXTS: Mapping[int, str] = {0: "Undefined", **{state: state.name.capitalize() for state in PackMLState}}
 COMMAND_TEXTS: Mapping[int, str] = {0: "none", **{command: command.name.capitalize() for command in Command}}
 
 
 def objection(command: int, state: int) -> str:
     """Why a command is not taken in a state, "" if it is."""
-    given, now = Command(command), State(state)
+    given, now = Command(command), PackMLState(state)
     if now in FROM[given]:
         return ""
-    allowed, refused = ([s for s in State if (s in FROM[given]) is taken] for taken in (True, False))
+    allowed, refused = ([s for s in PackMLState if (s in FROM[given]) is taken] for taken in (True, False))
     expected = f"in {_listed(allowed)}" if len(allowed) <= len(refused) else f"outside {_listed(refused)}"
     return f"{COMMAND_TEXTS[given]} given in {STATE_TEXTS[now]}, expected {expected}"
 
@@ -127,7 +135,7 @@ def mode_objection(state: int) -> str:
     return f"is in {STATE_TEXTS[state]}, expected {_listed(MODE_STATES)} for a change of mode"
 
 
-def _listed(states: Collection[State]) -> str:
+def _listed(states: Collection[PackMLState]) -> str:
     *most, last = (STATE_TEXTS[state] for state in states)
     return f"{', '.join(most)} or {last}" if most else last
 
@@ -137,7 +145,9 @@ class StateMachine:
 
     state: StateNumber
 
-    def __init__(self, state: State, ticks: Mapping[State, int], conditional: Collection[State] = ()) -> None:
+    def __init__(
+        self, state: PackMLState, ticks: Mapping[PackMLState, int], conditional: Collection[PackMLState] = ()
+    ) -> None:
         """ticks: that acting states last at least, 0 for those left out. conditional: acting states that are left only
         when `advance` says that they may be, however long they have lasted.
         """
@@ -164,18 +174,18 @@ class StateMachine:
 
     def advance(self, may_complete: bool = True) -> None:
         """A tick has passed. may_complete: whether what a conditional state waits for is there."""
-        after = COMPLETES.get(State(self.state))
+        after = COMPLETES.get(PackMLState(self.state))
         if after is None:
             return
         self.spent += 1
-        if self.spent >= self._ticks[State(self.state)] and (may_complete or self.state not in self._conditional):
+        if self.spent >= self._ticks[PackMLState(self.state)] and (may_complete or self.state not in self._conditional):
             self._enter(after)
 
-    def _enter(self, state: State) -> None:
+    def _enter(self, state: PackMLState) -> None:
         while state in COMPLETES and not self._ticks[state] and state not in self._conditional:
             state = COMPLETES[state]
         self.state, self.spent = _number(state), 0
 
 
-def _number(state: State) -> StateNumber:
+def _number(state: PackMLState) -> StateNumber:
     return int(state)  # type: ignore[return-value]

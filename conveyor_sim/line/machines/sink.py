@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from conveyor_sim.line.device import ScanContext
-from conveyor_sim.line.devices.setup import Setup
+from conveyor_sim.line.devices.setup import DeviceSetup
 from conveyor_sim.line.machines.stop_reason import NONE, STARVED
 from conveyor_sim.line.machines.taking import TakingDevice
 from conveyor_sim.line.tag import count, seconds, switch
@@ -13,7 +13,7 @@ from conveyor_sim.scene.parts.sink import Sink
 class SinkDevice(TakingDevice):
     """One sink while it runs. Starved: it would take a bottle, and none is in its region."""
 
-    def __init__(self, name: str, sink: Sink, setup: Setup) -> None:
+    def __init__(self, name: str, sink: Sink, setup: DeviceSetup) -> None:
         signals = [
             count(f"{name}/taken", "counter", "Bottles taken.", adds_to="removed"),
             count(f"{name}/taken_bad", "counter", "Bad bottles taken."),

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from conveyor_sim.line.device import ScanContext
 from conveyor_sim.line.devices.entry import Quality
-from conveyor_sim.line.devices.setup import BAD, Setup
+from conveyor_sim.line.devices.setup import BAD, DeviceSetup
 from conveyor_sim.line.machines.machine import MachineDevice
 from conveyor_sim.line.machines.stop_reason import BLOCKED, NONE
 from conveyor_sim.line.tag import count, seconds, switch
@@ -14,7 +14,7 @@ from conveyor_sim.scene.parts.source import Source
 class SourceDevice(MachineDevice):
     """One source while it runs. Blocked: it would run, has a bottle to give, and there is no room for it."""
 
-    def __init__(self, name: str, source: Source, setup: Setup) -> None:
+    def __init__(self, name: str, source: Source, setup: DeviceSetup) -> None:
         signals = [
             count(f"{name}/produced", "counter", "Bottles given.", adds_to="fed"),
             switch(f"{name}/blocked", "status", "It would give a bottle, and there is no room.", adds_to="state"),

@@ -8,7 +8,7 @@ import numpy as np
 
 from conveyor_sim.line.device import ScanContext
 from conveyor_sim.line.devices.entry import has_room
-from conveyor_sim.line.devices.setup import Setup
+from conveyor_sim.line.devices.setup import DeviceSetup
 from conveyor_sim.line.machines.stop_reason import BLOCKED, NONE, STARVED
 from conveyor_sim.line.machines.taking import TakingDevice
 from conveyor_sim.line.tag import count, seconds, switch
@@ -23,7 +23,7 @@ class StationDevice(TakingDevice):
     defects: dict[str, int]
     """By test, how many it has found defective."""
 
-    def __init__(self, name: str, station: Station, setup: Setup) -> None:
+    def __init__(self, name: str, station: Station, setup: DeviceSetup) -> None:
         signals = [
             count(f"{name}/processed", "counter", "Bottles given back."),
             count(f"{name}/good", "counter", "Those that no test has found defective."),
@@ -42,8 +42,13 @@ class StationDevice(TakingDevice):
         speed, direction = station.speed, station.direction
         self._velocity = speed * math.cos(direction), speed * math.sin(direction)
         self._radii = setup.model.type_radius.tolist()
-        self._sets = [Work(what, setting, setup.random(name, f"sets/{what}")) for what, setting in station.sets.items()]
-        self._tests = [Look(what, test, setup.random(name, f"tests/{what}")) for what, test in station.tests.items()]
+        self._sets = [
+            AttributeSetting(what, setting, setup.random(name, f"sets/{what}"))
+            for what, setting in station.sets.items()
+        ]
+        self._tests = [
+            AttributeTest(what, test, setup.random(name, f"tests/{what}")) for what, test in station.tests.items()
+        ]
         named = {f"sets_{work.attribute}": work.random for work in self._sets}
         self.streams = SimpleNamespace(**named, **{f"tests_{look.attribute}": look.random for look in self._tests})
         """What settings and tests draw from."""
@@ -140,7 +145,7 @@ class StationDevice(TakingDevice):
         return [self.works, self.cause == STARVED, self.cause == BLOCKED, *self.condition]
 
 
-class Work:
+class AttributeSetting:
     """What a station makes of one attribute."""
 
     def __init__(self, attribute: str, setting: Setting, random: np.random.Generator) -> None:
@@ -159,7 +164,7 @@ class Work:
         return setting.to + spread if chosen else None
 
 
-class Look:
+class AttributeTest:
     """What a station takes for good in one attribute."""
 
     def __init__(self, attribute: str, test: Acceptance, random: np.random.Generator) -> None:

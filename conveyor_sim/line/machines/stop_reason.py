@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from conveyor_sim.line.machines.packml import Command, State
+from conveyor_sim.line.machines.packml import Command, PackMLState
 from conveyor_sim.line.machines.time_account import Category
 from conveyor_sim.scene.parts.machine import MOST_STOPS, PackmlPart
 
@@ -32,10 +32,19 @@ _TEXTS = {
     FAULT: "fault stop",
 }
 
-WAITING = frozenset({State.SUSPENDED, State.SUSPENDING, State.UNSUSPENDING})
-FAILED = frozenset({State.HOLDING, State.HELD, State.UNHOLDING, State.ABORTING, State.ABORTED, State.CLEARING})
-STOPPED = frozenset({State.STOPPING, State.STOPPED})
-WORKING = frozenset({State.EXECUTE, State.COMPLETING})
+WAITING = frozenset({PackMLState.SUSPENDED, PackMLState.SUSPENDING, PackMLState.UNSUSPENDING})
+FAILED = frozenset(
+    {
+        PackMLState.HOLDING,
+        PackMLState.HELD,
+        PackMLState.UNHOLDING,
+        PackMLState.ABORTING,
+        PackMLState.ABORTED,
+        PackMLState.CLEARING,
+    }
+)
+STOPPED = frozenset({PackMLState.STOPPING, PackMLState.STOPPED})
+WORKING = frozenset({PackMLState.EXECUTE, PackMLState.COMPLETING})
 
 
 def reason_texts(part: PackmlPart) -> dict[int, str]:

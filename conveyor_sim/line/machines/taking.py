@@ -4,15 +4,15 @@ from collections.abc import Mapping, Sequence
 
 from conveyor_sim.line.device import ScanContext
 from conveyor_sim.line.devices.region import Region
-from conveyor_sim.line.devices.setup import Setup
+from conveyor_sim.line.devices.setup import DeviceSetup
 from conveyor_sim.line.devices.zone import ZoneDevice
 from conveyor_sim.line.machines.machine import MachineDevice
-from conveyor_sim.line.machines.packml import State
+from conveyor_sim.line.machines.packml import PackMLState
 from conveyor_sim.line.machines.stop_reason import BLOCKED, STARVED
 from conveyor_sim.line.tag import Tag
 from conveyor_sim.scene.parts.machine import TakingPart
 
-FILLS = frozenset({State.STARTING, State.UNSUSPENDING})
+FILLS = frozenset({PackMLState.STARTING, PackMLState.UNSUSPENDING})
 
 
 class TakingDevice(MachineDevice):
@@ -21,11 +21,11 @@ class TakingDevice(MachineDevice):
     waiting: tuple[int, ...]
     """Ids of the bottles in the region, in the order of their arrival."""
 
-    _working = (State.EXECUTE, State.COMPLETING)
+    _working = (PackMLState.EXECUTE, PackMLState.COMPLETING)
 
-    def __init__(self, name: str, part: TakingPart, setup: Setup, own: Sequence[Tag]) -> None:
+    def __init__(self, name: str, part: TakingPart, setup: DeviceSetup, own: Sequence[Tag]) -> None:
         fills = () if part.start_fill is None else FILLS
-        super().__init__(name, part, setup, own, (State.COMPLETING, *fills))
+        super().__init__(name, part, setup, own, (PackMLState.COMPLETING, *fills))
         self._region = Region(part.region)
         self._fill, self._zone_name, self._setup = part.start_fill or 0, part.start_zone, setup
         self._zone: ZoneDevice | None = None
@@ -44,9 +44,9 @@ class TakingDevice(MachineDevice):
 
     def ready(self, now: ScanContext) -> bool:
         """Whether enough wait to start, or to go on after it was starved; or nothing has come to empty out."""
-        if self.state == State.COMPLETING:
+        if self.state == PackMLState.COMPLETING:
             return self.cause == STARVED and self.waited >= self._run_down_ticks
-        if self.state not in FILLS or (self.state == State.UNSUSPENDING and self.reason == BLOCKED):
+        if self.state not in FILLS or (self.state == PackMLState.UNSUSPENDING and self.reason == BLOCKED):
             return True
         return self._filled(now) >= self._fill
 

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from conveyor_sim.line.commands.authority import AUTOMATIC, MAINTENANCE
-from conveyor_sim.line.machines.packml import State
+from conveyor_sim.line.machines.packml import PackMLState
 from conveyor_sim.line.machines.stop_reason import BLOCKED, FIRST_PLANNED, STARVED, STOPPED, is_failure
 from conveyor_sim.line.tag import Tag
 
@@ -48,17 +48,17 @@ NONE, PRODUCTION, START_UP, RUN_DOWN, MAINTAINED, BREAK = 0, 1, 2, 4, 32, 64
 PREPARED, LACK, TAILBACK, EQUIPMENT_FAILURE, EXTERNAL_FAILURE = 4, 8, 16, 1024, 2048
 
 STATES: Mapping[int, int] = {
-    State.STOPPED: 1,
-    State.CLEARING: 1,
-    State.STARTING: 2,
-    State.EXECUTE: 128,
-    State.COMPLETING: 128,
-    State.STOPPING: 256,
-    State.ABORTING: 512,
-    State.ABORTED: 4096,
-    State.IDLE: 32768,
-    State.RESETTING: 32768,
-    State.COMPLETE: 32768,
+    PackMLState.STOPPED: 1,
+    PackMLState.CLEARING: 1,
+    PackMLState.STARTING: 2,
+    PackMLState.EXECUTE: 128,
+    PackMLState.COMPLETING: 128,
+    PackMLState.STOPPING: 256,
+    PackMLState.ABORTING: 512,
+    PackMLState.ABORTED: 4096,
+    PackMLState.IDLE: 32768,
+    PackMLState.RESETTING: 32768,
+    PackMLState.COMPLETE: 32768,
 }
 """WS_Cur_State by state of PackML, where that alone says it. Acting states without a value of their own count as what
 they lead to.
@@ -70,7 +70,7 @@ STATE_TEXTS: Mapping[int, str] = {
     4096: "Emergency stop", 32768: "Idle",
 }  # fmt: skip
 
-_HOLDING = (State.HOLDING, State.HELD, State.UNHOLDING)
+_HOLDING = (PackMLState.HOLDING, PackMLState.HELD, PackMLState.UNHOLDING)
 
 
 def data_points(machine: str, tags: Mapping[str, Tag], values: Mapping[str, float]) -> dict[str, float]:
@@ -100,7 +100,9 @@ def program(mode: int, state: int, reason: int) -> int:
         return MAINTAINED
     if state in STOPPED and reason >= FIRST_PLANNED:
         return BREAK
-    return {int(State.STARTING): START_UP, State.COMPLETING: RUN_DOWN, State.COMPLETE: NONE}.get(state, PRODUCTION)
+    return {int(PackMLState.STARTING): START_UP, PackMLState.COMPLETING: RUN_DOWN, PackMLState.COMPLETE: NONE}.get(
+        state, PRODUCTION
+    )
 
 
 def state_of(state: int, reason: int) -> int:
