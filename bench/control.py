@@ -75,7 +75,7 @@ def _line(name: str, scene: Scene, seconds: float, turn: int) -> list[Row]:
     simulation = Simulation(scene, threads=1)
     simulation.advance(1)
     kernels = _Clock()
-    pool: Any = simulation._integration._pool
+    pool: Any = simulation.integration._pool
     pool.advance = kernels.around(pool.advance)
     ticks = round(seconds / scene.tick)
     whole = _Clock()

@@ -21,8 +21,8 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from conveyor_sim.bag.lock import claim
 from conveyor_sim.errors import BagError
+from conveyor_sim.support.file_lock import lock
 
 if TYPE_CHECKING:
     from conveyor_sim.simulation import Simulation
@@ -76,7 +76,7 @@ class InputLog(contextlib.AbstractContextManager["InputLog"]):
                 shutil.copyfile(start, folder / START_NAME)
             self._stream = self.path.open("xb")
             with contextlib.suppress(BlockingIOError):  # another process checks whether the file is abandoned
-                claim(self._stream)
+                lock(self._stream)
             self._write(header)
             self._stream.flush()
         except OSError as error:
@@ -86,7 +86,7 @@ class InputLog(contextlib.AbstractContextManager["InputLog"]):
         """Log the inputs that wait for the tick that is about to begin. Raise BagError if they can't be written."""
         if self._failed:
             return
-        tick, waiting = self._sim.tick, tuple(map(tuple, self._sim.waiting))
+        tick, waiting = self._sim.tick, tuple(map(tuple, self._sim.line.waiting))
         now = repr(waiting)  # -0.0 and 0.0 are equal, but not the same bits
         if tick != self._next and self._last != _NONE:  # ticks have passed without a call of this method
             self._write({"tick": self._next, "inputs": []})

@@ -61,13 +61,12 @@ class Outputs:
         """Writes what is known of a tick that failed: what became of its commands, what the guard says, and what went
         beyond limits.
         """
-        happened: dict[str, Sequence[Any]] = {}
-        for name, topic, events in _EVENTS:
-            happened[name] = found = events(self._sim)
-            for event in found if self._sinks else ():
+        events = self._sim.take_events()
+        for name, topic, view in _EVENTS:
+            for event in view(events) if self._sinks else ():
                 self._hand_out(name, topic, self._header(event.tick), _itself, event)
-        self._noticed += happened["guard"]
-        return list(happened["outcomes"])
+        self._noticed += events.guard
+        return events.outcomes
 
     def take_noticed(self) -> list[GuardEvent]:
         """What the guard said since the last call; it has been written."""
@@ -119,12 +118,6 @@ class Outputs:
     def _header(self, tick: int) -> Header:
         # ROS reads a stamp of 0 as "not set", so tick 0 is stamped 1 ns, as Simulation.stamp_ns does.
         return Header(tick, max(1, tick * self._sim.model.tick_ns), self._frame_id)
-
-
-def forget_past(sim: Simulation) -> None:
-    """Have a simulation that was loaded from a checkpoint report nothing that happened before."""
-    for _, _, events in _EVENTS:
-        events(sim)
 
 
 def _itself(what: Any) -> Any:

@@ -13,7 +13,6 @@ from pathlib import Path
 from conveyor_sim.bag.channels import ENCODING, metadata_of, schema_of
 from conveyor_sim.bag.folder import make_folder, remove_folders
 from conveyor_sim.bag.input_log import START_NAME
-from conveyor_sim.bag.lock import claim
 from conveyor_sim.bag.mcap.line_copy import NAME as LINE_COPY
 from conveyor_sim.bag.mcap.line_copy import LineCopy
 from conveyor_sim.bag.mcap.metadata import write_metadata
@@ -21,6 +20,7 @@ from conveyor_sim.bag.mcap.writer import McapFileWriter
 from conveyor_sim.bag.messages.topics import OUTPUTS
 from conveyor_sim.bag.messages.typestore import default_distro
 from conveyor_sim.errors import BagError, CheckpointError
+from conveyor_sim.support.file_lock import lock
 
 LINE_TOPIC = "line"
 FLUSH_INTERVAL = 0.5
@@ -60,7 +60,7 @@ class Recorder(contextlib.AbstractContextManager["Recorder"]):
             remove_folders(self._made)
             raise BagError(f"{self._storage}: can't be written ({error.strerror})") from error
         try:
-            claim(self._stream)
+            lock(self._stream)
             self._file = McapFileWriter(self._stream, name, self._distro)
             self._channels = {topic: self._register(topic) for topic in (OUTPUTS if topics is None else topics)}
             self._file.flush()  # a full disk raises here

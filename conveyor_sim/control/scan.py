@@ -96,41 +96,16 @@ def commands_of(answer: Mapping[str, float]) -> dict[str, float]:
             if not isinstance(name, str):
                 text = f"scan: {name!r:.200} returned as a name, expected that of a command or an alarm"
                 raise ControlError(text) from None
-            _number(name, value)
+            number(name, value)
         raise
 
 
-def _number(name: str, value: object) -> float:
+def number(name: str, value: object) -> float:
+    """Return a value of an answer as a number. Raise ControlError if it is none."""
     try:
         return float(value)  # type: ignore[arg-type]
     except (OverflowError, TypeError, ValueError):
         raise ControlError(f"{name}: {value!r:.200} answered by the controller, expected a number") from None
-
-
-class AlarmChanges:
-    """What of a controller's alarms is to be given to the line with its commands: all at first, then what changes."""
-
-    def __init__(self) -> None:
-        self._given: dict[str, float] = {}
-
-    def of(self, answer: Mapping[str, float]) -> dict[str, float]:
-        """The alarms of a scan's answer that come or go, 1 or 0; one that it does not have any more goes.
-
-        Raises ControlError for one that is said by what is no number.
-        """
-        alarms = {name: float(_number(name, value) >= ON) for name, value in answer.items() if name.startswith(ALARMS)}
-        now = {**dict.fromkeys(self._given, 0.0), **alarms}
-        changes = {name: value for name, value in now.items() if self._given.get(name) != value}
-        self._given = now
-        return changes
-
-    def snapshot(self) -> dict[str, float]:
-        """The alarms that were given."""
-        return dict(self._given)
-
-    def restore(self, given: Mapping[str, float]) -> None:
-        """Go on from there."""
-        self._given = {str(name): float(value) for name, value in given.items()}
 
 
 @dataclass(frozen=True)

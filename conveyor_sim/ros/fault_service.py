@@ -1,4 +1,4 @@
-"""The service `inject_fault`: what goes wrong on a line, for tests of controllers."""
+"""Service `inject_fault`: faults of a line, for tests of controllers."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from conveyor_sim.run.stepper import Stepper
 
 
 class FaultService:
-    """Answers requests by asking the stepper."""
+    """Answers requests through the stepper."""
 
     def __init__(self, node: Node, executor: Executor, stepper: Stepper) -> None:
         self._executor = executor
@@ -27,12 +27,12 @@ class FaultService:
     async def _inject(self, request: Any, response: Any) -> Any:
         def between_ticks() -> None:
             stepper = self._stepper
-            given = Input(FAULT, "inject_fault", "test", INJECT, (request.name,), (request.value,))
-            simulation, size = stepper.session.simulation, size_of(given)
+            fault = Input(FAULT, "inject_fault", "test", INJECT, (request.name,), (request.value,))
+            simulation, size = stepper.run.session.simulation, size_of(fault)
             response.tick = simulation.tick
-            response.message = stepper.standstill or simulation.refusal(given) or stepper.inbox.admit(size)
+            response.message = stepper.run.standstill or simulation.line.refusal(fault) or stepper.run.inbox.admit(size)
             if not response.message:
-                stepper.reception.hand_over(stepper.session, given, size)
+                stepper.run.reception.hand_over(stepper.run.session, fault, size)
                 response.success = True
 
         try:

@@ -1,4 +1,4 @@
-"""The service `operate`: what operators and engineers do to the line, and controllers that want an answer."""
+"""Service `operate`: operations of operators, engineers, and controllers that need an answer."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ WRITERS = (*PEOPLE, "controller")
 
 
 class OperateService:
-    """Answers requests by asking the stepper."""
+    """Answers requests through the stepper."""
 
     def __init__(self, node: Node, executor: Executor, stepper: Stepper) -> None:
         self._executor = executor
@@ -33,18 +33,18 @@ class OperateService:
             stepper = self._stepper
             response.tick = stepper.simulation.tick
             names, values, texts = tuple(request.names), tuple(request.values), tuple(request.texts)
-            given = Input(OPERATE, request.writer, request.writer_kind, request.operation, names, values, texts)
-            size = size_of(given)
+            command = Input(OPERATE, request.writer, request.writer_kind, request.operation, names, values, texts)
+            size = size_of(command)
             response.reason = (
-                stepper.standstill
+                stepper.run.standstill
                 or _stranger(request)
-                or (TOO_LARGE if size > MESSAGE_BYTES else "")  # before it is looked at, name by name
-                or stepper.simulation.refusal(given)
-                or stepper.inbox.admit(size)
+                or (TOO_LARGE if size > MESSAGE_BYTES else "")  # before each name is checked
+                or stepper.simulation.line.refusal(command)
+                or stepper.run.inbox.admit(size)
             )
             if not response.reason:
                 response.accepted = True
-                stepper.reception.hand_over(stepper.session, given, size)
+                stepper.run.reception.hand_over(stepper.run.session, command, size)
 
         try:
             await settled(self._executor, self._stepper.call(between_ticks))
@@ -54,11 +54,11 @@ class OperateService:
 
 
 def _stranger(request: Any) -> str:
-    """Why nobody of this name and kind can use the service, "" if they can."""
+    """Return why the writer of a request can't use the service, or ""."""
     if request.writer_kind not in WRITERS:
         return f"writer_kind: {printable(request.writer_kind)!r} given, expected one of {', '.join(WRITERS)}"
     if not request.writer:
-        return "writer: no name given, expected that of whoever does it"
+        return "writer: no name given, expected that of the person or controller"
     if len(request.writer) > MOST:
         return f"writer: a name of {len(request.writer)} characters given, expected at most {MOST}"
     return ""

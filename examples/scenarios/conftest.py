@@ -18,6 +18,6 @@ def quiet(line: Lines) -> Iterator[None]:
     for scenario, _ in line.made:
         simulation, model = scenario.simulation, scenario.simulation.model
         assert [event.text for event in scenario._outputs.take_noticed()] == []
-        deepest = simulation.deepest_overlap * float(model.type_radius.max())
+        deepest = simulation.integration.deepest_overlap * float(model.type_radius.max())
         allowed = min(impact.overlap(HARDER * model.prediction.force) for impact in model.impacts)
         assert deepest <= allowed or scenario.scene.name in BEYOND

@@ -73,7 +73,7 @@ def test_the_rest_of_the_controllers_scan_goes_on_and_its_refusals_are_events(li
     refused = []
     for _ in range(100):
         plant.run_for(TICK)
-        refused += [event.name for event in plant.simulation.happened if event.kind == "command_refused"]
+        refused += [event.name for event in plant.simulation.line.happened if event.kind == "command_refused"]
     assert refused == [SPEED]  # once, though it was refused a hundred times
     assert plant.history[FILLER][-1] == 1.5
     assert plant.history[SPEED][-1] == SLOW

@@ -44,8 +44,8 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[tuple[int,
                 sim.command(names, values, "controller")
             sim.advance()
             outputs.after_tick()
-            if sim.happened:
-                seen.append((sim.tick, tuple(sim.happened), sim.line.happened_so_far))
+            if sim.line.happened:
+                seen.append((sim.tick, tuple(sim.line.happened), sim.line.happened_so_far))
     return folder, seen
 
 

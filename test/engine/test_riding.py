@@ -83,7 +83,7 @@ def everything(sim: Simulation) -> list[bytes]:
     columns = [*vars(sim.bottles()).values(), *vars(sim.contacts()).values(), *vars(sim.belts()).values()]
     for asked in (sim.damage(), sim.rail_wear()):
         columns += [] if asked is None else list(vars(asked).values())
-    told = (sim.ledger(), sim.counts, sim.deepest_overlap, sim.take_guard_events(), sim.take_damage_events())
+    told = (sim.ledger(), sim.counts, sim.integration.deepest_overlap, sim.take_events())
     return [*(np.asarray(column).tobytes() for column in columns), sim.signals().tobytes(), repr(told).encode()]
 
 
@@ -145,7 +145,7 @@ def test_a_whole_line_is_the_same_to_the_bit(integrator: str, solver: str) -> No
     sim, rode = run(given, 900, act)
     assert sum(len(ids) for ids in rode) > 0.3 * 900 * 10
     assert (sim.counts.fed > 10, sim.counts.removed > 4) == (True, True)
-    assert sim.deepest_overlap > 0.0
+    assert sim.integration.deepest_overlap > 0.0
 
 
 # ---------------------------------------------------------------- woken
@@ -169,7 +169,7 @@ def test_woken_by_a_bottle_that_runs_into_them() -> None:
     struck, rode = run(plant(bottle(-0.4, 0.9), machines={}), RIDE + 60, at(RIDE, throw))
     assert by(rode, RIDE) == ROWS * COLUMNS + 1
     assert by(rode, RIDE + 30) < ROWS * COLUMNS
-    assert struck.deepest_overlap > 0.0
+    assert struck.integration.deepest_overlap > 0.0
 
 
 def test_woken_by_a_rail_in_their_way() -> None:
@@ -240,7 +240,7 @@ def test_woken_by_an_edit_from_outside() -> None:
     sim, rode = run(plant(machines={}), RIDE + 40, at(RIDE, shove))
     assert by(rode, RIDE) == ROWS * COLUMNS
     assert 3 not in rode[RIDE]
-    assert sim.deepest_overlap > 0.0
+    assert sim.integration.deepest_overlap > 0.0
 
 
 def test_woken_by_a_restored_checkpoint(tmp_path: Path) -> None:

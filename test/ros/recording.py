@@ -28,7 +28,7 @@ MADE = {"commands": types.COMMANDS, SPEED: types.SPEED, TURN: types.SPEED, EYE: 
 
 
 class EyeSink:
-    """What the live line tells of its photo-eye."""
+    """Collects the messages of the photo-eye of the live line."""
 
     def __init__(self) -> None:
         self.told: list[bytes] = []

@@ -1,4 +1,4 @@
-"""What a run reached beside what was expected of it."""
+"""Forces of a run compared with the expected forces."""
 
 import math
 from typing import Any

@@ -14,6 +14,9 @@ from typing import Any
 import yaml
 from ruamel.yaml import YAML
 
+from conveyor_sim.errors import BagError
+from conveyor_sim.support.files import FileError, write_file
+
 FILE_NAME = "metadata.yaml"
 VERSION = 9
 SIZE_LIMIT = 1 << 24
@@ -115,14 +118,12 @@ def from_yaml(text: str) -> Any:
 
 
 def write_metadata(folder: Path, information: str) -> None:
-    """Write metadata.yaml into the folder in one go. information: `bag_information` as YAML."""
-    temporary = folder / f"{FILE_NAME}.tmp"
+    """Write metadata.yaml into the folder, complete or not at all. information: `bag_information` as YAML."""
+    file = folder / FILE_NAME
     try:
-        temporary.write_text(_HEAD + indent(information, "  "), encoding="utf-8")
-        temporary.replace(folder / FILE_NAME)
-    except OSError:
-        temporary.unlink(missing_ok=True)
-        raise
+        write_file(file, (_HEAD + indent(information, "  ")).encode())
+    except FileError as error:
+        raise BagError(f"{file}: {error}") from error
 
 
 def read_metadata(folder: Path) -> dict[str, Any] | None:

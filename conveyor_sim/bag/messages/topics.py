@@ -24,7 +24,7 @@ from conveyor_sim.line.run_state import RunState
 from conveyor_sim.scene.marks import marks_of
 
 if TYPE_CHECKING:
-    from conveyor_sim.simulation import Simulation
+    from conveyor_sim.simulation import Events, Simulation
 
 
 class Snapshot:
@@ -77,8 +77,8 @@ class Topic:
     """The key of Scene.outputs whose rate it has; None: sent at the start (`once`), or when there is something."""
     state: Callable[[Snapshot], Any] | None = None
     """What it shows of a tick; None: nothing, and no message is sent."""
-    events: Callable[[Simulation], Sequence[Any]] | None = None
-    """What has happened since the last call, each with a tick of its own and sent as a message of its own."""
+    events: Callable[[Events], Sequence[Any]] | None = None
+    """View of the event stream (`Simulation.take_events`): one message per event, with the tick of the event."""
     write: Callable[[Any, Header], bytes] | None = None
     """A message from what `state` or `events` gave; None: field by field."""
     columns: Callable[..., Any] | None = None
@@ -152,7 +152,7 @@ _ROWS = (
         "what became of an input: who gave it, tick, accepted or the reason",
         "when it happens",
         OUTCOMES,
-        events=lambda sim: sim.take_outcomes(),
+        events=lambda events: events.outcomes,
         write=encode.outcome_message,
         read=encode.to_outcome,
         columns=Outcome,
@@ -163,7 +163,7 @@ _ROWS = (
         "what the [guard](stability.md) noticed: which bottle, where, why, and what helps",
         "when it happens",
         EVENTS,
-        events=lambda sim: sim.take_guard_events(),
+        events=lambda events: events.guard,
     ),
     Topic(
         "damage_events",
@@ -171,7 +171,7 @@ _ROWS = (
         "a limit of the scene (`limits`) was passed: which bottle, what, where",
         "when it happens",
         EVENTS,
-        events=lambda sim: sim.take_damage_events(),
+        events=lambda events: events.damage,
         columns=DamageEvent,
     ),
     Topic(
@@ -271,7 +271,7 @@ _ROWS = (
         "what happened: bottles fed, removed, rejected, alarms, states of machines, faults, refusals, limits",
         "each tick at which something did",
         EVENTS,
-        state=lambda now: event_columns(now.sim.happened, now.sim.line.happened_so_far),
+        state=lambda now: event_columns(now.sim.line.happened, now.sim.line.happened_so_far),
         columns=EventColumns,
         compare=Compare(lambda line, message, index: f"{message.kind[index]} of {message.name[index]}"),
     ),

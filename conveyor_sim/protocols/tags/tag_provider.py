@@ -251,7 +251,7 @@ class SteppedTagProvider:
         line = self._simulation.line
         self._alarms = line.alarms.changes() or self._alarms
         self._read_back = line.read_back.changes() or self._read_back
-        self._events.add(self._simulation.happened)
+        self._events.add(self._simulation.line.happened)
 
     def _show(self) -> None:
         simulation = self._simulation

@@ -237,7 +237,7 @@ def run(
     states, outcomes = [], []
     while sim.tick < ticks:
         given = script.get(sim.tick, [])
-        expected = None if watch is None or not given else sim.refusal(given[0])
+        expected = None if watch is None or not given else sim.line.refusal(given[0])
         for one in given:
             sim.give(one)
         if sim.tick == half and place is not None:
