@@ -115,7 +115,7 @@ def serving(source: BagTagProvider) -> Iterator[Serving]:
 
 @pytest.fixture
 def address(serving: Serving) -> str:
-    return serving.faces[0].address
+    return serving.hosts[0].address
 
 
 def test_messages_come_as_they_were_recorded(address: str, bag: Path) -> None:

@@ -77,7 +77,7 @@ def test_no_client_that_keeps_up_misses_a_change_and_memory_stays_flat() -> None
     source, memory = Counting(), 0
     with Serving(source, [(kind, 0) for kind in KINDS], ServerSettings()) as serving:
         names = [kind.name for kind in KINDS]
-        clients = {name: Clients(name, face.address) for name, face in zip(names, serving.faces, strict=True)}
+        clients = {name: Clients(name, face.address) for name, face in zip(names, serving.hosts, strict=True)}
         try:
             for those in clients.values():
                 those.wait_for(0)
