@@ -1,4 +1,4 @@
-"""JSON with a checksum: every flipped bit is found, and no content ends in another error than a sentence."""
+"""JSON with a checksum: every flipped bit is detected, and all content errors are one sentence."""
 
 from __future__ import annotations
 
