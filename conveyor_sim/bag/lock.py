@@ -1,4 +1,4 @@
-"""Lock of a recording: its writer holds it, so that no other process repairs it meanwhile."""
+"""Lock on the file of a recording. Its writer holds the lock, which keeps other processes from repairing the file."""
 
 from __future__ import annotations
 

@@ -6,7 +6,7 @@ import time
 import uuid
 from pathlib import Path
 
-from conveyor_sim.bag.outputs import Outputs, Sink
+from conveyor_sim.bag.outputs import MessageSink, Outputs
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.line.commands.inputs import CommandOutcome, Input
@@ -20,7 +20,7 @@ from conveyor_sim.support.printable import SENTENCE, printable
 class Session:
     """A simulation with its sinks. Not for several threads: whoever steps it owns it."""
 
-    def __init__(self, simulation: Simulation, sink: Sink, bag: Path | None, frame_id: str, distro: str) -> None:
+    def __init__(self, simulation: Simulation, sink: MessageSink, bag: Path | None, frame_id: str, distro: str) -> None:
         """Starts the run from where `simulation` is; `bag` is the folder to record to, if any.
 
         Raises BagError if the folder can't be written; nothing has been published then.

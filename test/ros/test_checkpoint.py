@@ -70,7 +70,7 @@ def test_what_was_saved_goes_on_to_the_same_bits(
     tmp_path: Path,
     request: pytest.FixtureRequest,
 ) -> None:
-    """In the same node, in another one with other threads, and without ROS; each run has a recording of its own."""
+    """In the same node, in another one with other threads, and without ROS. Each run has a separate recording."""
     file = folder / "checkpoint"
     node = start_node(record=tmp_path / "bag", threads=1, checkpoint_folder=folder)
     scans(client, 10, 150)
@@ -207,7 +207,7 @@ def test_a_file_is_read_while_the_simulation_goes_on(line: LineClient, folder: P
 
 
 def test_what_is_no_checkpoint_neither_stops_nor_ends_a_run(line: LineClient, shared_node: Child, folder: Path) -> None:
-    """A pipe that nobody writes to, a device without end, a header without its fields, arrays cut short, NaN.
+    """A pipe without a writer, a device without end, a header without its fields, arrays cut short, NaN.
 
     The last test of the shared node.
     """

@@ -18,7 +18,7 @@ from conveyor_sim.control.recorded import RecordedVariables
 from conveyor_sim.control.scan import ControlError, together
 from conveyor_sim.control.st import StructuredText
 from conveyor_sim.page.content import Collector
-from conveyor_sim.page.recording import Detail, Recording
+from conveyor_sim.page.recording import Detail, PageRecording
 from conveyor_sim.page.watch import Watch
 from conveyor_sim.testing import Scenario
 
@@ -77,7 +77,7 @@ def test_a_recording_made_of_the_inputs_has_them_too(recorded: tuple[Path, list,
 def test_the_page_shows_them_as_signals(recorded: tuple[Path, list, int]) -> None:
     folder, seen, _ = recorded
     with open_bag(folder / "bag") as bag:
-        recording = Recording(bag, Detail())
+        recording = PageRecording(bag, Detail())
         assert recording.head()["signals"] == [*bag.line.signal_names, *NAMES]
         assert recording.block(0)
         collector = Collector(bag, 0, {"signals": 1}, NAMES)

@@ -91,8 +91,8 @@ def test_what_is_left_out_does_not_change_the_future(saved: Path) -> None:
     other.take_outcomes()
     other.take_guard_events()
     other.take_damage_events()
-    other._integration._guard.deepest = 0.9
-    other._integration.shortened_ticks = 7
+    other._integration._memory.deepest = 0.9
+    other._integration._memory.shortened_ticks = 7
     for _ in range(AHEAD):
         assert other.full_state_hash() == sim.full_state_hash()
         sim.advance()
