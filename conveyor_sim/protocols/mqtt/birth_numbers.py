@@ -13,9 +13,9 @@ import os
 import secrets
 from pathlib import Path
 
+from conveyor_sim.support.checked_json import parsed
 from conveyor_sim.support.file_lock import locked
 from conveyor_sim.support.files import FileError, read_file, write_file
-from conveyor_sim.support.sealed_json import parsed
 
 COUNT = 256
 """Numbers go from 0 to COUNT - 1, and round."""

@@ -1,4 +1,4 @@
-"""A line in Foxglove: a WebSocket client decodes the messages with rosbags, by the definitions that the server states."""
+"""A line in Foxglove: a WebSocket client decodes messages with rosbags, by the definitions that the server states."""
 
 from __future__ import annotations
 

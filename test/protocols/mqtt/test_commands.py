@@ -1,4 +1,4 @@
-"""Commands of hosts by MQTT: checked at once, recorded as inputs, and refused with a reason that every host can read."""
+"""Commands of hosts by MQTT: checked at once, recorded as inputs, and refused with a reason that hosts can read."""
 
 from __future__ import annotations
 
