@@ -178,7 +178,7 @@ def _clients(serving: Serving, seconds: float) -> Iterator[Callable[[], dict[str
     command = [sys.executable, "-m", "bench.scada_clients", str(seconds)]
     with ExitStack() as stack:
         processes = []
-        for face in serving.faces:
+        for face in serving.hosts:
             process = subprocess.Popen([*command, face.address], stdout=subprocess.PIPE, text=True)
             stack.callback(process.wait)
             stack.callback(process.kill)

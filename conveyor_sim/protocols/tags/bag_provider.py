@@ -67,7 +67,7 @@ class BagTagProvider(LineMirror, AbstractContextManager["BagTagProvider"]):
         """History of the recording."""
         return self._past
 
-    def give(self, given: Input) -> str:
+    def give(self, request: Input) -> str:
         """Refuse."""
         return f"{self._path}: a recording can't be commanded"
 

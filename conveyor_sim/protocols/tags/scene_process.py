@@ -279,9 +279,9 @@ class _Process:
         if stepper is None:  # the line is not known yet
             return
         if isinstance(request, InputRequest):
-            if request.given.operation == SET:  # commands are counted
+            if request.input.operation == SET:  # commands are counted
                 stepper.run.inbox.receive()
-            stepper.give(request.given, size_of(request.given))
+            stepper.give(request.input, size_of(request.input))
             self._handed += 1
             return
         if isinstance(request, VariablesRequest):
@@ -320,12 +320,12 @@ class _Process:
         except Refused:  # the run has ended, and its state has the reason
             return
         self._goal = goal
-        for given in goal.inputs:
-            size = size_of(given)
-            if given.operation == SET:
+        for command in goal.inputs:
+            size = size_of(command)
+            if command.operation == SET:
                 stepper.run.inbox.receive()
             stepper.run.inbox.occupy(1, size)
-            stepper.run.reception.hand_over(stepper.run.session, given, size)
+            stepper.run.reception.hand_over(stepper.run.session, command, size)
 
         def arrived(_: Future[None]) -> None:
             self._goal = None

@@ -41,7 +41,7 @@ from scenes import (
 from conveyor_sim.accuracy.displacement import displace
 from conveyor_sim.engine.arrays.world import World
 from conveyor_sim.errors import CheckpointError
-from conveyor_sim.physics.state.checkpoint import FORMAT, sealed, versions
+from conveyor_sim.physics.state.checkpoint import FORMAT, to_bytes, versions
 from conveyor_sim.physics.state.snapshot import snapshot
 from conveyor_sim.physics.state.world_arrays import CONSTANT, FIXED, UNCHECKED, changing_arrays
 from conveyor_sim.physics.state.world_checks import indices, ranges
@@ -285,14 +285,14 @@ def with_header(path: Path, to: Path, **changes: Any) -> Path:
     """The file with other entries in its header, without those that are None, and a checksum that fits."""
     header, arrays = contents(path)
     header = {name: value for name, value in {**header, **changes}.items() if value is not None}
-    to.write_bytes(sealed(json.dumps(header), arrays))
+    to.write_bytes(to_bytes(json.dumps(header), arrays))
     return to
 
 
 def with_arrays(path: Path, to: Path, **changes: Any) -> Path:
     """The file with other arrays and a checksum that fits."""
     header, arrays = contents(path)
-    to.write_bytes(sealed(json.dumps(header), {**arrays, **changes}))
+    to.write_bytes(to_bytes(json.dumps(header), {**arrays, **changes}))
     return to
 
 

@@ -1,4 +1,4 @@
-"""The Modbus map: each tag has an address of its own, a kept map only grows, words are as other libraries have them."""
+"""The Modbus map: each tag has a separate address, a stored map only grows, and words match other libraries."""
 
 from __future__ import annotations
 

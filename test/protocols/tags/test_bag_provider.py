@@ -1,4 +1,4 @@
-"""A recording as a tag source: at each time it shows what was recorded there, forwards and back."""
+"""A recording as a tag provider: it shows the recorded values of each time, forwards and back."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ GIVEN = Input("modbus", "me", "controller", SET, (SETPOINT,), (0.25,))
 
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Ten seconds of the zoned line; in the middle it gets an owner, a setpoint, and a signal that is forced."""
+    """Record ten seconds of the zoned line; in the middle it gets an owner, a setpoint, and a forced signal."""
     folder = tmp_path_factory.mktemp("bags") / "zoned"
     simulation = Simulation(load_scene("config/scenarios/zoned_line.yaml"), threads=1)
     with Recorder(folder) as recorder:
