@@ -88,7 +88,7 @@ def _long(folder: Path, effort: Effort) -> list[Row]:
 
 
 def _cpu() -> float:
-    """s of processor time that all processes of the browser have spent."""
+    """Return the processor time of all processes of the browser, s."""
     ticks = 0
     for place in Path("/proc").glob("[0-9]*"):
         try:
@@ -101,7 +101,7 @@ def _cpu() -> float:
 
 
 def _written(folder: Path, seconds: float, bottles: int, rate: float, with_contacts: bool = True) -> Path:
-    """A recording of a square crowd that sways, each bottle touching the next."""
+    """Write a recording of a swaying square crowd in which each bottle touches the next."""
     simulation = Simulation(load_scene(scene_path("accumulation_table"), {"bottles": []}))
     ids, zeros, side = np.arange(bottles, dtype=np.uint64), np.zeros(bottles), int(bottles**0.5)
     kinds, belts, pairs = np.zeros(bottles, np.uint16), np.zeros(bottles, np.int32), np.zeros(bottles - 1)
