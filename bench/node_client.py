@@ -90,7 +90,7 @@ class Line:
         return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
     def _until(self, condition: Callable[[], Any], patience: float) -> Any:
-        """Wait for a true value of a condition and return it. Raise RuntimeError after `patience` or if the node has ended."""
+        """Wait for a true value of a condition. Raise RuntimeError after `patience`, or if the node has ended."""
         end = time.monotonic() + patience
         while not (value := condition()):
             if self._child.exit_code is not None:
