@@ -14,7 +14,7 @@ from bench.measure import Effort, say
 from bench.rows import Row, Rows
 from conveyor_sim.bag.messages.encode import Header
 from conveyor_sim.bag.messages.topics import TOPICS
-from conveyor_sim.bag.outputs import Outputs
+from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.columns.bottles import BottleColumns, ContactColumns
 from conveyor_sim.page.one_file import write_page
@@ -108,7 +108,7 @@ def _written(folder: Path, seconds: float, bottles: int, rate: float, with_conta
     places = np.arange(bottles, dtype=np.float64)
     every = round(1.0 / rate / simulation.model.tick_ns * 1e9)
     with Recorder(folder) as recorder:
-        Outputs(simulation, [recorder], run_id="run").start()
+        OutputWriter(simulation, [recorder], run_id="run").start()
         for tick in range(every, round(seconds * 1e9 / simulation.model.tick_ns) + 1, every):
             x = 1.2 / side * (places % side) + 0.05 * np.sin(0.01 * tick)
             y, peak = 0.9 / side * (places // side), 5.0 + 5.0 * np.sin(9.0 * x)

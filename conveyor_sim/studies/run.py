@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from conveyor_sim.bag.outputs import Outputs
+from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.errors import BagError, ConveyorError, StudyError
 from conveyor_sim.line.commands.inputs import Input
@@ -113,7 +113,7 @@ def simulate(work: Work, bag: Path | None, clock: _Clock | None = None) -> Row:
     keep_start = None if work.start is None else simulation.save
     recorder = None if bag is None else Recorder(bag, start=keep_start)
     try:
-        outputs = Outputs(simulation, [recorder] if recorder else [], run_id=uuid.uuid4().hex)
+        outputs = OutputWriter(simulation, [recorder] if recorder else [], run_id=uuid.uuid4().hex)
         if work.start is not None:
             simulation.take_events()  # of the warm start
         outputs.start()
@@ -168,7 +168,7 @@ def begun(scene: Scene, start: Path | bytes | None) -> Simulation:
         return Simulation.load(path, threads=1, scene=scene)
 
 
-def make_tick(simulation: Simulation, scans: ScanLoop, outputs: Outputs | None) -> None:
+def make_tick(simulation: Simulation, scans: ScanLoop, outputs: OutputWriter | None) -> None:
     """Make one tick of a run, with a scan of its controller."""
     scans.before_tick(outputs)
     simulation.advance(1)
