@@ -54,8 +54,7 @@ WITHIN: Mapping[str, Mapping[str, str]] = {
     },
     "bag": {"mcap": "", "messages": "", "": "mcap messages"},
     "line": {
-        "units": "",
-        "tag": "units",
+        "tag": "",
         "process_image": "tag",
         "alarms": "",
         "device": "alarms process_image tag",

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 _EVENTS = [(name, topic, topic.events) for name, topic in OUTPUTS.items() if topic.events is not None]
 
 
-class Sink(Protocol):
+class MessageSink(Protocol):
     """Takes serialized messages: the recorder, a node's publishers."""
 
     def wants(self, topic: str) -> bool:
@@ -34,7 +34,7 @@ class Sink(Protocol):
 class Outputs:
     """Feeds sinks from a simulation: `start` once, then `after_tick` after every single tick."""
 
-    def __init__(self, sim: Simulation, sinks: Sequence[Sink], *, run_id: str, frame_id: str = "world") -> None:
+    def __init__(self, sim: Simulation, sinks: Sequence[MessageSink], *, run_id: str, frame_id: str = "world") -> None:
         self._sim = sim
         self._sinks = sinks
         self._run_id = run_id

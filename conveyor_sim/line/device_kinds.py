@@ -1,4 +1,4 @@
-"""The devices of a line: which class a part of the scene becomes. What a scene does not name is not there."""
+"""Table of device classes by kind of part, and the devices of a scene."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -13,7 +13,7 @@ from conveyor_sim.line.devices.mover import Mover
 from conveyor_sim.line.devices.outfeed import OutfeedDevice
 from conveyor_sim.line.devices.photo_eye import PhotoEyeDevice
 from conveyor_sim.line.devices.reject import RejectDevice
-from conveyor_sim.line.devices.setup import Setup
+from conveyor_sim.line.devices.setup import DeviceSetup
 from conveyor_sim.line.devices.spill import SpillDevice
 from conveyor_sim.line.devices.zone import ZoneDevice
 from conveyor_sim.line.machines.sink import SinkDevice
@@ -22,7 +22,7 @@ from conveyor_sim.line.machines.station import StationDevice
 from conveyor_sim.physics.model import Model
 from conveyor_sim.scene.schema import Scene
 
-DEVICES: Mapping[str, Callable[[str, Any, Setup], Device]] = {
+DEVICES: Mapping[str, Callable[[str, Any, DeviceSetup], Device]] = {
     "belt": belt_device,
     "gate": Mover,
     "pusher": Mover,
@@ -40,12 +40,12 @@ DEVICES: Mapping[str, Callable[[str, Any, Setup], Device]] = {
     "counter": CounterDevice,
     "indicator": IndicatorDevice,
 }
-"""By the kind of a part (`DevicePart.KIND`): what makes its device, of its name (`zones/exit`), the part, and Setup."""
+"""Device class by kind of a part (`DevicePart.KIND`). Arguments: name (`zones/exit`), the part, and DeviceSetup."""
 
 
 def build_devices(scene: Scene, model: Model) -> tuple[Device, ...]:
-    """All devices of a scene, in the order in which they act and stand in the process image."""
-    setup = Setup(scene, model)
+    """Build all devices of a scene, in the order in which they act and stand in the process image."""
+    setup = DeviceSetup(scene, model)
     for (field, name), part in scene.devices():
         device = DEVICES[part.KIND](f"{field}/{name}", part, setup)
         device.classify(part.KIND)

@@ -39,7 +39,7 @@ def block_ticks(tick_ns: int, seconds: float = SECONDS) -> int:
 
 
 @dataclass
-class Content:
+class BlockContent:
     """What a block is made of, in the order of time."""
 
     bottles: list[tuple[int, BottleColumns]] = field(default_factory=list)
@@ -51,7 +51,7 @@ class Content:
     """Ticks and values, of forced ones what is read; then those of a controller's variables, from when there are."""
 
 
-def pack(content: Content, start: int) -> bytes:
+def pack(content: BlockContent, start: int) -> bytes:
     """A block that begins at a tick."""
     ids, arrays = _bottles(content.bottles, start)
     arrays += _contacts(content.contacts, content.bottles, ids, start)

@@ -11,7 +11,7 @@ from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.bag.reader import Bag
 from conveyor_sim.columns.bottles import BottleColumns
 from conveyor_sim.columns.variables import VariableColumns
-from conveyor_sim.page.block import Content
+from conveyor_sim.page.block import BlockContent
 
 DRAWN = ("bottles", "contacts", "belts", "signals")
 """Topics of which blocks are made."""
@@ -20,13 +20,13 @@ VARIABLES = "variables"
 
 
 class Collector:
-    """Fills a Content."""
+    """Fills a BlockContent."""
 
     def __init__(self, bag: Bag, start: int, gaps: Mapping[str, int], variables: Sequence[str] = ()) -> None:
         """start: the block's first tick. gaps: by topic, ticks from one that is taken to the next, at least. variables:
         names of the controller's that are shown.
         """
-        self.content = Content()
+        self.content = BlockContent()
         self._bag = bag
         self._start = start
         self._gaps = gaps

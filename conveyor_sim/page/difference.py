@@ -42,7 +42,7 @@ Messages = Mapping[str, Sequence[bytes]]
 
 
 @dataclass(frozen=True)
-class Difference:
+class RecordingDifference:
     """The first one of its kind between two recordings, A and B."""
 
     kind: str
@@ -57,7 +57,7 @@ class Difference:
     """The one that is farthest from where it is in the other recording."""
 
 
-class Comparison:
+class RecordingComparison:
     """Finds them in what both hold: bit for bit; in recordings of two versions or machines, within tolerances."""
 
     def __init__(self, a: Bag, b: Bag, seconds: float) -> None:
@@ -101,12 +101,12 @@ class Comparison:
         """For the page: as `find`."""
         return [vars(one) for one in self.find(number)]
 
-    def find(self, number: int = 0) -> list[Difference]:
+    def find(self, number: int = 0) -> list[RecordingDifference]:
         """The first difference of each kind in a stretch, from 0 on, where there is one. Raises BagError."""
         start = self._first + number * self._length
         stop = min(start + self._length, self._last + 1)
         batch = max(1, round(_BATCH * 1e9 / self._tick_ns))
-        found: dict[str, Difference] = {}
+        found: dict[str, RecordingDifference] = {}
         for begin in range(start, stop, batch):
             wanted = [kind for kind in KINDS if kind not in found]
             a, b = (self._messages(stamps, wanted, begin, min(begin + batch, stop)) for stamps in self._stamps)
@@ -126,7 +126,7 @@ class Comparison:
             found[tick][topic].append(raw)
         return found
 
-    def _at(self, kind: str, tick: int, a: Messages, b: Messages) -> Difference | None:
+    def _at(self, kind: str, tick: int, a: Messages, b: Messages) -> RecordingDifference | None:
         """By the first topic that differs."""
         for row in self._rows[kind]:
             raw = a.get(row.name, []), b.get(row.name, [])
@@ -148,7 +148,8 @@ class Comparison:
             if len(texts) > MOST:
                 texts = [*texts[: MOST - 1], f"and {len(texts) - MOST + 1} more"]
             if texts:
-                return Difference(kind, tick, tick * self._tick_ns * 1e-9, tuple(texts), tuple(signals), bottle)
+                time = tick * self._tick_ns * 1e-9
+                return RecordingDifference(kind, tick, time, tuple(texts), tuple(signals), bottle)
         return None
 
     def _decoded(self, place: int, row: Topic, raw: Iterable[bytes]) -> list[Any]:

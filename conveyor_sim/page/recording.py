@@ -33,7 +33,7 @@ class Detail:
     """s: how much of what happened is read at a time."""
 
 
-class Recording:
+class PageRecording:
     """What the page is given of an open bag. Raises SceneError if its scene can't be read by this version."""
 
     def __init__(self, bag: Bag, detail: Detail) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from conveyor_sim.columns.bottles import BottleColumns, ContactColumns
-from conveyor_sim.page.block import Content, block_ticks, pack
+from conveyor_sim.page.block import BlockContent, block_ticks, pack
 
 if TYPE_CHECKING:
     from conveyor_sim.simulation import Simulation
@@ -29,7 +29,7 @@ class Watch:
         """last: s that are kept, at least."""
         self._last = last
         self._kept: deque[bytes] = deque()
-        self._content = Content()
+        self._content = BlockContent()
         self._start = -1
         self._block = 1
         self.variables: tuple[str, ...] = ()
@@ -53,7 +53,7 @@ class Watch:
             self._start, self._block = tick, block_ticks(simulation.model.tick_ns)
         while tick >= self._start + self._block:
             self._kept.append(_deflated(self._content, self._start))
-            self._content = Content()
+            self._content = BlockContent()
             self._start += self._block
             while (len(self._kept) - 1) * self._block * seconds >= self._last:
                 self._kept.popleft()
@@ -81,5 +81,5 @@ def with_forces(bottles: BottleColumns, contacts: ContactColumns) -> BottleColum
     return BottleColumns(**{**vars(bottles), "peak_force": force})
 
 
-def _deflated(content: Content, start: int) -> bytes:
+def _deflated(content: BlockContent, start: int) -> bytes:
     return zlib.compress(pack(content, start), 9)

@@ -17,7 +17,7 @@ from conveyor_msgs.srv import Lockstep
 from rclpy.node import Node
 
 from conveyor_sim.bag.messages.topics import TOPICS
-from conveyor_sim.control.recorded import Recorded
+from conveyor_sim.control.recorded import RecordedVariables
 from conveyor_sim.control.scan import (
     ALARMS,
     ControlError,
@@ -64,7 +64,7 @@ class Scanner:
         self._changes = AlarmChanges()
         try:
             self._declared = declared_alarms(controller)
-            self._recorded = Recorded(controller)
+            self._recorded = RecordedVariables(controller)
         except ControlError as error:
             raise ConveyorError(str(error)) from error
 

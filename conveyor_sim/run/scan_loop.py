@@ -12,7 +12,7 @@ from typing import Any, Protocol
 from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.control.line_tags import LineTags, bind
 from conveyor_sim.control.memory import restore, snapshot
-from conveyor_sim.control.recorded import Recorded
+from conveyor_sim.control.recorded import RecordedVariables
 from conveyor_sim.control.scan import ALARMS, ControlError, Controller, Inputs, declared_alarms
 from conveyor_sim.errors import CommandError, ConveyorError
 from conveyor_sim.line.commands.inputs import DECLARE, CommandOutcome, Input
@@ -33,7 +33,7 @@ class AttachedController(Protocol):
     """Name of the writer of its commands."""
     controller: Controller | None = None
     """Object of this process whose memory belongs into checkpoints; None if there is no such object."""
-    recorded: Recorded = Recorded(None)
+    recorded: RecordedVariables = RecordedVariables(None)
     """Variables that are recorded, and that test conditions can read."""
 
     def scan(self, inputs: Inputs, alarms: AlarmChanges) -> dict[str, float]:
@@ -65,7 +65,7 @@ class LocalController(AttachedController):
     ) -> None:
         """Bind a controller to the tags of the line, and declare its alarms by `give`.
 
-        record: patterns of variables that are recorded, beside those of the controller's own (`Recorded`).
+        record: patterns of variables that are recorded, beside those of the controller's own (`RecordedVariables`).
         Raises ControlError for a controller that does not fit the line, and for a pattern that fits no variable.
         """
         image = simulation.process_image
@@ -74,7 +74,7 @@ class LocalController(AttachedController):
         declared = declared_alarms(controller)
         self.writer = type(controller).__name__
         self.controller = controller
-        self.recorded = Recorded(controller, record)
+        self.recorded = RecordedVariables(controller, record)
         if declared:
             ids, texts = tuple(alarm.id for alarm in declared), tuple(alarm.as_text() for alarm in declared)
             give(Input(CONTROLLER, self.writer, "controller", DECLARE, ids, (), texts))
@@ -116,9 +116,9 @@ class ScanLoop:
         return self._attached is not None
 
     @property
-    def recorded(self) -> Recorded:
+    def recorded(self) -> RecordedVariables:
         """Variables of the controller."""
-        return Recorded(None) if self._attached is None else self._attached.recorded
+        return RecordedVariables(None) if self._attached is None else self._attached.recorded
 
     def attach(self, make: Callable[[], AttachedController]) -> None:
         """Attach the controller that `make` returns. The one before is closed first."""

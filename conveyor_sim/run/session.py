@@ -6,7 +6,7 @@ import time
 import uuid
 from pathlib import Path
 
-from conveyor_sim.bag.outputs import Outputs, Sink
+from conveyor_sim.bag.outputs import MessageSink, Outputs
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.line.commands.inputs import CommandOutcome, Input
@@ -20,7 +20,7 @@ from conveyor_sim.support.printable import SENTENCE, printable
 class RunSession:
     """A simulation with its sinks. Only the thread that steps it may use it."""
 
-    def __init__(self, simulation: Simulation, sink: Sink, bag: Path | None, frame_id: str, distro: str) -> None:
+    def __init__(self, simulation: Simulation, sink: MessageSink, bag: Path | None, frame_id: str, distro: str) -> None:
         """Start the run at the present tick of `simulation`. bag: folder to record to, or None.
 
         Raises BagError if the folder can't be written; nothing has been published then.

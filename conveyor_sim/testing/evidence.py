@@ -9,7 +9,7 @@ import numpy as np
 
 from conveyor_sim.bag.rerun import rerun
 from conveyor_sim.control.scan import ALARMS
-from conveyor_sim.page.one_file import Failure, write_page
+from conveyor_sim.page.one_file import FailedCondition, write_page
 from conveyor_sim.page.watch import Watch
 from conveyor_sim.report.figures import style
 from conveyor_sim.report.figures.data import Frame, Plant
@@ -83,7 +83,7 @@ def keep_page(scenario: Scenario, bag: Path, path: Path, watch: Watch) -> Path:
 
     Raises BagError, and ConveyorError if the file can't be written.
     """
-    failure = Failure(scenario.time, scenario.failure or "the test failed")
+    failure = FailedCondition(scenario.time, scenario.failure or "the test failed")
     known = {*scenario.simulation.process_image.signal_names, *watch.variables}
     trends = [name for name in traced(scenario) if name in known]
     return write_page(bag, path, failures=[failure], watch=watch, trends=trends)

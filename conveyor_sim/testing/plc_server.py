@@ -11,7 +11,7 @@ import time
 from contextlib import ExitStack
 from pathlib import Path
 
-from conveyor_sim.control.recorded import Recorded
+from conveyor_sim.control.recorded import RecordedVariables
 from conveyor_sim.control.scan import ControlError, Inputs
 from conveyor_sim.line.process_image import ProcessImage
 from conveyor_sim.protocols.attach.links import plc_link
@@ -49,7 +49,7 @@ class ServedPlc(AttachedController):
         """Values of the PLC (plc/<name>) after its last scan; NaN before."""
         self.record = tuple(self.variables)
         """Names of the variables that are recorded: all."""
-        self.recorded = Recorded(self)
+        self.recorded = RecordedVariables(self)
         with ExitStack() as stack:
             self._thread = stack.enter_context(ServerThread())
             self._link = plc_link(url, self._map.all, user, password)

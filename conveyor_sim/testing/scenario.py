@@ -387,7 +387,7 @@ class Scenario(AbstractContextManager["Scenario"]):
         self._signals = dict(zip(self.simulation.process_image.signal_names, now.tolist(), strict=True))
         alarms = self.simulation.line.alarms
         if alarms.changed:
-            self._alarms |= alarms.said()
+            self._alarms |= alarms.controller_alarms()
             self.history.alarms(self._alarms)
 
     def _watch(self) -> None:

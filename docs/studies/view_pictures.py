@@ -19,7 +19,7 @@ from typing import Any
 from PIL import Image, ImageDraw
 from playwright.sync_api import sync_playwright
 
-from conveyor_sim.page.one_file import Failure, write_page
+from conveyor_sim.page.one_file import FailedCondition, write_page
 from conveyor_sim.protocols.server.users import keep_user, new_user
 from conveyor_sim.protocols.tags.scene_messages import SceneTask
 from conveyor_sim.protocols.tags.scene_provider import SceneTagProvider
@@ -83,7 +83,7 @@ class Studio:
     def state(self, state: State) -> Path:
         """The page of a state of the tests."""
         html = self.folder / f"{state.of}.html"
-        failures = [Failure(22.0, "always: no more than 20 bottles")] if state.of == "failed" else []
+        failures = [FailedCondition(22.0, "always: no more than 20 bottles")] if state.of == "failed" else []
         other = self.bag("stays_open") if state.of == "pair" else None
         return write_page(self.bag("closes_at_6_s"), html, failures=failures, other=other)
 

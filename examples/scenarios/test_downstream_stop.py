@@ -5,7 +5,7 @@ Run it by hand: `pytest examples/scenarios/test_downstream_stop.py`.
 
 import pytest
 
-from conveyor_sim.control.cascade import Cascade, Zone
+from conveyor_sim.control.cascade import Cascade, CascadeZone
 from conveyor_sim.control.scan import Constant, Controller
 from conveyor_sim.testing import Scenario
 from conveyor_sim.testing.plugin import Lines
@@ -18,7 +18,7 @@ FORCE = 50.0  # N, of all contacts of a bottle together, on average over a secon
 
 def cascade() -> Controller:
     """Zones stop as they fill, and deliver only what the next one has room for."""
-    zones = tuple(Zone(zone, f"full{number}", SPEED) for number, zone in enumerate(ZONES, 1))
+    zones = tuple(CascadeZone(zone, f"full{number}", SPEED) for number, zone in enumerate(ZONES, 1))
     return Cascade(zones, takes="machines/packer/running")
 
 

@@ -3,7 +3,7 @@
 Run it by hand: `pytest examples/scenarios/test_trip.py`.
 """
 
-from conveyor_sim.control.cascade import Cascade, Zone
+from conveyor_sim.control.cascade import Cascade, CascadeZone
 from conveyor_sim.control.scan import Controller
 from conveyor_sim.testing.plugin import Lines
 
@@ -20,7 +20,7 @@ for _alarm in ALARMS.values():
 
 def cascade() -> Controller:
     """Zones stop as they fill."""
-    zones = tuple(Zone(zone, f"full{number}", 0.5) for number, zone in enumerate(ZONES, 1))
+    zones = tuple(CascadeZone(zone, f"full{number}", 0.5) for number, zone in enumerate(ZONES, 1))
     return Cascade(zones, takes="machines/packer/running")
 
 

@@ -1,4 +1,4 @@
-"""A study written is the study read; what is damaged is told, with the file and what was expected."""
+"""Files of studies: a written study is read back equal; damage is reported with the file and the expectation."""
 
 from __future__ import annotations
 

@@ -73,7 +73,7 @@ def test_few_runs_compare_nothing(rows: tuple[Comparison, ...]) -> None:
 
 
 def test_a_setting_that_others_were_compared_with_was_compared_with_none() -> None:
-    """Cheaper ones were found different from it; how good it is itself nobody has looked at."""
+    """Cheaper settings differed from it; its own error was not measured."""
     of = replace(with_runs(), ensemble_reference=CHOSEN)
     facts = ["Throughput", "cheaper settings", "differ", "long runs", "none", *FORCES_ONLY]
     assert missing(three_lines(of)[1], facts) == []

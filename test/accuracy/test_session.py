@@ -1,4 +1,4 @@
-"""What somebody who waits sees, in order, and what Ctrl-C answers at any moment."""
+"""Answers that a user sees while a study runs, in order, and the answer after Ctrl-C at any moment."""
 
 from __future__ import annotations
 

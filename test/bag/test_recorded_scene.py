@@ -8,7 +8,7 @@ import pytest
 from scenes import scene
 
 from conveyor_sim.bag.recorded_scene import recorded_scene
-from conveyor_sim.line.devices.streams import random_stream
+from conveyor_sim.line.devices.setup import random_stream
 from conveyor_sim.simulation import Simulation
 
 PLACE = {"bottle": "bottle", "direction": 0.0, "speed": 0.0}

@@ -1,4 +1,4 @@
-"""What controllers declare of their alarms."""
+"""Declarations of alarms by controllers."""
 
 import json
 from typing import Any

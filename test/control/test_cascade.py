@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from control.scans import Scans
 
-from conveyor_sim.control.cascade import Cascade, Zone
+from conveyor_sim.control.cascade import Cascade, CascadeZone
 
 NAMES = ("a", "b", "c")  # downstream
 TAKES = "machines/packer/running"
@@ -21,7 +21,7 @@ def speed(name: str) -> str:
 
 @pytest.fixture
 def scans() -> Scans:
-    zones = tuple(Zone(name, name, 0.3) for name in NAMES)
+    zones = tuple(CascadeZone(name, name, 0.3) for name in NAMES)
     controller = Cascade(zones, TAKES, full_delay=1.0, clear_delay=0.2, start_delay=0.7)
     return Scans(controller, **{eye(name): 0.0 for name in NAMES}, **{TAKES: 1.0})
 

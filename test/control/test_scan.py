@@ -18,7 +18,7 @@ def test_together_merges_what_all_answer() -> None:
 
 
 def test_together_refuses_two_that_command_the_same() -> None:
-    with pytest.raises(ControlError, match=r"belts/a/cmd_speed: given by both Constant and Constant in one scan"):
+    with pytest.raises(ControlError, match=r"belts/a/cmd_speed: sent by both Constant and Constant in one scan"):
         Scans(together(Constant({"belts/a/cmd_speed": 0.5}), Constant({"belts/a/cmd_speed": 0.5}))).scan({})
 
 

@@ -96,7 +96,7 @@ def test_a_better_comment_throws_no_kernels_away(copied: Path) -> None:
     friction, before = copied / "conveyor_sim" / "engine" / "contact" / "friction.py", hash_of(copied)
     text = friction.read_text()
     friction.write_text(
-        text.replace("Two curves p", "Two better curves p", 1).replace("\n\n\n", "\n\n\n# Better.\n", 1)
+        text.replace("two curves p", "two better curves p", 1).replace("\n\n\n", "\n\n\n# Better.\n", 1)
     )
     assert len(friction.read_text()) == len(text) + len("better ") + len("# Better.\n")
     assert hash_of(copied) == before

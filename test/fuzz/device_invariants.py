@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from conveyor_sim.columns.bottles import BottleColumns
 from conveyor_sim.line.commands.inputs import INJECT, CommandOutcome
-from conveyor_sim.line.machines.packml import State
+from conveyor_sim.line.machines.packml import PackMLState
 from conveyor_sim.scene.geometry import SegmentPiece
 from conveyor_sim.scene.moving import MovingShape, moving_shapes
 from conveyor_sim.scene.parts.inspection import Inspection
@@ -27,7 +27,7 @@ F8 = NDArray[np.float64]
 NEAR = 1e-7
 """Of a length: what rounding may make of a place at which something begins or ends."""
 
-RUNNING = (State.EXECUTE, State.SUSPENDED, State.COMPLETING)
+RUNNING = (PackMLState.EXECUTE, PackMLState.SUSPENDED, PackMLState.COMPLETING)
 """States in which a machine may give or take a bottle."""
 
 RISING = {
@@ -141,7 +141,7 @@ class DeviceWatch:
         state = int(now[f"{place}/state"])
         if now[f"{place}/running"] and state not in RUNNING:
             raise Violation("machine", f"{place} runs in state {state} at tick {self._sim.tick}")
-        if now[f"{place}/cur_rate"] > 0.0 and state not in (State.EXECUTE, State.COMPLETING):
+        if now[f"{place}/cur_rate"] > 0.0 and state not in (PackMLState.EXECUTE, PackMLState.COMPLETING):
             raise Violation("machine", f"{place} has a rate in state {state} at tick {self._sim.tick}")
         counters = [f"{place}/{what}" for what in ("produced", "taken", "processed") if f"{place}/{what}" in now]
         moved = any(now[name] > before[name] for name in counters)

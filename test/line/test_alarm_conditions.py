@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from line.alarms.board import SIGNALS, Board
 
-from conveyor_sim.line.alarm_conditions import Measured
+from conveyor_sim.line.alarm_conditions import MeasuredConditions
 from conveyor_sim.line.device import Device
 from conveyor_sim.line.tag import count, number
 
@@ -31,7 +31,7 @@ class Shown(Device):
 def seen(fields: dict[str, Any], values: Sequence[float]) -> list[bool]:
     """Whether the alarm is active after each value, a tick each."""
     board, device = Board(it={"tag": SIGNALS[0], **fields}), Shown(SIGNALS[0])
-    measured, found = Measured(board.alarms, [device, Shown(SIGNALS[1])]), []
+    measured, found = MeasuredConditions(board.alarms, [device, Shown(SIGNALS[1])]), []
     for device.value in values:
         board.tick += 1
         board.say(**measured.changes(NOW, {}))
@@ -58,7 +58,7 @@ def test_limits(fields: dict[str, Any], values: list[float], active: list[int]) 
 
 def test_only_devices_with_alarms_are_looked_at_each_once() -> None:
     board, one, other = Board(), Shown(SIGNALS[0]), Shown(SIGNALS[1])
-    measured = Measured(board.alarms, [one, other])
+    measured = MeasuredConditions(board.alarms, [one, other])
     assert measured.changes(NOW, {}) == {}
     assert one.looks == other.looks == 0
     board.declare(a={"tag": SIGNALS[1], "high": 1.0}, b={"tag": SIGNALS[1], "high": 3.0})  # later, by a controller

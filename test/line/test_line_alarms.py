@@ -47,7 +47,7 @@ def value(sim: Simulation, name: str) -> float:
 def test_a_belt_that_its_watchdog_stops_is_an_alarm_until_a_command_comes() -> None:
     sim = line(belts={"feeder": {"watchdog": 0.5}})
     assert alarm_events(sim, 60) == [(50, "raised", "belts/feeder/watchdog")]
-    assert sim.line.alarms["belts/feeder/watchdog"].text == "belts/feeder stopped: no command came for its watchdog"
+    assert sim.line.alarms["belts/feeder/watchdog"].text == "belts/feeder stopped: its watchdog received no command"
     assert value(sim, "alarms/belts/feeder/watchdog") == value(sim, "alarm_counts/errors") == 1
     sim.command((FEEDER,), (0.2,))
     assert alarm_events(sim, 10) == [(60, "cleared", "belts/feeder/watchdog")]
@@ -284,7 +284,7 @@ def test_a_checkpoint_that_claims_what_can_not_be_is_refused(tmp_path: Path) -> 
     sim.advance()
     sim.line.alarms["late"].due = 10**8
     sim.save(tmp_path / "edited.npz")
-    with pytest.raises(CheckpointError, match="late, that has a delay that can't be"):
+    with pytest.raises(CheckpointError, match="late, that has an impossible delay"):
         Simulation.load(tmp_path / "edited.npz")
 
 

@@ -17,4 +17,4 @@ def test_every_class_of_device_is_in_a_table() -> None:
         if line.startswith("| `")
     ]
     assert len(rows) == len(tags)
-    assert "| `photo_eyes/<e>/delay` | fault | s | 0 | All that it sees comes so much later. |" in rows
+    assert "| `photo_eyes/<e>/delay` | fault | s | 0 | Delay of all changes. |" in rows

@@ -13,7 +13,7 @@ from page.line import LINE, record
 from page.live_line import PASSWORD, PEOPLE, Live
 from protocols.waiting import PATIENCE
 
-from conveyor_sim.page.one_file import Failure, write_page
+from conveyor_sim.page.one_file import FailedCondition, write_page
 from conveyor_sim.protocols.server.users import keep_user, new_user
 from conveyor_sim.protocols.tags.scene_messages import SceneTask
 from conveyor_sim.protocols.tags.scene_provider import SceneTagProvider
@@ -37,7 +37,7 @@ def other_bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def html(bag: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The same as one file, with a condition that failed at 22 s."""
-    failures = [Failure(22.0, "always: no more than 20 bottles <script>alert(3)</script>")]
+    failures = [FailedCondition(22.0, "always: no more than 20 bottles <script>alert(3)</script>")]
     return write_page(bag, tmp_path_factory.mktemp("page") / "line.html", failures=failures)
 
 

@@ -14,7 +14,7 @@ from page.states import STATES
 from page.test_page import settled
 from PIL import Image
 
-from conveyor_sim.page.one_file import Failure, write_page
+from conveyor_sim.page.one_file import FailedCondition, write_page
 
 IMAGES = Path(__file__).resolve().parents[2] / "docs" / "images"
 BLOCK = 20
@@ -41,7 +41,7 @@ def different(one: np.ndarray, other: np.ndarray) -> float:
 @pytest.fixture(scope="module")
 def pages(bag: Path, other_bag: Path, tmp_path_factory: pytest.TempPathFactory) -> Mapping[str, Path]:
     folder = tmp_path_factory.mktemp("states")
-    failure = Failure(22.0, "always: no more than 20 bottles")
+    failure = FailedCondition(22.0, "always: no more than 20 bottles")
     return {
         "line": write_page(bag, folder / "line.html"),
         "failed": write_page(bag, folder / "failed.html", failures=[failure]),

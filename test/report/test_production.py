@@ -1,4 +1,4 @@
-"""How a recorded line produced: read from its bag, printed and drawn."""
+"""Production of a recorded line: read from its bag, printed and drawn."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def production(bag: Path) -> Production:
 
 
 def test_periods_are_where_the_counted_time_went(production: Production) -> None:
-    """Those of each machine follow one another from start to end, and sum up to its counters."""
+    """Periods of each machine are contiguous from start to end, and sum up to its counters."""
     assert tuple(production.periods) == MACHINES
     for index, (machine, periods) in enumerate(production.periods.items()):
         assert (periods[0].begin, periods[-1].end) == (production.start, production.end), machine
@@ -103,7 +103,7 @@ def test_bottles_of_the_report_are_those_of_the_counters(production: Production)
 
 
 def test_alarms_are_counted(bag: Path, tmp_path: Path) -> None:
-    """Those that a controller raises and clears; one stands at the end."""
+    """A controller raises and clears alarms; one is active at the end."""
     scene = load_scene(FAILING_LINE)
     sim = Simulation(scene)
     with Recorder(tmp_path / "bag") as recorder:

@@ -70,7 +70,7 @@ def test_what_was_saved_goes_on_to_the_same_bits(
     tmp_path: Path,
     request: pytest.FixtureRequest,
 ) -> None:
-    """In the same node, in another one with other threads, and without ROS; each run has its recording."""
+    """In the same node, in another one with other threads, and without ROS. Each run has a separate recording."""
     file = folder / "checkpoint"
     node = start_node(record=tmp_path / "bag", threads=1, checkpoint_folder=folder)
     scans(client, 10, 150)

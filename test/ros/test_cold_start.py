@@ -131,5 +131,5 @@ def test_a_folder_that_cannot_be_recorded_to_is_found_before_compiling(tmp_path:
 
 
 def _is_zombie(process: int) -> bool:
-    """Return True if a process has ended and its parent has not read the exit status."""
+    """Return True if a process has ended, and its parent has not collected it yet."""
     return " Z " in Path(f"/proc/{process}/stat").read_text()

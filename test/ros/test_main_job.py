@@ -28,7 +28,7 @@ def children_of(process: int) -> list[int]:
 
 @pytest.fixture
 def nothing_left() -> Iterator[None]:
-    """Check that no further child process is left (multiprocessing keeps one)."""
+    """Check afterwards that this process has no new child (multiprocessing keeps one)."""
     before = children_of(os.getpid())
     yield
     assert set(children_of(os.getpid())) <= set(before)

@@ -10,7 +10,7 @@ import pytest
 from bag.small_line import SPEED, TURN
 from ros.recording import EYE, MADE, TICKS, record
 
-from conveyor_sim.bag.mcap.file import McapFile, Schema
+from conveyor_sim.bag.mcap.writer import McapFileWriter, Schema
 from conveyor_sim.bag.messages import encode as types
 from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.bag.messages.typestore import definition, typestore
@@ -233,7 +233,7 @@ def test_a_jump_stays_within_the_recording(bag: Bag) -> None:
 def test_topics_outside_the_namespace_stay_there_and_the_clock_is_the_players_own(bag: Bag, tmp_path: Path) -> None:
     _, _, line = next(bag.raw({"line"}))
     with (tmp_path / "bag.mcap").open("xb") as stream:
-        file = McapFile(stream, "bag.mcap", "jazzy")
+        file = McapFileWriter(stream, "bag.mcap", "jazzy")
         for name, kind in {
             "/hall/line": types.LINE,
             "/hall/belts": "conveyor_msgs/msg/Belts",

@@ -20,7 +20,7 @@ from ros.recording import MADE, TICKS, record
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
-from conveyor_sim.bag.mcap.file import McapFile, Schema
+from conveyor_sim.bag.mcap.writer import McapFileWriter, Schema
 from conveyor_sim.bag.messages import encode as types
 from conveyor_sim.bag.messages.qos import EVENTS
 from conveyor_sim.bag.messages.topics import TOPICS
@@ -162,7 +162,7 @@ def test_topics_of_types_that_are_not_installed_so_are_left_out(
     """Bytes that are read by another definition than they were written by would be garbage."""
     _, _, line = next(bag.raw({"line"}))
     with (tmp_path / "bag.mcap").open("xb") as stream:
-        file = McapFile(stream, "bag.mcap", "jazzy")
+        file = McapFileWriter(stream, "bag.mcap", "jazzy")
         definitions = {
             "line": (types.LINE, definition(types.LINE)),
             "signals": (types.SIGNALS, "uint64 tick\nfloat32[] values\n"),

@@ -112,7 +112,10 @@ MANDATORY = ["mapping", "name", "duration", "bottle_types"]
         ("a: 1\n---\nb: 2\n", 2, ["not valid YAML", "single document"]),
         ("a: \x01\n", 1, ["not valid YAML", "control character"]),
         ("a: &a [*a]\n", 1, ["nested too deeply"]),
-        ("[" * 5000, 1, ["nested too deeply"]),
+        ("[" * 5000, 1, ["not valid YAML", "maximum nesting depth"]),
+        ("- " * 5000, 1, ["nested too deeply"]),
+        ("é: µµµ\n\n# ééé\nb: \x01\n\n\n", 4, ["not valid YAML", "control character"]),
+        ("a: 1\nb: \ud800\n", 2, ["not valid YAML", "half of a character"]),
         ("a: *nowhere\n", 1, ["not valid YAML", "undefined alias", "'nowhere'"]),
     ],
 )
@@ -147,7 +150,7 @@ def test_a_scene_that_is_no_regular_file_is_refused_at_once(tmp_path: Path) -> N
 
 
 def test_a_name_of_a_scene_may_be_anything(tmp_path: Path) -> None:
-    """What is no regular file is left to the reader, which says what it is."""
+    """Paths that are no regular files are left to the reader, which reports their kind."""
     os.mkfifo(tmp_path / "pipe")
     assert scene_path(tmp_path / "pipe") == tmp_path / "pipe"
     for name in ("x" * 5000, "~nobody-of-this-name/scene.yaml", "a\0b", ""):

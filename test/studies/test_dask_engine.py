@@ -87,7 +87,7 @@ class Cluster:
 
 @contextmanager
 def cluster(folder: Path, workers: int) -> Iterator[tuple[Cluster, str]]:
-    """With so many workers."""
+    """Start a cluster with `workers` workers."""
     made = Cluster(folder)
     try:
         address = made.scheduler()
@@ -132,7 +132,7 @@ def swept(setup: Setup, folder: Path, address: str) -> Iterator[list[Row]]:
 
 @pytest.fixture(scope="module")
 def expected(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, float]]:
-    """What the runs amount to, made here."""
+    """Return the metrics of the runs, made in this process."""
     setup = setup_of(tmp_path_factory.mktemp("expected"), parameters=RATES, duration=1.0)
     jobs = [Job(point, {"rate": rate}, seed) for point, rate in enumerate((4.0, 5.0, 6.0)) for seed in (1, 2)]
     return [dict(run_alone(setup, job, None).metrics) for job in jobs]

@@ -1,4 +1,4 @@
-"""Optimisation: the best point is found, the same one again, by whatever path the study came to it."""
+"""Optimisation: the best point is found, and found again on any path to it."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Study:
         shutil.copy(HERE / "optimised.py", folder)
 
     def run(self, objective: str, out: str, trials: int = TRIALS, stop_after: int | None = None) -> Optimum:
-        """What comes of it in a folder `out`."""
+        """Optimise by an objective in the folder `out`, and return the result."""
         path = self.folder / "study.yaml"
         path.write_text((HERE / "optimised.py").read_text().split('STUDY = """')[1].split('"""')[0].format(
             objective=objective, trials=trials))  # fmt: skip

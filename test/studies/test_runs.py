@@ -1,4 +1,4 @@
-"""A study from its file to its table: the same bits whoever makes the runs, in whatever order they are finished."""
+"""A study from its file to its table: equal bits from any engine, in any order of completion."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ def test_runs_of_another_study_are_left_alone(made: tuple[Setup, Path, list[Row]
 
 
 def test_a_metric_that_has_become_another_is_asked_of_new_runs(tmp_path: Path) -> None:
-    """Of the same name: what older runs say to it is an answer to another question."""
+    """Older runs hold values of another metric with the same name."""
     out = tmp_path / "out"
     mean = setup_of(tmp_path, duration=0.5, seeds=3)
     with Runs(mean, out, Here()) as runs:

@@ -1,4 +1,4 @@
-"""`warm_up: mser`: pilot runs find how long a line takes to fill; the same, whoever makes them and however often."""
+"""`warm_up: mser`: pilot runs find how long a line takes to fill, equally with any engine and number of tries."""
 
 from __future__ import annotations
 

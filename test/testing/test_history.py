@@ -71,7 +71,7 @@ def test_names_units_and_types(table: Scenario) -> None:
 
 
 def test_a_long_run_keeps_the_last_seconds_alone() -> None:
-    """The stored history is the end of a full history at every tick, and its memory does not grow."""
+    """A limited history equals the end of an unlimited one at any tick, and does not grow with time."""
     whole, last = (Scenario(TABLE, history=length) for length in (None, 0.5))
     with whole, last:
         for ticks in (20, 29, 1, 1, 48, 51, 100, 333):

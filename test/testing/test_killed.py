@@ -58,7 +58,7 @@ def pytest_command(*arguments: str) -> list[str]:
 
 
 def end_by(kind: signal.Signals, folder: Path) -> None:
-    """Run the test that hangs in another pytest, in a folder, and end it by a signal at a known tick."""
+    """Run the test that hangs in a separate pytest, in a folder, and end that by a signal at a known tick."""
     (folder / "test_killed.py").write_text(TESTS)
     with Scenario(TABLE) as table:
         table.run_for(FIRST * 0.01)

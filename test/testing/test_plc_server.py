@@ -34,7 +34,7 @@ SECONDS = 4.0
 
 
 class Twin:
-    """The program of the PLC, in this process."""
+    """Controller in this process with the same program."""
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
         answer, full = program(inputs[BOTTLES])
@@ -52,7 +52,7 @@ class Plc:
         self.tags = write_map(folder / "tags.csv", self.places)
 
     def start_again(self) -> None:
-        """Start the server at the same address after `made.stop`."""
+        """Start it again at the same address, after `made.stop`."""
         self.thread.run(self.made.start(int(self.url.rpartition(":")[2])))
         self.thread.run(self.made.scan())
 
@@ -80,7 +80,7 @@ def plcs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[str], P
 
 @pytest.fixture(params=["modbus", "opcua"])
 def plc(request: pytest.FixtureRequest, plcs: Callable[[str], Plc]) -> Iterator[Plc]:
-    """Yield a PLC that scans, before any write."""
+    """Start a PLC that scans, without any written value."""
     plc = plcs(request.param)
     plc.thread.run(plc.made.scan())
     yield plc
@@ -274,7 +274,7 @@ def free(plc: Plc) -> Iterator[FreeRunning]:
 
 
 def test_a_free_running_plc_commands_a_line_and_is_reached_again(free: FreeRunning) -> None:
-    """Signals reach the PLC, its commands act, and its loss is reported. Real time has no bits to compare."""
+    """In real time there are no bits to compare: inputs arrive, outputs act, and its loss is reported."""
     plant, plc, face, said = free.plant, free.plc, free.face, free.said
     free.until(lambda: plant.signals[BOTTLES] > 2)
     free.until(lambda: plant.simulation.line.read_back.values[0] == 0.0 and ALARM in plant.signals)

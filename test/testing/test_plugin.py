@@ -85,7 +85,7 @@ def test_a_failure_leaves_bag_and_picture_and_tells_where(run: pytest.RunResult,
     second = kept / "test_table.py_test_of_two_lines_a_b_c" / "line_2"
     assert (second / "line.png").exists() and (second / "bag" / "metadata.yaml").exists()
     # What can't be made again is said so.
-    run.stdout.fnmatch_lines([f"bag: {kept}/test_table.py_test_moves_*/bag (the run made again is another at 2.00 s *"])
+    run.stdout.fnmatch_lines([f"bag: {kept}/test_table.py_test_moves_*/bag (the repeated run differs at 2.00 s *"])
     # The report ends where the test does, not inside of the kit.
     assert "scenario.py" not in run.stdout.str()
 

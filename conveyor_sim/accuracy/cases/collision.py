@@ -10,7 +10,7 @@ from typing import Any
 
 from conveyor_sim.engine.contact.laws import DampingLaw, ElasticLaw
 from conveyor_sim.engine.contact.laws.linear import LINEAR
-from conveyor_sim.physics.effects import choose_effects
+from conveyor_sim.physics.effects.choice import choose_effects
 from conveyor_sim.physics.effects.terms import Meeting, Terms, deepest
 from conveyor_sim.physics.laws.coefficients import build_laws
 from conveyor_sim.physics.plant import Plant

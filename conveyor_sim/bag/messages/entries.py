@@ -1,4 +1,4 @@
-"""Entries of messages in words, by Line, message and index: for differences that a replay finds."""
+"""Entries of messages in words, by Line, message and index, for the first difference of a replay."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from typing import Any
 
 
 def bottle_name(line: Any, message: Any, index: int) -> str:
-    """Entry of columns by bottle."""
+    """Return an entry of columns by bottle in words."""
     return f"bottle {message.id[index]}"
 
 
 def contact_name(line: Any, message: Any, index: int) -> str:
-    """Entry of contacts."""
+    """Return an entry of contacts in words."""
     other = int(message.b[index])
     if message.kind[index] == 0:
         return f"the contact of bottles {message.a[index]} and {other}"
@@ -20,11 +20,11 @@ def contact_name(line: Any, message: Any, index: int) -> str:
 
 
 def command_name(line: Any, message: Any, index: int) -> str:
-    """Entry of read-back values."""
+    """Return an entry of read-back values in words."""
     names = line.command_names
-    return f"command {names[index]}" if index < len(names) else ""  # of the writers there may be more
+    return f"command {names[index]}" if index < len(names) else ""  # there may be more writers than commands
 
 
 def bin_name(line: Any, message: Any, index: int) -> str:
-    """Entry of rail wear."""
+    """Return an entry of rail wear in words."""
     return f"rail {line.rails[message.rail[index]]} at ({message.x[index]:.4g}, {message.y[index]:.4g}) m"

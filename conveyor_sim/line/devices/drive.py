@@ -1,37 +1,74 @@
-"""Drives: a belt that ramps to its setpoint, runs, reverses, trips and is reset, and counts its travel."""
+"""Drives of belts: ramps, running, reversing, trips and reset, and travel of an encoder."""
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from conveyor_sim.line.alarms.declaration import Declared, error
 from conveyor_sim.line.device import ScanContext
 from conveyor_sim.line.devices.belt import BeltDevice
 from conveyor_sim.line.devices.edge import RisingEdge
-from conveyor_sim.line.devices.ramp import Ramp
-from conveyor_sim.line.devices.setup import Setup
+from conveyor_sim.line.devices.setup import DeviceSetup
 from conveyor_sim.line.tag import MOST_COUNT, count, switch
 from conveyor_sim.scene.belts import CurvedBelt, StraightBelt
 from conveyor_sim.scene.drives import Drive
 
 AT_SPEED = 1e-9
-"""m/s, between setpoint and speed."""
+"""Tolerance between setpoint and speed, m/s."""
+
+
+@dataclass
+class Ramp:
+    """Speed that follows a setpoint within limits of acceleration and jerk.
+
+    It does not overshoot from rest. If the setpoint changes on the way, the jerk limit may cause an overshoot.
+    """
+
+    value: float
+    """Speed, m/s."""
+    acceleration: float = 0.0
+    """Acceleration in the last interval, m/s^2."""
+
+    def approach(self, setpoint: float, limit: float, jerk: float | None, interval: float) -> float:
+        """Return the speed (m/s) after an interval (s).
+
+        limit: m/s^2. jerk: m/s^3, None for no limit.
+        """
+        left = setpoint - self.value
+        if left == 0.0 and self.acceleration == 0.0:
+            return self.value
+        wanted = min(limit, abs(left) / interval)
+        if jerk is not None:
+            # The sum of a, a - j dt, ... down to 0, each for dt, is a^2 / (2 j) + a dt / 2.
+            wanted = min(wanted, jerk * (math.sqrt(0.25 * interval**2 + 2.0 * abs(left) / jerk) - 0.5 * interval))
+        wanted = math.copysign(wanted, left)
+        if jerk is not None:
+            most = jerk * interval
+            wanted = min(max(wanted, self.acceleration - most), self.acceleration + most)
+        change = wanted * interval
+        arrived = abs(left - change) <= 1e-12 * max(1.0, abs(setpoint))
+        self.acceleration = wanted
+        self.value = setpoint if arrived else self.value + change
+        if arrived and (jerk is None or abs(wanted) <= jerk * interval):
+            self.acceleration = 0.0
+        return self.value
 
 
 class DriveDevice(BeltDevice):
-    """One belt with a drive while it runs. It runs at the start, at the speed of the scene.
+    """Belt with a drive. It runs at the start, at the speed of the scene.
 
-    A trip stops it, at its ramp, until the fault is gone and `reset` has risen since.
+    A trip stops it along its ramp, until the fault is gone and `reset` has risen since.
     """
 
-    def __init__(self, name: str, belt: StraightBelt | CurvedBelt, drive: Drive, setup: Setup) -> None:
+    def __init__(self, name: str, belt: StraightBelt | CurvedBelt, drive: Drive, setup: DeviceSetup) -> None:
         tags = [
             switch(f"{name}/running", "status", "Commanded to run, and not tripped.", 1.0, "state"),
-            switch(f"{name}/at_speed", "status", "At the end of its ramp, also of one to standstill.", 1.0),
+            switch(f"{name}/at_speed", "status", "At the end of its ramp, also at standstill.", 1.0),
             switch(f"{name}/fault", "status", "It has tripped.", adds_to="state"),
             switch(f"{name}/run", "command", "Runs while on.", 1.0),
             switch(f"{name}/reverse", "command", "Runs backward while on."),
-            switch(f"{name}/reset", "command", "As it rises, a trip is over if its cause is."),
-            switch(f"{name}/trip", "fault", "The drive trips and stops by its ramp."),
+            switch(f"{name}/reset", "command", "Its rising edge resets a trip whose cause is gone."),
+            switch(f"{name}/trip", "fault", "The drive trips and stops along its ramp."),
         ]
         if drive.pulses_per_metre is not None:
             text = "Pulses of the encoder, counted down in reverse."
@@ -46,15 +83,15 @@ class DriveDevice(BeltDevice):
         self.trip = False
         self.tripped = False
         self.travel = 0.0
-        """m, forward less backward."""
+        """Travel forward minus backward, m."""
 
     @property
     def alarms(self) -> Sequence[Declared]:
-        """It has tripped, beside those of a belt."""
+        """Alarm of a trip, and those of a belt."""
         return (error(self._tripped, f"the drive of {self.name} has tripped", f"{self.name}/fault"), *super().alarms)
 
     def command(self, name: str, value: float, now: ScanContext) -> None:
-        """Take a setpoint (m/s), run, reverse, reset, or the fault trip."""
+        """Apply a setpoint (m/s), run, reverse, reset, or the fault `trip`."""
         if name == self._speed_command:
             super().command(name, value, now)
             return
@@ -73,18 +110,18 @@ class DriveDevice(BeltDevice):
             now.alarm(self._tripped, self.tripped)
 
     def begin(self, now: ScanContext) -> None:
-        """Ramp for a tick."""
+        """Ramp for one tick."""
         drive, ramp, wanted = self._drive, self.ramp, self.wanted(now)
         if ramp.value != wanted or ramp.acceleration != 0.0:
             now.speeds[self._index] = ramp.approach(wanted, drive.acceleration, drive.jerk, now.length)
 
     def end(self, now: ScanContext) -> None:
-        """Count what was travelled in the tick."""
+        """Add the travel of this tick."""
         if now.tick > 0:
             self.travel += self.ramp.value * now.length
 
     def values(self, now: ScanContext) -> Sequence[float]:
-        """As a belt, then running, at_speed, fault, and pulses."""
+        """Return the values of a belt, then running, at_speed, fault, and pulses."""
         index, tripped = self._index, self.tripped
         at_speed = abs(self.ramp.value - self.wanted(now)) <= AT_SPEED
         values = [now.speeds[index], now.carried(index), self.run and not tripped, at_speed, tripped]
@@ -93,17 +130,17 @@ class DriveDevice(BeltDevice):
         return values
 
     def states(self, now: ScanContext) -> list[float]:
-        """Running and fault."""
+        """Return running and fault."""
         return [self.run and not self.tripped, self.tripped]
 
     def wanted(self, now: ScanContext) -> float:
-        """The speed that it is commanded to run at, m/s: none while it is stopped or tripped."""
+        """Return the commanded speed, m/s; 0 while stopped or tripped."""
         if not self.run or self.tripped:
             return 0.0
         setpoint = float(now.setpoints[self._index])
         return -setpoint if self.reverse else setpoint
 
 
-def belt_device(name: str, belt: StraightBelt | CurvedBelt, setup: Setup) -> BeltDevice:
-    """A belt, with a drive if it has one."""
+def belt_device(name: str, belt: StraightBelt | CurvedBelt, setup: DeviceSetup) -> BeltDevice:
+    """Build a belt, with a drive if the part has one."""
     return BeltDevice(name, belt, setup) if belt.drive is None else DriveDevice(name, belt, belt.drive, setup)

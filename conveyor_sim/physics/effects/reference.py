@@ -1,7 +1,7 @@
 """Reference of all effects: `python -m conveyor_sim.physics.effects.reference > docs/effects.md` writes it."""
 
 from conveyor_sim.engine.contact.laws import DAMPING
-from conveyor_sim.physics.effects import EFFECTS
+from conveyor_sim.physics.effects.choice import EFFECTS
 from conveyor_sim.physics.effects.declaration import Effect
 
 INTRODUCTION = """\

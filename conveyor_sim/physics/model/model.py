@@ -18,7 +18,8 @@ from conveyor_sim.engine.arrays.world import EngineSettings
 from conveyor_sim.engine.compiler.compile import ENGINE_HASH
 from conveyor_sim.engine.integrators import AHEAD, LAG
 from conveyor_sim.errors import SceneError
-from conveyor_sim.physics.effects import EffectChoice, prediction_of
+from conveyor_sim.physics.effects.choice import prediction_of
+from conveyor_sim.physics.effects.declaration import EffectChoice
 from conveyor_sim.physics.effects.load import Load
 from conveyor_sim.physics.laws.coefficients import BaseSprings, Laws
 from conveyor_sim.physics.model.plant_arrays import plant_grid, rail_arrays

@@ -2,7 +2,9 @@
 
 from dataclasses import dataclass
 
-from conveyor_sim.physics.effects import EffectChoice, Terms, bounds_of, choose_effects, impacts_of
+from conveyor_sim.physics.effects.choice import bounds_of, choose_effects, impacts_of
+from conveyor_sim.physics.effects.declaration import EffectChoice
+from conveyor_sim.physics.effects.terms import Terms
 from conveyor_sim.physics.laws.coefficients import build_laws
 from conveyor_sim.physics.plant import Plant
 from conveyor_sim.physics.timestep.bounds import Bound, fewest_steps, steps_per_tick

@@ -2,8 +2,7 @@
 
 import os
 import time
-from dataclasses import astuple
-from typing import Any, Literal
+from typing import Any
 
 from conveyor_sim.columns.events import GuardEvent
 from conveyor_sim.engine.arrays.rails import RailContacts
@@ -13,16 +12,14 @@ from conveyor_sim.engine.threads.thread_pool import ThreadPool
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.physics.model.moving_rails import fastest_rail
 from conveyor_sim.physics.state import State
-from conveyor_sim.physics.state.snapshot import entries, typed
-from conveyor_sim.physics.stepping.guard import Guard, Violation, chatter
+from conveyor_sim.physics.state.snapshot import restore, snapshot
+from conveyor_sim.physics.stepping.guard import chatter
+from conveyor_sim.physics.stepping.guard.guard import Guard
+from conveyor_sim.physics.stepping.guard.violation import Violation
 from conveyor_sim.physics.stepping.guard.world_snapshot import WorldSnapshot
-from conveyor_sim.scene.types import Unchecked
 
 SHORTER = (4, 16, 64)
 """By what factors steps are shortened, one after another, for a tick that the guard objects to."""
-
-
-_Event = tuple[int, Literal["shorter_steps", "chatter", "soft", "stopped"], int, Unchecked, Unchecked, str]
 
 
 class Integration:
@@ -38,10 +35,8 @@ class Integration:
         self._choice = ThreadChoice(cores) if threads is None else None
         self._shorter = SHORTER if shorten else ()
         self._guard = Guard(state, self.found)
-        self._events: list[GuardEvent] = []
-        self._chatters = False
+        self._memory = self._guard.memory
         self._listening = self._ticks_between_listening()
-        self.shortened_ticks = 0
         self._kernel_seconds = 0.0
 
     @property
@@ -61,36 +56,31 @@ class Integration:
 
     @property
     def deepest_overlap(self) -> float:
-        """The largest overlap over a radius so far."""
-        return self._guard.deepest
+        """Largest overlap over a radius so far."""
+        return self._memory.deepest
+
+    @property
+    def shortened_ticks(self) -> int:
+        """Ticks that were repeated in shorter steps."""
+        return self._memory.shortened_ticks
 
     def take_events(self) -> list[GuardEvent]:
-        """What the guard has reported since the last call."""
-        events, self._events = self._events, []
-        return events
+        """Return what the guard has reported since the last call."""
+        events, self._memory.events = self._memory.events, []
+        return [GuardEvent(*event) for event in events]
 
     def snapshot(self) -> dict[str, Any]:
-        """What is remembered from tick to tick beside the State, as plain data for `restore`."""
-        return {
-            "events": [astuple(event) for event in self._events],
-            "chatters": self._chatters,
-            "shortened_ticks": self.shortened_ticks,
-            "deepest": self._guard.deepest,
-            "put_in": self._guard.has_put_in,
-        }
+        """Return the state between ticks beside the State, as plain data for `restore`."""
+        memory: dict[str, Any] = snapshot(self._memory)
+        return memory
 
     def restore(self, memory: dict[str, Any]) -> None:
-        """Take over what another one of the same Model remembered. Raises ValueError for what is no such memory."""
-        entries(memory, self.snapshot(), "integration")
-        self._events = [GuardEvent(*event) for event in typed(list[_Event], memory["events"], "integration.events")]
-        self._chatters = typed(bool, memory["chatters"], "integration.chatters")
-        self.shortened_ticks = typed(int, memory["shortened_ticks"], "integration.shortened_ticks")
-        self._guard.deepest = typed(float, memory["deepest"], "integration.deepest")
-        self._guard.has_put_in = typed(bool, memory["put_in"], "integration.put_in")
+        """Take over the snapshot of another one of the same Model. Raise ValueError for anything else."""
+        restore(self._memory, memory, "integration")
 
     def put_in(self) -> None:
-        """Bottles were put somewhere from outside."""
-        self._guard.has_put_in = True
+        """Note that bottles were placed from outside."""
+        self._memory.put_in = True
 
     def take_tick(self, tick: int, surface_speed: float) -> None:
         """From a tick to the next. surface_speed: m/s, of the fastest belt. SimulationError: back at the beginning."""
@@ -116,15 +106,15 @@ class Integration:
             self._take_steps(factor)
             again = self._guard.end(self._model.dt / factor)
             if again is None:
-                self.shortened_ticks += 1
+                self._memory.shortened_ticks += 1
                 text = f"{first.sentence(seconds, 1)}; the tick was done again in steps {factor} times shorter"
-                self._events.append(GuardEvent(tick + 1, "shorter_steps", first.bottle, first.x, first.y, text))
+                self._memory.report(GuardEvent(tick + 1, "shorter_steps", first.bottle, first.x, first.y, text))
                 return
             tried, wrong = factor, again
         raise self._stopped(tick, wrong, wrong.sentence(seconds, tried))
 
     def _stopped(self, tick: int, wrong: Violation, text: str) -> SimulationError:
-        self._events.append(GuardEvent(tick, "stopped", wrong.bottle, wrong.x, wrong.y, text))
+        self._memory.report(GuardEvent(tick, "stopped", wrong.bottle, wrong.x, wrong.y, text))
         return SimulationError(text, wrong.kind)
 
     def _take_steps(self, factor: int) -> None:
@@ -146,8 +136,8 @@ class Integration:
     def _tell(self, tick: int) -> None:
         """What does not stop a run, reported the first time."""
         if (event := self._guard.soft(tick)) is not None:
-            self._events.append(event)
-        if self._listening and not self._chatters and tick % self._listening == 0:
+            self._memory.report(event)
+        if self._listening and not self._memory.chatters and tick % self._listening == 0:
             self._listen(tick)
 
     def _ticks_between_listening(self) -> int:
@@ -177,5 +167,5 @@ class Integration:
         worst, amplitude = meter.worst()
         share = amplitude / model.settings.slip_limit
         if share > chatter.LEAST:
-            self._chatters = True
-            self._events.append(self._guard.chatters(tick, worst, share))
+            self._memory.chatters = True
+            self._memory.report(self._guard.chatters(tick, worst, share))

@@ -16,7 +16,7 @@ from asyncua.common.instantiate_util import instantiate
 from asyncua.crypto.permission_rules import User
 
 from conveyor_sim.line.commands.inputs import MODE, SET
-from conveyor_sim.line.machines.packml import Command, State, objection
+from conveyor_sim.line.machines.packml import Command, PackMLState, objection
 from conveyor_sim.line.tag import Tag
 from conveyor_sim.protocols.opcua.nodes import INDEX, Nodes, name_of, node_id
 from conveyor_sim.protocols.opcua.packml_admin import A_MINUTE, Admin
@@ -78,22 +78,26 @@ _PARTS: Mapping[str, tuple[int, ...]] = {
 
 _CLEARED, _RUNNING = ("Cleared", 71), ("Running", 75)
 
-_STATES: Mapping[str, Mapping[State, tuple[str, int]]] = {
-    _BASE: {State.ABORTING: ("Aborting", 61), State.ABORTED: ("Aborted", 62)},
-    _MACHINE: {State.STOPPED: ("Stopped", 53), State.STOPPING: ("Stopping", 54), State.CLEARING: ("Clearing", 55)},
+_STATES: Mapping[str, Mapping[PackMLState, tuple[str, int]]] = {
+    _BASE: {PackMLState.ABORTING: ("Aborting", 61), PackMLState.ABORTED: ("Aborted", 62)},
+    _MACHINE: {
+        PackMLState.STOPPED: ("Stopped", 53),
+        PackMLState.STOPPING: ("Stopping", 54),
+        PackMLState.CLEARING: ("Clearing", 55),
+    },
     _EXECUTE: {
-        State.RESETTING: ("Resetting", 27),
-        State.IDLE: ("Idle", 28),
-        State.STARTING: ("Starting", 29),
-        State.SUSPENDING: ("Suspending", 30),
-        State.SUSPENDED: ("Suspended", 31),
-        State.UNSUSPENDING: ("Unsuspending", 32),
-        State.HOLDING: ("Holding", 33),
-        State.HELD: ("Held", 34),
-        State.UNHOLDING: ("Unholding", 35),
-        State.EXECUTE: ("Execute", 36),
-        State.COMPLETING: ("Completing", 37),
-        State.COMPLETE: ("Complete", 38),
+        PackMLState.RESETTING: ("Resetting", 27),
+        PackMLState.IDLE: ("Idle", 28),
+        PackMLState.STARTING: ("Starting", 29),
+        PackMLState.SUSPENDING: ("Suspending", 30),
+        PackMLState.SUSPENDED: ("Suspended", 31),
+        PackMLState.UNSUSPENDING: ("Unsuspending", 32),
+        PackMLState.HOLDING: ("Holding", 33),
+        PackMLState.HELD: ("Held", 34),
+        PackMLState.UNHOLDING: ("Unholding", 35),
+        PackMLState.EXECUTE: ("Execute", 36),
+        PackMLState.COMPLETING: ("Completing", 37),
+        PackMLState.COMPLETE: ("Complete", 38),
     },
 }
 """Names and IDs of states by state machine."""
@@ -242,11 +246,11 @@ class PackMl:
         """Return the present state of each state machine; without a text: it is not active."""
         none: tuple[str | None, int] = (None, 0)
         if number in _STATES[_BASE]:
-            return {_BASE: _STATES[_BASE][State(number)], _MACHINE: none, _EXECUTE: none}
+            return {_BASE: _STATES[_BASE][PackMLState(number)], _MACHINE: none, _EXECUTE: none}
         if number in _STATES[_MACHINE]:
-            return {_BASE: _CLEARED, _MACHINE: _STATES[_MACHINE][State(number)], _EXECUTE: none}
+            return {_BASE: _CLEARED, _MACHINE: _STATES[_MACHINE][PackMLState(number)], _EXECUTE: none}
         if number in _STATES[_EXECUTE]:
-            return {_BASE: _CLEARED, _MACHINE: _RUNNING, _EXECUTE: _STATES[_EXECUTE][State(number)]}
+            return {_BASE: _CLEARED, _MACHINE: _RUNNING, _EXECUTE: _STATES[_EXECUTE][PackMLState(number)]}
         return dict.fromkeys((_BASE, _MACHINE, _EXECUTE), none)
 
 

@@ -14,7 +14,7 @@ from contextlib import suppress
 from typing import Any
 
 from conveyor_sim.bag.messages.topics import TOPICS
-from conveyor_sim.page.block import Content, block_ticks, pack
+from conveyor_sim.page.block import BlockContent, block_ticks, pack
 from conveyor_sim.page.head import head
 from conveyor_sim.page.recording import text
 from conveyor_sim.protocols.tags.line_mirror import DrawableFrame, DrawableProvider
@@ -205,7 +205,7 @@ class Feed:
 
 
 def _packed(picture: DrawableFrame) -> bytes:
-    content = Content(signals=[(picture.tick, picture.signals)])
+    content = BlockContent(signals=[(picture.tick, picture.signals)])
     drawn = {topic: decode() for topic, decode in picture.drawn.items() if topic in ("bottles", "contacts", "belts")}
     if (message := drawn.get("bottles")) is not None:
         content.bottles.append((int(message.tick), TOPICS["bottles"].unpack(message)))

@@ -9,7 +9,7 @@ from rich.console import Group
 from rich.padding import Padding
 from rich.table import Table
 
-from conveyor_sim.physics.effects import EFFECTS
+from conveyor_sim.physics.effects.choice import EFFECTS
 from conveyor_sim.physics.effects.notes import notes
 from conveyor_sim.physics.model import Model
 from conveyor_sim.physics.model.remedies import step_limit

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from statistics import median
 
 from conveyor_sim.errors import ConveyorError, SimulationError
-from conveyor_sim.physics.effects import EFFECTS
+from conveyor_sim.physics.effects.choice import EFFECTS
 from conveyor_sim.physics.model import Model
 from conveyor_sim.physics.model.remedies import step_limit, with_remedy
 from conveyor_sim.scene import Scene, parse_overrides, parse_scene

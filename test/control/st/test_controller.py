@@ -146,7 +146,7 @@ def test_a_task_runs_at_its_interval_and_its_outputs_hold(tmp_path: Path) -> Non
 
 
 def test_a_task_does_not_make_up_for_scans_that_there_were_not(tmp_path: Path) -> None:
-    """As where a node that runs free was held up: it goes on at its interval, counted from its first scan."""
+    """A free-running node may be delayed; its task continues at its interval, counted from the first scan."""
     plc = bound(tmp_path, TASKS)
     ticks = (0, 1, 2, 3, 100, 101, 102, 103, 104, 105)
     assert [scan(plc, tick)["belts/a/cmd_speed"] for tick in ticks] == [1, 1, 1, 2, 3, 3, 4, 4, 4, 5]

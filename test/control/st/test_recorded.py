@@ -14,11 +14,11 @@ from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.replay import replay
 from conveyor_sim.bag.rerun import rerun
 from conveyor_sim.cli import main
-from conveyor_sim.control.recorded import Recorded
+from conveyor_sim.control.recorded import RecordedVariables
 from conveyor_sim.control.scan import ControlError, together
 from conveyor_sim.control.st import StructuredText
 from conveyor_sim.page.content import Collector
-from conveyor_sim.page.recording import Detail, Recording
+from conveyor_sim.page.recording import Detail, PageRecording
 from conveyor_sim.page.watch import Watch
 from conveyor_sim.testing import Scenario
 
@@ -77,7 +77,7 @@ def test_a_recording_made_of_the_inputs_has_them_too(recorded: tuple[Path, list,
 def test_the_page_shows_them_as_signals(recorded: tuple[Path, list, int]) -> None:
     folder, seen, _ = recorded
     with open_bag(folder / "bag") as bag:
-        recording = Recording(bag, Detail())
+        recording = PageRecording(bag, Detail())
         assert recording.head()["signals"] == [*bag.line.signal_names, *NAMES]
         assert recording.block(0)
         collector = Collector(bag, 0, {"signals": 1}, NAMES)
@@ -95,7 +95,10 @@ def test_patterns_choose_variables(tmp_path: Path) -> None:
     )
 
     def chosen(*record: str) -> list[str]:
-        return [name.removeprefix("plc/") for name in Recorded(StructuredText(tmp_path / "p.st", record=record)).names]
+        return [
+            name.removeprefix("plc/")
+            for name in RecordedVariables(StructuredText(tmp_path / "p.st", record=record)).names
+        ]
 
     assert chosen() == []
     assert chosen("p/b", "g") == ["g", "p/b"]
@@ -103,7 +106,7 @@ def test_patterns_choose_variables(tmp_path: Path) -> None:
     assert chosen("p/v[1?]") == ["p/v[10]", "p/v[11]", "p/v[12]"]
     assert len(chosen("*")) == 15
     two = together(StructuredText(tmp_path / "p.st", record="p/a"), StructuredText(PROGRAMS / "table.st", record="*"))
-    assert "plc/p/a" in Recorded(two).names and "plc/table/held" in Recorded(two).names
+    assert "plc/p/a" in RecordedVariables(two).names and "plc/table/held" in RecordedVariables(two).names
     with pytest.raises(ControlError, match=stating("'p/w'", "no variable", "pattern", "plc/g", "plc/p/a")):
         chosen("p/w")
     (tmp_path / "p.st").write_text("PROGRAM p VAR v : ARRAY [1..1001] OF INT; END_VAR ; END_PROGRAM")

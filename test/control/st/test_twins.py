@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from control.test_gap_on_a_line import DIAMETER, GAP, metered
 
-from conveyor_sim.control.cascade import Cascade, Zone
+from conveyor_sim.control.cascade import Cascade, CascadeZone
 from conveyor_sim.control.gap import GapControl
 from conveyor_sim.control.jam import JamAlarm, JamClearing
 from conveyor_sim.control.level import Count, table_level
@@ -24,7 +24,9 @@ PROGRAMS = Path(__file__).parent.parent.parent.parent / "examples" / "st"
 
 
 def cascade() -> Controller:
-    return Cascade(tuple(Zone(f"zone{n}", f"full{n}", 0.5) for n in range(1, 7)), takes="machines/packer/running")
+    return Cascade(
+        tuple(CascadeZone(f"zone{n}", f"full{n}", 0.5) for n in range(1, 7)), takes="machines/packer/running"
+    )
 
 
 def v_curve() -> Controller:

@@ -27,7 +27,7 @@ from conveyor_sim.columns.read_back import ReadBackColumns
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.line.commands.authority import MAY, PEOPLE
 from conveyor_sim.line.commands.inputs import WRITER_KINDS, CommandOutcome, Input
-from conveyor_sim.line.machines.packml import COMMAND_TEXTS, MODE_STATES, Command, State
+from conveyor_sim.line.machines.packml import COMMAND_TEXTS, MODE_STATES, Command, PackMLState
 from conveyor_sim.line.machines.stop_reason import BY_HAND, COMMANDED, WORKING
 from conveyor_sim.line.machines.time_account import CATEGORIES
 from conveyor_sim.scene import Scene, parse_scene
@@ -42,8 +42,14 @@ VALUES = (0.0, 1.0, 1.0, 2.0, 3.0, 8.0, 0.5, -1.0, 1e-9, 1e300, math.nan, math.i
 VALUED = ("set", "inject", "mode", "force")
 STOPS = (Command.STOP, Command.ABORT)
 STOPPED = {
-    Command.STOP: {State.STOPPING, State.STOPPED, State.ABORTING, State.ABORTED, State.CLEARING},
-    Command.ABORT: {State.ABORTING, State.ABORTED},
+    Command.STOP: {
+        PackMLState.STOPPING,
+        PackMLState.STOPPED,
+        PackMLState.ABORTING,
+        PackMLState.ABORTED,
+        PackMLState.CLEARING,
+    },
+    Command.ABORT: {PackMLState.ABORTING, PackMLState.ABORTED},
 }
 """Where a machine is after what a person has stopped it with."""
 
@@ -309,7 +315,7 @@ class Watch:
         for name, value in zip(one.names, one.values, strict=False):
             machine = name.removesuffix("/cntrl_cmd")
             changed = one.operation == "mode" and modes[name] != self._modes[name]
-            if changed and self._states.get(name, State.STOPPED) not in MODE_STATES:
+            if changed and self._states.get(name, PackMLState.STOPPED) not in MODE_STATES:
                 raise Violation("mode", f"{name}: changed in state {self._states[name]}")
             stopped = one.operation == "set" and machine != name and value in STOPS and one.writer_kind in PEOPLE
             if stopped and now[machine] not in STOPPED[Command(int(value))]:

@@ -33,7 +33,7 @@ class Board:
     def say(self, **conditions: bool) -> list[str]:
         """What happened then: kinds and ids."""
         before = len(self.events)
-        self.alarms.say(self.tick, conditions)
+        self.alarms.report(self.tick, conditions)
         return [f"{kind} {id}" for _, kind, id in self.events[before:]]
 
     def to(self, tick: int) -> list[str]:

@@ -15,7 +15,7 @@ from conveyor_sim.line.commands.inputs import (
     WATCHDOG,
     Input,
     arrival,
-    as_kept,
+    normalized,
     recorded_input,
 )
 from conveyor_sim.line.device import Device, ScanContext
@@ -240,7 +240,7 @@ def test_what_does_not_print_is_taken_as_a_replay_will_find_it() -> None:
         sim.give(one)
         sim.advance()
         (outcome,) = sim.take_outcomes()
-        assert outcome.reason == told and outcome.input == as_kept(one)
+        assert outcome.reason == told and outcome.input == normalized(one)
         outcomes.append(outcome)
     assert [outcome.accepted for outcome in outcomes] == [True, True, True, False]
     assert "\\n" in outcomes[3].reason and outcomes[3].reason.isprintable()

@@ -149,7 +149,7 @@ def test_what_waits_counts_when_a_refusal_is_asked_for() -> None:
         (act("controller", DISOWN), "the line has no owner, expected one"),
         (act("controller", OWN, writer=""), "no writer given, expected the name of a controller"),
         (act("controller", OWN, texts=("zones/*",)), "zones/*: fits no device that takes commands, expected such as"),
-        (act("controller", OWN, (ONE, 1.0)), "1 names, 1 values, 0 texts, expected texts alone, patterns of devices"),
+        (act("controller", OWN, (ONE, 1.0)), "1 names, 1 values, 0 texts given, expected texts alone"),
         (act("operator", INJECT, ("x", 1.0)), "inject: given by operator Jo, expected one of the kind test"),
     ],
 )  # fmt: skip

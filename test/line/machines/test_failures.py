@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter
 
-from conveyor_sim.line.devices.streams import random_stream
+from conveyor_sim.line.devices.setup import random_stream
 from conveyor_sim.line.machines.failures import LONGEST, Draws, FailureClock, PlannedTimes, weibull_scale
 from conveyor_sim.physics.state.snapshot import restore, snapshot
 from conveyor_sim.scene.failures import Failure, PlannedStop, Times, Weibull

@@ -6,7 +6,7 @@ import pytest
 from line.machines.machine_line import line, signals, sink, source
 
 from conveyor_sim.line.commands.inputs import MODE, SET, CommandOutcome, Input
-from conveyor_sim.line.machines.packml import MODE_STATES, Command, State
+from conveyor_sim.line.machines.packml import MODE_STATES, Command, PackMLState
 from conveyor_sim.simulation import Simulation
 
 FILLER = "machines/filler"
@@ -48,9 +48,9 @@ def reason(sim: Simulation) -> str:
 
 
 @pytest.mark.parametrize("kind", ["operator", "engineer"])
-@pytest.mark.parametrize(("word", "then"), [(Command.STOP, State.STOPPED), (Command.ABORT, State.ABORTED)])
+@pytest.mark.parametrize(("word", "then"), [(Command.STOP, PackMLState.STOPPED), (Command.ABORT, PackMLState.ABORTED)])
 @pytest.mark.parametrize("number", [AUTOMATIC, MAINTENANCE, MANUAL])
-def test_a_person_stops_a_machine_in_whatever_mode(kind: str, word: Command, then: State, number: float) -> None:
+def test_a_person_stops_a_machine_in_whatever_mode(kind: str, word: Command, then: PackMLState, number: float) -> None:
     sim = filling()
     if number != AUTOMATIC:
         command(sim, "test", Command.STOP)
@@ -81,9 +81,9 @@ def test_the_stop_reason_tells_a_person_s_command_from_a_controller_s() -> None:
             assert reason(sim) == f"command {word.name.capitalize()}{ending}", kind
             assert all(command(sim, kind, *back))
         assert act(sim, kind, SET, (RUN, 0.0)).accepted
-        assert (state(sim), reason(sim)) == (State.STOPPED, f"command run{ending}")
+        assert (state(sim), reason(sim)) == (PackMLState.STOPPED, f"command run{ending}")
         assert act(sim, kind, SET, (RUN, 1.0)).accepted
-        assert (state(sim), reason(sim)) == (State.EXECUTE, f"command run{ending}")
+        assert (state(sim), reason(sim)) == (PackMLState.EXECUTE, f"command run{ending}")
 
 
 @pytest.mark.parametrize("word", [word for word in Command if word not in (Command.STOP, Command.ABORT)])
@@ -92,7 +92,7 @@ def test_nothing_else_is_taken_of_an_operator_in_automatic(word: Command) -> Non
     outcome = act(sim, "operator", SET, (COMMAND, float(word)))
     assert outcome.without_control and "is in Automatic, expected Manual" in outcome.reason
     both = act(sim, "operator", SET, (COMMAND, float(Command.STOP)), (f"{FILLER}/rate", 1.0))
-    assert both.without_control and state(sim) == State.EXECUTE, "a set is taken as a whole or not at all"
+    assert both.without_control and state(sim) == PackMLState.EXECUTE, "a set is taken as a whole or not at all"
 
 
 @pytest.mark.parametrize("held", [Command.START, Command.RESET, Command.STOP])
@@ -105,11 +105,11 @@ def test_a_controller_that_holds_its_last_command_does_not_undo_it(held: Command
         for value in (0.0, 1.0):
             act(sim, "controller", SET, (RUN, value))
     for _ in range(2):
-        assert state(sim) == State.EXECUTE
+        assert state(sim) == PackMLState.EXECUTE
         assert command(sim, "operator", Command.STOP) == [True]
         for _ in range(3):
             assert act(sim, "controller", SET, (COMMAND, float(held)), (RUN, 1.0)).accepted
-            assert state(sim) == State.STOPPED
+            assert state(sim) == PackMLState.STOPPED
         for value in (0.0, 1.0):  # it may start it again: to keep it from that, the machine is taken to Manual
             act(sim, "controller", SET, (RUN, value))
 
@@ -124,9 +124,9 @@ def test_a_machine_changes_hands_only_where_it_works_on_nothing() -> None:
         assert state(sim) in MODE_STATES
         assert mode(sim, "operator", MANUAL) == mode(sim, "operator", AUTOMATIC) == ""
     command(sim, "test", Command.CLEAR, Command.RESET, Command.START, Command.HOLD)
-    assert state(sim) == State.HELD and "is in Held" in mode(sim, "operator", MANUAL)
+    assert state(sim) == PackMLState.HELD and "is in Held" in mode(sim, "operator", MANUAL)
     command(sim, "test", Command.UNHOLD, Command.SUSPEND)
-    assert state(sim) == State.SUSPENDED and "is in Suspended" in mode(sim, "operator", MANUAL)
+    assert state(sim) == PackMLState.SUSPENDED and "is in Suspended" in mode(sim, "operator", MANUAL)
 
 
 def test_an_operator_takes_a_machine_and_gives_it_back() -> None:
@@ -136,12 +136,12 @@ def test_an_operator_takes_a_machine_and_gives_it_back() -> None:
     assert mode(sim, "operator", MANUAL) == ""
     assert not act(sim, "controller", SET, (RUN, 1.0)).accepted
     assert command(sim, "operator", Command.RESET, Command.START) == [True, True]
-    assert state(sim) == State.EXECUTE
+    assert state(sim) == PackMLState.EXECUTE
     assert act(sim, "operator", SET, (RUN, 0.0)).accepted
     assert mode(sim, "operator", AUTOMATIC) == ""
-    assert state(sim) == State.STOPPED
+    assert state(sim) == PackMLState.STOPPED
     assert act(sim, "controller", SET, (RUN, 1.0)).accepted
-    assert state(sim) == State.EXECUTE
+    assert state(sim) == PackMLState.EXECUTE
 
 
 def test_a_stop_by_hand_is_in_a_checkpoint(tmp_path: Path) -> None:
@@ -152,6 +152,6 @@ def test_a_stop_by_hand_is_in_a_checkpoint(tmp_path: Path) -> None:
     again = Simulation.load(tmp_path / "kept")
     for one in (sim, again):
         one.advance(3)
-        assert state(one) == State.STOPPED
+        assert state(one) == PackMLState.STOPPED
     assert again.signals().tolist() == sim.signals().tolist()
     assert [outcome.accepted for outcome in again.take_outcomes()] == [True]

@@ -136,7 +136,7 @@ def test_the_fault_stop_holds_it_until_it_is_gone() -> None:
     now = signals(sim)
     assert (now["machines/packer/fault"], now["machines/packer/failures"], now["machines/packer/running"]) == (1, 1, 0)
     assert now["machines/packer/cur_rate"] == 0.0
-    says = "Unhold given while it is not repaired, expected machines/packer/fault to go first"
+    says = "Unhold given while it is not repaired, expected machines/packer/fault to be off"
     assert command(sim, "Unhold") == f"machines/packer/cntrl_cmd: {says}"
     sim.inject("machines/packer/stop", 0.0)
     sim.advance()

@@ -8,7 +8,7 @@ from conveyor_sim.line.machines.packml import (
     STATE_TEXTS,
     TO,
     Command,
-    State,
+    PackMLState,
     StateMachine,
     objection,
 )
@@ -51,9 +51,9 @@ def test_the_numbers_are_those_of_packml() -> None:
     assert dict(COMMAND_TEXTS) == numbered(COMMANDS)
 
 
-@pytest.mark.parametrize("state", State, ids=lambda state: STATE_TEXTS[state])
+@pytest.mark.parametrize("state", PackMLState, ids=lambda state: STATE_TEXTS[state])
 @pytest.mark.parametrize("command", Command, ids=lambda command: COMMAND_TEXTS[command])
-def test_every_command_in_every_state(command: Command, state: State) -> None:
+def test_every_command_in_every_state(command: Command, state: PackMLState) -> None:
     """Each acting state lasts three ticks here, so that it can be seen."""
     machine = StateMachine(state, dict.fromkeys(COMPLETES, 3))
     if str(int(state)) in TAKEN[COMMAND_TEXTS[command]].split():
@@ -72,7 +72,7 @@ def test_every_command_in_every_state(command: Command, state: State) -> None:
 
 @pytest.mark.parametrize(("acting", "after"), WHEN_COMPLETE.items(), ids=lambda state: STATE_TEXTS[state])
 def test_an_acting_state_lasts_and_is_complete(acting: int, after: int) -> None:
-    machine = StateMachine(State(acting), {State(acting): 3})
+    machine = StateMachine(PackMLState(acting), {PackMLState(acting): 3})
     assert machine.acts
     for _ in range(2):
         machine.advance()
@@ -85,30 +85,32 @@ def test_an_acting_state_lasts_and_is_complete(acting: int, after: int) -> None:
 
 @pytest.mark.parametrize(("acting", "after"), WHEN_COMPLETE.items(), ids=lambda state: STATE_TEXTS[state])
 def test_one_that_takes_no_time_is_passed_at_once(acting: int, after: int) -> None:
-    assert StateMachine(State(acting), {}).state == after
+    assert StateMachine(PackMLState(acting), {}).state == after
 
 
 @pytest.mark.parametrize("ticks", [0, 2])
 def test_a_conditional_state_waits_for_its_condition_and_its_time(ticks: int) -> None:
-    machine = StateMachine(State.IDLE, {State.STARTING: ticks}, [State.STARTING])
+    machine = StateMachine(PackMLState.IDLE, {PackMLState.STARTING: ticks}, [PackMLState.STARTING])
     machine.take(Command.START)
-    assert machine.state == State.STARTING
+    assert machine.state == PackMLState.STARTING
     machine.advance(True)
-    assert machine.state == (State.EXECUTE if ticks <= 1 else State.STARTING)
-    machine = StateMachine(State.STARTING, {State.STARTING: ticks}, [State.STARTING])
+    assert machine.state == (PackMLState.EXECUTE if ticks <= 1 else PackMLState.STARTING)
+    machine = StateMachine(PackMLState.STARTING, {PackMLState.STARTING: ticks}, [PackMLState.STARTING])
     for _ in range(5):
         machine.advance(False)
-        assert machine.state == State.STARTING
+        assert machine.state == PackMLState.STARTING
     machine.advance(True)
-    assert machine.state == State.EXECUTE
+    assert machine.state == PackMLState.EXECUTE
 
 
 def test_what_is_refused_says_where_it_is_taken() -> None:
-    assert objection(Command.START, State.STOPPED) == "Start given in Stopped, expected in Idle"
-    assert objection(Command.RESET, State.EXECUTE) == "Reset given in Execute, expected in Stopped or Complete"
-    assert objection(Command.ABORT, State.ABORTED) == "Abort given in Aborted, expected outside Aborting or Aborted"
+    assert objection(Command.START, PackMLState.STOPPED) == "Start given in Stopped, expected in Idle"
+    assert objection(Command.RESET, PackMLState.EXECUTE) == "Reset given in Execute, expected in Stopped or Complete"
+    assert (
+        objection(Command.ABORT, PackMLState.ABORTED) == "Abort given in Aborted, expected outside Aborting or Aborted"
+    )
 
 
 def test_every_command_leads_to_an_acting_state() -> None:
     assert set(TO.values()) == set(COMPLETES)
-    assert len(State) == 17
+    assert len(PackMLState) == 17

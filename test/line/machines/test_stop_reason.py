@@ -2,7 +2,7 @@
 
 import pytest
 
-from conveyor_sim.line.machines.packml import State
+from conveyor_sim.line.machines.packml import PackMLState
 from conveyor_sim.line.machines.stop_reason import (
     BLOCKED,
     FAULT,
@@ -37,8 +37,8 @@ WHERE = [
 @pytest.mark.parametrize(("states", "reason", "cause", "failed", "category"), WHERE)
 def test_where_the_time_goes(states: str, reason: int, cause: int, failed: bool, category: str) -> None:
     for name in states.split():
-        assert category_of(State[name], reason, cause, failed) == category
+        assert category_of(PackMLState[name], reason, cause, failed) == category
 
 
 def test_every_state_is_in_the_table() -> None:
-    assert {name for states, *_ in WHERE for name in states.split()} == {state.name for state in State}
+    assert {name for states, *_ in WHERE for name in states.split()} == {state.name for state in PackMLState}

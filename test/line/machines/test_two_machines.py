@@ -16,7 +16,7 @@ import pytest
 from scipy.stats import t as student
 from study_page import load_study
 
-from conveyor_sim.line.devices.streams import random_stream
+from conveyor_sim.line.devices.setup import random_stream
 from conveyor_sim.line.machines.failures import Draws
 from conveyor_sim.scene import Scene
 

@@ -8,7 +8,7 @@ from line.machines.machine_line import END, line, sink, source, station
 
 from conveyor_sim.line.commands.authority import AUTOMATIC, MAINTENANCE, MANUAL
 from conveyor_sim.line.commands.inputs import MODE, Input
-from conveyor_sim.line.machines.packml import Command, State
+from conveyor_sim.line.machines.packml import Command, PackMLState
 from conveyor_sim.line.machines.stop_reason import (
     BLOCKED,
     COMMANDED,
@@ -72,30 +72,33 @@ def test_why_it_stands() -> None:
 @pytest.mark.parametrize(
     ("state", "reason", "name"),
     [
-        (State.SUSPENDED, STARVED, "Lack"),
-        (State.SUSPENDING, BLOCKED, "Tailback"),
-        (State.UNSUSPENDING, COMMANDED[Command.SUSPEND], "Prepared"),
-        (State.HELD, FIRST_FAILURE, "Equipment failure"),
-        (State.HOLDING, FAULT, "Equipment failure"),
-        (State.HELD, COMMANDED[Command.HOLD], "External failure"),
-        (State.ABORTED, COMMANDED[Command.ABORT], "Emergency stop"),
-        (State.EXECUTE, STARVED, "Operating"),
+        (PackMLState.SUSPENDED, STARVED, "Lack"),
+        (PackMLState.SUSPENDING, BLOCKED, "Tailback"),
+        (PackMLState.UNSUSPENDING, COMMANDED[Command.SUSPEND], "Prepared"),
+        (PackMLState.HELD, FIRST_FAILURE, "Equipment failure"),
+        (PackMLState.HOLDING, FAULT, "Equipment failure"),
+        (PackMLState.HELD, COMMANDED[Command.HOLD], "External failure"),
+        (PackMLState.ABORTED, COMMANDED[Command.ABORT], "Emergency stop"),
+        (PackMLState.EXECUTE, STARVED, "Operating"),
     ],
 )
-def test_states_below_those_of_packml(state: State, reason: int, name: str) -> None:
+def test_states_below_those_of_packml(state: PackMLState, reason: int, name: str) -> None:
     assert STATE_TEXTS[state_of(state, reason)] == name
 
 
 def test_every_state_has_a_value_and_they_are_bits() -> None:
-    found = {state_of(state, reason) for state in State for reason in (NONE, STARVED, BLOCKED, FAULT, FIRST_PLANNED)}
+    found = {
+        state_of(state, reason) for state in PackMLState for reason in (NONE, STARVED, BLOCKED, FAULT, FIRST_PLANNED)
+    }
     assert found == set(STATE_TEXTS) and all(value.bit_count() == 1 for value in found)
 
 
 @pytest.mark.parametrize("mode", [AUTOMATIC, MANUAL])
 @pytest.mark.parametrize(
-    ("state", "value"), [(State.STARTING, 2), (State.COMPLETING, 4), (State.COMPLETE, 0), (State.HELD, 1)]
+    ("state", "value"),
+    [(PackMLState.STARTING, 2), (PackMLState.COMPLETING, 4), (PackMLState.COMPLETE, 0), (PackMLState.HELD, 1)],
 )
-def test_programs(mode: int, state: State, value: int) -> None:
+def test_programs(mode: int, state: PackMLState, value: int) -> None:
     assert program(mode, state, NONE) == value
     assert program(MAINTENANCE, state, NONE) == 32
 

@@ -6,7 +6,7 @@ import pytest
 from scenes import NO_FLOOR, NO_OUTPUTS, arc, base, belt, bottle, contact, kind, line, scene, segment
 
 from conveyor_sim.errors import SceneError
-from conveyor_sim.physics.effects import EFFECTS, choose_effects
+from conveyor_sim.physics.effects.choice import EFFECTS, choose_effects
 from conveyor_sim.physics.model import build_model
 from conveyor_sim.physics.plant import Plant
 from conveyor_sim.scene import parse_overrides, parse_scene

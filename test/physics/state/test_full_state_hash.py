@@ -89,8 +89,8 @@ def test_what_is_left_out_does_not_change_the_future(saved: Path) -> None:
             spoilt.add(name)
     assert len(spoilt) > 5
     other.take_events()
-    other.integration._guard.deepest = 0.9
-    other.integration.shortened_ticks = 7
+    other.integration._memory.deepest = 0.9
+    other.integration._memory.shortened_ticks = 7
     for _ in range(AHEAD):
         assert other.full_state_hash() == sim.full_state_hash()
         sim.advance()

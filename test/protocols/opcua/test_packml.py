@@ -9,7 +9,7 @@ import pytest
 from asyncua import ua
 
 from conveyor_sim.line.alarms.alarm import AlarmState
-from conveyor_sim.line.machines.packml import Command, State
+from conveyor_sim.line.machines.packml import Command, PackMLState
 from conveyor_sim.line.tag import number
 from conveyor_sim.protocols.opcua.packml import NAMESPACE, NODESET, _a_second
 from test.protocols.opcua.conftest import refused
@@ -83,11 +83,11 @@ def test_commands_are_methods(line: Line) -> None:
     client = line.client("controller")
     line.advance(3)
     for method, state, expected in (
-        ("Stop", State.STOPPED, ["Cleared", "Stopped", None]),
-        ("Reset", State.IDLE, ["Cleared", "Running", "Idle"]),
-        ("Start", State.EXECUTE, ["Cleared", "Running", "Execute"]),
-        ("Abort", State.ABORTED, ["Aborted", None, None]),
-        ("Clear", State.STOPPED, ["Cleared", "Stopped", None]),
+        ("Stop", PackMLState.STOPPED, ["Cleared", "Stopped", None]),
+        ("Reset", PackMLState.IDLE, ["Cleared", "Running", "Idle"]),
+        ("Start", PackMLState.EXECUTE, ["Cleared", "Running", "Execute"]),
+        ("Abort", PackMLState.ABORTED, ["Aborted", None, None]),
+        ("Clear", PackMLState.STOPPED, ["Cleared", "Stopped", None]),
     ):
         call(client, method)
         for _ in range(5):

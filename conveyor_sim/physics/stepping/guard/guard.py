@@ -1,7 +1,11 @@
-"""The guard of one simulation: what it looks at, when, and from where on it is too much."""
+"""The guard of one simulation: what it checks, when, and with which limits.
+
+It reads `engine/observers/guard_probe.py`. `tick.py` repeats a tick that fails in shorter steps, or stops the run.
+"""
 
 import math
-from typing import Any
+from dataclasses import astuple, dataclass, field
+from typing import Any, Literal
 
 from conveyor_sim.columns.events import GuardEvent
 from conveyor_sim.engine.arrays.bodies import Bottles, Spin
@@ -14,6 +18,7 @@ from conveyor_sim.physics.state import State
 from conveyor_sim.physics.stepping.guard.squeeze import Squeeze, squeeze_of
 from conveyor_sim.physics.stepping.guard.violation import Violation, Words
 from conveyor_sim.physics.stepping.guard.world_snapshot import WorldSnapshot
+from conveyor_sim.scene.types import Unchecked
 
 DEEPEST = 0.75
 """Overlap over the (smaller) radius: at 1 an axis is on a rail, and the normal turns round beyond."""
@@ -28,12 +33,30 @@ CLOSELY = 128
 """Steps after which overlaps are looked at again at the latest; that costs about half a step."""
 
 
-class Guard:
-    """Looks at a State before and after every tick.
+@dataclass
+class GuardMemory:
+    """State of the guard between ticks, as checkpoints hold it."""
 
-    has_put_in: bottles were put somewhere from outside, and what is deep by that may part. deepest: the largest overlap
-    over a radius so far.
-    """
+    events: list[tuple[int, Literal["shorter_steps", "chatter", "soft", "stopped"], int, Unchecked, Unchecked, str]] = (
+        field(default_factory=list)
+    )
+    """Events that were not taken yet."""
+    chatters: bool = False
+    """True once chatter was reported."""
+    shortened_ticks: int = 0
+    """Ticks that were repeated in shorter steps."""
+    deepest: float = 0.0
+    """Largest overlap over a radius so far."""
+    put_in: bool = False
+    """True after bottles were placed from outside: deep overlaps may come from that, and may part."""
+
+    def report(self, event: GuardEvent) -> None:
+        """Append an event."""
+        self.events.append(astuple(event))
+
+
+class Guard:
+    """Checks of a State before and after every tick."""
 
     def __init__(self, state: State, found: RailContacts) -> None:
         """found: scratch of the thread that calls."""
@@ -51,8 +74,7 @@ class Guard:
         self._work = 0.0
         self._look: Any = self._compile
         self._soft: Violation | None = None
-        self.has_put_in = False
-        self.deepest = 0.0
+        self.memory = GuardMemory()
 
     def begin(self, tick: int, surface_speed: float, rail_speed: float) -> Violation | None:
         """Keep the state at the beginning of a tick; report a bottle that is not finite there.
@@ -85,11 +107,11 @@ class Guard:
         if kinetic > GROWTH * self._kinetic + self._work and (energies := self._grown()):
             return self._words_before(fastest).energy(fastest, *energies, self._work)
         depth = max(deep)
-        if self.has_put_in and depth > DEEPEST and self._was_deep():
+        if self.memory.put_in and depth > DEEPEST and self._was_deep():
             return None
         # Until overlaps are seen that are not too deep.
-        self.has_put_in = self.has_put_in and depth == 0.0
-        if depth > SOFT >= self.deepest or depth > DEEPEST:
+        self.memory.put_in = self.memory.put_in and depth == 0.0
+        if depth > SOFT >= self.memory.deepest or depth > DEEPEST:
             worst = deep.index(depth)
             bottle, other = int(world.probe.bottle[worst]), int(world.probe.other[worst])
             words = self._words_before(bottle) if depth > DEEPEST else Words(model, world, self._squeeze(bottle))
@@ -97,7 +119,7 @@ class Guard:
             if depth > DEEPEST:
                 return found
             self._soft = found
-        self.deepest = max(self.deepest, depth)
+        self.memory.deepest = max(self.memory.deepest, depth)
         return None
 
     def forget(self) -> None:

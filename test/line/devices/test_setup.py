@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from conveyor_sim.line.devices.streams import random_stream
+from conveyor_sim.line.devices.setup import random_stream
 
 KEYS = [
     (1, "machines/filler", "jam/between"),

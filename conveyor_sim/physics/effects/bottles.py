@@ -1,0 +1,86 @@
+"""Effects on bottles as a whole: they turn, ride, enter and leave."""
+
+from collections.abc import Collection
+
+from conveyor_sim.engine.integrators import RIDES
+from conveyor_sim.physics.effects.base import RING_BASE
+from conveyor_sim.physics.effects.damping import TURNING
+from conveyor_sim.physics.effects.declaration import Cause, Effect
+from conveyor_sim.physics.effects.friction import CONTACT_FRICTION
+from conveyor_sim.physics.laws.coefficients import base_friction
+from conveyor_sim.physics.plant import Plant
+from conveyor_sim.scene.schema import Single
+
+
+def _rotation(plant: Plant, on: Collection[str]) -> Cause | None:
+    for turning in (CONTACT_FRICTION, *TURNING, RING_BASE):
+        if turning.name in on and (cause := turning.called_for(plant, on)) is not None:
+            return cause
+    for index, bottle in enumerate(plant.scene.bottles):
+        if isinstance(bottle, Single) and bottle.spin != 0.0:
+            return Cause(("bottles", index, "spin"), f"{bottle.spin:g} rad/s")
+        if isinstance(bottle, Single) and bottle.angle != 0.0:
+            return Cause(("bottles", index, "angle"), f"{bottle.angle:g} rad")
+    return None
+
+
+def _riding(plant: Plant, on: Collection[str]) -> Cause | None:
+    if _prevented(plant, on) or "belts" not in on:
+        return None
+    table = base_friction(plant.scene)
+    for row, (name, belt) in enumerate(plant.scene.belts.items()):
+        if belt.kind == "straight" and table[row].any():
+            return Cause(("belts", name))
+    return None
+
+
+def _prevented(plant: Plant, on: Collection[str]) -> str:
+    """Why no bottle of a plant can ride, "" if one may."""
+    if plant.scene.accuracy.integrator not in RIDES:
+        return f"with {plant.scene.accuracy.integrator} a step leaves nobody out"
+    return "springs under the bottles pull anew at every step" if "static_friction" in on else ""
+
+
+def _infeed(plant: Plant, on: Collection[str]) -> Cause | None:
+    return next((Cause(path) for path, _ in plant.scene.givers()), None)
+
+
+def _outfeed(plant: Plant, on: Collection[str]) -> Cause | None:
+    return next((Cause(path) for path, _ in plant.scene.exits()), None)
+
+
+ROTATION = Effect(
+    name="rotation",
+    law="J alpha = M",
+    source="(1)",
+    called_for=_rotation,
+    absent="nothing turns a bottle: no contact friction, no paper damping, no ring base, no spin, no angle",
+    needs="angle, angular velocity, inertia and moment of each bottle",
+    can_force_on=True,
+)
+RIDING = Effect(
+    name="riding",
+    law="a bottle on a straight belt that is near nothing, and whose velocity a step leaves as it is to the bit, takes "
+    "its next steps without forces: x += dt v, the same bits; until lists are made anew or the tick ends",
+    source="added",
+    called_for=_riding,
+    absent="no straight belt with friction, or springs under the bottles, or rk4, dormand_prince or linearly_implicit",
+    absent_here=_prevented,
+    needs="velocities of a step before; runs of bottles that are stepped",
+)
+INFEED = Effect(
+    name="infeed",
+    law="bottles enter one behind the other, by gap or rate; stations give theirs back",
+    source="added",
+    called_for=_infeed,
+    absent="no infeed, source, spill or station",
+    needs="counters and draws of each entry; room for more bottles as they come",
+)
+OUTFEED = Effect(
+    name="outfeed",
+    law="bottles whose axis is in a region are removed: at once, at a rate, or when a reject is fired",
+    source="added",
+    called_for=_outfeed,
+    absent="no outfeed, sink, reject or station",
+    needs="corners and counters of each",
+)

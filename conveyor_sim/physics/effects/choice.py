@@ -1,0 +1,131 @@
+"""All effects in order, the choice of those that a scene needs, and their joint bounds and predictions."""
+
+from collections.abc import Mapping, Sequence
+
+from conveyor_sim.errors import SceneError
+from conveyor_sim.physics.effects.base import BASE_FRICTION, BELTS, CURVED_BELTS, RING_BASE
+from conveyor_sim.physics.effects.bottles import INFEED, OUTFEED, RIDING, ROTATION
+from conveyor_sim.physics.effects.contacts import BOTTLE_CONTACT, HERTZ, LINEAR, TABLE
+from conveyor_sim.physics.effects.damping import DAMPING_EFFECTS
+from conveyor_sim.physics.effects.declaration import Effect, EffectChoice
+from conveyor_sim.physics.effects.friction import ATAN_FRICTION, CONTACT_FRICTION, IMPLICIT_FRICTION, TANGENTIAL_SPRING
+from conveyor_sim.physics.effects.geometry import ARC_RAILS, MOVING_RAILS, SEGMENT_RAILS, UNEQUAL_RADII
+from conveyor_sim.physics.effects.impacts import impact_bounds, impacts
+from conveyor_sim.physics.effects.observers import (
+    CONTACT_ARRAYS,
+    CRUSHING,
+    ENERGY_LEDGER,
+    IMPACTS,
+    PEAKS,
+    SCUFFING,
+    TIPPING,
+)
+from conveyor_sim.physics.effects.static_friction import STATIC_FRICTION
+from conveyor_sim.physics.effects.terms import Terms
+from conveyor_sim.physics.plant import Plant
+from conveyor_sim.physics.timestep.bounds import Bound
+from conveyor_sim.physics.timestep.prediction import Impact, Prediction, predict
+from conveyor_sim.scene.effect_names import EffectName
+from conveyor_sim.scene.places import Places
+from conveyor_sim.scene.schema import Scene
+
+EFFECTS: tuple[Effect, ...] = (
+    BOTTLE_CONTACT,
+    SEGMENT_RAILS,
+    ARC_RAILS,
+    MOVING_RAILS,
+    UNEQUAL_RADII,
+    LINEAR,
+    HERTZ,
+    TABLE,
+    *DAMPING_EFFECTS,
+    CONTACT_FRICTION,
+    BASE_FRICTION,
+    ATAN_FRICTION,
+    IMPLICIT_FRICTION,
+    TANGENTIAL_SPRING,
+    STATIC_FRICTION,
+    RING_BASE,
+    BELTS,
+    CURVED_BELTS,
+    ROTATION,
+    INFEED,
+    OUTFEED,
+    PEAKS,
+    CONTACT_ARRAYS,
+    ENERGY_LEDGER,
+    SCUFFING,
+    CRUSHING,
+    IMPACTS,
+    TIPPING,
+    RIDING,
+)
+"""In the order in which they are decided: what is on may call for those after it."""
+
+
+def choose_effects(plant: Plant) -> tuple[EffectChoice, ...]:
+    """Decide every effect for a plant, in the order of EFFECTS. SceneError if one can't be forced as the scene says."""
+    choices: list[EffectChoice] = []
+    refused: dict[EffectName, str] = {}
+    on: set[str] = set()
+    for effect in EFFECTS:
+        choice = _choose(effect, plant, on)
+        if choice is None:
+            refused[effect.name] = _absent(effect, plant, on)
+            continue
+        choices.append(choice)
+        if choice.on:
+            on.add(effect.name)
+    if refused:
+        raise SceneError("\n".join(_refusals(plant.scene, refused)))
+    return tuple(choices)
+
+
+def impacts_of(terms: Terms) -> tuple[Impact, ...]:
+    """The impacts that are expected, with what the effects that are on add to their error."""
+    return impacts(terms, EFFECTS)
+
+
+def bounds_of(terms: Terms, expected: Sequence[Impact]) -> tuple[Bound, ...]:
+    """The bounds on dt of all effects that are on and of the impacts, each the tightest over types and materials."""
+    found = [effect.bounds(terms) for effect in EFFECTS if effect.bounds is not None and effect.name in terms.on]
+    return (*impact_bounds(expected, terms.tolerance), *(bound for bounds in found for bound in bounds))
+
+
+def prediction_of(terms: Terms, expected: Sequence[Impact], dt: float) -> Prediction:
+    """The errors to expect at a time step in s."""
+    on = [effect for effect in EFFECTS if effect.name in terms.on]
+    sides = [term for effect in on if effect.side is not None for term in effect.side(terms, dt)]
+    resting = [term for effect in on if effect.resting is not None for term in effect.resting(terms, dt)]
+    return predict(expected, resting, sides, (terms.load.force, terms.load.reason), dt)
+
+
+def _choose(effect: Effect, plant: Plant, on: set[str]) -> EffectChoice | None:
+    """The choice; None if the scene forces what can't be."""
+    cause = effect.called_for(plant, on)
+    forced = plant.scene.effects.get(effect.name)
+    if forced is None:
+        why = _absent(effect, plant, on) if cause is None else str(cause)
+        return EffectChoice(effect.name, cause is not None, why, None if cause is None else cause.path)
+    possible = effect.can_force_off if forced == "off" else effect.can_force_on
+    if not possible and (cause is not None) != (forced == "on"):
+        return None
+    why = f"forced {forced} by effects.{effect.name}" + (f"; {cause} calls for it" if cause is not None else "")
+    return EffectChoice(effect.name, forced == "on", why, ("effects", effect.name), forced=True)
+
+
+def _absent(effect: Effect, plant: Plant, on: set[str]) -> str:
+    here = "" if effect.absent_here is None else effect.absent_here(plant, on)
+    return here or effect.absent
+
+
+def _refusals(scene: Scene, absent: Mapping[EffectName, str]) -> list[str]:
+    """A line for each effect that can't be forced, in the order of the scene's lines. absent: what it lacks."""
+    places = Places(scene)
+    lines = []
+    for name in sorted(absent, key=lambda name: places.line_of(("effects", name)) or 0):
+        reason = f'"on" given, expected "off": {absent[name]}'
+        if scene.effects[name] == "off":
+            reason = f'"off" given, expected "on": what calls for {name} makes no sense without it'
+        lines.append(f"{places.of(('effects', name))}: effects.{name}: {reason}")
+    return lines
