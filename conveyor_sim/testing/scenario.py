@@ -93,7 +93,7 @@ class Scenario(AbstractContextManager["Scenario"]):
         self._noting = [self._outputs.show_variables, *([self._inputs.note_variables] if self._inputs else [])]
         self._loop = ScanLoop(self.simulation)
         # Alarms of a controller before the checkpoint: the next controller clears those that it does not raise.
-        self._loop.alarms.of({f"{ALARMS}{alarm.id}": 1.0 for alarm in self.simulation.line.alarms if alarm.is_said})
+        self._loop.alarms.of({f"{ALARMS}{alarm.id}": 1.0 for alarm in self.simulation.line.alarms if alarm.is_reported})
         self._read_by_controller: dict[str, None] = {}
         self._alarms: dict[str, float] = {}
         self._standing: list[Assertion] = []
