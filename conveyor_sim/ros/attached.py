@@ -9,14 +9,12 @@ from __future__ import annotations
 
 import os
 import tempfile
-import threading
 import time
 import uuid
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from pathlib import Path
-from queue import Empty, SimpleQueue
 from typing import TypeVar
 
 import rclpy
@@ -37,6 +35,7 @@ from conveyor_sim.ros.lockstep_service import LockstepService
 from conveyor_sim.ros.publishers import check_type, ros_qos
 from conveyor_sim.ros.spinner import Spinner
 from conveyor_sim.run.alarm_changes import AlarmChanges
+from conveyor_sim.run.calls import CallQueue
 from conveyor_sim.run.lockstep import LOCKSTEP, Lockstep, LockstepAnswer, LockstepRequest, Refused
 from conveyor_sim.run.scan_loop import AttachedController
 from conveyor_sim.scene import Scene, parse_overrides, parse_scene
@@ -113,7 +112,7 @@ class AttachedNode(AttachedController):
             return {}
         end = time.monotonic() + self._patience
         while turns.request is None:
-            turns.take_call(LOOK)
+            turns.take_calls(LOOK)
             if turns.request is None:
                 self._require_going_on(inputs, time.monotonic() > end)
         request = turns.request
@@ -179,9 +178,7 @@ class _Turns:
         self._lockstep = Lockstep(LAST_TICK)
         self._answer: Future[LockstepAnswer] = Future()
         self._released = False
-        self._ended = False
-        self._calls: SimpleQueue[Callable[[], None]] = SimpleQueue()
-        self._lock = threading.Lock()
+        self._calls = CallQueue(ENDED)
         self.request: LockstepRequest | None = None
         """Request whose target is still to be reached."""
         self.refused = ""
@@ -198,20 +195,7 @@ class _Turns:
 
     def call(self, function: Callable[[], T]) -> Future[T]:
         """Queue a function for the scanning thread, which calls it while it waits. Any thread may call this."""
-        future: Future[T] = Future()
-
-        def run() -> None:
-            try:
-                future.set_result(function())
-            except Exception as error:
-                future.set_exception(error)
-
-        with self._lock:
-            if self._ended:
-                future.set_exception(Refused(ENDED))
-            else:
-                self._calls.put(run)
-        return future
+        return self._calls.request(function)
 
     def advance_lockstep(self, request: LockstepRequest) -> Future[LockstepAnswer]:
         """Accept a request, or a repetition of the last one. Raise Refused."""
@@ -219,8 +203,10 @@ class _Turns:
         if repeated is not None:
             return repeated
         try:
-            if self._ended or self._released:
-                raise Refused(ENDED if self._ended else "the line was released; the test goes on without a controller")
+            if self._calls.ended:
+                raise Refused(ENDED)
+            if self._released:
+                raise Refused("the line was released; the test goes on without a controller")
             self._answer = self._lockstep.accept(request, self.run_id, self._simulation.tick, LAST_TICK)
         except Refused as error:
             self.refused = str(error)
@@ -234,10 +220,10 @@ class _Turns:
 
     # For the scanning thread
 
-    def take_call(self, patience: float) -> None:
-        """Make one call, if one comes within `patience` (s of wall time)."""
-        with suppress(Empty):
-            self._calls.get(timeout=patience)()
+    def take_calls(self, patience: float) -> None:
+        """Make the calls that come within `patience` (s of wall time)."""
+        self._calls.wait(patience)
+        self._calls.take()
 
     def reached(self) -> bool:
         """Return True if another request is due. The last one is answered then."""
@@ -250,10 +236,8 @@ class _Turns:
 
     def end(self) -> None:
         """Refuse the waiting request and all later ones."""
-        with self._lock:
-            self._ended = True
-        while not self._calls.empty():
-            self.take_call(0.0)
+        self._calls.end()
+        self._calls.drain()
         if self.request is not None:
             self.request = None
             self._answer.set_exception(Refused(ENDED))

@@ -18,6 +18,7 @@ from rclpy.node import Node
 from conveyor_sim.errors import CheckpointError, ConveyorError
 from conveyor_sim.ros.clock import to_time
 from conveyor_sim.ros.services import settled
+from conveyor_sim.run.calls import settle
 from conveyor_sim.run.lockstep import Refused
 from conveyor_sim.run.stepper import Stepper
 from conveyor_sim.simulation import Simulation
@@ -112,12 +113,5 @@ class CheckpointServices:
 def _in_background(function: Callable[[], Simulation]) -> Future[Simulation]:
     """Call a function in a daemon thread, which does not keep the process from ending."""
     future: Future[Simulation] = Future()
-
-    def run() -> None:
-        try:
-            future.set_result(function())
-        except Exception as error:
-            future.set_exception(error)
-
-    threading.Thread(target=run, name="checkpoint", daemon=True).start()
+    threading.Thread(target=settle, args=(future, function), name="checkpoint", daemon=True).start()
     return future

@@ -22,11 +22,10 @@ from conveyor_sim.ros.clock import ClockPublisher
 from conveyor_sim.ros.commands import subscribe_commands
 from conveyor_sim.ros.context import new_node, one_sentence
 from conveyor_sim.ros.diagnostics import Diagnostics
-from conveyor_sim.ros.fault_service import FaultService
 from conveyor_sim.ros.graph_watch import GraphWatch
+from conveyor_sim.ros.input_services import InputServices
 from conveyor_sim.ros.intake import Intake
 from conveyor_sim.ros.lockstep_service import LockstepService
-from conveyor_sim.ros.operate_service import OperateService
 from conveyor_sim.ros.publishers import RosSink
 from conveyor_sim.ros.services import Services
 from conveyor_sim.ros.spinner import Spinner
@@ -143,8 +142,7 @@ class SimNode:
             commands = subscribe_commands(node, stepper)
             self._services.serve(stepper)
             CheckpointServices(node, executor, stepper, values.checkpoint_folder, read_checkpoint)
-            FaultService(node, executor, stepper)
-            OperateService(node, executor, stepper)
+            InputServices(node, executor, stepper)
             lockstep = LockstepService(node, stepper, values.frame_id, died=self._die)
             self._intake = Intake(node.context, lockstep, commands, died=self._die)
             diagnostics = Diagnostics(node, stepper, sink, GraphWatch(node, clock.topic if clock else None))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 import time
-from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from typing import Any, TypeVar
@@ -26,7 +25,7 @@ from conveyor_sim.ros.graph_watch import GraphWatch
 from conveyor_sim.ros.publishers import message_class, published_hashes, ros_qos
 from conveyor_sim.ros.services import settled
 from conveyor_sim.ros.spinner import Spinner
-from conveyor_sim.run.lockstep import Refused
+from conveyor_sim.run.calls import CallQueue
 from conveyor_sim.run.playback import Playback, PlayedMessage, PlayedTopic
 from conveyor_sim.run.player import Player
 from conveyor_sim.support.printable import printable
@@ -59,9 +58,7 @@ class ReplayNode:
         """
         self.error: Exception | None = None
         self._on_end = on_end
-        self._calls: deque[Callable[[], None]] = deque()
-        self._wake = threading.Condition()
-        self._quit = False
+        self._calls = CallQueue("the recording has been played")
         playback = Playback(bag)
         self._spinner = Spinner(context, died=self._die)
         self._node = new_node(
@@ -88,9 +85,7 @@ class ReplayNode:
 
     def close(self) -> None:
         """End between two ticks, and wait until published messages have arrived."""
-        with self._wake:
-            self._quit = True
-            self._wake.notify()
+        self._calls.end()
         self._thread.join()
         end = time.monotonic() + LAST_WORDS
         for publisher in self._publishers.values():
@@ -100,21 +95,7 @@ class ReplayNode:
 
     def call(self, function: Callable[[], T]) -> Future[T]:
         """Call `function` between two ticks. The future raises Refused once playing has ended. For any thread."""
-        future: Future[T] = Future()
-
-        def run() -> None:
-            try:
-                future.set_result(function())
-            except Exception as error:
-                future.set_exception(error)
-
-        with self._wake:
-            if self._quit:
-                future.set_exception(Refused("the recording has been played"))
-            else:
-                self._calls.append(run)
-                self._wake.notify()
-        return future
+        return self._calls.request(function)
 
     def _advertise(self, bag: Bag, topics: Sequence[PlayedTopic]) -> dict[str, Publisher]:
         """Create a publisher for each topic whose recorded type is installed. Log a warning for each other topic."""
@@ -155,24 +136,16 @@ class ReplayNode:
         else:
             self._on_end()
         finally:
-            with self._wake:
-                self._quit = True
-            self._take_calls()
+            self._calls.end()
+            self._calls.drain()
 
     def _loop(self) -> None:
-        while not self._quit:
-            self._take_calls()
+        while not self._calls.ended:
+            self._calls.take()
             wait = self.player.step(time.monotonic())
             if self.player.ended and not self.player.paused:
                 return
-            if wait > 0.0:
-                with self._wake:
-                    if not self._calls and not self._quit:
-                        self._wake.wait(wait)
-
-    def _take_calls(self) -> None:
-        while self._calls:
-            self._calls.popleft()()
+            self._calls.wait(wait)
 
     def _die(self, error: Exception) -> None:
         self.error = error

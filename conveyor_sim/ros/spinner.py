@@ -11,6 +11,8 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
+from conveyor_sim.run.calls import settle
+
 T = TypeVar("T")
 
 
@@ -36,10 +38,7 @@ class Spinner:
 
         def run() -> None:
             if future.set_running_or_notify_cancel():
-                try:
-                    future.set_result(function())
-                except Exception as error:
-                    future.set_exception(error)
+                settle(future, function)
 
         self._calls.append(future)
         self.executor.create_task(run)

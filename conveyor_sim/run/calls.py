@@ -18,7 +18,9 @@ MOST_CALLS = 100
 class CallQueue:
     """Queue of functions. Any thread may call its methods, but `take` and `wait` are for the stepping thread."""
 
-    def __init__(self) -> None:
+    def __init__(self, end: str = "the thread has ended") -> None:
+        """end: why calls after the end are refused."""
+        self._end = end
         self.ended = False
         """True once the stepping thread must end."""
         self._waiting: deque[Callable[[], None]] = deque()
@@ -26,24 +28,24 @@ class CallQueue:
         self._wake = threading.Condition()
 
     def request(self, function: Callable[[], T]) -> Future[T]:
-        """Queue a function, and return a future of its result. The future raises Refused if too many wait already."""
+        """Queue a function. Return a future of its result, or of Refused if too many wait, or after the end."""
         future: Future[T] = Future()
-        with self._wake:
-            full = self._requests >= MOST_CALLS
-            self._requests += not full
-        if full:
-            future.set_exception(Refused(f"{MOST_CALLS} requests wait for their answers already, expected fewer"))
-            return future
 
         def run() -> None:
             with self._wake:
                 self._requests -= 1
-            try:
-                future.set_result(function())
-            except Exception as error:
-                future.set_exception(error)
+            settle(future, function)
 
-        self.put(run)
+        with self._wake:
+            reason = self._end if self.ended else ""
+            if self._requests >= MOST_CALLS:
+                reason = f"{MOST_CALLS} requests wait for their answers already, expected fewer"
+            if not reason:
+                self._requests += 1
+                self._waiting.append(run)
+                self._wake.notify()
+        if reason:
+            future.set_exception(Refused(reason))
         return future
 
     def put(self, function: Callable[[], None]) -> None:
@@ -63,8 +65,21 @@ class CallQueue:
         while self._waiting and not self.ended:
             self._waiting.popleft()()
 
+    def drain(self) -> None:
+        """Call all functions that wait at the end."""
+        while self._waiting:
+            self._waiting.popleft()()
+
     def wait(self, seconds: float) -> None:
         """Block until a function arrives or `seconds` have passed."""
         with self._wake:
             if not self._waiting and not self.ended:
                 self._wake.wait(seconds)
+
+
+def settle(future: Future[T], function: Callable[[], T]) -> None:
+    """Set the result of a future to that of a function, or to its exception."""
+    try:
+        future.set_result(function())
+    except Exception as error:
+        future.set_exception(error)

@@ -17,7 +17,7 @@ from typing import TypeVar
 from conveyor_sim.line.commands.inputs import DISOWN, OWN, SET, Input
 from conveyor_sim.run.active_run import ActiveRun, Advance, OpenSession
 from conveyor_sim.run.calls import CallQueue
-from conveyor_sim.run.inbox import sizes_of
+from conveyor_sim.run.inbox import MESSAGE_BYTES, TOO_LARGE, size_of, sizes_of
 from conveyor_sim.run.lockstep import LOCKSTEP, LockstepAnswer, LockstepRequest, Refused
 from conveyor_sim.run.pacing import Pacer
 from conveyor_sim.run.run_state import Log, SimulationState
@@ -206,6 +206,19 @@ class Stepper:
 
         run.advance = Advance(request.target_tick, paced=True, done=done, failed=answer.set_exception)
         return answer
+
+    def offer(self, command: Input) -> str:
+        """Queue an input for the next tick. Return why it is refused, "" if it is queued."""
+        size = size_of(command)
+        reason = (
+            self.run.standstill
+            or (TOO_LARGE if size > MESSAGE_BYTES else "")  # before each name is checked
+            or self.simulation.line.refusal(command)
+            or self.run.inbox.admit(size)
+        )
+        if not reason:
+            self.run.reception.hand_over(self.run.session, command, size)
+        return reason
 
     def present(self) -> LockstepAnswer:
         """Return the present state of the simulation, without command results."""
