@@ -48,7 +48,7 @@ def test_roles_say_what_is_read_written_and_injected() -> None:
     tags = (
         switch("m/run", "command", "Runs.", 1.0),
         choice("m/state", "status", "What it does.", texts, 4),
-        number("m/rate", "setpoint", "Bottles a second.", "1/s", 0.0, 2.0, 1.5, nominal=1.5),
+        number("m/rate", "setpoint", "Bottles per second.", "1/s", 0.0, 2.0, 1.5, nominal=1.5),
         count("m/made", "counter", "Bottles."),
         switch("m/stop", "fault", "Stops."),
         seconds("m/time", "actual", "When."),
