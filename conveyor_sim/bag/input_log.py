@@ -86,7 +86,7 @@ class InputLog(contextlib.AbstractContextManager["InputLog"]):
         """Log the inputs that wait for the tick that is about to begin. Raise BagError if they can't be written."""
         if self._failed:
             return
-        tick, waiting = self._sim.tick, tuple(map(tuple, self._sim.waiting))
+        tick, waiting = self._sim.tick, tuple(map(tuple, self._sim.line.waiting))
         now = repr(waiting)  # -0.0 and 0.0 are equal, but not the same bits
         if tick != self._next and self._last != _NONE:  # ticks have passed without a call of this method
             self._write({"tick": self._next, "inputs": []})

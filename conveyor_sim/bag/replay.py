@@ -15,7 +15,6 @@ from conveyor_sim.bag.input_log import START_NAME
 from conveyor_sim.bag.messages.encode import Header, Outcome, to_outcome
 from conveyor_sim.bag.messages.topics import COMPARED, STATES, Snapshot
 from conveyor_sim.bag.messages.typestore import typestore
-from conveyor_sim.bag.outputs import forget_past
 from conveyor_sim.bag.reader import Bag, open_bag
 from conveyor_sim.bag.recorded_scene import recorded_scene
 from conveyor_sim.columns.image import NOTHING_FORCED, Image
@@ -228,8 +227,8 @@ def _from_checkpoint(bag: Bag, start: Path) -> Simulation:
             f"{start}: a checkpoint at tick {simulation.tick}, expected the one at tick {bag.line.tick}, "
             "from which the recording began"
         )
-    simulation.take_waiting()  # it is among the recorded outcomes
-    forget_past(simulation)
+    simulation.line.take_waiting()  # it is among the recorded outcomes
+    simulation.take_events()  # of the run before the checkpoint
     return simulation
 
 

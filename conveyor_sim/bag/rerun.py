@@ -12,7 +12,7 @@ from typing import Any
 
 from conveyor_sim.bag.input_log import FILE_NAME, FORMAT, START_NAME, copier, environment_of
 from conveyor_sim.bag.lock import alone
-from conveyor_sim.bag.outputs import Outputs, forget_past
+from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.errors import BagError, SimulationError
 from conveyor_sim.line.commands.inputs import Input
@@ -87,8 +87,8 @@ def rerun(
         start = folder / START_NAME
         if run.from_checkpoint:
             simulation = Simulation.load(start, scene=run.scene)
-            simulation.take_waiting()  # it is among the inputs
-            forget_past(simulation)
+            simulation.line.take_waiting()  # it is among the inputs
+            simulation.take_events()  # of the run before the checkpoint
         else:
             simulation = Simulation(run.scene)
         if run.last < simulation.tick:
@@ -113,7 +113,7 @@ def _simulate(
     watch: Watcher | None,
 ) -> str:
     """Run to the end. Return the first deviation from the logged states in words; "": there is none."""
-    outputs = Outputs(simulation, [recorder], run_id=uuid.uuid4().hex)
+    outputs = OutputWriter(simulation, [recorder], run_id=uuid.uuid4().hex)
     outputs.start()
     outputs.show_run(RunState(RUNNING))
     total = run.last * simulation.model.tick_ns * 1e-9

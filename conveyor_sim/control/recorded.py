@@ -35,20 +35,21 @@ class RecordedVariables:
         """
         self._controller = controller
         wanted = [*getattr(controller, "record", ()), *record]
-        known = tuple(self._variables) if wanted else ()
+        known = tuple(self.variables) if wanted else ()
         chosen = {name for pattern in wanted for name in _fitting(pattern, known)}
         if len(chosen) > MOST:
             raise ControlError(f"record: found {len(chosen)} variables, expected at most {MOST}")
         self.names = tuple(name for name in known if name in chosen)
 
     @property
-    def _variables(self) -> Mapping[str, float]:
+    def variables(self) -> Mapping[str, float]:
+        """Return all variables of the controller, by name."""
         variables: Mapping[str, float] = getattr(self._controller, "variables", {})
         return variables
 
     def values(self) -> tuple[float, ...]:
         """Return the present values, in the order of `names`."""
-        now = self._variables
+        now = self.variables
         return tuple(float(now[name]) for name in self.names)
 
 

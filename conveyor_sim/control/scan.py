@@ -100,41 +100,16 @@ def commands_of(answer: Mapping[str, float]) -> dict[str, float]:
             if not isinstance(name, str):
                 text = f"scan: {name!r:.200} returned as a name, expected that of a command or an alarm"
                 raise ControlError(text) from None
-            _number(name, value)
+            number(name, value)
         raise
 
 
-def _number(name: str, value: object) -> float:
+def number(name: str, value: object) -> float:
+    """Return a value of an answer as a number. Raise ControlError if it is none."""
     try:
         return float(value)  # type: ignore[arg-type]
     except (OverflowError, TypeError, ValueError):
         raise ControlError(f"{name}: {value!r:.200} answered by the controller, expected a number") from None
-
-
-class AlarmChanges:
-    """Alarms of a controller that go to the line with its commands: all at first, then changes only."""
-
-    def __init__(self) -> None:
-        self._sent: dict[str, float] = {}
-
-    def of(self, answer: Mapping[str, float]) -> dict[str, float]:
-        """Return the alarms in a scan's answer that begin or end, 1 or 0. A missing alarm ends.
-
-        Raise ControlError for a value that is no number.
-        """
-        alarms = {name: float(_number(name, value) >= ON) for name, value in answer.items() if name.startswith(ALARMS)}
-        now = {**dict.fromkeys(self._sent, 0.0), **alarms}
-        changes = {name: value for name, value in now.items() if self._sent.get(name) != value}
-        self._sent = now
-        return changes
-
-    def snapshot(self) -> dict[str, float]:
-        """Return the alarms sent so far."""
-        return dict(self._sent)
-
-    def restore(self, sent: Mapping[str, float]) -> None:
-        """Continue from such alarms."""
-        self._sent = {str(name): float(value) for name, value in sent.items()}
 
 
 @dataclass(frozen=True)

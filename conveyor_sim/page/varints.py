@@ -9,7 +9,7 @@ _MOST_BYTES = 10
 
 
 def varints(values: ArrayLike) -> bytes:
-    """Numbers (n,), one after the other, least significant bits first; a byte's highest bit: more follow."""
+    """Return numbers (n,) as bytes, least significant bits first; a byte's highest bit means that more follow."""
     signed = np.asarray(values, dtype=np.int64)
     rest = ((signed << 1) ^ (signed >> 63)).view(np.uint64)
     parts = np.empty((len(rest), _MOST_BYTES), dtype=np.uint8)
@@ -28,10 +28,10 @@ def varints(values: ArrayLike) -> bytes:
 
 
 def packed(arrays: list[NDArray[np.int64]]) -> bytes:
-    """Arrays one after the other, each behind its length."""
+    """Return arrays as bytes, each after its length."""
     return b"".join(varints([len(array)]) + varints(array) for array in arrays)
 
 
 def differences(values: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The first, then each less the one before."""
+    """Return the first value, then each value less the one before."""
     return np.diff(values, prepend=np.int64(0))

@@ -27,9 +27,9 @@ from conveyor_sim.studies.run_file import (
 from conveyor_sim.studies.setup import Setup
 from conveyor_sim.studies.study import Study
 from conveyor_sim.studies.units_file import UNITS, Units, read_units
+from conveyor_sim.support.checked_json import CheckedJson, with_checksum
 from conveyor_sim.support.file_lock import lock
 from conveyor_sim.support.files import MB, FileError, read_file, write_file
-from conveyor_sim.support.sealed_json import Kept, sealed
 
 SOURCE = "study.yaml"
 """The study as text, for people: commands read it in ORIGIN."""
@@ -127,7 +127,7 @@ class Journal(AbstractContextManager["Journal"]):
         start = self.start_of(seed).relative_to(self.folder)
         self._write(start, content)
         mark = {"start": hashlib.sha256(content).hexdigest()}
-        self._write(start.with_suffix(".json"), sealed({**mark, MADE_WITH: self._made_with}))
+        self._write(start.with_suffix(".json"), with_checksum({**mark, MADE_WITH: self._made_with}))
 
     def pilot_of(self, job: Job) -> Pilot | None:
         """Return the stored result of a pilot run; None if it has to run."""
@@ -143,7 +143,7 @@ class Journal(AbstractContextManager["Journal"]):
     def keep_pilot(self, job: Job, made: Pilot) -> None:
         """Keep a pilot run. Raises StudyError if it can't be written."""
         about = {"parameters": dict(job.parameters), "asked": self._asked}
-        self._write(_pilot(job), sealed({**about, **asdict(made), MADE_WITH: self._made_with}))
+        self._write(_pilot(job), with_checksum({**about, **asdict(made), MADE_WITH: self._made_with}))
 
     def keep_warm_up(self, seconds: float) -> None:
         """Keep what pilot runs have found: that of all runs in the folder. Raises StudyError if it can't be written."""
@@ -165,7 +165,7 @@ class Journal(AbstractContextManager["Journal"]):
     def keep_units(self, metrics: Mapping[str, str], parameters: Mapping[str, str]) -> None:
         """Keep the units of metrics and parameters. Raises StudyError if they can't be written."""
         found = Units(path=self._setup.path, asked=dict(self._asked), units=dict(metrics), parameters=dict(parameters))
-        self._write(Path(UNITS), sealed({**dict(found), MADE_WITH: self._made_with}, indent=1))
+        self._write(Path(UNITS), with_checksum({**dict(found), MADE_WITH: self._made_with}, indent=1))
 
     @property
     def _made_with(self) -> dict[str, Any]:
@@ -196,7 +196,7 @@ class Journal(AbstractContextManager["Journal"]):
         """Return the content of a file with the same origin as this study. Raises FileError."""
         kept = read_study_json(file, finite)
         made = kept.data.pop(MADE_WITH, None)
-        if not kept.sealed or not isinstance(made, dict):
+        if not kept.has_checksum or not isinstance(made, dict):
             raise FileError("has no checksum")
         if any(made.get(what) != value for what, value in origin_of(self._setup).items()):
             raise FileError("was made with another study")
@@ -226,7 +226,7 @@ class Journal(AbstractContextManager["Journal"]):
             if found.fields != wanted:
                 raise self._of_another(found.fields)
             self.warm_up = found.warm_up
-            if not found.sealed:
+            if not found.has_checksum:
                 raise FileError("has no checksum")
             reason = ""
         except FileError as error:
@@ -290,10 +290,10 @@ def _pilot(job: Job) -> Path:
     return Path(PILOTS) / f"point_{job.point}_seed_{job.seed}.json"
 
 
-_Runs = list[tuple[Path, "tuple[Row, Kept] | FileError"]]
+_Runs = list[tuple[Path, "tuple[Row, CheckedJson] | FileError"]]
 
 
-def _runs_in(folder: Path) -> Iterator[tuple[Path, tuple[Row, Kept] | FileError]]:
+def _runs_in(folder: Path) -> Iterator[tuple[Path, tuple[Row, CheckedJson] | FileError]]:
     """Yield the files of runs, each with its content or the reason why it is unusable. Raises OSError."""
     for file in run_files(folder):
         try:

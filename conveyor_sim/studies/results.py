@@ -23,8 +23,8 @@ from conveyor_sim.studies.row import Row
 from conveyor_sim.studies.run_file import row_of
 from conveyor_sim.studies.study import HALF_WIDTH, Seeds, Until
 from conveyor_sim.studies.units_file import UNITS, read_units
+from conveyor_sim.support.checked_json import CHECKSUM, parsed
 from conveyor_sim.support.files import MB, FileError, read_file, write_file
-from conveyor_sim.support.sealed_json import SEAL, parsed
 
 PARQUET = "results.parquet"
 METADATA = "conveyor_sim"
@@ -100,14 +100,16 @@ def read_results(path: Path) -> Results:
         raise unusable(path / ORIGIN, error) from None
     rows = read_rows(path, origin)
     try:
-        about = read_units(path / UNITS, origin.fields, origin.sealed)
+        about = read_units(path / UNITS, origin.fields, origin.has_checksum)
     except FileError as error:
         raise unusable(path / UNITS, error) from None
     versions = {"conveyor_sim": __version__, "engine": origin.fields["engine"], "sources": origin.fields[VERSION]}
     rows = [_as_asked(row, about.asked) for row in rows]
     try:
         study = read_file(path / SOURCE, 8 * MB).decode() if origin.text is None else origin.text
-        found = Results(study, about.path, about.units, about.parameters, versions, rows, origin.warm_up, origin.sealed)
+        found = Results(
+            study, about.path, about.units, about.parameters, versions, rows, origin.warm_up, origin.has_checksum
+        )
         return _fitting(found)
     except (FileError, ValueError, SceneError) as error:
         reason = error if isinstance(error, FileError) else "does not fit the runs beside it"
@@ -190,7 +192,7 @@ def _table(results: Results) -> Any:
         WARM_UP: results.warm_up,
     }
     made = pyarrow.Table.from_arrays([column for column, _ in columns.values()], schema=pyarrow.schema(fields))
-    about[SEAL] = _digest(about, made.to_pylist())
+    about[CHECKSUM] = _digest(about, made.to_pylist())
     return made.replace_schema_metadata({METADATA: json.dumps(about)})
 
 
@@ -204,7 +206,7 @@ def _of_parquet(path: Path) -> Results:
         content = read_file(path, MOST)
         table = parquet.read_table(BufferReader(content))
         about = parsed(table.schema.metadata[METADATA.encode()])
-        digest, rows = about.pop(SEAL, None), table.to_pylist()
+        digest, rows = about.pop(CHECKSUM, None), table.to_pylist()
         if digest is not None and digest != _digest(about, rows):
             raise StudyError(f"{path}: its checksum does not fit, {expected}")
         kept = {name: about[name] for name in ("study", "path", "units", "parameters", "versions")}

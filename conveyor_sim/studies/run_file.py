@@ -12,8 +12,8 @@ from pydantic import BaseModel, Field, FiniteFloat, ValidationError
 
 from conveyor_sim.studies.origin import WARM_UP, Origin, read_study_json
 from conveyor_sim.studies.row import Job, Row, Status
+from conveyor_sim.support.checked_json import CheckedJson, with_checksum
 from conveyor_sim.support.files import FileError
-from conveyor_sim.support.sealed_json import Kept, sealed
 
 RUNS = "runs"
 MADE_WITH = "made_with"
@@ -47,7 +47,7 @@ def name_of(job: Job | Row) -> str:
 
 def content_of(row: Row, made_with: Mapping[str, Any]) -> bytes:
     """Return the content of the file of a run. made_with: as `made_with` returns it."""
-    return sealed({**json.loads(json.dumps(asdict(row), default=str)), MADE_WITH: dict(made_with)})
+    return with_checksum({**json.loads(json.dumps(asdict(row), default=str)), MADE_WITH: dict(made_with)})
 
 
 def made_with(fields: Mapping[str, str], warm_up: float | None) -> dict[str, Any]:
@@ -60,7 +60,7 @@ def row_of(data: Mapping[str, Any]) -> Row:
     return Row(**dict(_Row.model_validate(dict(data))))
 
 
-def read_row(folder: Path, file: Path) -> tuple[Row, Kept]:
+def read_row(folder: Path, file: Path) -> tuple[Row, CheckedJson]:
     """Return a run and the content of its file, with its field MADE_WITH.
 
     Raises FileError for a file that is damaged, or has the name of another run.
@@ -72,7 +72,7 @@ def read_row(folder: Path, file: Path) -> tuple[Row, Kept]:
     except ValidationError as error:
         where = ".".join(map(str, error.errors(include_url=False)[0]["loc"]))
         raise FileError(f"{where}: is not as conveyor_sim writes it") from None
-    if kept.sealed is not isinstance(kept.data.get(MADE_WITH), dict):
+    if kept.has_checksum is not isinstance(kept.data.get(MADE_WITH), dict):
         raise FileError("does not say what it was made with")
     if file.relative_to(folder).as_posix() != name_of(row):
         raise FileError(f"holds the run of point {row.point} with seed {row.seed}")
@@ -81,11 +81,11 @@ def read_row(folder: Path, file: Path) -> tuple[Row, Kept]:
     return row, kept
 
 
-def objection(row: Row, kept: Kept, origin: Origin) -> str:
+def objection(row: Row, kept: CheckedJson, origin: Origin) -> str:
     """Return why a run is not one of a folder, in words that follow its file, "" if it is one."""
-    if kept.sealed is not origin.sealed:
-        return "has no checksum" if origin.sealed else "has a checksum, which study.json has not"
-    if not kept.sealed:
+    if kept.has_checksum is not origin.has_checksum:
+        return "has no checksum" if origin.has_checksum else "has a checksum, which study.json has not"
+    if not kept.has_checksum:
         return ""
     fields = dict(kept.data[MADE_WITH])
     warm_up = fields.pop(WARM_UP, None)

@@ -12,7 +12,7 @@ from bag.small_line import SMALL_LINE
 from rosbags.highlevel import AnyReader
 
 from conveyor_sim.bag.messages.topics import OUTPUTS
-from conveyor_sim.bag.outputs import Outputs
+from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.bag.replay import replay
@@ -37,15 +37,15 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[tuple[int,
     sim = Simulation(load_scene(SMALL_LINE, {"limits": {"impact_speed": 0.2}, "effects": {"energy_ledger": "on"}}))
     seen = []
     with Recorder(folder) as recorder:
-        outputs = Outputs(sim, [recorder], run_id="run")
+        outputs = OutputWriter(sim, [recorder], run_id="run")
         outputs.start()
         while sim.tick < 100:
             for names, values in GIVEN.get(sim.tick, []):
                 sim.command(names, values, "controller")
             sim.advance()
             outputs.after_tick()
-            if sim.happened:
-                seen.append((sim.tick, tuple(sim.happened), sim.line.happened_so_far))
+            if sim.line.happened:
+                seen.append((sim.tick, tuple(sim.line.happened), sim.line.happened_so_far))
     return folder, seen
 
 

@@ -8,7 +8,7 @@ from bag.small_line import COMMANDS, SMALL_LINE, record
 from conveyor_sim.bag.messages.encode import BOOL
 from conveyor_sim.bag.messages.topics import OUTPUTS, photo_eye_topics
 from conveyor_sim.bag.messages.typestore import typestore
-from conveyor_sim.bag.outputs import Outputs
+from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.scene import Scene, load_scene
 from conveyor_sim.simulation import Simulation
@@ -34,7 +34,7 @@ class Collector:
 def run(scene: Scene, sinks: list[Collector], ticks: int) -> Simulation:
     """Runs a scene into sinks."""
     simulation = Simulation(scene)
-    outputs = Outputs(simulation, sinks, run_id="run", frame_id="hall")
+    outputs = OutputWriter(simulation, sinks, run_id="run", frame_id="hall")
     outputs.start()
     for _ in range(ticks):
         for names, values in COMMANDS.get(simulation.tick, []):
@@ -95,7 +95,7 @@ def test_stamps_are_simulated_time_above_zero_and_never_go_back(scene: Scene) ->
 
 def test_outcomes_are_returned_and_stamped_with_the_tick_that_applied_them(scene: Scene, bag: Path) -> None:
     simulation = Simulation(scene)
-    outputs = Outputs(simulation, [], run_id="run")
+    outputs = OutputWriter(simulation, [], run_id="run")
     outputs.start()
     simulation.command(["belts/turn/cmd_speed"], [0.1])
     simulation.advance()

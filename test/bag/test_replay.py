@@ -15,7 +15,7 @@ from scenes import NO_OUTPUTS
 from conveyor_sim.bag.messages.encode import Header
 from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.bag.messages.typestore import typestore
-from conveyor_sim.bag.outputs import Outputs
+from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.bag.replay import replay
@@ -309,7 +309,7 @@ def held_up(folder: Path) -> Path:
     sim = press(damping=5.0, outputs={**NO_OUTPUTS, "signals": 100, "ledger": 100})
     inputs = {2: "push", 30: "jammed", 45: "jammed", 70: "push"}
     with Recorder(folder) as recorder:
-        outputs = Outputs(sim, [recorder], run_id="run", frame_id="hall")
+        outputs = OutputWriter(sim, [recorder], run_id="run", frame_id="hall")
         outputs.start()
         while sim.tick < 90:
             name = inputs.get(sim.tick)

@@ -27,7 +27,7 @@ def alarm_events(sim: Simulation, ticks: int) -> list[tuple[int, str, str]]:
     found = []
     for _ in range(ticks):
         sim.advance()
-        found += [_short(event) for event in sim.happened if event.kind.startswith("alarm_")]
+        found += [_short(event) for event in sim.line.happened if event.kind.startswith("alarm_")]
     return found
 
 
@@ -156,7 +156,7 @@ def test_a_clogged_outfeed_is_an_alarm() -> None:
     assert came[1:] == ("raised", "outfeeds/out/clogged")
     again = len(went) // 2  # after moments at which none waits
     assert [kind for _, kind, _ in went] == ["cleared", "raised"] * again
-    assert [event.kind for event in sim.take_damage_events()] == ["clogging_time"] * (1 + again)
+    assert [event.kind for event in sim.take_events().damage] == ["clogging_time"] * (1 + again)
 
 
 def test_a_controller_that_only_says_an_alarm_has_one_as_by_default() -> None:
@@ -183,7 +183,7 @@ def test_declared_first_then_said() -> None:
     sim.operate("acknowledge", writer="anna")
     sim.operate("reset", ["alarms/full"], writer="ben")
     assert alarm_events(sim, 1) == [(11, "acknowledged", "full"), (11, "reset", "full")]
-    assert [event.text for event in sim.happened] == ["by anna", "by ben"]
+    assert [event.text for event in sim.line.happened] == ["by anna", "by ben"]
     assert not sim.alarms and value(sim, "alarm_counts/first_out") == 0
 
 
@@ -219,7 +219,7 @@ def test_a_controller_can_have_a_value_watched() -> None:
 )
 def test_what_can_not_be_is_refused(given: Input, reason: str) -> None:
     sim = line(alarms={"high": {"tag": ON_TABLE, "high": 10}})
-    assert sim.refusal(given).startswith(reason)
+    assert sim.line.refusal(given).startswith(reason)
     sim.give(given)
     sim.advance()
     (outcome,) = sim.take_outcomes()

@@ -375,7 +375,7 @@ def test_what_waits_for_a_page_is_bounded() -> None:
 def test_nobody_who_is_not_let_in_sees_anything(browser: Any, live: Live, users: Path) -> None:
     settings = ServerSettings(users=users / "users", anonymous=False)
     with Serving(live.source, [(WEB, 0)], settings) as serving:
-        url = serving.faces[0].address.rstrip("/")
+        url = serving.hosts[0].address.rstrip("/")
 
         async def work() -> None:
             async with ClientSession() as session, session.ws_connect(f"{url}/live", origin=url) as socket:
@@ -399,7 +399,7 @@ def test_nobody_who_is_not_let_in_sees_anything(browser: Any, live: Live, users:
 def test_other_machines_get_it_by_tls_alone(open_page: Callable[[str], Any], live: Live, users: Path) -> None:
     settings = ServerSettings("127.0.0.2", users=users / "users", opcua_certificates=users / "certificates")
     with Serving(live.source, [(WEB, 0)], settings) as serving:
-        address = serving.faces[0].address
+        address = serving.hosts[0].address
         assert address.startswith("https://127.0.0.2:")
         page = open_page(address)
         signed_in(page, "jo")

@@ -230,7 +230,7 @@ def test_a_line_that_has_ended_says_so_and_begins_anew(open_page: Callable[[str]
     with SceneTagProvider(SceneTask(load_scene(LINE, {"duration": 1.0}), None, 0, 1.0, 1), lambda text: None) as source:
         source.wait_for_line()
         with Serving(source, [(WEB, 0)], ServerSettings(users=users / "users")) as serving:
-            page = open_page(serving.faces[0].address)
+            page = open_page(serving.hosts[0].address)
             page.wait_for_selector("#run.stands:has-text('ended')")
             assert clock(page) == 1.0 and not page.locator("text=Pause run").is_visible()
             signed_in(page, "jo")
@@ -251,7 +251,7 @@ def test_a_command_given_on_the_page_is_in_the_recording_which_replays(
     with SceneTagProvider(SceneTask(scene, tmp_path / "bag", 0, 1.0, 1), lambda text: None) as source:
         source.wait_for_line()
         with Serving(source, [(WEB, 0)], ServerSettings(users=users / "users")) as serving:
-            page = open_page(serving.faces[0].address)
+            page = open_page(serving.hosts[0].address)
             signed_in(page, "jo")
             put_into_mode(page, "3")
             mode = page.locator("#panel_device tr", has_text="mode").first.locator("td")
@@ -274,7 +274,7 @@ def test_a_recording_is_played_on_the_page(open_page: Callable[[str], Any], user
         BagTagProvider(bag, lambda text: None, loop=True) as source,
         Serving(source, [(WEB, 0)], ServerSettings(users=users / "users")) as serving,
     ):
-        page = open_page(serving.faces[0].address)
+        page = open_page(serving.hosts[0].address)
         soon(page, lambda: int(page.get_attribute("body", "data-bottles") or 0) > 3, "its bottles")  # "": none yet
         page.select_option("#colour", "force")
         weak = page.inner_text("#legend")

@@ -28,7 +28,7 @@ from conveyor_sim.bag.messages.typestore import definition
 from conveyor_sim.bag.reader import Bag, open_bag
 from conveyor_sim.ros.publishers import message_class, ros_qos
 from conveyor_sim.ros.replay_node import ReplayNode
-from conveyor_sim.run.playback import Message, Playback
+from conveyor_sim.run.playback import Playback, PlayedMessage
 
 
 @pytest.fixture(scope="module")
@@ -55,9 +55,9 @@ def nanoseconds(clock: Any) -> int:
 
 
 def played(bag: Bag) -> dict[str, list[bytes]]:
-    """What the whole recording comes to, by topic."""
+    """Return all messages of a played recording, by topic."""
     playback = Playback(bag)
-    told: list[Message] = [*playback.cue(0), *playback.take(TICKS)]
+    told: list[PlayedMessage] = [*playback.cue(0), *playback.take(TICKS)]
     return {topic: [message.data for message in told if message.topic == topic] for topic in {**bag.types, **MADE}}
 
 

@@ -41,7 +41,7 @@ def test_commands_and_faults_from_when_they_are_in_force(table: Scenario) -> Non
     command, speed = table.history[SPEED], table.history["belts/table/speed"]
     assert np.isnan(command[:10]).all()
     assert (command[10:20] == 0.1).all() and (command[20:] == 0.3).all()
-    # The belt's speed is told at the end of the tick for which it was commanded.
+    # The belt reports its speed at the end of the tick for which it was commanded.
     assert (speed[11:21] == command[10:20]).all() and speed[10] == 0.4
     assert table.history[STOP].tolist() == [0.0] * 10 + [1.0] * 21
     marks = [(round(mark.time, 9), mark.name, mark.value) for mark in table.history.marks]

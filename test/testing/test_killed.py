@@ -122,9 +122,7 @@ def test_the_next_run_says_what_is_left_and_lets_it_be(killed: Path, pytester: p
     pytester.makepyfile(test_killed=TESTS)
     result = pytester.runpytest_inprocess(*PLUGIN, "-k", "passes")
     result.assert_outcomes(passed=1, deselected=1)
-    result.stdout.fnmatch_lines(
-        ["*inputs that killed tests have left*", f"{left}: `conveyor-sim recover {left}` makes *"]
-    )
+    result.stdout.fnmatch_lines(["*inputs left by killed tests*", f"{left}: `conveyor-sim recover {left}` makes *"])
     assert sorted(file.name for file in left.iterdir()) == ["inputs.jsonl", "start.npz"]
     assert sorted(root.iterdir()) == [left]
 

@@ -17,8 +17,8 @@ from conveyor_sim.accuracy.report.plain import Unlike, plain, typed
 from conveyor_sim.accuracy.results import Study
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.errors import ConveyorError
+from conveyor_sim.support.checked_json import read_checked, with_checksum
 from conveyor_sim.support.files import FileError, write_file
-from conveyor_sim.support.sealed_json import read_sealed, sealed
 
 STUDY = "study.json"
 
@@ -32,7 +32,7 @@ def write_study(study: Study, out_dir: str | Path) -> list[Path]:
     SampleFile holds them. Returns the files; ConveyorError if one can't be written.
     """
     out = Path(out_dir)
-    contents = {STUDY: sealed(cast("dict[str, object]", plain(study)), indent=1)}
+    contents = {STUDY: with_checksum(cast("dict[str, object]", plain(study)), indent=1)}
     contents |= {f"{name}.csv": _csv(table).encode() for name, table in _tables(study).items() if table}
     for name, content in contents.items():
         write(out / name, content)
@@ -46,7 +46,7 @@ def read_study(path: str | Path, say: Callable[[str], object] = lambda _: None) 
     Raise ConveyorError if the file can't be read, is damaged or holds no study.
     """
     try:
-        kept = read_sealed(Path(path))
+        kept = read_checked(Path(path))
     except FileError as error:
         raise ConveyorError(
             f"{path}: {error}, expected an intact {STUDY} of a study of conveyor-sim accuracy"
@@ -56,7 +56,7 @@ def read_study(path: str | Path, say: Callable[[str], object] = lambda _: None) 
     except Unlike as unlike:
         raise ConveyorError(f"{path}: {unlike}") from None
     assert isinstance(study, Study)
-    if not kept.sealed:
+    if not kept.has_checksum:
         say(f"{path}: was made by an older version without checksums, so it can't be verified")
     return study
 

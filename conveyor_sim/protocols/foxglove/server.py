@@ -121,10 +121,10 @@ class FoxgloveServer:
             self._in_loop(self._draw_plant)
         self._channels[topic].log(data)
 
-    def _in_loop(self, function: Callable[..., object], *given: object) -> None:
+    def _in_loop(self, function: Callable[..., object], *arguments: object) -> None:
         """Call a function in the event loop. May be called by any thread."""
         with suppress(RuntimeError):  # the loop has ended
-            self._loop.call_soon_threadsafe(function, *given)
+            self._loop.call_soon_threadsafe(function, *arguments)
 
     # In the loop
 

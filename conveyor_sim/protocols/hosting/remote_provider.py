@@ -94,7 +94,9 @@ class RemoteTagProvider(LineMirror):
     """The line by the frames that the parent sends; one thread applies them."""
 
     def __init__(self, task: ServerTask, calls: ParentCalls, decode: Decode, past: TagHistory | None) -> None:
-        """decode: decodes the message of a topic. past: history of the recording that is played back, if it is one."""
+        """Start without data. decode: decodes the message of a topic. past: history of the recording that is played
+        back, if it is one.
+        """
         super().__init__()
         self._task, self._calls, self._decode, self._past = task, calls, decode, past
         self.takes_inputs = task.takes_inputs
@@ -109,9 +111,9 @@ class RemoteTagProvider(LineMirror):
         """History of a recording; None otherwise."""
         return self._past
 
-    def give(self, given: Input) -> str:
+    def give(self, request: Input) -> str:
         """Give an input to the line, through the parent. Return the reason for a refusal, "" if it was accepted."""
-        return self._ask("give", given)
+        return self._ask("give", request)
 
     def control(self, what: Control, value: float, by: str) -> str:
         """Control the run, through the parent. Return the reason for a refusal, "" if it was accepted."""

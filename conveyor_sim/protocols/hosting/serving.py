@@ -58,7 +58,7 @@ class Serving(AbstractContextManager["Serving"]):
         return ServerHost(kind, place, self._settings, self._source, logins, say, self.health, ready)
 
     @property
-    def faces(self) -> Sequence[ServerHost | ThreadHost]:
+    def hosts(self) -> Sequence[ServerHost | ThreadHost]:
         """Hosts of all servers, in the order of `chosen`."""
         return self._hosts
 

@@ -257,8 +257,8 @@ class _Handler(ServerRequestHandler):
         end = _HEADER.size - 1 + length
         if len(self._received) < end:
             return None
-        found, self._received = self._received[_HEADER.size : end], self._received[end:]
-        return transaction, unit, found
+        pdu, self._received = self._received[_HEADER.size : end], self._received[end:]
+        return transaction, unit, pdu
 
     async def _answer(self, transaction: int, unit: int, asked: bytes) -> ModbusPDU:
         function = asked[0]
@@ -337,8 +337,8 @@ class _Image:
         # It has the last address, so a request writes it last.
         target = numbers.pop() if names[-1] == TARGET and names.pop() else None
         writer = claimant = _writer.get()
-        given = Input(MODBUS, writer, self._role, SET, tuple(names), tuple(numbers))
-        if names and (refusal := refused_for_good(self._source, self._receipt, given)):
+        request = Input(MODBUS, writer, self._role, SET, tuple(names), tuple(numbers))
+        if names and (refusal := refused_for_good(self._source, self._receipt, request)):
             return _EXCEPTIONS[refusal.cause]
         if self._role == "controller" and self._source.shown.owner not in ("", writer):
             claimant = self.holding.judged_as(writer)
@@ -356,7 +356,7 @@ class _Image:
         # In lockstep, the attached PLC owns the line.
         if self._role == "controller" and not in_lockstep and self.holding.take(writer):
             return ExcCodes.DEVICE_BUSY
-        if names and self._source.give(given):
+        if names and self._source.give(request):
             return ExcCodes.DEVICE_BUSY
         if target is None:
             return None
@@ -369,10 +369,10 @@ class _Image:
         if not all(name.endswith(SET_MODE) for name in names):
             return ExcCodes.ILLEGAL_ADDRESS
         devices = tuple(name.removesuffix(SET_MODE) for name in names)
-        given = Input(MODBUS, _writer.get(), self._role, MODE, devices, tuple(modes))
-        if refusal := refused_for_good(self._source, self._receipt, given):
+        request = Input(MODBUS, _writer.get(), self._role, MODE, devices, tuple(modes))
+        if refusal := refused_for_good(self._source, self._receipt, request):
             return _EXCEPTIONS[refusal.cause]
-        return ExcCodes.DEVICE_BUSY if self._source.give(given) else None
+        return ExcCodes.DEVICE_BUSY if self._source.give(request) else None
 
 
 def _shown_as(row: Row) -> str:

@@ -131,8 +131,8 @@ class HostCommands:
         return self._set_modes(role, names, numbers) if modes else self._set(role, names, numbers)
 
     def _set(self, role: WriterKind, names: list[str], numbers: list[float]) -> str:
-        given = Input(MQTT, self._writer, role, SET, tuple(names), tuple(numbers))
-        if refusal := refused_for_good(self._source, self._receipt, given):
+        request = Input(MQTT, self._writer, role, SET, tuple(names), tuple(numbers))
+        if refusal := refused_for_good(self._source, self._receipt, request):
             return refusal.reason
         for name, number in zip(names, numbers, strict=True):
             if reason := objection(self._source, self._commands[name], number, role, self._writer):
@@ -142,11 +142,11 @@ class HostCommands:
             if reason := self._holding.take(self._writer):
                 return reason
             self._last = time.monotonic()
-        return self._source.give(given)
+        return self._source.give(request)
 
     def _set_modes(self, role: WriterKind, names: list[str], numbers: list[float]) -> str:
         devices = tuple(self._modes[name].device for name in names)
-        given = Input(MQTT, self._writer, role, MODE, devices, tuple(numbers))
-        if refusal := refused_for_good(self._source, self._receipt, given):
+        request = Input(MQTT, self._writer, role, MODE, devices, tuple(numbers))
+        if refusal := refused_for_good(self._source, self._receipt, request):
             return refusal.reason
-        return self._source.give(given)
+        return self._source.give(request)

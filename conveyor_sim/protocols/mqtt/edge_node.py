@@ -82,7 +82,7 @@ class EdgeNode:
         self._waiting: deque[tuple[LineSnapshot, datetime]] = deque()
         self._left_out = 0
         self._longest = 0.0
-        self._told = False
+        self._is_woken = False
         self._tasks: list[asyncio.Task[None]] = []
 
     @property
@@ -197,7 +197,7 @@ class EdgeNode:
             while not link.lost:
                 await self._wake.wait()
                 self._wake.clear()
-                self._told = False
+                self._is_woken = False
                 was_online = host.online
                 for message in link.take():
                     if message.topic == host.topic:
@@ -271,8 +271,8 @@ class EdgeNode:
 
     def _notice(self) -> None:
         """Wake the loop. May be called by any thread."""
-        if not self._told:
-            self._told = True
+        if not self._is_woken:
+            self._is_woken = True
             with suppress(RuntimeError):  # the loop is closed
                 self._loop.call_soon_threadsafe(self._wake.set)
 

@@ -147,10 +147,10 @@ class AlarmStates:
         name = f"{ALARM_STATES}/{id}"
         if name not in self._nodes:
             return
-        for field, given in row._asdict().items():
-            value: Any = given
+        for field, raw in row._asdict().items():
+            value: Any = raw
             if _VARIABLES[field].kind is ua.VariantType.DateTime:
-                value = nothing(ua.VariantType.DateTime) if given == NEVER else self._clock.simulated(given)
+                value = nothing(ua.VariantType.DateTime) if raw == NEVER else self._clock.simulated(raw)
             await self._nodes.write(f"{name}/{field}", ua.Variant(value, _VARIABLES[field].kind), stamp, status)
 
     async def _emit(self, id: str, row: _Row, at: datetime) -> None:

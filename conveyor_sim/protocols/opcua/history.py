@@ -86,13 +86,13 @@ class OpcUaHistory(HistoryStorageInterface):
             most = min(nb_values or MOST_VALUES, MOST_VALUES)
             return ([], None) if tag is None else await self._read_past(self._past, tag, low, high, most, back)
         kept = self._kept.get(name_of(node_id), ())
-        found = [
+        values = [
             value
             for value in (reversed(kept) if back else kept)
             if (low is None or value.SourceTimestamp >= low) and (high is None or value.SourceTimestamp <= high)
         ]
         most = min(nb_values or MOST_VALUES, MOST_VALUES)
-        return found[:most], found[most].SourceTimestamp if len(found) > most else None
+        return values[:most], values[most].SourceTimestamp if len(values) > most else None
 
     async def _read_past(
         self, past: TagHistory, tag: Tag, low: datetime | None, high: datetime | None, most: int, back: bool
@@ -106,11 +106,11 @@ class OpcUaHistory(HistoryStorageInterface):
         except BagError as error:
             raise ServiceError(ua.StatusCodes.BadHistoryOperationInvalid) from error
         now = datetime.now(timezone.utc)
-        found = [
+        values = [
             ua.DataValue(as_variant(tag, sample.value), ua.StatusCode(), self._clock.simulated(sample.tick), now)
             for sample in samples
         ]
-        return found, None if rest is None else self._clock.simulated(rest)
+        return values, None if rest is None else self._clock.simulated(rest)
 
     async def stop(self) -> None:
         """Do nothing: no resource is open."""

@@ -153,9 +153,9 @@ class Nodes:
 
     async def write(self, name: str, value: ua.Variant, stamp: datetime, status: int = ua.StatusCodes.Good) -> None:
         """Write a value of a variable. stamp: its SourceTimestamp."""
-        given = ua.DataValue(value, ua.StatusCode(status), stamp, datetime.now(timezone.utc))
-        self._history.note(name, given)
-        await self._server.write_attribute_value(node_id(name), given)
+        data_value = ua.DataValue(value, ua.StatusCode(status), stamp, datetime.now(timezone.utc))
+        self._history.note(name, data_value)
+        await self._server.write_attribute_value(node_id(name), data_value)
 
     def _add(
         self,

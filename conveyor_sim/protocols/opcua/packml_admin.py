@@ -72,9 +72,9 @@ class Admin:
         self._reasons = tags[f"{machine}/stop_reason"].texts
         self._design = tags[f"{machine}/rate"].nominal
         self._counts = {
-            name: tags[f"{machine}/{found[0]}"]
+            name: tags[f"{machine}/{counters[0]}"]
             for name, ends in _COUNTS.items()
-            if (found := [end for end in ends if f"{machine}/{end}" in tags])
+            if (counters := [end for end in ends if f"{machine}/{end}" in tags])
         }
         self._reason, self._since = 0, NEVER
         self._alarms: AlarmColumns | None = None
@@ -96,13 +96,13 @@ class Admin:
 
     def values(self, shown: LineSnapshot) -> dict[str, ua.Variant]:
         """Return the values of the variables by name."""
-        found = {name: self._count(tag, shown.values) for name, tag in self._counts.items()}
+        variables = {name: self._count(tag, shown.values) for name, tag in self._counts.items()}
         if self._design is not None:
-            found["MachDesignSpeed"] = ua.Variant(self._design * A_MINUTE, ua.VariantType.Float)
-        found["StopReason"] = self._stop_reason(shown)
+            variables["MachDesignSpeed"] = ua.Variant(self._design * A_MINUTE, ua.VariantType.Float)
+        variables["StopReason"] = self._stop_reason(shown)
         if shown.alarms is not self._alarms and shown.alarms is not None:
             self._alarms, self._rows = shown.alarms, self._standing(shown.alarms)
-        return found | self._rows
+        return variables | self._rows
 
     def _count(self, tag: Tag, values: Mapping[str, float]) -> ua.Variant:
         count = min(_MOST, int(values.get(tag.name, 0.0)))
@@ -128,11 +128,11 @@ class Admin:
                 text, priority, active = columns.text[place], int(columns.priority[place]), bool(columns.active[place])
                 made = PackMLAlarmDataType(place, state, text, priority, since, acknowledged, active)
                 rows[kind].append(made)
-        found: dict[str, ua.Variant] = {}
+        variables: dict[str, ua.Variant] = {}
         for name, kind in (("Alarm", "error"), ("Warning", "warning")):
-            found[name] = _array(rows[kind])
-            found[f"{name}Extent"] = ua.Variant(len(rows[kind]), ua.VariantType.Int32)
-        return found
+            variables[name] = _array(rows[kind])
+            variables[f"{name}Extent"] = ua.Variant(len(rows[kind]), ua.VariantType.Int32)
+        return variables
 
 
 def _array(values: Sequence[object]) -> ua.Variant:

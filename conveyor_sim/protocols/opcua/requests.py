@@ -89,8 +89,8 @@ class Requests:
                 places.append(place)
             codes.append(code)
         self._flush(client, together, places, codes)
-        self.writes += (given := codes.count(Codes.GoodCompletesAsynchronously))
-        self.refused += len(codes) - given
+        self.writes += (accepted := codes.count(Codes.GoodCompletesAsynchronously))
+        self.refused += len(codes) - accepted
         return [ua.StatusCode(code) for code in codes]
 
     def write_together(self, client: User, names: Sequence[str], values: Sequence[float]) -> int:
@@ -173,8 +173,8 @@ class Requests:
         kind, writer = _kind(client), _writer(client)
         if kind is None:
             return Codes.BadUserAccessDenied
-        given = Input(OPCUA, writer, kind, SET, (tag.name,), (number,))
-        if refusal := refused_for_good(self._source, self._receipt, given):
+        request = Input(OPCUA, writer, kind, SET, (tag.name,), (number,))
+        if refusal := refused_for_good(self._source, self._receipt, request):
             return CODES[refusal.cause]
         if objection(self._source, tag, number, kind, writer):
             return Codes.BadInvalidState
@@ -194,13 +194,13 @@ class Requests:
         kind = _kind(client)
         if kind is None or not self.may(client, operation):
             return Codes.BadUserAccessDenied
-        given = Input(OPCUA, _writer(client), kind, operation, names, values, texts)
-        if refusal := refused_for_good(self._source, self._receipt, given):
+        request = Input(OPCUA, _writer(client), kind, operation, names, values, texts)
+        if refusal := refused_for_good(self._source, self._receipt, request):
             return CODES[refusal.cause]
         shown = self._source.shown
         if shown.lost or shown.run.state in TAKES_NO_INPUT:
             return Codes.BadInvalidState
-        return Codes.BadTooManyOperations if self._source.give(given) else Codes.GoodCompletesAsynchronously
+        return Codes.BadTooManyOperations if self._source.give(request) else Codes.GoodCompletesAsynchronously
 
 
 def _judge_form(value: ua.WriteValue, kind: ua.VariantType) -> int:

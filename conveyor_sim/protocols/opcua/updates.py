@@ -37,7 +37,7 @@ class Updates:
         self._run_tag = next((tag for tag in source.about.tags if tag.name == f"{RUN}/state"), None)
         self._commands = [tag.name for tag in source.about.tags if tag.role in COMMANDS]
         self._waiting: deque[tuple[LineSnapshot, datetime]] = deque()
-        self._told = False
+        self._is_woken = False
         self._wake = asyncio.Event()
         self._loop = asyncio.get_running_loop()
         self._last: LineSnapshot | None = None
@@ -60,7 +60,7 @@ class Updates:
             while True:
                 await self._wake.wait()
                 self._wake.clear()
-                self._told = False
+                self._is_woken = False
                 while self._waiting:
                     shown, heard = self._waiting.popleft()
                     await self._bring(shown, heard)
@@ -76,8 +76,8 @@ class Updates:
                 self._waiting.pop()
                 self.left_out += 1
         self._waiting.append((self._source.shown, datetime.now(timezone.utc)))
-        if not self._told:
-            self._told = True
+        if not self._is_woken:
+            self._is_woken = True
             with suppress(RuntimeError):  # the loop is closed
                 self._loop.call_soon_threadsafe(self._wake.set)
 

@@ -16,8 +16,8 @@ from conveyor_sim.line.run_state import ENDED, PAUSED, REPLAYING, RunState
 from conveyor_sim.protocols.tags.line_mirror import DRAWING_TOPICS, STATE_TOPICS, LineMirror
 from conveyor_sim.protocols.tags.tag_history import TagHistory
 from conveyor_sim.protocols.tags.tag_provider import Control
-from conveyor_sim.run.calls import Calls
-from conveyor_sim.run.playback import Message, Playback
+from conveyor_sim.run.calls import CallQueue
+from conveyor_sim.run.playback import Playback, PlayedMessage
 from conveyor_sim.run.player import Player
 from conveyor_sim.support.printable import SENTENCE, printable
 
@@ -45,7 +45,7 @@ class BagTagProvider(LineMirror, AbstractContextManager["BagTagProvider"]):
         self._states: dict[str, bytes] = {}
         self._new_events: list[bytes] = []
         self._shown_at = 0.0  # s of wall time
-        self._calls = Calls()
+        self._calls = CallQueue()
         self._bag = open_bag(path)
         self._past = TagHistory(path)
         try:
@@ -67,7 +67,7 @@ class BagTagProvider(LineMirror, AbstractContextManager["BagTagProvider"]):
         """History of the recording."""
         return self._past
 
-    def give(self, given: Input) -> str:
+    def give(self, request: Input) -> str:
         """Refuse."""
         return f"{self._path}: a recording can't be commanded"
 
@@ -147,7 +147,7 @@ class BagTagProvider(LineMirror, AbstractContextManager["BagTagProvider"]):
         self._states.clear()
         self._player.seek(to)
 
-    def _keep(self, message: Message) -> None:
+    def _keep(self, message: PlayedMessage) -> None:
         if message.topic == "events":
             self._new_events.append(message.data)
         else:

@@ -189,14 +189,14 @@ class LineMirror:
         """Block until there is a first snapshot, or `seconds` (wall time) have passed. Return True if there is one."""
         return self._known.wait(seconds)
 
-    def _objection(self, given: Input) -> str:
+    def _objection(self, request: Input) -> str:
         """Return the reason why an input can't be passed on to the line, "" if it can."""
         shown = self.shown
         if shown.lost:
             return shown.lost
         if shown.run.state in (ENDED, STOPPED):
             return f"the run has {shown.run.text}, expected a reset"
-        return TOO_LARGE if size_of(given) > MESSAGE_BYTES else ""
+        return TOO_LARGE if size_of(request) > MESSAGE_BYTES else ""
 
     # Called by the thread that receives messages
 

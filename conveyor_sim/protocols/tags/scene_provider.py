@@ -99,28 +99,28 @@ class SceneTagProvider(LineMirror, AbstractContextManager["SceneTagProvider"]):
     @property
     def recordings(self) -> list[Path]:
         """Folders of the recordings so far, one for each run."""
-        found: list[Path] = []
-        while (folder := bag_folder(self._task.record, len(found))) and folder.is_dir() and any(folder.iterdir()):
-            found.append(folder)
-        return found
+        folders: list[Path] = []
+        while (folder := bag_folder(self._task.record, len(folders))) and folder.is_dir() and any(folder.iterdir()):
+            folders.append(folder)
+        return folders
 
-    def give(self, given: Input) -> str:
+    def give(self, request: Input) -> str:
         """Queue an input for the next tick, or in lockstep for the next target.
 
         Return the reason for a refusal, "" if it was queued.
         """
-        if reason := self._objection(given):
+        if reason := self._objection(request):
             return reason
         with self._lock:
             if self._task.lockstep:
                 if len(self._set) >= MOST_WAITING:
                     return f"{MOST_WAITING} inputs wait for the next {TARGET} already"
-                self._set.append(given)
+                self._set.append(request)
                 return ""
             if self._given - self._handed + self._waiting >= MOST_WAITING:
                 return f"{MOST_WAITING} inputs wait for the next tick already"
             self._given += 1
-            self._requests.put(InputRequest(given))
+            self._requests.put(InputRequest(request))
         return ""
 
     def control(self, what: Control, value: float, by: str) -> str:

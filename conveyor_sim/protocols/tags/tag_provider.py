@@ -117,11 +117,11 @@ class TagProvider(Protocol):
         `heard` must not block and must not raise.
         """
 
-    def give(self, given: Input) -> str:
-        """Have an input judged and applied as the next tick begins. Why it can't wait for that, "" if it does."""
+    def give(self, request: Input) -> str:
+        """Queue an input for the next tick. Return the reason for a refusal, "" if it was queued."""
 
     def control(self, what: Control, value: float, by: str) -> str:
-        """Ask something of the run, in the name of somebody. Why that can't be, "" if it will be done."""
+        """Control the run in the name of `by`. Return the reason for a refusal, "" if the request was accepted."""
 
 
 class Listeners:
@@ -220,11 +220,11 @@ class SteppedTagProvider:
         """Call `heard` after each tick. Return a function that ends this."""
         return self._listeners.add(heard)
 
-    def give(self, given: Input) -> str:
-        """Have an input judged and applied as the next tick begins. Why it can't wait for that, "" if it does."""
+    def give(self, request: Input) -> str:
+        """Queue an input for the next tick. Return the reason for a refusal, "" if it was queued."""
         if len(self._waiting) >= MOST_WAITING:
             return f"{MOST_WAITING} inputs wait for the next tick already"
-        self._waiting.append(given)
+        self._waiting.append(request)
         return ""
 
     def control(self, what: Control, value: float, by: str) -> str:
@@ -251,7 +251,7 @@ class SteppedTagProvider:
         line = self._simulation.line
         self._alarms = line.alarms.changes() or self._alarms
         self._read_back = line.read_back.changes() or self._read_back
-        self._events.add(self._simulation.happened)
+        self._events.add(self._simulation.line.happened)
 
     def _show(self) -> None:
         simulation = self._simulation

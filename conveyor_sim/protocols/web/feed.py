@@ -34,7 +34,7 @@ STORY = 0.1
 BLOCK = 2.0
 """Length of the blocks in which a page stores the data that it received, s."""
 
-MOST_TOLD = 2000
+MOST_PAST_EVENTS = 2000
 """Largest number of past events that a newly opened page receives."""
 
 
@@ -50,7 +50,7 @@ class Feed:
         self._task: asyncio.Task[None] | None = None
         self._picture, self._shown = source.picture, source.shown
         self._story = self._new_story()
-        self._told = 0.0
+        self._sent_at = 0.0
         self._due = False  # True if a message of events is scheduled
         self._heard = 0
         self._status: dict[str, Any] = {}
@@ -118,12 +118,12 @@ class Feed:
                 viewer.began = False
         self._look()
         now, new = time.monotonic(), [one for one in self._viewers if not one.began or (one.lagging and one.free)]
-        if new or now > self._told + STORY:  # a new page's first message includes earlier events
-            self._told = now
-            self._tell_all()
+        if new or now > self._sent_at + STORY:  # a new page's first message includes earlier events
+            self._sent_at = now
+            self._send_all()
         elif not self._due:
             self._due = True
-            asyncio.get_running_loop().call_later(STORY, self._tell_later)
+            asyncio.get_running_loop().call_later(STORY, self._send_later)
         for viewer in new:
             self._begin(viewer)
         for viewer in self._viewers:
@@ -147,14 +147,14 @@ class Feed:
         }
         about = {**self._head[1], "times": times, "forced": picture.forced.tolist()}
         story = self._new_story()
-        total, events = self._source.events(max(0, self._heard - MOST_TOLD))
+        total, events = self._source.events(max(0, self._heard - MOST_PAST_EVENTS))
         story.look(
             self._shown, picture, events[: len(events) - (total - self._heard)]
         )  # later events follow in messages
         viewer.begin(text_message("begin", head=about, story=story.take(), status=self._status_now(), **self._about))
         viewer.began, viewer.seen = True, None
 
-    def _tell_later(self) -> None:
+    def _send_later(self) -> None:
         """Send pending events even if there is no new tick."""
         self._due = False
         self._changed.set()
@@ -164,7 +164,7 @@ class Feed:
         self._heard, events = self._source.events(self._heard)
         self._story.look(self._shown, self._picture, events)
 
-    def _tell_all(self) -> None:
+    def _send_all(self) -> None:
         """Send new events and status to the pages that have begun."""
         self._look()
         data = self._story.take()
@@ -194,7 +194,7 @@ class Feed:
         return LineStory(int(self._picture.line.tick_ns))
 
     def _key(self) -> Any:
-        """Key of the present frame; it changes with the frame."""
+        """Return the key of the present frame, which changes with the frame."""
         picture = self._picture
         return self._shown.run_id, picture.tick, *picture.drawn.values()
 

@@ -23,9 +23,9 @@ class LineStory(Story):
 
     def look(self, shown: LineSnapshot, picture: DrawableFrame, events: Sequence[Event]) -> None:
         """Add events, and what has changed since the last call."""
-        found: dict[str, Any] = {"alarm_states": shown.alarms, "readback": shown.read_back}
-        found |= {topic: picture.drawn.get(topic) for topic in ("counters", "rail_wear")}
-        new = {topic: what for topic, what in found.items() if what is not None and what is not self._seen.get(topic)}
+        latest: dict[str, Any] = {"alarm_states": shown.alarms, "readback": shown.read_back}
+        latest |= {topic: picture.drawn.get(topic) for topic in ("counters", "rail_wear")}
+        new = {topic: what for topic, what in latest.items() if what is not None and what is not self._seen.get(topic)}
         self._seen |= new
         if (columns := event_columns(events, len(events))) is not None:
             self.add("events", columns, shown.tick)

@@ -25,7 +25,7 @@ from conveyor_sim.studies.row import Row
 from conveyor_sim.studies.runs import Runs
 from conveyor_sim.studies.setup import Setup
 from conveyor_sim.studies.sweep import sweep
-from conveyor_sim.support.sealed_json import sealed
+from conveyor_sim.support.checked_json import with_checksum
 
 Rng = np.random.Generator
 SEEDS = {"seeds": 2, "metrics": ["stops", {"queue": "mean belts/conveyor/bottles"}]}
@@ -224,7 +224,7 @@ def _edit(copy: Path, rng: Rng, only: Path | None = None) -> bool:
         case "forged" if file.suffix == ".json":
             data = _data(file.read_bytes())
             _change(data, rng)
-            file.write_bytes(sealed(data or {"a": 1}))
+            file.write_bytes(with_checksum(data or {"a": 1}))
             return True
     return False
 

@@ -96,7 +96,7 @@ def test_commands_of_a_device_whose_mode_is_forced_are_taken_as_it_is() -> None:
 )  # fmt: skip
 def test_refusals(given: Input, reason: str) -> None:
     sim = passing()
-    assert sim.refusal(given).startswith(reason)
+    assert sim.line.refusal(given).startswith(reason)
     (outcome,) = after(sim, given)
     assert outcome.reason.startswith(reason) and not sim.line.signals().forced.size
 
@@ -106,9 +106,9 @@ def test_each_is_an_event() -> None:
     events = []
     for given in (force((SPEED, 0.1), (BLOCKED, 1.0)), force((SPEED, 0.2)), unforce(SPEED), unforce(), unforce(SPEED)):
         after(sim, given)
-        events += [(event.at, event.kind, event.name, event.text) for event in sim.happened]
+        events += [(event.at, event.kind, event.name, event.text) for event in sim.line.happened]
         if given.operation == FORCE:
-            assert [event.value for event in sim.happened] == list(given.values)
+            assert [event.value for event in sim.line.happened] == list(given.values)
     assert events == [
         (0, "signal_forced", SPEED, "by engineer Jo"),
         (0, "signal_forced", BLOCKED, "by engineer Jo"),

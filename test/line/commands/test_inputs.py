@@ -58,7 +58,7 @@ def test_inputs_of_a_tick_are_taken_in_the_order_in_which_they_were_given() -> N
     ]
     for one in given:
         sim.give(one)
-    assert list(sim.waiting) == given
+    assert list(sim.line.waiting) == given
     sim.advance()
     outcomes = sim.take_outcomes()
     assert [outcome.input for outcome in outcomes] == given
@@ -129,7 +129,7 @@ def test_watchdogs_come_after_all_inputs() -> None:
 def test_what_cant_be_is_refused_with_the_reason_and_changes_nothing(changes: dict[str, str], reason: str) -> None:
     sim = two_drives()
     given = setting("anna", (ONE, 0.9))._replace(**changes)
-    assert sim.refusal(given).startswith(reason)
+    assert sim.line.refusal(given).startswith(reason)
     sim.give(given)
     sim.advance()
     (outcome,) = sim.take_outcomes()
@@ -156,12 +156,12 @@ def test_what_is_of_the_wrong_type_is_not_taken(changes: dict[str, object], mess
     """Neither is it queued. A type checker would report it."""
     sim = two_drives()
     given = setting("anna", (ONE, 0.9))._replace(**changes)  # type: ignore[arg-type]
-    for use in (sim.refusal, sim.give):
+    for use in (sim.line.refusal, sim.give):
         with pytest.raises(CommandError) as raised:
             use(given)
         assert str(raised.value) == message
     sim.advance()
-    assert not sim.waiting and not sim.take_outcomes()
+    assert not sim.line.waiting and not sim.take_outcomes()
 
 
 def test_nobody_of_an_unknown_kind_says_an_alarm() -> None:
@@ -181,7 +181,7 @@ def test_short_forms_say_who_gave_them() -> None:
     sim.command([ONE], [0.4])
     sim.command([ONE], [0.5], "test", writer="case_1", writer_kind="test")
     sim.inject("belts/one/trip", 1.0)
-    assert list(sim.waiting) == [
+    assert list(sim.line.waiting) == [
         Input("commands", "commands", "controller", SET, (ONE,), (0.4,)),
         Input("test", "case_1", "test", SET, (ONE,), (0.5,)),
         Input(FAULT, FAULT, "test", INJECT, ("belts/one/trip",), (1.0,)),
@@ -196,9 +196,9 @@ def test_what_waits_and_what_became_of_it_is_in_a_checkpoint(tmp_path: Path) -> 
     sim.give(waiting)
     sim.save(tmp_path / "kept")
     again = Simulation.load(tmp_path / "kept")
-    assert repr(again.waiting) == repr((waiting,))  # a NaN is not equal to itself
+    assert repr(again.line.waiting) == repr((waiting,))  # a NaN is not equal to itself
     assert again.take_outcomes() == sim.take_outcomes()
-    assert again.take_waiting() and not again.waiting
+    assert again.line.take_waiting() and not again.line.waiting
 
 
 def test_a_device_may_object_to_a_command_as_it_stands(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -210,13 +210,13 @@ def test_a_device_may_object_to_a_command_as_it_stands(monkeypatch: pytest.Monke
     monkeypatch.setattr(DriveDevice, "objection", objection)
     sim = two_drives()
     reverse = setting("anna", (TWO, 0.9), ("belts/one/reverse", 1.0))
-    assert sim.refusal(reverse) == "belts/one/reverse: it is running"
+    assert sim.line.refusal(reverse) == "belts/one/reverse: it is running"
     sim.give(reverse)
     sim.give(setting("anna", (ONE, 0.0)))
     sim.advance()
     assert [outcome.accepted for outcome in sim.take_outcomes()] == [False, True]
     assert sim.belts().commanded.tolist() == [0.0, 0.3]
-    assert sim.refusal(reverse) == ""
+    assert sim.line.refusal(reverse) == ""
 
 
 def test_the_source_of_an_old_outcome_says_what_it_was() -> None:
@@ -239,7 +239,7 @@ def test_what_does_not_print_is_taken_as_a_replay_will_find_it() -> None:
     ]
     outcomes = []
     for one in given:
-        told = sim.refusal(one)
+        told = sim.line.refusal(one)
         sim.give(one)
         sim.advance()
         (outcome,) = sim.take_outcomes()

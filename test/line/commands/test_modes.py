@@ -113,7 +113,7 @@ def test_of_others_the_whole_is_refused() -> None:
     after(sim, mode("operator", MANUAL))
     given = act("operator", SET, (ONE, 0.5), (TWO, 0.6))
     reason = "belts/two: is in Automatic, expected Manual for an operator's commands"
-    assert sim.refusal(given) == reason
+    assert sim.line.refusal(given) == reason
     (outcome,) = after(sim, given)
     assert (outcome.reason, outcome.names, commanded(sim)) == (reason, (ONE, TWO), [0.2, 0.3])
 
@@ -121,19 +121,20 @@ def test_of_others_the_whole_is_refused() -> None:
 def test_what_waits_counts_when_a_refusal_is_asked_for() -> None:
     sim = two_belts()
     command = act("operator", SET, (ONE, 0.5))
-    assert sim.refusal(command)
+    assert sim.line.refusal(command)
     sim.give(mode("controller", MANUAL))  # which will be refused
-    assert sim.refusal(command)
+    assert sim.line.refusal(command)
     sim.give(mode("operator", MANUAL))
-    assert sim.refusal(command) == ""
-    assert sim.refusal(plc((ONE, 0.5))) and sim.refusal(plc((ONE, 0.5), (TWO, 0.5))) == ""
+    assert sim.line.refusal(command) == ""
+    assert sim.line.refusal(plc((ONE, 0.5))) and sim.line.refusal(plc((ONE, 0.5), (TWO, 0.5))) == ""
     assert (
-        sim.refusal(mode("operator", MAINTENANCE))
+        sim.line.refusal(mode("operator", MAINTENANCE))
         == "belts/one: Maintenance is not for operators, expected an engineer"
     )
     sim.give(mode("engineer", MAINTENANCE))
     assert (
-        sim.refusal(mode("operator", AUTOMATIC)) == "belts/one: Maintenance is not for operators, expected an engineer"
+        sim.line.refusal(mode("operator", AUTOMATIC))
+        == "belts/one: Maintenance is not for operators, expected an engineer"
     )
 
 
@@ -157,7 +158,7 @@ def test_what_waits_counts_when_a_refusal_is_asked_for() -> None:
 )  # fmt: skip
 def test_refusals(given: Input, reason: str) -> None:
     sim = two_belts()
-    assert sim.refusal(given).startswith(reason)
+    assert sim.line.refusal(given).startswith(reason)
     (outcome,) = after(sim, given)
     assert not outcome.accepted and outcome.reason.startswith(reason)
     assert shown(sim, "belts/one/mode") == AUTOMATIC and not sim.line.modes.owner
@@ -171,10 +172,10 @@ def test_an_owner_excludes_other_controllers_but_where_it_releases_groups() -> N
     assert other[0].reason == "belts/one: the line is owned by controller plc, expected its release"
     assert all(o.accepted for o in after(sim, plc((ONE, 0.7), (TWO, 0.8))))
     assert (
-        sim.refusal(act("controller", OWN, writer="forgotten"))
+        sim.line.refusal(act("controller", OWN, writer="forgotten"))
         == "the line is owned by controller plc, expected its release"
     )
-    assert sim.refusal(act("controller", DISOWN, writer="forgotten"))
+    assert sim.line.refusal(act("controller", DISOWN, writer="forgotten"))
     after(sim, mode("operator", MANUAL))
     assert all(o.accepted for o in after(sim, act("operator", SET, (ONE, 0.1)), act("test", SET, (TWO, 0.1))))
     after(sim, mode("operator", AUTOMATIC), act("controller", OWN, writer="plc"))
@@ -195,7 +196,9 @@ def test_each_change_is_an_event_and_refusals_are_one_each_time_hands_change() -
         (plc((ONE, 0.6), writer="forgotten"), act("controller", DISOWN, writer="plc")),
     ):
         after(sim, *given)
-        events += [(event.at, event.kind, event.name, event.value, event.text.split(",")[0]) for event in sim.happened]
+        events += [
+            (event.at, event.kind, event.name, event.value, event.text.split(",")[0]) for event in sim.line.happened
+        ]
     assert events == [
         (0, "mode_changed", "belts/one", 3.0, "by operator Jo"),
         (0, "command_refused", ONE, 0.5, "belts/one: is in Manual"),

@@ -65,7 +65,7 @@ def test_the_line_refuses_what_its_receipt_refuses(
     wanted = asked(kind, operation, tuple(names), tuple(values), tuple(texts))
     for simulation, of_line in zip(SIMULATIONS, RECEIPTS, strict=True):
         if of_line.refusal(wanted) is not None:
-            assert simulation.refusal(wanted)
+            assert simulation.line.refusal(wanted)
 
 
 @pytest.mark.parametrize("operation", ["set", "inject", "mode", "force"])
@@ -74,7 +74,7 @@ def test_what_the_line_refuses_at_its_start_its_receipt_refuses(operation: str) 
     for kind, name, value in product(WRITER_KINDS, NAMES, VALUES):
         wanted = asked(kind, operation, (name,), (value,))
         known = receipt().refusal(wanted)
-        reason = ZONED.refusal(wanted)
+        reason = ZONED.line.refusal(wanted)
         by_state = any(words in reason for words in ("is in Automatic", "in Execute"))
         assert (known is not None) == bool(reason) or by_state, (wanted, reason)
 

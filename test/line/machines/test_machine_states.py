@@ -438,7 +438,7 @@ def test_a_run_goes_on_from_a_checkpoint_with_the_same_bits(tmp_path: Path) -> N
             each.advance(50)
         assert loaded.signals().tolist() == sim.signals().tolist()
         assert loaded.full_state_hash() == sim.full_state_hash()
-        assert (loaded.happened, loaded.take_outcomes()) == (sim.happened, sim.take_outcomes())
+        assert (loaded.line.happened, loaded.take_outcomes()) == (sim.line.happened, sim.take_outcomes())
         states |= {at(sim)[0], at(sim, "filler")[0]}
     assert len(states) > 3, states
 

@@ -49,7 +49,9 @@ def test_a_bottle_comes_back_after_a_cycle_with_its_id() -> None:
         before = set(sim.bottles().id.tolist())
         sim.advance()
         now = set(sim.bottles().id.tolist())
-        told = {kind: {e.bottle for e in sim.happened if e.kind == kind} for kind in ("bottle_fed", "bottle_removed")}
+        told = {
+            kind: {e.bottle for e in sim.line.happened if e.kind == kind} for kind in ("bottle_fed", "bottle_removed")
+        }
         gone |= dict.fromkeys(before - now - told["bottle_removed"], sim.tick)
         back |= dict.fromkeys(now - before - told["bottle_fed"], sim.tick)
     assert len(back) >= 2
@@ -138,7 +140,7 @@ def test_what_it_has_borne_stays_with_a_bottle() -> None:
             work[bottle] = value
         before = set(damage.id.tolist())
     assert returned > 2
-    passed = [event.bottle for event in sim.take_damage_events() if event.kind == "scuffing_work"]
+    passed = [event.bottle for event in sim.take_events().damage if event.kind == "scuffing_work"]
     assert passed
     assert len(passed) == len(set(passed))
 

@@ -1,6 +1,5 @@
-"""What a line tells an MQTT broker: births with all there is, then what changes, and deaths of what is no longer so.
-
-The host that hears it holds each message against the rules of Sparkplug 3.0 (`kit.py`).
+"""Messages of a line to an MQTT broker: complete births, changes, and deaths of what is gone. The host checks each
+message against the rules of Sparkplug 3.0 (`kit.py`).
 """
 
 from __future__ import annotations
@@ -214,7 +213,7 @@ def test_everything_comes_back_when_the_broker_does(line: Line) -> None:
 
 
 def test_a_broker_that_stands_still_holds_up_nothing_and_is_told_the_newest(line: Line) -> None:
-    """What it does not take in time is left out; a host finds no number missing."""
+    """Late messages are left out, and the host finds no gap in the numbers."""
     assert line.broker.process is not None
     os.kill(line.broker.process.pid, signal.SIGSTOP)
     left_out = 0

@@ -1,4 +1,4 @@
-"""Commands of hosts by MQTT: judged at once, recorded as all inputs, and refused in words that every host can read."""
+"""Commands of hosts by MQTT: checked at once, recorded as inputs, and refused with a reason that hosts can read."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ MANUAL = 3
 
 @pytest.fixture
 def controlled(serve: Callable[..., Line]) -> Line:
-    """The zoned line, which a controller may command."""
+    """Serve the zoned line, which a controller may command."""
     return serve(role="controller", silence=LONG)
 
 

@@ -1,4 +1,4 @@
-"""A host application in JavaScript, with the codec of Eclipse Tahu: an implementation that we did not write."""
+"""A host application in JavaScript, with the codec of Eclipse Tahu: an independent implementation."""
 
 from __future__ import annotations
 

@@ -47,7 +47,7 @@ def test_it_is_what_the_tag_was(simulated: Line) -> None:
 
 
 def test_that_of_a_recording_is_its_own_up_to_its_place(tmp_path: Path, certificates: Path) -> None:
-    """Though nobody was there to listen."""
+    """No client needs to be connected while it is recorded."""
     with Scenario("scenarios/zoned_line", bag=tmp_path / "bag") as line:
         for value in (0.1, 0.2, 0.3):
             line.run_for(0.5)

@@ -24,7 +24,7 @@ OBJECT = "machines/filler/PackML"
 
 
 def child(client: Client, *names: str) -> SyncNode:
-    """By the standard's browse names."""
+    """Return a node by the browse names of the standard."""
     index = client.get_namespace_index(NAMESPACE)
     filler = client.get_node(f"ns=2;s={OBJECT}")
     standard = ("CurrentState", "Id", "EURange", "AvailableStates", "AvailableTransitions")
@@ -32,7 +32,7 @@ def child(client: Client, *names: str) -> SyncNode:
 
 
 def states(line: Line) -> list[str | None]:
-    """Of the three state machines, one in the other; None: it is not active."""
+    """Return the states of the three nested state machines; None: it is not active."""
     found: list[str | None] = []
     path: list[str] = []
     for name in ("BaseStateMachine", "MachineState", "ExecuteState"):
@@ -72,7 +72,7 @@ def test_a_machine_is_an_object_of_the_standards_type(line: Line) -> None:
 
 
 def call(client: Client, method: str, *arguments: Any) -> None:
-    """The method where the standard has it."""
+    """Call a method where the standard has it."""
     path = ("BaseStateMachine", "MachineState", "ExecuteState")
     depth = {"Clear": 1, "Abort": 1, "Stop": 2}.get(method, 3)
     owner = child(client, *path[:depth])

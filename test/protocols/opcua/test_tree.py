@@ -1,4 +1,4 @@
-"""What clients find: names, types, units, ranges, texts, and the values that the simulation shows."""
+"""Address space: names, types, units, ranges, texts, and values of the simulation."""
 
 from __future__ import annotations
 

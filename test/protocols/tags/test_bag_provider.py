@@ -1,4 +1,4 @@
-"""A recording as a tag source: at each time it shows what was recorded there, forwards and back."""
+"""A recording as a tag provider: it shows the recorded values of each time, forwards and back."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from protocols.waiting import until
 
-from conveyor_sim.bag.outputs import Outputs
+from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.errors import BagError
@@ -29,11 +29,11 @@ GIVEN = Input("modbus", "me", "controller", SET, (SETPOINT,), (0.25,))
 
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Ten seconds of the zoned line; in the middle it gets an owner, a setpoint, and a signal that is forced."""
+    """Record ten seconds of the zoned line; in the middle it gets an owner, a setpoint, and a forced signal."""
     folder = tmp_path_factory.mktemp("bags") / "zoned"
     simulation = Simulation(load_scene("config/scenarios/zoned_line.yaml"), threads=1)
     with Recorder(folder) as recorder:
-        outputs = Outputs(simulation, [recorder], run_id="this run")
+        outputs = OutputWriter(simulation, [recorder], run_id="this run")
         outputs.start()
         for tick in range(TICKS):
             if tick == SET_AT:
@@ -154,7 +154,7 @@ def test_what_can_not_be_shown_is_said_at_the_start(bag: Path, tmp_path: Path) -
     folder = tmp_path / "silent"
     simulation = Simulation(load_scene("config/scenarios/zoned_line.yaml", {"outputs": {"signals": 0.0}}), threads=1)
     with Recorder(folder) as recorder:
-        outputs = Outputs(simulation, [recorder], run_id="")
+        outputs = OutputWriter(simulation, [recorder], run_id="")
         outputs.start()
     with pytest.raises(BagError, match="no message of topic signals"):
         BagTagProvider(folder, print)

@@ -1,4 +1,4 @@
-"""Lockstep by two tags: what was written before a target acts as one set, at the tick that the one before named."""
+"""Lockstep by two tags: writes before a target act as one set at the previous target."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def source() -> HandshakeTagProvider:
 
 
 def advance(source: HandshakeTagProvider) -> list[float]:
-    """One tick, and what acted in it; it must not have to wait."""
+    """Step one tick, and return its inputs; the target must be set."""
     taken = source.take(0.0)
     assert taken is not None
     for given in taken:

@@ -1,4 +1,4 @@
-"""A scene in a process of its own, as a tag source: what it shows, what can be asked of it, and what its end is."""
+"""A scene in a separate process as a tag provider: snapshots, requests, and its end."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def zoned(**overrides: Any) -> Scene:
 
 
 class Served:
-    """Sources that end with their test."""
+    """Providers that end with their test."""
 
     def __init__(self) -> None:
         self.sources: list[SceneTagProvider] = []
@@ -66,7 +66,7 @@ def served() -> Iterator[Served]:
 
 @pytest.fixture(scope="module")
 def kept() -> Iterator[SceneTagProvider]:
-    """For tests that need no process of their own."""
+    """Return the shared providers, for tests that need no separate process."""
     with SceneTagProvider(SceneTask(zoned(), None, 0, 1.0, 1), lambda sentence: None) as source:
         source.wait_for_line()
         yield source
@@ -74,7 +74,7 @@ def kept() -> Iterator[SceneTagProvider]:
 
 @pytest.fixture
 def running(kept: SceneTagProvider) -> SceneTagProvider:
-    """The same, at its beginning."""
+    """Return the shared provider at the start of its run."""
     run = kept.shown.run_id
     assert kept.control("reset", 0, "a test") == ""
     until(lambda: kept.shown.run_id != run, "the reset")
@@ -131,7 +131,7 @@ def mirror(source: SceneTagProvider, pipe: Connection) -> RemoteTagProvider:
 
 
 def catch_up(frames: Frames, view: RemoteTagProvider) -> int:
-    """Apply all frames that wait; how many there were."""
+    """Apply all waiting frames and return their number."""
     count = 0
     while (frame := frames.fetch()) is not None and frame.shown:
         view.apply(frame)
