@@ -1,4 +1,4 @@
-"""What a page is packed of: small, whole, and no larger than it may be."""
+"""Packed data of a page: complete, and no larger than its limit."""
 
 from __future__ import annotations
 
