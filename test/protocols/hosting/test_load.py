@@ -38,7 +38,7 @@ class Clients:
     """Clients of one protocol, in a separate process."""
 
     def __init__(self, name: str, address: str) -> None:
-        command = [sys.executable, "-m", "scada.load_clients", address, str(CHANGES)]
+        command = [sys.executable, "-m", "protocols.load_clients", address, str(CHANGES)]
         path = os.pathsep.join((str(ROOT), str(ROOT / "test")))
         self.process = subprocess.Popen(
             command, cwd=ROOT, env={**os.environ, "PYTHONPATH": path}, stdout=subprocess.PIPE, text=True
