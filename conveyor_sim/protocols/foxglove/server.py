@@ -80,7 +80,7 @@ class FoxgloveServer:
 
         try:
             self._server = foxglove.start_server(
-                name=self._source.about.name,
+                name=self._source.info.name,
                 host=self._at[0],
                 port=self._at[1],
                 context=self._context,

@@ -93,12 +93,12 @@ class ParentCalls:
 class RemoteTagProvider(LineMirror):
     """The line by the frames that the parent sends; one thread applies them."""
 
-    def __init__(self, task: ServerTask, calls: ParentCalls, decode: Decode, past: TagHistory | None) -> None:
-        """Start without data. decode: decodes the message of a topic. past: history of the recording that is played
+    def __init__(self, task: ServerTask, calls: ParentCalls, decode: Decode, history: TagHistory | None) -> None:
+        """Start without data. decode: decodes the message of a topic. history: of the recording that is played
         back, if it is one.
         """
         super().__init__()
-        self._task, self._calls, self._decode, self._past = task, calls, decode, past
+        self._task, self._calls, self._decode, self._history = task, calls, decode, history
         self.takes_inputs = task.takes_inputs
 
     @property
@@ -107,9 +107,9 @@ class RemoteTagProvider(LineMirror):
         return self._task.controls
 
     @property
-    def past(self) -> TagHistory | None:
+    def history(self) -> TagHistory | None:
         """History of a recording; None otherwise."""
-        return self._past
+        return self._history
 
     def give(self, request: Input) -> str:
         """Give an input to the line, through the parent. Return the reason for a refusal, "" if it was accepted."""
@@ -154,7 +154,7 @@ class RemoteTagProvider(LineMirror):
         self.state_run(frame.run)
         if frame.lost and self._known.is_set():
             self.lose(frame.lost)
-        elif frame.shown or self.shown.lost:
+        elif frame.is_new or self.snapshot.lost:
             self.show(frame.at)
             if frame.lost:
                 self.lose(frame.lost)

@@ -188,7 +188,7 @@ class _Process:
         self._handed = 0
         self._goals: deque[TargetRequest] = deque()
         self._goal: TargetRequest | None = None  # target that the line is advancing to
-        self._shown = self._pictured = ("", -1)  # run and tick of the latest copied signals and frame
+        self._snapshot = self._pictured = ("", -1)  # run and tick of the latest copied signals and frame
         self._next_picture = 0.0  # s of wall time
 
     def run(self) -> None:
@@ -234,8 +234,8 @@ class _Process:
         if self._goal is not None and simulation.tick < self._goal.target and not stepper.run.standstill:
             self._copies.live()  # ticks before the target are not shown
             return
-        if self._shown != (now := (stepper.run_id, simulation.tick)):
-            self._shown = now
+        if self._snapshot != (now := (stepper.run_id, simulation.tick)):
+            self._snapshot = now
             header = Header(simulation.tick, simulation.stamp_ns, FRAME)
             self._copies.write("signals", TOPICS["signals"].pack(simulation.line.signals(), header), header.stamp_ns)
         if self._copies.watched and self._pictured != now and self._copies.sent:

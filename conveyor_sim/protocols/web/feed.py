@@ -48,7 +48,7 @@ class Feed:
         self._changed = asyncio.Event()
         self._ends: list[Any] = []
         self._task: asyncio.Task[None] | None = None
-        self._picture, self._shown = source.picture, source.shown
+        self._picture, self._snapshot = source.picture, source.snapshot
         self._story = self._new_story()
         self._sent_at = 0.0
         self._due = False  # True if a message of events is scheduled
@@ -75,7 +75,7 @@ class Feed:
                     loop.call_soon_threadsafe(self._changed.set)
 
             self._ends = [self._source.watch(), self._source.listen(heard)]
-            self._picture, self._shown = self._source.picture, self._source.shown
+            self._picture, self._snapshot = self._source.picture, self._source.snapshot
             self._story, (self._heard, _) = self._new_story(), self._source.events(0)
             self._status = {}
             self._task = asyncio.create_task(self._run())
@@ -111,8 +111,10 @@ class Feed:
             await asyncio.sleep(SHORTEST)
 
     def _follow(self) -> None:
-        before, self._picture, self._shown = self._shown, self._source.picture, self._source.shown
-        if self._shown.run_id != before.run_id or self._shown.tick < before.tick:  # another run, or a step back in time
+        before, self._picture, self._snapshot = self._snapshot, self._source.picture, self._source.snapshot
+        if (
+            self._snapshot.run_id != before.run_id or self._snapshot.tick < before.tick
+        ):  # another run, or a step back in time
             self._story, (self._heard, _) = self._new_story(), self._source.events(0)
             for viewer in self._viewers:
                 viewer.began = False
@@ -149,7 +151,7 @@ class Feed:
         story = self._new_story()
         total, events = self._source.events(max(0, self._heard - MOST_PAST_EVENTS))
         story.look(
-            self._shown, picture, events[: len(events) - (total - self._heard)]
+            self._snapshot, picture, events[: len(events) - (total - self._heard)]
         )  # later events follow in messages
         viewer.begin(text_message("begin", head=about, story=story.take(), status=self._status_now(), **self._about))
         viewer.began, viewer.seen = True, None
@@ -162,7 +164,7 @@ class Feed:
     def _look(self) -> None:
         """Collect new events with their ticks."""
         self._heard, events = self._source.events(self._heard)
-        self._story.look(self._shown, self._picture, events)
+        self._story.look(self._snapshot, self._picture, events)
 
     def _send_all(self) -> None:
         """Send new events and status to the pages that have begun."""
@@ -180,12 +182,12 @@ class Feed:
                     viewer.tell(message)
 
     def _status_now(self) -> dict[str, Any]:
-        shown = self._shown
+        snapshot = self._snapshot
         return {
-            "lost": shown.lost or self._failure,
-            "run": shown.run.text,
-            "reason": shown.run.reason,
-            "owner": shown.owner,
+            "lost": snapshot.lost or self._failure,
+            "run": snapshot.run.text,
+            "reason": snapshot.run.reason,
+            "owner": snapshot.owner,
             "viewers": len(self._viewers),
             "servers": [{**health._asdict(), "text": health.text} for health in self._source.servers],
         }
@@ -196,7 +198,7 @@ class Feed:
     def _key(self) -> Any:
         """Return the key of the present frame, which changes with the frame."""
         picture = self._picture
-        return self._shown.run_id, picture.tick, *picture.drawn.values()
+        return self._snapshot.run_id, picture.tick, *picture.drawn.values()
 
     def _frame_of(self, key: Any) -> bytes:
         if self._frame[0] != key:
