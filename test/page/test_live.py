@@ -62,9 +62,9 @@ def test_bottles_are_drawn_where_the_source_has_them_to_a_pixel(page: Any, live:
     page.click("text=Pause run")
     page.wait_for_selector("text=Resume run")
     until(
-        lambda: live.source.picture.drawn["bottles"]().tick == live.source.snapshot.tick, "a picture of where it stands"
+        lambda: live.source.frame.drawn["bottles"]().tick == live.source.snapshot.tick, "a picture of where it stands"
     )
-    drawn = live.source.picture.drawn["bottles"]()
+    drawn = live.source.frame.drawn["bottles"]()
     soon(
         page, lambda: float(page.get_attribute("#plan", "data-frame")) == pytest.approx(drawn.tick * 0.01), "its frame"
     )

@@ -41,8 +41,8 @@ def test_a_line_is_shown_and_worked_and_all_is_on_record(
     image = image_of(load_scene(ZONED))
     assert [tag.name for tag in source.info.tags] == [tag.name for tag in image.tags]
     assert source.snapshot.values.keys() == {*image.signal_names, *image.command_names}
-    until(lambda: {"bottles", "belts"} <= source.picture.drawn.keys(), "what a page draws")
-    assert len(source.picture.drawn["belts"]().actual) == len(source.picture.line.belts)
+    until(lambda: {"bottles", "belts"} <= source.frame.drawn.keys(), "what a page draws")
+    assert len(source.frame.drawn["belts"]().actual) == len(source.frame.line.belts)
     assert source.give(setpoint(0.25)) == ""
     until(lambda: source.snapshot.values[SPEED] == 0.25, "the speed")
     read_back = source.snapshot.read_back

@@ -133,7 +133,7 @@ class Frames:
             now.lost,
             now.owner,
             now.released,
-            view.picture.at,
+            view.frame.at,
             (),
         )
 

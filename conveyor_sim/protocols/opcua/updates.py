@@ -108,9 +108,8 @@ class Updates:
             await self._bring_read_back(snapshot.read_back, stamp, status)
         for follow in self._others:
             await follow(snapshot, heard, back)
-        await self._bring_run(
-            snapshot, last, stamp, every
-        )  # last, so that clients that see the tick find all its values
+        # Last, so that clients that see the tick find all its values.
+        await self._bring_run(snapshot, last, stamp, every)
 
     async def _bring_run(self, snapshot: LineSnapshot, last: LineSnapshot | None, stamp: datetime, every: bool) -> None:
         """Write the variables of the run. Their status stays Good when the run stops; it is BadNoCommunication only if

@@ -66,7 +66,7 @@ class DrawableProvider(TagProvider, Protocol):
     takes_inputs: bool
 
     @property
-    def picture(self) -> DrawableFrame:
+    def frame(self) -> DrawableFrame:
         """Latest data for drawing the line."""
 
     @property
@@ -124,7 +124,7 @@ class LineMirror:
         self._known = threading.Event()
         self._strange = False  # True if the topics describe another line now
         self._snapshot = LineSnapshot(0, {}, lost=NOTHING)
-        self._picture: DrawableFrame | None = None
+        self._frame: DrawableFrame | None = None
         self._watchers = 0
         self._watching = threading.Lock()
         self._hearers = Listeners()
@@ -147,11 +147,11 @@ class LineMirror:
         return self._snapshot
 
     @property
-    def picture(self) -> DrawableFrame:
+    def frame(self) -> DrawableFrame:
         """Latest data for drawing. Raises RuntimeError before there are any."""
-        if self._picture is None:
+        if self._frame is None:
             raise RuntimeError("there is no snapshot yet")
-        return self._picture
+        return self._frame
 
     @property
     def newest(self) -> Mapping[str, bytes]:
@@ -249,7 +249,7 @@ class LineMirror:
         tags = dict(zip(names, values.tolist(), strict=False))
         tags |= zip(self._command_names, self._commands(), strict=False)
         now = time.time() if at is None else at
-        self._picture = DrawableFrame(
+        self._frame = DrawableFrame(
             self._line, self._tick, now, self._image.values, self._image.forced, dict(self._drawn)
         )
         self._snapshot = LineSnapshot(

@@ -21,10 +21,10 @@ class LineStory(Story):
         super().__init__(lambda tick: tick * tick_ns * 1e-9, COUNTERS)
         self._seen: dict[str, Any] = {}
 
-    def look(self, snapshot: LineSnapshot, picture: DrawableFrame, events: Sequence[Event]) -> None:
+    def look(self, snapshot: LineSnapshot, drawable: DrawableFrame, events: Sequence[Event]) -> None:
         """Add events, and what has changed since the last call."""
         latest: dict[str, Any] = {"alarm_states": snapshot.alarms, "readback": snapshot.read_back}
-        latest |= {topic: picture.drawn.get(topic) for topic in ("counters", "rail_wear")}
+        latest |= {topic: drawable.drawn.get(topic) for topic in ("counters", "rail_wear")}
         new = {topic: what for topic, what in latest.items() if what is not None and what is not self._seen.get(topic)}
         self._seen |= new
         if (columns := event_columns(events, len(events))) is not None:
