@@ -13,7 +13,6 @@ import select
 import threading
 import time
 from collections.abc import Callable
-from functools import partial
 from multiprocessing.connection import Connection
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any
@@ -28,7 +27,7 @@ from conveyor_sim.protocols.hosting.server_messages import (
     ServerTask,
 )
 from conveyor_sim.protocols.server.users import User
-from conveyor_sim.protocols.tags.line_mirror import DRAWING_TOPICS, STATE_TOPICS, LineMirror
+from conveyor_sim.protocols.tags.line_mirror import LineMirror
 from conveyor_sim.protocols.tags.tag_provider import Control
 from conveyor_sim.support.printable import SENTENCE, printable
 
@@ -139,14 +138,7 @@ class RemoteTagProvider(LineMirror):
     def _apply(self, frame: LineFrame) -> None:
         if frame.anew:
             self.forget()
-        for topic in STATE_TOPICS:
-            if (data := frame.states.get(topic)) is not None:
-                self.take(topic, self._decode(topic, data))
-                self.pass_on(topic, data)
-        for topic in DRAWING_TOPICS:
-            if (data := frame.states.get(topic)) is not None:
-                self.keep(topic, partial(self._decode, topic, data))
-                self.pass_on(topic, data)
+        self.receive(frame.states, self._decode)
         for data in frame.passed:
             self.pass_on("events", data)
         self._events.bring(frame.total, frame.events)

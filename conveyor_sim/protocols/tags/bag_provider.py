@@ -161,16 +161,9 @@ class BagTagProvider(LineMirror, AbstractContextManager["BagTagProvider"]):
             return
         states, self._states = self._states, {}
         events, self._new_events = self._new_events, []
-        for topic in STATE_TOPICS:
-            if topic in states and topic != "run_state":  # the playback has its own state
-                self.take(topic, self._bag.decode(topic, states[topic]))
-                self.pass_on(topic, states[topic])
-        for topic in states.keys() & set(DRAWING_TOPICS):
-            self.keep(topic, partial(self._bag.decode, topic, states[topic]))
-            self.pass_on(topic, states[topic])
-        for data in events:
-            self.take("events", self._bag.decode("events", data))
-            self.pass_on("events", data)
+        states.pop("run_state", None)  # the playback has its own state
+        self.receive(states, self._bag.decode)
+        self.receive_events(events, self._bag.decode)
         self.state_run(run)
         self.show()
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -220,6 +221,22 @@ class LineMirror:
                 self._alarms = TOPICS[topic].unpack(message)
             case "events":
                 self._take_events(TOPICS[topic].unpack(message))
+
+    def receive(self, states: Mapping[str, bytes], decode: Callable[[str, bytes], Any]) -> None:
+        """Take the serialized newest messages by topic, in the order of STATE_TOPICS and DRAWING_TOPICS."""
+        for topic in (*STATE_TOPICS, *DRAWING_TOPICS):
+            if (data := states.get(topic)) is not None:
+                if topic in STATE_TOPICS:
+                    self.take(topic, decode(topic, data))
+                else:
+                    self.keep(topic, partial(decode, topic, data))
+                self.pass_on(topic, data)
+
+    def receive_events(self, messages: Iterable[bytes], decode: Callable[[str, bytes], Any]) -> None:
+        """Take serialized messages of topic `events`."""
+        for data in messages:
+            self.take("events", decode("events", data))
+            self.pass_on("events", data)
 
     def pass_on(self, topic: str, data: bytes) -> None:
         """Notify listeners of a serialized message of one of STATE_TOPICS and DRAWING_TOPICS."""

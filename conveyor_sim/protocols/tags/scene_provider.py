@@ -8,7 +8,6 @@ import time
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, suppress
 from dataclasses import replace
-from functools import partial
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -20,7 +19,7 @@ from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.commands.inputs import Input
 from conveyor_sim.line.run_state import ENDED, PAUSED, STOPPED
 from conveyor_sim.protocols.tags.handshake import TARGET, problem
-from conveyor_sim.protocols.tags.line_mirror import DRAWING_TOPICS, STATE_TOPICS, LineMirror, decoded
+from conveyor_sim.protocols.tags.line_mirror import LineMirror, decoded
 from conveyor_sim.protocols.tags.scene_messages import (
     PATIENCE,
     ControlRequest,
@@ -272,17 +271,8 @@ class SceneTagProvider(LineMirror, AbstractContextManager["SceneTagProvider"]):
                     return message.reason
 
     def _take_copy(self, copy: LineUpdate) -> None:
-        for topic in STATE_TOPICS:
-            if (data := copy.states.get(topic)) is not None:
-                self.take(topic, decoded(topic, data))
-                self.pass_on(topic, data)
-        for topic in DRAWING_TOPICS:
-            if (data := copy.states.get(topic)) is not None:
-                self.keep(topic, partial(decoded, topic, data))
-                self.pass_on(topic, data)
-        for data in copy.events:
-            self.take("events", decoded("events", data))
-            self.pass_on("events", data)
+        self.receive(copy.states, decoded)
+        self.receive_events(copy.events, decoded)
         with self._lock:
             self._handed, self._waiting = copy.handed, copy.waiting
         self._begun = self._begun or bool(copy.states)
