@@ -1,11 +1,11 @@
-"""`Simulation`: the one class that the node, the command line and the tests drive."""
+"""`Simulation`: a scene that advances tick by tick, takes commands, is observed and saved."""
 
 import math
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from conveyor_sim.columns.bottles import BeltColumns, BottleColumns, ContactColumns
 from conveyor_sim.columns.counts import Counts
 from conveyor_sim.columns.damage import DamageColumns, DamageEvent, RailWearColumns
-from conveyor_sim.columns.events import Event, GuardEvent
+from conveyor_sim.columns.events import GuardEvent
 from conveyor_sim.columns.ledger import Ledger
 from conveyor_sim.engine.arrays.bodies import Bottles
 from conveyor_sim.engine.observers.contact_list import closed_contacts
@@ -30,13 +30,11 @@ from conveyor_sim.line.commands.inputs import (
 )
 from conveyor_sim.line.line import Line
 from conveyor_sim.line.process_image import ProcessImage
-from conveyor_sim.physics.accounts.clogging import clogging_of
-from conveyor_sim.physics.accounts.damage import DamageAccount
-from conveyor_sim.physics.accounts.energy import EnergyAccount
+from conveyor_sim.physics.accounts.accounts import Accounts
 from conveyor_sim.physics.model import build_model
 from conveyor_sim.physics.state.checkpoint import Checkpoint, damaged, read_checkpoint, write_checkpoint
 from conveyor_sim.physics.state.full_state_hash import full_state_hash
-from conveyor_sim.physics.state.snapshot import entries, restore, snapshot, typed
+from conveyor_sim.physics.state.snapshot import entries, typed
 from conveyor_sim.physics.state.state import FIRST_SLOTS, Held, State
 from conveyor_sim.physics.state.state_hash import COLUMNS, state_hash
 from conveyor_sim.physics.state.world_arrays import changing_arrays
@@ -45,19 +43,31 @@ from conveyor_sim.scene.geometry import RailShape
 from conveyor_sim.scene.schema import Scene
 
 LAST_STAMP_NS = 2**31 * 10**9 - 1
-"""The seconds of a message header are 32 bits."""
+"""Last time of a message header, whose seconds have 32 bits, ns."""
+
+
+class Events(NamedTuple):
+    """Everything reported since the last call of `Simulation.take_events`, each kind in order."""
+
+    outcomes: list[CommandOutcome]
+    """Command results."""
+    guard: list[GuardEvent]
+    """Reports of the guard."""
+    damage: list[DamageEvent]
+    """Limits of the scene that were passed."""
 
 
 class Simulation:
-    """A scene in motion. Time passes in whole ticks only; commands act and observations are made between them.
+    """A scene that advances in whole ticks. Commands are given and observations are made between ticks.
 
-    The same scene and the same commands at the same ticks give the same bits, however the ticks are divided into calls
-    of `advance`, whoever observes and on however many threads. Raises SceneError for a scene that can't be.
+    The same scene and the same commands at the same ticks give the same bits. The number of threads, observations, and
+    the division of ticks into calls of `advance` do not matter. `line` has the devices, and the inputs that wait for
+    the next tick. `integration` has the figures of the steps. Raises SceneError for an invalid scene.
     """
 
     def __init__(self, scene: Scene, threads: int | None = None, shorten: bool = True) -> None:
-        """Put the bottles of a scene in place. threads: to step with; None: as many as turn out to be fastest.
-        shorten: have a tick that the guard objects to done again in shorter steps, before the run is stopped.
+        """Place the bottles of a scene. threads: number of threads; None: the number that turns out to be fastest.
+        shorten: repeat a tick that the guard rejects in shorter steps, before the run is stopped.
 
         Raises ValueError for less than one thread.
         """
@@ -68,20 +78,18 @@ class Simulation:
         self.tick = 0
         bottles = self.model.plant.bottles
         self._state = State(self.model, len(bottles) or FIRST_SLOTS)
-        self._integration = Integration(self._state, threads, shorten)
+        self.integration = Integration(self._state, threads, shorten)
+        """Threads, kernel time and guard of the steps."""
         self._every = {output: scene.every(output) for output in scene.TOPICS}
         self._line = Line(scene, self._state)
         for kind, x, y, theta, vx, vy, omega in bottles:
             self._state.add(self.model.bottle_types.index(kind), x, y, theta, vx, vy, omega)
-        self._damage = None if self._state.world.damage is None else DamageAccount(self._state, scene.limits)
-        self._clogging = clogging_of(self._state, scene)
-        self._account: EnergyAccount | None = None
+        self._accounts = Accounts(self._state, scene)
         self._feed()
         self._line.end(self.tick)
         self._state.make_lists()
         self._line.move_belts()
-        if self.model.has("energy_ledger"):
-            self._account = EnergyAccount(self._state)
+        self._accounts.open_ledger()
 
     @classmethod
     def load(
@@ -91,11 +99,11 @@ class Simulation:
         scene: Scene | None = None,
         folder: Path | None = None,
     ) -> "Simulation":
-        """Go on from a checkpoint as if the run had never stopped: the same bits, on any number of threads.
+        """Continue from a checkpoint with the same bits as if the run had not stopped, on any number of threads.
 
-        scene: must be the one that was saved, but for `duration` and `description`; None: the one in the file.
-        folder: where relative paths start, and which no path may leave; None: anywhere.
-        Raises CheckpointError for a file that is missing, no checkpoint, damaged, of another version or scene.
+        scene: the saved one, except for `duration` and `description`; None: the one in the file.
+        folder: base of relative paths, which no path may leave; None: no restriction.
+        Raises CheckpointError for a file that is missing, no checkpoint, damaged, or of another version or scene.
         """
         checkpoint = read_checkpoint(Path(path), scene, folder)
         simulation = cls(checkpoint.scene, threads)
@@ -105,10 +113,10 @@ class Simulation:
     def save(
         self, path: str | PathLike[str], folder: Path | None = None, controller: dict[str, Any] | None = None
     ) -> None:
-        """Write a checkpoint: the whole state at this tick, in place of what the file held. The run does not notice.
+        """Write a checkpoint of the state at this tick, and replace the file. The run is not affected.
 
-        folder: as for `load`. controller: what that remembers, to be kept with it.
-        Raises CheckpointError if the file can't be written, which leaves what it held.
+        folder: as for `load`. controller: memory of the controller, stored with the state.
+        Raises CheckpointError if the file can't be written; its former content stays.
         """
         arrays = changing_arrays(self._state.world)
         write_checkpoint(Path(path), self.scene, self._snapshot(), arrays, folder, controller)
@@ -119,18 +127,13 @@ class Simulation:
         return self.tick * self.model.tick_ns * 1e-9
 
     @property
-    def kernel_seconds(self) -> float:
-        """Wall time that steps have taken, s."""
-        return self._integration.kernel_seconds
-
-    @property
     def stamp_ns(self) -> int:
-        """Simulated time for message headers, ns: 1 at tick 0, for ROS reads 0 as unset."""
+        """Simulated time for message headers, ns: 1 at tick 0, because ROS reads 0 as unset."""
         return max(1, self.tick * self.model.tick_ns)
 
     @property
     def line(self) -> Line:
-        """All but the bottles' motion: to be looked at; what acts on it is given by `give`."""
+        """Devices, alarms and inputs of the line, for observation. Inputs are queued by `give`."""
         return self._line
 
     @property
@@ -145,8 +148,9 @@ class Simulation:
         return Counts(self._line.fed, self._line.removed, present, self._line.blocked_ticks, held)
 
     def advance(self, ticks: int = 1) -> None:
-        """Let `ticks` ticks pass. Raises SimulationError, in one sentence, for a tick that the guard can't let pass;
-        the state is that at its beginning then.
+        """Advance by `ticks` ticks.
+
+        Raises SimulationError, in one sentence, for a tick that the guard rejects. The state is then that before it.
         """
         for _ in range(ticks):
             self._line.begin(self.tick)
@@ -154,27 +158,24 @@ class Simulation:
             if peaks is not None and self.due("bottles"):
                 peaks.force[:] = 0.0
                 peaks.impulse[:] = 0.0
-            if self._damage is not None:
-                self._damage.begin(self.due("damage"))
-            self._integration.take_tick(self.tick, self._line.fastest_surface)
+            self._accounts.begin(self.due("damage"))
+            self.integration.take_tick(self.tick, self._line.fastest_surface)
             self.tick += 1
-            passed = [] if self._damage is None else self._damage.end(self.tick)
-            if self._clogging is not None:
-                passed += self._clogging.end(self.tick, self._line.removed_by())
+            passed = self._accounts.end(self.tick, self._line.removed_by)
             self._line.end(self.tick)
             self._remove()
             self._feed()
-            self._line.close(passed, {} if self._clogging is None else self._clogging.clogged())
+            self._line.close(passed, self._accounts.clogged())
             self._state.make_lists()
 
-    def give(self, given: Input) -> None:
-        """Queue an input; the next tick applies it, or refuses it with the reason (`take_outcomes`).
+    def give(self, request: Input) -> None:
+        """Queue an input. The next tick applies it, or refuses it with the reason (`take_outcomes`).
 
-        Raises ValueError for one of the kind "line": what the line does, it does by itself.
+        Raises ValueError for the writer kind "line", which is that of inputs by the line itself.
         """
-        if given.by_line:
-            raise ValueError(f"writer_kind: line given by {given.source}, expected another: that is the line itself")
-        self._line.queue(given)
+        if request.by_line:
+            raise ValueError(f"writer_kind: line given by {request.source}, expected another: that is the line itself")
+        self._line.queue(request)
 
     def command(
         self,
@@ -185,9 +186,9 @@ class Simulation:
         writer: str = "",
         writer_kind: WriterKind = "controller",
     ) -> None:
-        """Queue setpoints by name (`process_image.command_names`); the next tick applies or refuses them together.
+        """Queue setpoints by name (`process_image.command_names`). The next tick applies or refuses them together.
 
-        writer: "" for the name of the source. Raises ValueError for the sources that faults and the line itself have.
+        writer: "" for the name of the source. Raises ValueError for the sources of faults and of the line itself.
         """
         if source in (FAULT, WATCHDOG, ARRIVAL):
             raise ValueError(
@@ -196,97 +197,58 @@ class Simulation:
         self.give(Input(source, writer or source, writer_kind, SET, tuple(names), tuple(values)))
 
     def inject(self, name: str, value: float, *, writer: str = FAULT) -> None:
-        """Queue a fault by name (`process_image.fault_names`), as `command` does; its source is "fault"."""
+        """Queue a fault by name (`process_image.fault_names`), with the source "fault"."""
         self.give(Input(FAULT, writer, "test", INJECT, (name,), (value,)))
 
     def operate(self, operation: str, names: Sequence[str] = (), values: Sequence[float] = (), *, writer: str) -> None:
-        """Queue what an operator does: `acknowledge`, `reset`, `shelve`, ... of alarms by their ids."""
+        """Queue an operation of an operator: `acknowledge`, `reset`, `shelve`, ... of alarms by ID."""
         self.give(Input(OPERATE, writer, "operator", operation, tuple(names), tuple(values)))
 
-    def refusal(self, given: Input) -> str:
-        """Why the next tick would refuse an input if nothing came before it, "" if it would not."""
-        return self._line.refusal(given)
-
-    @property
-    def waiting(self) -> Sequence[Input]:
-        """Inputs that wait for the next tick."""
-        return self._line.waiting
-
-    def take_waiting(self) -> list[Input]:
-        """The same, given up: they will not be applied."""
-        return self._line.take_waiting()
-
     def take_outcomes(self) -> list[CommandOutcome]:
-        """What became of inputs since the last call, in order."""
+        """Return the results of commands and other inputs since the last call, in order."""
         return self._line.take_outcomes()
 
     @property
-    def happened(self) -> Sequence[Event]:
-        """What has happened on the line since the tick before, in order."""
-        return self._line.happened
-
-    @property
     def alarms(self) -> frozenset[str]:
-        """Ids of the alarms that stand: active or latched, and neither shelved, suppressed nor out of service."""
+        """IDs of the alarms that stand: active or latched, and neither shelved, suppressed nor out of service."""
         return frozenset(alarm.id for alarm in self._line.alarms if alarm.stands)
 
-    def take_guard_events(self) -> list[GuardEvent]:
-        """What the guard has reported since the last call, in order."""
-        return self._integration.take_events()
-
-    def take_damage_events(self) -> list[DamageEvent]:
-        """What went beyond a limit of the scene since the last call, in order."""
-        watches = (self._damage, self._clogging)
-        events = [event for watch in watches if watch is not None for event in watch.take_events()]
-        return sorted(events, key=lambda event: event.tick)
-
-    @property
-    def shortened_ticks(self) -> int:
-        """Ticks so far that were done again in shorter steps."""
-        return self._integration.shortened_ticks
-
-    @property
-    def deepest_overlap(self) -> float:
-        """The largest overlap over a radius so far that the guard has seen."""
-        return self._integration.deepest_overlap
-
-    @property
-    def threads(self) -> int:
-        """Threads that the next tick is to be stepped with."""
-        return self._integration.threads
+    def take_events(self) -> Events:
+        """Return command results, guard events and passed limits since the last call."""
+        return Events(self._line.take_outcomes(), self.integration.take_events(), self._accounts.take_events())
 
     def restore_from(self, other: "Simulation") -> None:
-        """Take over the bottles, the time and the belts' speeds of another Simulation of the same line.
+        """Copy bottles, time, and belt speeds of another Simulation of the same line.
 
-        The scenes may differ in their effects and steps. Tangential springs of contacts start anew.
+        The scenes may differ in effects and steps. Tangential springs of contacts start unloaded.
         """
         self.tick = other.tick
         self._line.restore_from(other._line)
         self._state.restore_from(other._state)
-        self._integration.put_in()
+        self.integration.put_in()
         self._line.move_belts()
-        if self._account is not None:
-            self._account.restart()
+        if self._accounts.energy is not None:
+            self._accounts.energy.restart()
 
     @contextmanager
     def editing(self) -> Iterator[tuple[Bottles, NDArray[np.int64]]]:
-        """The bottles' arrays, to be changed from outside between two ticks, and the slots in them by order of the ids.
+        """Yield the arrays of the bottles, which may be changed inside, and their slots in the order of the IDs.
 
-        The ledger books what that does to the energy as fed.
+        The ledger books the change of energy as fed.
         """
-        with nullcontext() if self._account is None else self._account.feeding():
+        with self._accounts.feeding():
             yield self._state.world.bottles, self._slots()
             self._state.world.neighbourhood.stale[0] = 1
         self._state.make_lists()
-        self._integration.put_in()
+        self.integration.put_in()
 
     def due(self, output: str) -> bool:
-        """Whether this tick is one at which an output (`Scene.TOPICS`) is made."""
+        """Return True if an output (`Scene.TOPICS`) is due at this tick."""
         every = self._every[output]
         return every > 0 and self.tick % every == 0
 
     def bottles(self) -> BottleColumns:
-        """Every bottle present, ordered by id; peaks are NaN where the scene has no such output (effect `peaks`)."""
+        """Return every bottle present, ordered by ID. Peaks are NaN without the effect `peaks`."""
         world = self._state.world
         slots = self._slots()
         rest, unknown = np.zeros(slots.size), np.full(slots.size, math.nan)
@@ -312,34 +274,34 @@ class Simulation:
         return None if peaks is None else float(peaks.force.max(initial=0.0))
 
     def contacts(self) -> ContactColumns:
-        """Every closed contact at this tick, with the forces that act now."""
-        kind, ends, values = closed_contacts(self._state.world, self._integration.found)
+        """Return every closed contact at this tick, with its present forces."""
+        kind, ends, values = closed_contacts(self._state.world, self.integration.found)
         ids = self._state.world.bottles.id
         b = np.where(kind == 0, ids[np.where(kind == 0, ends[1], 0)], ends[1])
         return ContactColumns(kind, ids[ends[0]].astype(np.uint64), b.astype(np.uint64), *values)
 
     def belts(self) -> BeltColumns:
-        """Commanded and actual speeds, m/s."""
+        """Return commanded and actual belt speeds, m/s."""
         return BeltColumns(self._line.now.setpoints.copy(), self._line.now.speeds.copy())
 
     def moving_rails(self) -> tuple[RailShape, ...]:
-        """Gates, pushers and diverters where they are now, the last ones of all rails by number."""
+        """Return gates, pushers and diverters at their present places; they are the last rails by number."""
         return self._state.moving_rails()
 
     def ledger(self) -> Ledger | None:
-        """Where energy came from and went since the start; None without the effect `energy_ledger`."""
-        return None if self._account is None else self._account.ledger()
+        """Return the energy balance since the start; None without the effect `energy_ledger`."""
+        return None if self._accounts.energy is None else self._accounts.energy.ledger()
 
     def damage(self) -> DamageColumns | None:
-        """Loads on every bottle present, ordered by id; None where the scene does not ask."""
-        return None if self._damage is None else self._damage.columns(self._slots())
+        """Return the loads on every bottle present, ordered by ID; None if the scene does not enable them."""
+        return None if self._accounts.damage is None else self._accounts.damage.columns(self._slots())
 
     def rail_wear(self) -> RailWearColumns | None:
-        """Loads on the rails since the start; None where the scene does not ask."""
-        return None if self._damage is None else self._damage.rail_wear()
+        """Return the loads on the rails since the start; None if the scene does not enable them."""
+        return None if self._accounts.damage is None else self._accounts.damage.rail_wear()
 
     def signals(self) -> np.ndarray:
-        """The process image as controllers read it, in the order of `process_image.signal_names`; float64."""
+        """Return the process image as controllers read it: float64, in the order of `process_image.signal_names`."""
         return self._line.signals().values
 
     def state_hash(self) -> int:
@@ -352,21 +314,15 @@ class Simulation:
         """Return 64 bits over everything that decides how the run continues (`physics/state/full_state_hash.py`)."""
         return full_state_hash(self._snapshot(), changing_arrays(self._state.world), self.scene.limits)
 
-    def rehearse(self) -> None:
-        """Call what the line may call of the engine in a later tick, so that it is compiled before a run begins."""
-        self._line.rehearse()
-
     def _snapshot(self) -> dict[str, Any]:
-        """All that changes as it runs but the arrays of the World, as plain data."""
+        """Return the state that changes with time, without the arrays of the World, as plain data."""
         return {
             "tick": self.tick,
             "next_id": self._state.next_id,
             "held": list(self._state.held.items()),
             "line": self._line.snapshot(),
-            "account": None if self._account is None else snapshot(self._account),
-            "damage": None if self._damage is None else snapshot(self._damage),
-            "clogging": None if self._clogging is None else snapshot(self._clogging),
-            "integration": self._integration.snapshot(),
+            **self._accounts.snapshot(),
+            "integration": self.integration.snapshot(),
         }
 
     def _restore(self, checkpoint: Checkpoint) -> None:
@@ -375,15 +331,10 @@ class Simulation:
             entries(memory, self._snapshot(), "memory")
             self.tick = typed(int, memory["tick"], "tick")
             if self.tick < 0 or self.stamp_ns > LAST_STAMP_NS:
-                raise ValueError(f"tick {self.tick}, which no message can say")
+                raise ValueError(f"tick {self.tick}, which is beyond the times of messages")
             self._line.restore(self.tick, memory["line"])
-            accounts = (("account", self._account), ("damage", self._damage), ("clogging", self._clogging))
-            for name, account in accounts:
-                if account is None:
-                    typed(type(None), memory[name], name)
-                else:
-                    restore(account, memory[name], name)
-            self._integration.restore(memory["integration"])
+            self._accounts.restore(memory)
+            self.integration.restore(memory["integration"])
             held = typed(list[tuple[int, Held]], memory["held"], "held")
             self._state.restore(checkpoint.arrays, typed(int, memory["next_id"], "next_id"), held)
             if self._line.held != sorted(self._state.held):
@@ -398,10 +349,10 @@ class Simulation:
 
     def _remove(self) -> None:
         if self._line.takes:
-            with nullcontext() if self._account is None else self._account.removing():
+            with self._accounts.removing():
                 self._line.take()
 
     def _feed(self) -> None:
         if self._line.feeds:
-            with nullcontext() if self._account is None else self._account.feeding():
+            with self._accounts.feeding():
                 self._line.feed()

@@ -1,4 +1,4 @@
-"""What holds the package together: its resources, versions and dependencies, both ways of installing, the set-up."""
+"""Packaging: resources, versions and dependencies, both ways of installing, the set-up."""
 
 import ast
 import importlib.metadata

@@ -33,12 +33,12 @@ def test_it_runs_as_its_prediction_expects(path: Path) -> None:
     for _ in range(round(min(SECONDS.get(name, scene.duration), scene.duration) / scene.tick)):
         simulation.advance()
         peaks.after_tick()
-    assert [event.text for event in simulation.take_guard_events()] == []
+    assert [event.text for event in simulation.take_events().guard] == []
     model = simulation.model
     reached = achieved(model, peaks.force)
     if reached is None:
         # The guard's look at overlaps, some hundred times a second, has to do.
-        deepest = simulation.deepest_overlap * float(model.type_radius.max())
+        deepest = simulation.integration.deepest_overlap * float(model.type_radius.max())
         allowed = min((impact.overlap(HARDER * model.prediction.force) for impact in model.impacts), default=0.0)
         assert deepest <= allowed
         return

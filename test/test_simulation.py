@@ -1,4 +1,4 @@
-"""Simulation: the same scene and commands give the same bits, however time is divided and whoever looks."""
+"""Simulation: the same scene and commands give the same bits, for any division of time and any observers."""
 
 import subprocess
 import sys
@@ -73,12 +73,12 @@ def assert_same_bits(one: Simulation, other: Simulation) -> None:
 
 @pytest.fixture(scope="module", params=INTEGRATORS)
 def reference(request: pytest.FixtureRequest) -> Simulation:
-    """One run, tick by tick, with nobody looking."""
+    """Return the simulation after one run, tick by tick, without observers."""
     return run(little_line(request.param))
 
 
 def test_the_little_line_is_busy(reference: Simulation) -> None:
-    """What follows says little if nothing happens."""
+    """The next tests need a line on which much happens."""
     sim = little_line(reference.model.integrator)
     contacts, belts = {0: 0, 1: 0}, set()
     while sim.tick < TICKS:
@@ -124,7 +124,7 @@ def test_rebuilds_of_the_lists_leave_no_trace(reference: Simulation) -> None:
 
 
 def lengthen_lists(sim: Simulation, needed: int) -> None:
-    """As if so many entries had been needed in each list."""
+    """Lengthen each list as if it had `needed` entries."""
     sim._state._lengthen_lists(needed, needed, needed, needed, needed)
     sim._state.world.neighbourhood.stale[0] = 1
     sim._state.make_lists()
@@ -142,7 +142,7 @@ def test_room_for_bottles_and_lists_leaves_no_trace(reference: Simulation) -> No
 
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_lists_that_grow_within_a_tick_leave_no_trace(integrator: str) -> None:
-    """A bottle slides in one long tick onto a rail of so many pieces that its list does not hold them."""
+    """A bottle slides in one long tick onto a rail of more pieces than its list holds."""
 
     def sliding() -> Simulation:
         corners = [[-0.4 + 0.0001 * n, 1e-4 * (n % 2)] for n in range(1000)]
@@ -185,7 +185,7 @@ def test_the_seed_decides_the_jitter() -> None:
 
 
 def test_leapfrog_and_semi_implicit_euler_are_one_where_no_belt_turns() -> None:
-    """What a belt's velocity was at mid-step is a question on turning belts only."""
+    """The velocity of a belt at mid-step matters on turning belts only."""
     straight = {name: belt for name, belt in line()["belts"].items() if belt["kind"] == "straight"}
     one, other = (little_line(integrator, belts=straight) for integrator in ("leapfrog", "semi_implicit_euler"))
     for sim in (one, other):
@@ -200,7 +200,7 @@ def test_leapfrog_and_semi_implicit_euler_are_one_where_no_belt_turns() -> None:
 
 
 def test_the_hash_tells_states_apart() -> None:
-    """Of tick, bottles and belts: also where nothing else differs."""
+    """The hash differs if only the tick, a bottle or a belt differs."""
     one, other = little_line(), little_line()
     assert one.state_hash() == other.state_hash()
     other.command(["belts/side/cmd_speed"], [0.61])

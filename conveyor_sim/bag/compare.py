@@ -1,4 +1,4 @@
-"""Finds where two messages of one tick differ first, bit for bit or within a tolerance."""
+"""First difference of two messages of one tick, bit for bit or within a tolerance."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from conveyor_sim.bag.messages.encode import Outcome
 from conveyor_sim.bag.messages.topics import COMPARED
 
 RELATIVE = 1e-6
-"""Of the value, beside the absolute tolerance of a field (topics.Compare)."""
+"""Relative tolerance, added to the absolute tolerance of a field (topics.Compare)."""
 
 
 @dataclass(frozen=True)
-class Difference:
-    """Where a replay first differs from its recording."""
+class ReplayDifference:
+    """First difference of a replay from its recording."""
 
     tick: int
     time: float
@@ -29,9 +29,9 @@ class Difference:
     recorded: str
     replayed: str
     bottle: int | None = None
-    """Id, where the field belongs to a bottle (of a contact: its bottle a)."""
+    """Id, if the field belongs to a bottle; for a contact: its bottle a."""
     part: str = ""
-    """Which entry, in words: "bottle 17", "belt feeder"."""
+    """Entry in words: "bottle 17", "belt feeder"."""
 
     def __str__(self) -> str:
         part = f" of {self.part}" if self.part else ""
@@ -41,30 +41,30 @@ class Difference:
         )
 
 
-def first_difference(topic: str, line: Any, recorded: Any, replayed: Any, *, exact: bool) -> Difference | None:
-    """Compares two decoded messages; `replayed` gives the tick and names the entries. None if they are equal."""
+def first_difference(topic: str, line: Any, recorded: Any, replayed: Any, *, exact: bool) -> ReplayDifference | None:
+    """Compare two decoded messages; `replayed` gives the tick and names the entries. Return None if they are equal."""
     row = COMPARED[topic]
     compare = row.compare
     tick = int(replayed.tick)
     time = tick * line.tick_ns * 1e-9
 
-    def found(field: str, then: object, now: object, index: int | None = None) -> Difference:
+    def difference(field: str, then: object, now: object, index: int | None = None) -> ReplayDifference:
         bottle = None if index is None or compare.bottle is None else int(getattr(replayed, compare.bottle)[index])
         part = "" if index is None else compare.entry(line, replayed, index)
-        return Difference(tick, time, topic, field, str(then), str(now), bottle, part)
+        return ReplayDifference(tick, time, topic, field, str(then), str(now), bottle, part)
 
     if recorded.tick != replayed.tick:
-        return found("tick", recorded.tick, replayed.tick)
+        return difference("tick", recorded.tick, replayed.tick)
     if exact and recorded.header.stamp != replayed.header.stamp:
-        return found("header.stamp", _seconds(recorded), _seconds(replayed))
+        return difference("header.stamp", _seconds(recorded), _seconds(replayed))
     for field in row.fields:
         then, now = np.atleast_1d(getattr(recorded, field)), np.atleast_1d(getattr(replayed, field))
         if len(then) != len(now):
-            return found(f"the number of entries ({field})", len(then), len(now))
+            return difference(f"the number of entries ({field})", len(then), len(now))
         unequal = np.flatnonzero(_unequal(then, now, None if exact else compare.within.get(field)))
         if len(unequal):
             index = int(unequal[0])
-            return found(field, repr(then[index].item()), repr(now[index].item()), index)
+            return difference(field, repr(then[index].item()), repr(now[index].item()), index)
     return None
 
 
@@ -84,22 +84,22 @@ def _unequal(then: NDArray[Any], now: NDArray[Any], tolerance: float | None) -> 
 
 def outcome_difference(
     tick: int, time: float, recorded: Sequence[Outcome], replayed: Sequence[Outcome]
-) -> Difference | None:
-    """Compares what became of the commands of one tick. None if it is equal."""
+) -> ReplayDifference | None:
+    """Compare the results of the commands of one tick. Return None if they are equal."""
     for then, now in zip(recorded, replayed, strict=False):
         for field in fields(Outcome):
             before, after = getattr(then, field.name), getattr(now, field.name)
             if not _same(before, after):
                 part = f"the command {', '.join(then.names)} from {then.source}"
-                return Difference(tick, time, "outcomes", field.name, str(before), str(after), part=part)
+                return ReplayDifference(tick, time, "outcomes", field.name, str(before), str(after), part=part)
     if len(recorded) != len(replayed):
         counts = (str(len(recorded)), str(len(replayed)))
-        return Difference(tick, time, "outcomes", "the number of outcomes", *counts)
+        return ReplayDifference(tick, time, "outcomes", "the number of outcomes", *counts)
     return None
 
 
 def _same(before: Any, after: Any) -> bool:
-    """Equality in which a NaN, which a refused command may hold, equals itself."""
+    """Return True if two values are equal. A NaN, which a refused command may hold, equals itself."""
     if isinstance(before, tuple):
         return len(before) == len(after) and all(map(_same, before, after))
     if isinstance(before, float) and isinstance(after, float) and math.isnan(before):

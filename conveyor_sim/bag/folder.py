@@ -1,4 +1,4 @@
-"""The folder of a recording: whether it can take one, found out before anything is simulated or compiled for it."""
+"""The folder of a recording, which is checked before the simulation is compiled and run."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from conveyor_sim.errors import BagError
 
 
 def require_recordable(path: Path) -> None:
-    """Raises BagError unless a folder is empty or can be made, and can be written to. Nothing stays behind."""
+    """Raise BagError unless a folder is empty or can be made, and can be written to. No file or folder is left."""
     made = make_folder(path)
     try:
         with tempfile.TemporaryFile(dir=path):
@@ -23,7 +23,7 @@ def require_recordable(path: Path) -> None:
 
 
 def make_folder(path: Path) -> list[Path]:
-    """Makes a folder for a recording; returns the folders that were not there before, the innermost first.
+    """Make a folder for a recording. Return the folders that did not exist before, the innermost first.
 
     Raises BagError if it can't be made, or is not empty.
     """
@@ -43,20 +43,20 @@ def make_folder(path: Path) -> list[Path]:
 
 
 def bag_folder(record: Path | None, runs: int) -> Path | None:
-    """Where the run after so many others is recorded: `<record>`, then `<record>_1`, `<record>_2`, ..."""
+    """Return the folder of a run that follows `runs` others: `<record>`, then `<record>_1`, `<record>_2`, ..."""
     if record is None or runs == 0:
         return record
     return record.with_name(f"{record.name}_{runs}")
 
 
 def remove_folders(folders: Iterable[Path]) -> None:
-    """Removes those that are empty, in this order."""
+    """Remove the empty ones of these folders, in this order."""
     for folder in folders:
         with suppress(OSError):
             folder.rmdir()
 
 
 def _refused(path: Path, error: OSError) -> BagError:
-    # Only what is no folder makes mkdir say that the file exists.
+    # With exist_ok, mkdir raises FileExistsError only for a path that is not a folder.
     why = "a file is in its place" if isinstance(error, FileExistsError) else error.strerror
     return BagError(f"{path}: can't be created as the folder of a recording ({why})")

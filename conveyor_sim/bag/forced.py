@@ -1,4 +1,4 @@
-"""Which signals were forced in a recording."""
+"""Forced signals of a recording."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from conveyor_sim.support.printable import printable
 
 
 def forced_signals(bag: Bag) -> tuple[str, ...]:
-    """Names of those that were forced at any time, in the order in which they were."""
+    """Return the names of the signals that were forced at any time, in the order of their first forcing."""
     names: dict[str, None] = {}
-    for frame in bag.messages("signals"):  # those of a checkpoint from which it began
+    for frame in bag.messages("signals"):  # the first holds those of a checkpoint at which the run began
         names.update((bag.line.signal_names[place], None) for place in to_image(frame.data).forced)
         break
     for outcome in bag.outcomes():

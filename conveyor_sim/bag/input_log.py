@@ -1,11 +1,13 @@
-"""A run's start and inputs, written as it goes: with both, the run can be simulated again (`rerun.py`).
+"""Log of a run's start and inputs, from which the run can be simulated again (`rerun.py`).
 
-A file of JSON lines. The first holds the scene; a run that began from a checkpoint has a copy of it beside the file.
-`{"tick": t, "inputs": [[source, writer, writer_kind, operation, names, values, texts], ...]}` gives what is applied at
-t and at every tick after it, until the next such line. `{"tick": t, "hash": h}` says that t was reached, with that
-state; with `"failed": true` the guard stopped the run there. `{"tick": t, "variables": [[place, value], ...]}` says
-which of a controller's recorded variables have changed at its scan; `"names": [...]` in such a line, which these are
-from then on.
+A file of JSON lines. The first line holds the scene. The copy of a checkpoint at which the run began lies beside the
+file. Further lines:
+
+- `{"tick": t, "inputs": [[source, writer, writer_kind, operation, names, values, texts], ...]}`: inputs applied
+  at t and at each tick after it, until the next such line;
+- `{"tick": t, "hash": h}`: t was reached, with this state hash; with `"failed": true` the guard stopped the run there;
+- `{"tick": t, "variables": [[place, value], ...]}`: recorded variables of a controller that changed at its scan;
+  `"names": [...]` in such a line states the names of all of them from then on.
 """
 
 from __future__ import annotations
@@ -19,37 +21,38 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from conveyor_sim.bag.lock import claim
 from conveyor_sim.errors import BagError
+from conveyor_sim.support.file_lock import lock
 
 if TYPE_CHECKING:
     from conveyor_sim.simulation import Simulation
 
 FILE_NAME = "inputs.jsonl"
 START_NAME = "start.npz"
-"""The checkpoint from which a run began, beside its inputs, and in the folder of a bag."""
+"""Name of the copy of the checkpoint at which a run began, beside its inputs and in the folder of a bag."""
 
 FORMAT = 3
-"""Raised by one whenever the layout of the file changes."""
+"""Version of the file's layout; it is raised by one at each change of the layout."""
 
 FLUSH_INTERVAL = 1.0
-"""s, simulated: a killed process loses the inputs of less than that."""
+"""Simulated time between flushes, s. A killed process loses the inputs of a shorter time."""
 
 _NONE = repr(())
 
 
 def copier(start: str | PathLike[str] | None) -> Callable[[Path], object] | None:
-    """What copies the checkpoint that a run begins from to where it is recorded; None: it begins at tick 0."""
+    """Return a function that copies the checkpoint at which a run begins to a path; None if it begins at tick 0."""
     return None if start is None else partial(shutil.copyfile, start)
 
 
 class InputLog(contextlib.AbstractContextManager["InputLog"]):
-    """Writes the inputs of a simulation to a folder, while somebody else steps it and calls this around each tick."""
+    """Writer of a simulation's inputs to a folder. The owner of the simulation calls it before and after each tick."""
 
     def __init__(self, folder: Path, simulation: Simulation, start: Path | None = None) -> None:
-        """folder: it is made. start: the checkpoint that the simulation was loaded from; None: it began at tick 0.
+        """Make the folder and write the first line.
 
-        Raises BagError if the folder can't be written to, or holds inputs already.
+        start: the checkpoint that the simulation was loaded from; None: it began at tick 0.
+        Raise BagError if the folder can't be written to, or holds inputs already.
         """
         self.path = folder / FILE_NAME
         self._sim = simulation
@@ -72,20 +75,20 @@ class InputLog(contextlib.AbstractContextManager["InputLog"]):
             if start is not None:
                 shutil.copyfile(start, folder / START_NAME)
             self._stream = self.path.open("xb")
-            with contextlib.suppress(BlockingIOError):  # somebody looks whether it was left
-                claim(self._stream)
+            with contextlib.suppress(BlockingIOError):  # another process checks whether the file is abandoned
+                lock(self._stream)
             self._write(header)
             self._stream.flush()
         except OSError as error:
             raise BagError(f"{self.path}: the inputs of a run can't be written ({error.strerror})") from error
 
     def before_tick(self) -> None:
-        """Note what waits for the tick that is about to begin. Raises BagError if it can't be written."""
+        """Log the inputs that wait for the tick that is about to begin. Raise BagError if they can't be written."""
         if self._failed:
             return
-        tick, waiting = self._sim.tick, tuple(map(tuple, self._sim.waiting))
+        tick, waiting = self._sim.tick, tuple(map(tuple, self._sim.line.waiting))
         now = repr(waiting)  # -0.0 and 0.0 are equal, but not the same bits
-        if tick != self._next and self._last != _NONE:  # somebody else has stepped it meanwhile
+        if tick != self._next and self._last != _NONE:  # ticks have passed without a call of this method
             self._write({"tick": self._next, "inputs": []})
             self._last = _NONE
         if now != self._last:
@@ -94,9 +97,9 @@ class InputLog(contextlib.AbstractContextManager["InputLog"]):
         self._next = tick + 1
 
     def note_variables(self, names: Sequence[str], values: Sequence[float]) -> None:
-        """Note a controller's variables after its scan at the present tick, if any are recorded.
+        """Log a controller's variables after its scan at the present tick, if any are recorded.
 
-        Raises BagError if it can't be written.
+        Raise BagError if they can't be written.
         """
         if not names:
             return
@@ -111,17 +114,17 @@ class InputLog(contextlib.AbstractContextManager["InputLog"]):
         self._write(line)
 
     def after_tick(self) -> None:
-        """A tick has passed. Raises BagError if what came so far can't be written."""
+        """Flush the log at intervals of simulated time. Raise BagError if it can't be written."""
         if self._sim.tick >= self._flush_at:
             self._reached()
 
     def after_failure(self) -> None:
-        """The tick that began last could not pass: here the run ends."""
+        """Log that the tick that began last has failed. The run ends here."""
         self._write({"tick": self._sim.tick, "hash": self._sim.state_hash(), "failed": True})
         self._failed = True
 
     def close(self) -> None:
-        """Note the state that was reached, and end. Does nothing the second time."""
+        """Log the state that was reached, and close the file. A second call does nothing."""
         if not self._stream.closed:
             if not self._failed:
                 self._reached()
@@ -150,11 +153,11 @@ class InputLog(contextlib.AbstractContextManager["InputLog"]):
 
 
 def input_folders(folder: Path) -> list[Path]:
-    """Those in a folder that hold inputs: itself, and those of further lines of the same test."""
+    """Return the folders with inputs: the folder itself, and those of further lines of the same test in it."""
     return [place for place in (folder, *sorted(folder.glob("line_*"))) if (place / FILE_NAME).is_file()]
 
 
 def environment_of(simulation: Simulation) -> list[str]:
-    """What decides the bits of a run beside its scene, start and inputs, as "what=version"."""
+    """Return the versions that determine a run's bits beside its scene, start and inputs, as "name=version"."""
     model = simulation.model
     return [f"engine={model.engine_hash}", *model.versions, f"machine={model.machine}"]

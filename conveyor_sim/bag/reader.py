@@ -1,4 +1,4 @@
-"""Reads a bag back as columns: one recorded by this package, or by stock rosbag2 from the same topics."""
+"""Reader of bags as columns: bags recorded by this package, or by stock rosbag2 from the same topics."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.bag.any_source import AnySource
-from conveyor_sim.bag.mcap.index import sealed
+from conveyor_sim.bag.mcap.index import is_complete
 from conveyor_sim.bag.mcap.metadata import FILE_NAME, file_names, is_stated_in, read_metadata
 from conveyor_sim.bag.mcap.records import mapped
 from conveyor_sim.bag.mcap.storage import other_storage, packed_message
-from conveyor_sim.bag.mcap_source import McapSource
+from conveyor_sim.bag.mcap_reader import McapFilesReader
+from conveyor_sim.bag.message_reader import MessageReader
 from conveyor_sim.bag.messages.encode import LINE, Outcome
 from conveyor_sim.bag.messages.qos import Qos
 from conveyor_sim.bag.messages.topics import TOPICS
-from conveyor_sim.bag.own_source import own_source
-from conveyor_sim.bag.source import Source
+from conveyor_sim.bag.own_reader import own_reader
+from conveyor_sim.bag.rosbags_reader import RosbagsReader
 from conveyor_sim.columns.bottles import BeltColumns, BottleColumns, ContactColumns
 from conveyor_sim.errors import BagError, ConveyorError
 from conveyor_sim.support.printable import SENTENCE, printable
@@ -34,7 +34,7 @@ T = TypeVar("T")
 
 LOG = logging.getLogger("conveyor_sim")
 SUFFIXES = (".mcap", ".db3")
-"""Of files that are a bag by themselves."""
+"""Suffixes of files that are a bag by themselves."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Frame(Generic[T]):
 
 @dataclass(frozen=True)
 class BottleSeries:
-    """One bottle over time, for as long as it was on the line: 1-D arrays of equal length, the fields of Bottles."""
+    """One bottle over its time on the line: 1-D arrays of equal length, with the fields of Bottles."""
 
     time: NDArray[np.float64]
     """s"""
@@ -78,10 +78,10 @@ class Bag(AbstractContextManager["Bag"]):
     `line` is the recorded conveyor_msgs/Line (its fields as attributes, arrays as NumPy, texts as lists of str).
     """
 
-    def __init__(self, path: Path, source: Source, verified: bool) -> None:
+    def __init__(self, path: Path, source: MessageReader, verified: bool) -> None:
         self.path = path
         self.verified = verified
-        """Every byte is as it was written; False: some carry no checksum."""
+        """True if every byte is as it was written; False if some bytes carry no checksum."""
         self._source = source
         line_topics = [recorded.topic for recorded in source.topics if recorded.type == LINE and recorded.count]
         if not line_topics:
@@ -93,7 +93,7 @@ class Bag(AbstractContextManager["Bag"]):
         self.close()
 
     def close(self) -> None:
-        """Closes the files; iterating afterwards is an error."""
+        """Close the files; iterating afterwards is an error."""
         self._source.close()
 
     @property
@@ -114,12 +114,12 @@ class Bag(AbstractContextManager["Bag"]):
         return {self._relative(recorded.topic): recorded.type for recorded in self._source.topics}
 
     def time(self, tick: int) -> float:
-        """Simulated time of a tick, s."""
+        """Return the simulated time of a tick, s."""
         return float(tick * self.line.tick_ns * 1e-9)
 
     @property
     def qos(self) -> dict[str, Qos]:
-        """Quality of service that was offered when it was recorded, by topic, names as in OUTPUTS."""
+        """Quality of service offered by the recorded publishers, by topic, names as in OUTPUTS."""
         return {self._relative(recorded.topic): recorded.qos for recorded in self._source.topics}
 
     @property
@@ -129,18 +129,18 @@ class Bag(AbstractContextManager["Bag"]):
 
     @cached_property
     def next_run_ns(self) -> int | None:
-        """Log time of a second line, which begins another run, after a reset; None if there is none."""
+        """Log time of a second line message, with which another run begins after a reset; None if there is none."""
         lines = [log_time for _, log_time, _ in self.raw({"line"})]
         return lines[1] if len(lines) > 1 else None
 
     def type_hash(self, topic: str) -> str:
-        """RIHS01 hash of a topic's type by the definition that the bag states."""
+        """Return the RIHS01 hash of a topic's type by the definition that the bag states."""
         return self._source.type_hash(self.types[topic])
 
     def raw(
         self, topics: Collection[str] | None = None, start_ns: int | None = None, stop_ns: int | None = None
     ) -> Iterator[tuple[str, int, bytes]]:
-        """Topic, log time (ns) and serialized bytes of every message in time order.
+        """Yield topic, log time (ns) and serialized bytes of every message in time order.
 
         If given: of some topics, from a log time on, before a log time.
         """
@@ -155,20 +155,20 @@ class Bag(AbstractContextManager["Bag"]):
             raise BagError(f"{self.path}: only {count} of {stated} messages can be read; damaged or cut short?")
 
     def decode(self, topic: str, data: bytes) -> Any:
-        """A rosbags message object. Raises BagError if the bytes are not one of the topic's type."""
+        """Return a rosbags message object. Raise BagError if the bytes are not a message of the topic's type."""
         with in_one_sentence(self.path, f"a message of topic {topic} can't be decoded", data):
             return self._source.deserialize(data, self.types[topic])
 
     def sense(self) -> AbstractContextManager[None]:
-        """Around whatever makes sense of decoded messages: where damage can't be excluded, errors become BagErrors."""
+        """Return a context for code that interprets messages. If the bag is not verified, errors become BagErrors."""
         return nullcontext() if self.verified else in_one_sentence(self.path, "its messages make no sense")
 
     def ticks(self, topic: str) -> NDArray[np.int64]:
-        """The ticks (n,) of the messages of one topic."""
+        """Return the ticks (n,) of the messages of one topic."""
         return np.array([self.tick(topic, data) for _, _, data in self.raw({topic})], dtype=np.int64)
 
     def messages(self, topic: str, ticks: Collection[int] | None = None) -> Iterator[Frame[Any]]:
-        """The messages of one topic that carries a tick, as rosbags objects: every one, or those of some ticks."""
+        """Yield the messages of one topic that carries a tick, as rosbags objects: all, or those of some ticks."""
         for _, _, data in self.raw({topic}):
             if ticks is not None and self.tick(topic, data) not in ticks:
                 continue
@@ -176,38 +176,38 @@ class Bag(AbstractContextManager["Bag"]):
             yield Frame(message.tick, message.tick * self._tick_ns(message) * 1e-9, message)
 
     def tick(self, topic: str, data: bytes) -> int:
-        """The tick of a message of a topic that carries one; nothing else of it is decoded."""
+        """Return the tick of a message of a topic that carries one, without decoding the rest."""
         with in_one_sentence(self.path, f"a message of topic {topic} can't be decoded", data):
             return self._source.tick(data, self.types[topic])
 
     def read(self, topic: str, ticks: Collection[int] | None = None) -> Iterator[Frame[Any]]:
-        """The same as its row of topics.TOPICS reads them: columns, or whatever it says there."""
+        """Yield the messages of one topic in the form that its row of topics.TOPICS states, usually columns."""
         row = TOPICS[topic]
         for frame in self.messages(topic, ticks):
             yield Frame(frame.tick, frame.time, row.unpack(frame.data))
 
     def bottles(self) -> Iterator[Frame[BottleColumns]]:
-        """Every recorded Bottles."""
+        """Yield every recorded Bottles."""
         return self.read("bottles")
 
     def contacts(self) -> Iterator[Frame[ContactColumns]]:
-        """Every recorded Contacts."""
+        """Yield every recorded Contacts."""
         return self.read("contacts")
 
     def belts(self) -> Iterator[Frame[BeltColumns]]:
-        """Every recorded Belts."""
+        """Yield every recorded Belts."""
         return self.read("belts")
 
     def signals(self) -> Iterator[Frame[NDArray[np.float64]]]:
-        """Every recorded process image, in the order of line.signal_names."""
+        """Yield every recorded process image, in the order of line.signal_names."""
         return self.read("signals")
 
     def outcomes(self) -> Iterator[Frame[Outcome]]:
-        """What became of every command, in order; the tick is the one at which it was applied or refused."""
+        """Yield the result of every command, in order. The tick is that at which it was applied or refused."""
         return self.read("outcomes")
 
     def bottle_series(self, ids: Collection[int]) -> dict[int, BottleSeries]:
-        """The histories of some bottles, from one pass over the bag; ids that never occur are left out."""
+        """Return the histories of some bottles, from one pass over the bag; ids that never occur are left out."""
         wanted = np.array(sorted(ids), dtype=np.uint64)
         names = [field.name for field in fields(BottleSeries)]
         rows: dict[int, dict[str, list[Any]]] = {}
@@ -227,10 +227,10 @@ class Bag(AbstractContextManager["Bag"]):
 
 
 class in_one_sentence(AbstractContextManager[None]):
-    """Turns whatever the libraries raise over a bag that they can't read into a BagError of one sentence."""
+    """Context that turns the errors of libraries over an unreadable bag into a BagError of one sentence."""
 
     def __init__(self, path: Path, what: str = "can't be read as a bag", data: bytes = b"") -> None:
-        """data: the message that is read, if it is one."""
+        """Describe the action that may fail. data: the message that is read; empty while no message is read."""
         self._path, self._what, self._data = path, what, data
 
     def __exit__(self, _kind: object, error: BaseException | None, _trace: object) -> None:
@@ -243,7 +243,7 @@ class in_one_sentence(AbstractContextManager[None]):
 
 
 def mcap_files(path: Path) -> list[Path]:
-    """The MCAP files of a rosbag2 folder in their order, or the file itself."""
+    """Return the MCAP files of a rosbag2 folder in their order, or the file itself."""
     if path.is_file():
         return [path]
     files = [file for file in path.glob("*.mcap") if file.is_file()]
@@ -262,10 +262,10 @@ def open_bag(path: str | Path, by_index: bool = False, *, report: bool = True) -
     with in_one_sentence(path):
         _require_bag(path)
         files = _checked_files(path)
-        if by_index and len(files) == 1 and (own := own_source(files[0])) is not None:
+        if by_index and len(files) == 1 and (own := own_reader(files[0])) is not None:
             return Bag(path, own, verified=False)
         source, verified = _source(path, files)
-        if report and isinstance(source, McapSource):
+        if report and isinstance(source, McapFilesReader):
             for sentence in source.skipped:
                 _report_skipped(sentence)
         try:
@@ -282,7 +282,7 @@ def _report_skipped(sentence: str) -> None:
 
 
 def _require_bag(path: Path) -> None:
-    """Raises BagError for what can't be one."""
+    """Raise BagError for a path that can't be a bag."""
     try:
         kind = path.stat().st_mode
     except FileNotFoundError:
@@ -297,7 +297,7 @@ def _require_bag(path: Path) -> None:
 
 
 def _checked_files(path: Path) -> list[Path]:
-    """The MCAP files that a bag consists of; none if rosbags must read it by its metadata.yaml."""
+    """Return the MCAP files of a bag; none if rosbags must read it by its metadata.yaml."""
     if path.is_file():
         if path.suffix != ".mcap":
             return []
@@ -331,19 +331,19 @@ def _checked_files(path: Path) -> list[Path]:
     return files
 
 
-def _source(path: Path, files: list[Path]) -> tuple[Source, bool]:
+def _source(path: Path, files: list[Path]) -> tuple[MessageReader, bool]:
     """Open a bag, by its MCAP files if it has any: these repeat, under a checksum, what metadata.yaml says.
 
     Return also True if every byte is as it was written. Raises BagError for damage that can be seen.
     """
     if not files:
-        return AnySource([path]), False
-    if len(files) == 1 and _is_sealed(files[0]) and (own := own_source(files[0])) is not None:
+        return RosbagsReader([path]), False
+    if len(files) == 1 and _is_sealed(files[0]) and (own := own_reader(files[0])) is not None:
         return own, True
-    source = McapSource(path, files)
+    source = McapFilesReader(path, files)
     return source, source.verified
 
 
 def _is_sealed(file: Path) -> bool:
     with mapped(file) as data:
-        return sealed(data)
+        return is_complete(data)

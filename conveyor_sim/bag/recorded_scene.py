@@ -1,4 +1,4 @@
-"""The scene of a recording as it ran: with its own integrator and steps, whatever is chosen by default today."""
+"""Scene of a recording with the integrator and steps of the recorded run, in place of the present defaults."""
 
 from dataclasses import replace
 from typing import Any
@@ -7,16 +7,16 @@ from conveyor_sim.scene import Scene, parse_overrides, parse_scene
 
 
 def recorded_scene(line: Any, name: str) -> Scene:
-    """The scene of a recorded Line message; `name` stands for its file in errors. SceneError if it is refused today.
+    """Return the scene of a recorded Line message. Raise SceneError, with `name` for its file, if it is refused now.
 
-    It is never read in today's defaults, which may be none that it allows. Random streams are keyed as they were when
-    it was made: lines had no tags while places in lists were the keys.
+    The scene is not read with the present defaults, which it may not allow. Random streams have the keys of the time of
+    the recording: while they were keyed by places in lists, lines had no tags.
     """
     overrides = parse_overrides(line.overrides)
-    given = overrides.get("accuracy")
-    kept = given if isinstance(given, dict) else {}  # such as `error`; a preset or tolerance has come to the steps
-    ran = {"integrator": str(line.integrator), "per_tick": int(line.steps_per_tick)}
-    pinned = {**kept, "preset": None, "tolerance": None, "dt": None, **ran}
+    accuracy = overrides.get("accuracy")
+    others = accuracy if isinstance(accuracy, dict) else {}  # such as `error`; the steps replace preset and tolerance
+    recorded = {"integrator": str(line.integrator), "per_tick": int(line.steps_per_tick)}
+    pinned = {**others, "preset": None, "tolerance": None, "dt": None, **recorded}
     scene = parse_scene(line.scene_text, name, {**overrides, "accuracy": pinned})
     scene._source = replace(scene._source, streams_by_index=not hasattr(line, "tag_names"))
     return scene

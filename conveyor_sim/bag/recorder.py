@@ -1,4 +1,4 @@
-"""Records a rosbag2 folder: one chunked, zstd-compressed MCAP file and metadata.yaml. Log time is simulated time."""
+"""Recorder of a rosbag2 folder: one chunked, zstd-compressed MCAP file and metadata.yaml, by simulated log time."""
 
 from __future__ import annotations
 
@@ -13,28 +13,28 @@ from pathlib import Path
 from conveyor_sim.bag.channels import ENCODING, metadata_of, schema_of
 from conveyor_sim.bag.folder import make_folder, remove_folders
 from conveyor_sim.bag.input_log import START_NAME
-from conveyor_sim.bag.lock import claim
-from conveyor_sim.bag.mcap.file import McapFile
 from conveyor_sim.bag.mcap.line_copy import NAME as LINE_COPY
 from conveyor_sim.bag.mcap.line_copy import LineCopy
 from conveyor_sim.bag.mcap.metadata import write_metadata
+from conveyor_sim.bag.mcap.writer import McapFileWriter
 from conveyor_sim.bag.messages.topics import OUTPUTS
 from conveyor_sim.bag.messages.typestore import default_distro
 from conveyor_sim.errors import BagError, CheckpointError
+from conveyor_sim.support.file_lock import lock
 
 LINE_TOPIC = "line"
 FLUSH_INTERVAL = 0.5
-"""s of wall time that a message waits at most to be handed to the operating system. A killed process loses these, and
-what a loaded machine adds: less than a second."""
+"""Wall time that a message waits at most until it is handed to the operating system, s. A killed process loses the
+messages of this time, and of the delay that a loaded machine adds: less than a second."""
 
 
 class Recorder(contextlib.AbstractContextManager["Recorder"]):
-    """A sink that records every message it is given; use it as a context manager.
+    """A sink that records every message; use it as a context manager.
 
     path: the folder to create, which must not exist or be empty. topics: names of OUTPUTS to record (default: all).
-    start: of a run that begins from a checkpoint, writes it to a path, for a replay begins there; None: from tick 0.
-    A thread of its own flushes, whether more messages come or not; any thread may call the methods.
-    Raises BagError, before anything is simulated, if the folder can't be written; then nothing is left of it.
+    start: writes the checkpoint at which the run begins to a path, because a replay begins there; None: tick 0.
+    A separate thread flushes, also when no more messages come. Any thread may call the methods.
+    Raise BagError before the simulation starts if the folder can't be written; then the folder is removed.
     """
 
     def __init__(
@@ -50,27 +50,27 @@ class Recorder(contextlib.AbstractContextManager["Recorder"]):
         self._ended = False
         self._failure: BagError | None = None
         self._waiting_since: float | None = None  # s of wall time; None: all has been flushed
-        self._changed = threading.Condition()  # its lock is held by whoever uses the file
+        self._changed = threading.Condition()  # its lock guards the file
         name = f"{self.path.resolve().name}_0.mcap"
         self._made = make_folder(self.path)
         self._storage = self.path / name
         try:
             self._stream = self._storage.open("xb")
-        except OSError as error:  # it may be that of another process, which was faster
+        except OSError as error:  # another process may have made the file in the meantime
             remove_folders(self._made)
             raise BagError(f"{self._storage}: can't be written ({error.strerror})") from error
         try:
-            claim(self._stream)
-            self._file = McapFile(self._stream, name, self._distro)
+            lock(self._stream)
+            self._file = McapFileWriter(self._stream, name, self._distro)
             self._channels = {topic: self._register(topic) for topic in (OUTPUTS if topics is None else topics)}
-            self._file.flush()  # a disk without room is noticed here
+            self._file.flush()  # a full disk raises here
             if start is not None:
                 start(self.path / START_NAME)
         except (OSError, CheckpointError) as error:
             self._leave_nothing()
             reason = error.strerror if isinstance(error, OSError) else error
             raise BagError(f"{self._storage}: can't be written ({reason})") from error
-        self._begun = False  # the first message, the line, is flushed at once: without it a bag can't be understood
+        self._begun = False  # the first message, the line, is flushed at once: without it a bag can't be read
         self._flusher = threading.Thread(target=self._keep_flushing, name="recorder", daemon=True)
         self._flusher.start()
 
@@ -79,11 +79,11 @@ class Recorder(contextlib.AbstractContextManager["Recorder"]):
         return self._file.add_topic(f"/{topic}", schema, ENCODING, metadata)
 
     def wants(self, topic: str) -> bool:
-        """Whether the topic is recorded."""
+        """Return True if the topic is recorded."""
         return topic in self._channels
 
     def write(self, topic: str, data: bytes, stamp_ns: int) -> None:
-        """Records one message. Raises BagError if the disk is full; what was written before stays recoverable."""
+        """Record one message. Raise BagError if the disk is full; earlier messages stay recoverable."""
         with self._changed:
             self._raise_failure()
             if self._ended:
@@ -103,9 +103,9 @@ class Recorder(contextlib.AbstractContextManager["Recorder"]):
                 self._fail(error)
 
     def flush(self) -> None:
-        """Hands everything recorded so far to the operating system at once.
+        """Hand all messages so far to the operating system at once.
 
-        Raises BagError if the disk is full, also if that was found in the meantime.
+        Raise BagError if the disk is full, also if the flushing thread noticed it earlier.
         """
         with self._changed:
             self._raise_failure()
@@ -113,9 +113,9 @@ class Recorder(contextlib.AbstractContextManager["Recorder"]):
                 self._flush()
 
     def close(self) -> None:
-        """Ends the recording: index, metadata, metadata.yaml. Does nothing the second time, or after a failure.
+        """End the recording: write index, metadata, metadata.yaml. A call after the end or a failure does nothing.
 
-        Raises BagError if the disk is full; what was written before stays recoverable.
+        Raise BagError if the disk is full; earlier messages stay recoverable.
         """
         with self._changed:
             self._raise_failure()
@@ -134,7 +134,7 @@ class Recorder(contextlib.AbstractContextManager["Recorder"]):
         self.close()
 
     def _keep_flushing(self) -> None:
-        """Flushes what has waited for long enough, until the recording ends."""
+        """Flush messages that have waited for FLUSH_INTERVAL, until the recording ends."""
         with self._changed:
             while not self._ended:
                 if self._waiting_since is None:
@@ -145,7 +145,7 @@ class Recorder(contextlib.AbstractContextManager["Recorder"]):
                     try:
                         self._flush()
                     except BagError as error:
-                        self._failure = error  # for whoever writes, flushes or closes next
+                        self._failure = error  # raised by the next write, flush or close
 
     def _flush(self) -> None:
         try:
@@ -157,17 +157,17 @@ class Recorder(contextlib.AbstractContextManager["Recorder"]):
         self._waiting_since = None
 
     def _raise_failure(self) -> None:
-        """Raises what ended the recording in the meantime, once."""
+        """Raise the error that ended the recording in the meantime, once."""
         if self._failure is not None:
             failure, self._failure = self._failure, None
             raise failure
 
     def _fail(self, error: OSError) -> None:
-        """Ends the recording where it is, which `recover` can repair, and raises BagError."""
+        """End the recording without its index, which `recover` can repair, and raise BagError."""
         self._ended = True
         self._changed.notify()
         with contextlib.suppress(OSError):
-            self._stream.close()  # tries once more to write what is buffered, which may not fit either
+            self._stream.close()  # tries once more to write the buffer, which may not fit either
         if not self._begun:
             self._leave_nothing()
             raise BagError(
@@ -186,7 +186,7 @@ class Recorder(contextlib.AbstractContextManager["Recorder"]):
         ) from error
 
     def _leave_nothing(self) -> None:
-        """Removes what was made before the first message, so that the same folder can be recorded to later."""
+        """Remove the files from before the first message, so that the same folder can be recorded to later."""
         with contextlib.suppress(OSError):
             self._stream.close()
         for file in (self._storage, self.path / START_NAME):
@@ -196,7 +196,7 @@ class Recorder(contextlib.AbstractContextManager["Recorder"]):
 
 
 def new_run_folder(root: str | Path = "runs") -> Path:
-    """Makes a folder ROOT/<UTC time>, such as runs/20250131T120501Z, which no other process has. Raises BagError."""
+    """Make a folder ROOT/<UTC time>, such as runs/20250131T120501Z, which no other process has. Raise BagError."""
     stamp = time.strftime("%Y%m%dT%H%M%SZ", time.gmtime())
     candidate, number = Path(root) / stamp, 2
     while True:
@@ -212,13 +212,13 @@ def new_run_folder(root: str | Path = "runs") -> Path:
 
 
 @contextlib.contextmanager
-def run_folder(given: Path | None) -> Iterator[Path]:
-    """The folder given, or a new one of `new_run_folder`, which is gone afterwards if nothing is in it."""
-    folder = given or new_run_folder()
+def run_folder(chosen: Path | None) -> Iterator[Path]:
+    """Yield the chosen folder, or a new one of `new_run_folder`, which is removed afterwards if it is empty."""
+    folder = chosen or new_run_folder()
     try:
         yield folder
     finally:
-        if given is None:
+        if chosen is None:
             for empty in (folder, folder.parent):
                 with contextlib.suppress(OSError):
                     empty.rmdir()

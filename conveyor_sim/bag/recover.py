@@ -1,4 +1,4 @@
-"""Repairs a bag that was interrupted or damaged: a copy of what is sound. The damaged file is kept beside it."""
+"""Repair of a bag that was interrupted or damaged: a copy of its valid parts. The damaged file stays beside it."""
 
 from __future__ import annotations
 
@@ -13,9 +13,8 @@ from mcap.records import Channel
 from mcap.records import Schema as SchemaRecord
 
 from conveyor_sim.bag.lock import alone
-from conveyor_sim.bag.mcap.file import McapFile, Schema, topic_info
 from conveyor_sim.bag.mcap.foreign import is_ros
-from conveyor_sim.bag.mcap.index import Index, read_index, sealed
+from conveyor_sim.bag.mcap.index import Index, is_complete, read_index
 from conveyor_sim.bag.mcap.line_copy import NAME as LINE_COPY
 from conveyor_sim.bag.mcap.metadata import (
     FILE_NAME,
@@ -33,27 +32,28 @@ from conveyor_sim.bag.mcap.records import mapped
 from conveyor_sim.bag.mcap.salvage import Salvage
 from conveyor_sim.bag.mcap.storage import other_storage, packed_part
 from conveyor_sim.bag.mcap.walk import NothingLeft
+from conveyor_sim.bag.mcap.writer import McapFileWriter, Schema, topic_info
 from conveyor_sim.bag.messages.encode import LINE
 from conveyor_sim.bag.messages.topics import STATES
 from conveyor_sim.bag.messages.typestore import default_distro
-from conveyor_sim.bag.own_source import is_of_this_package
+from conveyor_sim.bag.own_reader import is_of_this_package
 from conveyor_sim.bag.reader import mcap_files, open_bag
 from conveyor_sim.errors import BagError
 
 WRITTEN_ANEW = (RECORD_NAME, LINE_COPY)
-"""Names of metadata records that repeat what else is in the file."""
+"""Names of metadata records that repeat other parts of the file."""
 STATE_TYPES = {topic.type for topic in STATES.values()}
 
 
 @dataclass(frozen=True)
 class RecoverReport:
-    """What `recover` found and did."""
+    """Result of `recover`."""
 
     path: Path
     healthy: bool
-    """Nothing was wrong, and nothing was done."""
+    """True if there was no damage, and no file was changed."""
     unverified: tuple[str, ...]
-    """What carries no checksum, so that damage in it can't be seen, a phrase each; empty: every byte was verified."""
+    """One phrase for each part without a checksum, whose damage can't be seen; empty: every byte was verified."""
     skipped: tuple[str, ...]
     """One sentence for each file with valid parts that are not read: channels without ROS 2 type, unknown records."""
     message_count: int
@@ -61,16 +61,16 @@ class RecoverReport:
     end_ns: int
     """Log time of the last of them, ns."""
     damage: tuple[str, ...]
-    """What was wrong and what is lost, one sentence each."""
+    """One sentence for each fault and each loss."""
     kept: tuple[Path, ...]
     """The damaged originals."""
     unusable: str
-    """Why what is there can't be replayed or drawn; empty: it can."""
+    """Reason why the bag can't be replayed or drawn; empty: it can."""
 
 
 @dataclass(frozen=True)
-class _Content:
-    """What of one MCAP file is sound."""
+class _ValidPart:
+    """Valid part of one MCAP file."""
 
     file: FileInfo
     topics: tuple[TopicInfo, ...]
@@ -86,18 +86,18 @@ class _Content:
 
 
 def recover(path: str | Path) -> RecoverReport:
-    """Verifies a rosbag2 folder (or one .mcap file); where it is damaged, writes a copy without what is damaged.
+    """Verify a rosbag2 folder (or one .mcap file). Replace a damaged file by a copy of its valid parts.
 
-    The copy takes the old file's place only when all is written and at least one recorded state is left; the old file
-    stays as *.damaged, a metadata.yaml that does not fit too.
-    Raises BagError if there is nothing to recover, no room for the new file, or if it is still being recorded; then
-    nothing has changed.
+    The copy takes the old file's place only when it is complete and at least one recorded state is left. The old file
+    stays as *.damaged, and so does a metadata.yaml that does not fit.
+    Raise BagError if there is nothing to recover, no room for the new file, or if the bag is still being recorded; then
+    no file has changed.
     """
     path = Path(path)
     damage: list[str] = []
     unverified: list[str] = []
     kept: list[Path] = []
-    contents: list[_Content] = []
+    contents: list[_ValidPart] = []
     files: list[Path] = []
     with contextlib.ExitStack() as locks:
         try:
@@ -146,23 +146,23 @@ def _temporary(file: Path) -> Path:
     return file.with_name(f"{file.name}.recovering")
 
 
-def _repair_all(files: list[Path]) -> list[_Content]:
-    """What is sound of each file. Raises BagError if nothing can be recovered of any."""
-    contents: list[_Content] = []
+def _repair_all(files: list[Path]) -> list[_ValidPart]:
+    """Return the valid part of each file. Raise BagError if no file has one."""
+    contents: list[_ValidPart] = []
     failures: list[NothingLeft] = []
     for file in files:
         try:
             contents.append(_repair(file))
         except NothingLeft as failure:
             failures.append(failure)
-            contents.append(_Content(FileInfo(file.name, 0, 0, 0), (), (failure.why,), nothing_left=True))
+            contents.append(_ValidPart(FileInfo(file.name, 0, 0, 0), (), (failure.why,), nothing_left=True))
     if len(failures) == len(files):
         raise failures[0]
     return contents
 
 
 def _missing(folder: Path) -> list[str]:
-    """The MCAP files that metadata.yaml names and that are not there, a sentence each."""
+    """Return one sentence for each MCAP file that metadata.yaml names and that does not exist."""
     information = read_metadata(folder) or {}
     try:
         names = [name for name in file_names(information) if PurePath(name).suffix == ".mcap"]
@@ -176,28 +176,28 @@ def _missing(folder: Path) -> list[str]:
     ]
 
 
-def _repair(file: Path) -> _Content:
-    """Verifies a file; if it is damaged, writes a copy of what is sound beside it."""
+def _repair(file: Path) -> _ValidPart:
+    """Verify a file. If it is damaged, write a copy of its valid parts beside it."""
     with mapped(file) as data:
-        index = read_index(data) if sealed(data) and is_of_this_package(data) else None
+        index = read_index(data) if is_complete(data) and is_of_this_package(data) else None
         if index is not None and index.statistics is not None and _is_ours(index):
             statistics = index.statistics
             span = (statistics.message_start_time, statistics.message_end_time)
             topics = _topics(index.schemas, index.channels, statistics.channel_message_counts)
-            return _Content(FileInfo(file.name, *span, statistics.message_count), topics)
+            return _ValidPart(FileInfo(file.name, *span, statistics.message_count), topics)
         salvage = Salvage(file, data)
         if not salvage.damage:
             info = FileInfo(file.name, *salvage.span, sum(salvage.counts[number] for number in salvage.ros_channels))
             topics = _topics(salvage.schemas, salvage.ros_channels, salvage.counts)
-            return _Content(info, topics, unverified=tuple(salvage.unverified), skipped=salvage.skipped, chained=True)
+            return _ValidPart(info, topics, unverified=tuple(salvage.unverified), skipped=salvage.skipped, chained=True)
         with _temporary(file).open("wb") as stream:
-            copy = McapFile(stream, file.name, default_distro())
+            copy = McapFileWriter(stream, file.name, default_distro())
             _copy(salvage, copy)
             copy.finish()
             stream.flush()
             os.fsync(stream.fileno())
     with mapped(_temporary(file)) as data:
-        if not sealed(data):
+        if not is_complete(data):
             raise BagError(f"{file}: the repaired copy can't be read back; the original was left as it was")
     damage = [*salvage.damage, *(str(loss) for loss in salvage.losses)]
     if salvage.unread or salvage.unknown:
@@ -205,7 +205,7 @@ def _repair(file: Path) -> _Content:
     topics, kept = tuple(copy.topics), len([m for m in salvage.metadata if m.name not in WRITTEN_ANEW])
     foreign = sum(salvage.counts[number] for number in salvage.channels.keys() - salvage.ros_channels.keys())
     others = kept + len(salvage.attachments) + foreign
-    return _Content(copy.info, topics, tuple(damage), skipped=salvage.skipped, others=others, chained=salvage.chained)
+    return _ValidPart(copy.info, topics, tuple(damage), skipped=salvage.skipped, others=others, chained=salvage.chained)
 
 
 def _is_ours(index: Index) -> bool:
@@ -222,7 +222,7 @@ def _topics(
     )
 
 
-def _copy(salvage: Salvage, copy: McapFile) -> None:
+def _copy(salvage: Salvage, copy: McapFileWriter) -> None:
     """Copy messages with their times, topics and types; the records that repeat others are written anew."""
     channels = {}
     for number, channel in sorted(salvage.channels.items()):
@@ -247,7 +247,7 @@ def _copy(salvage: Salvage, copy: McapFile) -> None:
         )
 
 
-def _require_states(path: Path, contents: list[_Content]) -> None:
+def _require_states(path: Path, contents: list[_ValidPart]) -> None:
     """Raise BagError if a damaged bag has nothing left, or the recording of a line not one state."""
     topics = [topic for content in contents for topic in content.topics]
     left = {topic.name: topic.message_count for topic in topics if topic.message_count}
@@ -263,10 +263,10 @@ def _require_states(path: Path, contents: list[_Content]) -> None:
 
 
 def _put_in_place(file: Path) -> Path:
-    """Gives the new file the old one's name, the old one a name ending in .damaged; returns that name."""
+    """Give the new file the old one's name, and the old one a name ending in .damaged. Return that name."""
     aside = _aside(file)
     try:
-        os.link(file, aside)  # then the next line swaps without a moment at which the bag has no file
+        os.link(file, aside)  # then the next line swaps the files without a moment at which the bag has none
     except OSError:
         file.rename(aside)
     _temporary(file).replace(file)
@@ -274,7 +274,7 @@ def _put_in_place(file: Path) -> Path:
 
 
 def _set_aside(file: Path) -> Path:
-    """Gives a file of which nothing is left a name ending in .damaged; returns that name."""
+    """Give a file without any valid part a name ending in .damaged. Return that name."""
     aside = _aside(file)
     file.rename(aside)
     return aside
@@ -288,8 +288,8 @@ def _aside(file: Path) -> Path:
     return aside
 
 
-def _refresh_metadata(folder: Path, contents: list[_Content]) -> list[Path] | None:
-    """Rewrites metadata.yaml if it does not fit the files; then returns where the old one is, if there was one."""
+def _refresh_metadata(folder: Path, contents: list[_ValidPart]) -> list[Path] | None:
+    """Rewrite metadata.yaml if it does not fit the files. Then return the new path of the old one, if there was one."""
     counts: Counter[str] = Counter()
     topics: dict[str, TopicInfo] = {}
     for content in contents:
@@ -302,7 +302,7 @@ def _refresh_metadata(folder: Path, contents: list[_Content]) -> list[Path] | No
     old = read_metadata(folder)
     distro = str(old["ros_distro"]) if old and old.get("ros_distro") else default_distro()
     expected = bag_information(merged, [content.file for content in contents], distro)
-    if old is not None:  # what no MCAP file holds
+    if old is not None:  # fields that no MCAP file holds
         keys = ["custom_data"]
         if str(old.get("compression_mode")).lower() == "message":  # a compressed file would not be MCAP
             keys += ["compression_format", "compression_mode"]
@@ -319,7 +319,7 @@ def _refresh_metadata(folder: Path, contents: list[_Content]) -> list[Path] | No
 
 
 def _unusable(path: Path) -> str:
-    """Why a bag can't be replayed or drawn, in words; empty if it can."""
+    """Return the reason why a bag can't be replayed or drawn; empty if it can."""
     try:
         with open_bag(path, report=False) as bag:
             known = any(bag.counts.get(topic) for topic in STATES)

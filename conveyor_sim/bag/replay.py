@@ -1,4 +1,4 @@
-"""Runs a recorded line again, with the recorded commands at their ticks, and compares every recorded state."""
+"""Replay of a recorded line with the recorded commands at their ticks, and comparison of every recorded state."""
 
 from __future__ import annotations
 
@@ -10,12 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.bag.compare import Difference, first_difference, outcome_difference
+from conveyor_sim.bag.compare import ReplayDifference, first_difference, outcome_difference
 from conveyor_sim.bag.input_log import START_NAME
 from conveyor_sim.bag.messages.encode import Header, Outcome, to_outcome
 from conveyor_sim.bag.messages.topics import COMPARED, STATES, Snapshot
 from conveyor_sim.bag.messages.typestore import typestore
-from conveyor_sim.bag.outputs import forget_past
 from conveyor_sim.bag.reader import Bag, open_bag
 from conveyor_sim.bag.recorded_scene import recorded_scene
 from conveyor_sim.columns.image import NOTHING_FORCED, Image
@@ -28,29 +27,29 @@ from conveyor_sim.support.printable import printable
 
 @dataclass(frozen=True)
 class ReplayReport:
-    """What a replay found."""
+    """Result of a replay."""
 
     path: Path
     exact: bool
-    """Compared bit for bit, not within the tolerance."""
+    """True if states were compared bit for bit, and not within tolerances."""
     environment: tuple[str, ...]
-    """What differs from the recording's machine and versions, one sentence each; empty if nothing."""
+    """One sentence for each difference from the recording's machine and versions."""
     first_tick: int
     last_tick: int
     """Ticks of the first and last recorded state."""
     end: float
-    """s, simulated time up to which states were equal, or at which the first difference is."""
+    """Simulated time up to which states were equal, or of the first difference, s."""
     compared: dict[str, int]
     """Messages compared, by topic."""
-    difference: Difference | None
-    """The first one; None: everything is equal."""
+    difference: ReplayDifference | None
+    """First difference; None: all states are equal."""
 
 
 class _Messages:
     """The messages of one topic in the order of their ticks, each taken once."""
 
     def __init__(self, bag: Bag, topic: str, end_ns: int) -> None:
-        """end_ns: where the run was to end; a later message must be of the time that it states."""
+        """end_ns: intended end of the run; the tick of a later message must agree with its stamp."""
         self.topic = topic
         self._end_ns = end_ns
         end = bag.next_run_ns
@@ -64,7 +63,7 @@ class _Messages:
         return None if self._next is None else int(self._next.tick)
 
     def _decode(self, bag: Bag, data: bytes) -> Any:
-        """Raises BagError for a damaged tick, up to which the simulation might have to run for years."""
+        """Decode a message. Raise BagError for a damaged tick, which the simulation might take years to reach."""
         message = bag.decode(self.topic, data)
         stamp = message.header.stamp
         stamp_ns = stamp.sec * 10**9 + stamp.nanosec
@@ -76,7 +75,7 @@ class _Messages:
         return message
 
     def take(self, tick: int) -> Iterator[Any]:
-        """The messages up to a tick (an earlier tick than expected is a difference for the caller to find)."""
+        """Yield the messages up to a tick. The caller reports a tick before the expected one as a difference."""
         while self._next is not None and self._next.tick <= tick:
             message = self._next
             self._next = next(self._source, None)
@@ -84,13 +83,13 @@ class _Messages:
 
 
 def replay(path: str | Path, progress: Callable[[float, float], None] | None = None) -> ReplayReport:
-    """Replays a bag (recorded by this package or, the same topics, by stock rosbag2) and compares.
+    """Replay a bag (recorded by this package or, with the same topics, by stock rosbag2) and compare its states.
 
-    What is in topics.COMPARED, and the outcomes of commands, is compared bit for bit where the engine, versions and
-    machine are those of the recording; elsewhere within the tolerances of the topics, those without any left out.
-    A run that began from a checkpoint is replayed from it, if it is in the bag's folder as `start.npz`.
-    Stops at the first difference. progress(done, total) is called with simulated times, s.
-    Raises BagError, also for a recording from before rails that move had limits; SceneError if the recorded scene is
+    The topics of topics.COMPARED and the results of commands are compared bit for bit if the engine, versions and
+    machine are those of the recording. Otherwise topics with tolerances are compared within these, and others not.
+    A run that began at a checkpoint is replayed from it, if it is in the bag's folder as `start.npz`.
+    The replay stops at the first difference. progress(done, total) is called with simulated times, s.
+    Raise BagError, also for a recording made before rails that move had limits; SceneError if the recorded scene is
     refused; CheckpointError for a checkpoint that is damaged or of another version.
     """
     with open_bag(path) as bag, bag.sense():
@@ -140,7 +139,7 @@ class _Replay:
         while difference is None and any(state.next_tick is not None for state in self._states):
             commands = self._recorded_outcomes()
             for outcome in commands:
-                if not outcome.input.by_line:  # those it brings about itself
+                if not outcome.input.by_line:  # the simulation makes those of the line itself
                     self._sim.give(outcome.input)
             self._sim.advance(1)
             difference = self._compare_outcomes(commands) or self._compare_states()
@@ -161,9 +160,9 @@ class _Replay:
         if self._outcomes is None:
             return []
         outcomes = map(to_outcome, self._outcomes.take(self._sim.tick))
-        return [outcome for outcome in outcomes if outcome.source != ARRIVAL]  # the line never heard of those
+        return [outcome for outcome in outcomes if outcome.source != ARRIVAL]  # those never reached the line
 
-    def _compare_outcomes(self, recorded: list[Outcome]) -> Difference | None:
+    def _compare_outcomes(self, recorded: list[Outcome]) -> ReplayDifference | None:
         replayed = [Outcome.of(o.input, o.accepted, o.reason) for o in self._sim.take_outcomes()]
         if self._outcomes is not None:
             self._compared["outcomes"] = self._compared.get("outcomes", 0) + len(recorded)
@@ -172,7 +171,7 @@ class _Replay:
         tick = self._sim.tick - 1
         return outcome_difference(tick, self._bag.time(tick), recorded, replayed)
 
-    def _compare_states(self) -> Difference | None:
+    def _compare_states(self) -> ReplayDifference | None:
         now = Snapshot(self._sim)
         for state in self._states:
             for message in state.take(self._sim.tick):
@@ -183,15 +182,15 @@ class _Replay:
                     return difference
         return None
 
-    def _compare(self, topic: str, recorded: Any, now: Snapshot) -> Difference | None:
+    def _compare(self, topic: str, recorded: Any, now: Snapshot) -> ReplayDifference | None:
         header, row = Header(self._sim.tick, self._sim.stamp_ns, recorded.header.frame_id), COMPARED[topic]
         assert row.state is not None
         if (state := row.state(now)) is None:
             tick, time = self._sim.tick, self._bag.time(self._sim.tick)
-            return Difference(tick, time, topic, "the number of messages", "1", "0")
+            return ReplayDifference(tick, time, topic, "the number of messages", "1", "0")
         if topic == "signals":
             state = Image(state.values[self._signals], *NOTHING_FORCED)
-        # By the definition of today: that of the bag may be an older one, with fewer fields.
+        # The present definition; the bag's may be an older one with fewer fields.
         replayed = typestore().deserialize_cdr(row.pack(state, header), row.type)
         return first_difference(topic, self._bag.line, recorded, replayed, exact=self._exact)
 
@@ -211,7 +210,7 @@ def _simulation(bag: Bag) -> Simulation:
 
 
 def _signals_by_name(bag: Bag, simulation: Simulation) -> NDArray[np.int64]:
-    """Where the recorded signals, in their order, are among those of this version, which may have more."""
+    """Return the places of the recorded signals, in their order, among those of this version, which may have more."""
     index = {name: place for place, name in enumerate(simulation.process_image.signal_names)}
     gone = [name for name in bag.line.signal_names if name not in index]
     if gone:
@@ -220,7 +219,7 @@ def _signals_by_name(bag: Bag, simulation: Simulation) -> NDArray[np.int64]:
 
 
 def _from_checkpoint(bag: Bag, start: Path) -> Simulation:
-    # In the defaults of today, unlike `recorded_scene`: a checkpoint is of this version.
+    # With the present defaults, unlike `recorded_scene`, because a checkpoint is of this version.
     name, overrides = f"{bag.path} (recorded scene)", parse_overrides(bag.line.overrides)
     simulation = Simulation.load(start, scene=parse_scene(bag.line.scene_text, name, overrides))
     if simulation.tick != bag.line.tick:
@@ -228,13 +227,13 @@ def _from_checkpoint(bag: Bag, start: Path) -> Simulation:
             f"{start}: a checkpoint at tick {simulation.tick}, expected the one at tick {bag.line.tick}, "
             "from which the recording began"
         )
-    simulation.take_waiting()  # it is among the recorded outcomes
-    forget_past(simulation)
+    simulation.line.take_waiting()  # it is among the recorded outcomes
+    simulation.take_events()  # of the run before the checkpoint
     return simulation
 
 
 def _environment(bag: Bag, simulation: Simulation) -> tuple[str, ...]:
-    """What differs between the recording and here in what can change a bit."""
+    """Return one sentence for each difference between the recording and here that can change bits."""
     line, model = bag.line, simulation.model
     pairs: list[tuple[str, Any, Any]] = [
         ("engine", line.engine_hash, model.engine_hash),

@@ -1,4 +1,4 @@
-"""A run made again from its inputs (`input_log.py`), and recorded: the bag that it would have had."""
+"""Repetition of a run from its logged inputs (`input_log.py`), with a recording of it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any
 
 from conveyor_sim.bag.input_log import FILE_NAME, FORMAT, START_NAME, copier, environment_of
 from conveyor_sim.bag.lock import alone
-from conveyor_sim.bag.outputs import Outputs, forget_past
+from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.errors import BagError, SimulationError
 from conveyor_sim.line.commands.inputs import Input
@@ -23,7 +23,7 @@ from conveyor_sim.support.files import MB, FileError, read_file
 from conveyor_sim.support.printable import SENTENCE, printable
 
 MOST = 512 * MB
-"""Bytes of a file of inputs."""
+"""Bytes of a file of inputs, at most."""
 
 Watcher = Callable[[Simulation, Mapping[str, float]], None]
 """Called with a simulation and the variables of its controller that are recorded."""
@@ -31,39 +31,39 @@ Watcher = Callable[[Simulation, Mapping[str, float]], None]
 
 @dataclass(frozen=True)
 class Rerun:
-    """What was made."""
+    """Result of a repeated run."""
 
     bag: Path
     end: float
-    """s, simulated time up to which it goes."""
+    """Simulated time at its end, s."""
     departure: str
-    """Why it is not the run that it was to be, in a sentence; "": every state that was noted is the same."""
+    """One sentence on its first deviation from the logged run; "": every logged state is the same."""
 
 
 @dataclass(frozen=True)
 class _Changed:
-    """What a scan made of a controller's variables that are recorded."""
+    """Change of a controller's recorded variables at a scan."""
 
     names: tuple[str, ...] | None
-    """None: the same as before."""
+    """None: unchanged."""
     values: list[tuple[int, float]]
     """Places and values of those that changed."""
 
 
 @dataclass(frozen=True)
 class _Run:
-    """What a file of inputs says."""
+    """Content of a file of inputs."""
 
     scene: Scene
     from_checkpoint: bool
     environment: list[str]
     inputs: dict[int, list[Input]]
-    """By the tick from which on they are applied."""
+    """By the first tick at which they are applied."""
     variables: dict[int, _Changed]
     """By the tick of the scan."""
     hashes: dict[int, int]
     last: int
-    """The tick that was reached at least."""
+    """Last logged tick."""
     failed: bool
 
 
@@ -75,11 +75,11 @@ def rerun(
 ) -> Rerun:
     """Simulate a run again with the inputs in a folder, and record it to another folder, new or empty.
 
-    A copy of the checkpoint from which the run began, if it did, is put into the bag's folder: a replay needs it.
-    progress(done, total) is called with simulated times, s; watch at the start and after each tick, with the
-    simulation, to look at, and the recorded variables of its controller. Raises BagError for inputs that are missing,
-    damaged or still being written, and if the bag can't be recorded; CheckpointError for a checkpoint that is not
-    sound. What ends it early leaves no bag.
+    If the run began at a checkpoint, a copy of it is put into the bag's folder, because a replay needs it.
+    progress(done, total) is called with simulated times, s. watch is called at the start and after each tick with the
+    simulation, which it only reads, and the recorded variables of its controller. Raise BagError for inputs that are
+    missing, damaged or still being written, and if the bag can't be recorded; CheckpointError for an invalid
+    checkpoint. An error leaves no bag.
     """
     path = folder / FILE_NAME
     run = _read(path)
@@ -87,8 +87,8 @@ def rerun(
         start = folder / START_NAME
         if run.from_checkpoint:
             simulation = Simulation.load(start, scene=run.scene)
-            simulation.take_waiting()  # it is among the inputs
-            forget_past(simulation)
+            simulation.line.take_waiting()  # it is among the inputs
+            simulation.take_events()  # of the run before the checkpoint
         else:
             simulation = Simulation(run.scene)
         if run.last < simulation.tick:
@@ -112,8 +112,8 @@ def _simulate(
     progress: Callable[[float, float], None] | None,
     watch: Watcher | None,
 ) -> str:
-    """Run to the end; where it departs from the states that were noted, in words."""
-    outputs = Outputs(simulation, [recorder], run_id=uuid.uuid4().hex)
+    """Run to the end. Return the first deviation from the logged states in words; "": there is none."""
+    outputs = OutputWriter(simulation, [recorder], run_id=uuid.uuid4().hex)
     outputs.start()
     outputs.show_run(RunState(RUNNING))
     total = run.last * simulation.model.tick_ns * 1e-9
@@ -132,8 +132,8 @@ def _simulate(
     show()
     while simulation.tick < run.last or run.failed:
         applied = run.inputs.get(simulation.tick, applied)
-        for given in applied:
-            simulation.give(given)
+        for one in applied:
+            simulation.give(one)
         try:
             simulation.advance()
         except SimulationError as error:
@@ -153,7 +153,7 @@ def _simulate(
 
 
 def _after(variables: dict[str, float], scanned: _Changed) -> dict[str, float]:
-    """Variables by name after a scan."""
+    """Return the variables by name after a scan."""
     names = tuple(variables) if scanned.names is None else scanned.names
     now = dict(variables) if scanned.names is None else dict.fromkeys(names, 0.0)
     now.update((names[place], value) for place, value in scanned.values)
@@ -161,9 +161,9 @@ def _after(variables: dict[str, float], scanned: _Changed) -> dict[str, float]:
 
 
 def _departure(run: _Run, simulation: Simulation) -> str:
-    noted = run.hashes.get(simulation.tick)
-    same = noted is None or noted == simulation.state_hash()
-    return "" if same else f"the run made again is another at {simulation.time:.2f} s (tick {simulation.tick})"
+    logged = run.hashes.get(simulation.tick)
+    same = logged is None or logged == simulation.state_hash()
+    return "" if same else f"the repeated run differs at {simulation.time:.2f} s (tick {simulation.tick})"
 
 
 def _expected(run: _Run, simulation: Simulation) -> str:
@@ -175,7 +175,7 @@ def _expected(run: _Run, simulation: Simulation) -> str:
 
 
 def _read(path: Path) -> _Run:
-    """A file of inputs; a last line that was cut short is left out. Raises BagError, SceneError."""
+    """Read a file of inputs without a last line that was cut short. Raise BagError, SceneError."""
     try:
         text = read_file(path, MOST).decode("ascii", errors="replace")
     except FileError as error:
@@ -200,7 +200,7 @@ def _read(path: Path) -> _Run:
                 raise ValueError("ticks out of order")
             last = tick
             if "inputs" in entry:
-                inputs[tick] = [_input(*given) for given in entry["inputs"]]
+                inputs[tick] = [_input(*row) for row in entry["inputs"]]
             elif "variables" in entry:
                 names = tuple(str(name) for name in entry["names"]) if "names" in entry else None
                 known = known if names is None else names
@@ -214,8 +214,8 @@ def _read(path: Path) -> _Run:
 
 
 def _input(source: Any, writer: Any, kind: Any, operation: Any, names: Any, values: Any, texts: Any) -> Input:
-    who = str(source), str(writer), str(kind), str(operation)
-    given = Input(*who, tuple(map(str, names)), tuple(map(float, values)), tuple(map(str, texts)))
-    if given.by_line:
-        raise ValueError("nobody gives such inputs")
-    return given
+    origin = str(source), str(writer), str(kind), str(operation)
+    logged = Input(*origin, tuple(map(str, names)), tuple(map(float, values)), tuple(map(str, texts)))
+    if logged.by_line:
+        raise ValueError("an input of the line itself")
+    return logged

@@ -35,7 +35,7 @@ def attach(scene: str, url: str, tags: Path, user: str, period: float, **of_scen
     reads what the PLC commands. The simulation does not wait for the PLC; the lag is reported. Ctrl-C ends it.
     """
     with collected_later():
-        from conveyor_sim.protocols.attach.free_running import of_plc
+        from conveyor_sim.protocols.attach.free_running import plc_kind
         from conveyor_sim.protocols.hosting.serving import Serving
         from conveyor_sim.protocols.hosting.settings import ServerSettings
 
@@ -43,7 +43,7 @@ def attach(scene: str, url: str, tags: Path, user: str, period: float, **of_scen
     password = click.prompt("password", hide_input=True, err=True) if user else ""
     with ExitStack() as stack:
         source = stack.enter_context(scene_source(scene, console, **of_scene))
-        kind = of_plc(url, tags, user, password, period, console.print, source.observe)
+        kind = plc_kind(url, tags, user, password, period, console.print, source.observe)
         with Serving(source, [(kind, 0)], ServerSettings()) as serving:
             source.control("resume", 0.0, "")
             watch(serving, console, [f"{url} commands the line, and reads its signals"])

@@ -1,13 +1,13 @@
-"""Line control, structured as PLC programs are: process image in, commands out, once a tick.
+"""Line control, structured as PLC programs are: process image in, commands out, once per tick.
 
-`scan.py` says what a controller is, `alarm.py` what it may declare of its alarms, `blocks.py` has the function blocks
-of IEC 61131-3, `load.py` finds a controller by name; every other file is one control task. Only the standard library is
-imported, and nothing of the simulation: what a controller knows of the line is what its inputs tell.
+`scan.py` defines controllers, `alarm.py` their alarm declarations, `blocks.py` the function blocks of IEC 61131-3, and
+`load.py` finds a controller by name. Every other file is one control task. Only the standard library is imported, and
+nothing of the simulation: a controller knows the line by its inputs alone.
 
-A controller is a dataclass whose fields are its parameters: SI units; belts and photo-eyes by their names in the
-scene, signals and commands by their names in the process image. It answers all its commands in every scan, as a PLC
-writes its outputs, unless it says that it answers only while it acts (`jam.JamClearing`, `eye_monitor.EyeMonitor`):
-such a one goes before the others in `scan.priority`. Its memory starts empty: make a new one for a new run.
+A controller is a dataclass whose fields are its parameters: SI units; belts and photo-eyes by their names in the scene,
+signals and commands by their names in the process image. It returns all its commands in every scan, as a PLC writes its
+outputs. Exceptions state that they return commands only while they act (`jam.JamClearing`, `eye_monitor.EyeMonitor`);
+they precede the others in `scan.priority`. Memory starts empty, so make a new controller for a new run.
 """
 
 from conveyor_sim.control.alarm import Alarm

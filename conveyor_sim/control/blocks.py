@@ -1,7 +1,7 @@
-"""Function blocks, by their names in IEC 61131-3 where it has them.
+"""Function blocks, with the names of IEC 61131-3 where the standard has them.
 
-A block is called once a scan; what it returns is its output Q. Timers take the present time, so that they run in
-simulated time, and a time that is equal up to rounding has elapsed.
+A block is called once per scan and returns its output Q. Timers take the present time, so they run in simulated time. A
+time that is equal up to rounding has elapsed.
 """
 
 from __future__ import annotations
@@ -10,26 +10,26 @@ import math
 from dataclasses import dataclass, field
 
 ROUNDING = 1e-9
-"""s; a sum of ticks must not miss the preset time it amounts to."""
+"""Tolerance against rounding, s: a sum of ticks must not miss the preset time."""
 
 
 def limit(low: float, value: float, high: float) -> float:
-    """LIMIT: the value, or the bound that it lies beyond."""
+    """Return the value, or the bound that it exceeds (LIMIT)."""
     return min(max(value, low), high)
 
 
 @dataclass
 class TON:
-    """On-delay: Q once IN has been on for `pt` s; off as soon as IN is."""
+    """On-delay: Q turns on once IN has been on for `pt` s, and off with IN."""
 
     pt: float
     q: bool = field(default=False, init=False)
     et: float = field(default=0.0, init=False)
-    """s that IN has been on, no more than pt."""
+    """Time that IN has been on, at most pt, s."""
     _since: float | None = field(default=None, init=False, repr=False)
 
     def __call__(self, in_: bool, time: float) -> bool:
-        """One scan, at a time in s."""
+        """Evaluate one scan at a time in s."""
         if not in_:
             self._since = None
         elif self._since is None:
@@ -42,14 +42,14 @@ class TON:
 
 @dataclass
 class TOF:
-    """Off-delay: Q as soon as IN is on, and until IN has been off for `pt` s."""
+    """Off-delay: Q turns on with IN, and off once IN has been off for `pt` s."""
 
     pt: float
     q: bool = field(default=False, init=False)
     _since: float = field(default=-math.inf, init=False, repr=False)
 
     def __call__(self, in_: bool, time: float) -> bool:
-        """One scan, at a time in s."""
+        """Evaluate one scan at a time in s."""
         if in_:
             self.q, self._since = True, math.inf
         elif self.q:
@@ -60,7 +60,7 @@ class TOF:
 
 @dataclass
 class TP:
-    """Pulse: Q for `pt` s from where IN goes on; meanwhile IN does not matter."""
+    """Pulse: Q is on for `pt` s from a rising edge of IN. Further edges during the pulse have no effect."""
 
     pt: float
     q: bool = field(default=False, init=False)
@@ -68,7 +68,7 @@ class TP:
     _before: bool = field(default=False, init=False, repr=False)
 
     def __call__(self, in_: bool, time: float) -> bool:
-        """One scan, at a time in s."""
+        """Evaluate one scan at a time in s."""
         self.q = time - self._since < self.pt - ROUNDING
         if in_ and not self._before and not self.q:
             self.q, self._since = self.pt > 0.0, time
@@ -78,12 +78,12 @@ class TP:
 
 @dataclass
 class R_TRIG:
-    """Rising edge: Q for the one scan in which CLK goes on; it was off before the first."""
+    """Rising edge: Q is on for one scan when CLK turns on. CLK counts as off before the first scan."""
 
     _before: bool = field(default=False, init=False, repr=False)
 
     def __call__(self, clk: bool) -> bool:
-        """One scan."""
+        """Evaluate one scan."""
         q = clk and not self._before
         self._before = clk
         return q
@@ -91,12 +91,12 @@ class R_TRIG:
 
 @dataclass
 class F_TRIG:
-    """Falling edge: Q for the one scan in which CLK goes off; it was off before the first."""
+    """Falling edge: Q is on for one scan when CLK turns off. CLK counts as off before the first scan."""
 
     _before: bool = field(default=False, init=False, repr=False)
 
     def __call__(self, clk: bool) -> bool:
-        """One scan."""
+        """Evaluate one scan."""
         q = self._before and not clk
         self._before = clk
         return q
@@ -109,7 +109,7 @@ class SR:
     q: bool = field(default=False, init=False)
 
     def __call__(self, s1: bool, r: bool) -> bool:
-        """One scan: set wins."""
+        """Evaluate one scan: set wins."""
         self.q = s1 or (self.q and not r)
         return self.q
 
@@ -121,14 +121,14 @@ class RS:
     q: bool = field(default=False, init=False)
 
     def __call__(self, s: bool, r1: bool) -> bool:
-        """One scan: reset wins."""
+        """Evaluate one scan: reset wins."""
         self.q = not r1 and (s or self.q)
         return self.q
 
 
 @dataclass
 class CTU:
-    """Up-counter: counts rising edges of CU; Q from `pv` of them on, until it is reset."""
+    """Up-counter of rising edges of CU: Q is on from `pv` edges on, until reset."""
 
     pv: int
     cv: int = field(default=0, init=False)
@@ -136,7 +136,7 @@ class CTU:
     _edge: R_TRIG = field(default_factory=R_TRIG, init=False, repr=False)
 
     def __call__(self, cu: bool, r: bool) -> bool:
-        """One scan: reset wins."""
+        """Evaluate one scan: reset wins."""
         edge = self._edge(cu)
         self.cv = 0 if r else self.cv + edge
         return self.cv >= self.pv
@@ -144,21 +144,21 @@ class CTU:
 
 @dataclass
 class HYSTERESIS:
-    """On from `high` up, off from `low` down, as it was between."""
+    """Switch that turns on at `high` and off at `low`, and keeps its state in between."""
 
     low: float
     high: float
     q: bool = field(default=False, init=False)
 
     def __call__(self, value: float) -> bool:
-        """One scan; on wins where low and high are one."""
+        """Evaluate one scan: on wins if low equals high."""
         self.q = value >= self.high or (self.q and value > self.low)
         return self.q
 
 
 @dataclass
 class RAMP:
-    """Follows a target no faster than `rate` (units/s), from `start`."""
+    """Value that follows a target at `rate` (units/s) or less, from `start`."""
 
     rate: float
     start: float = 0.0
@@ -168,7 +168,7 @@ class RAMP:
         self.out = self.start
 
     def __call__(self, target: float, length: float) -> float:
-        """One scan of a length in s."""
+        """Evaluate one scan of a length in s."""
         step = self.rate * length
         self.out += limit(-step, target - self.out, step)
         return self.out
@@ -176,7 +176,7 @@ class RAMP:
 
 @dataclass
 class COVERED:
-    """A photo-eye at which bottles stand: blocked for `on` s makes it covered, free for `off` s uncovered.
+    """Photo-eye at which bottles stand: covered once blocked for `on` s, uncovered once free for `off` s.
 
     Bottles that pass one by one never cover it if each takes less than `on`.
     """
@@ -191,7 +191,7 @@ class COVERED:
         self._blocked, self._free = TON(self.on), TON(self.off)
 
     def __call__(self, blocked: bool, time: float) -> bool:
-        """One scan, at a time in s."""
+        """Evaluate one scan at a time in s."""
         stands, gone = self._blocked(blocked, time), self._free(not blocked, time)
         self.q = stands or (self.q and not gone)
         return self.q

@@ -1,10 +1,10 @@
 """Cascade stop and start of belts in a row: zones stop one after the other as they fill, and start from the front.
 
-A zone is held while bottles stand at its full-eye and the zone ahead has no room for them. So bottles that wait stand
-on belts that stand, and press on nobody; and as the front is taken away, each zone delivers only what the next one has
-room for. Were all started as soon as the machine ahead takes bottles again, the whole row would be pressed.
+A zone is held while bottles stand at its full-eye and the next zone has no room for them. So waiting bottles stand on
+belts that stand still, without pressure. When bottles are taken at the front, each zone delivers only what the next one
+has room for. If all zones restarted at once, the whole row would be under pressure.
 
-Bottles that move nose to tail count as standing ones: it is for lines that run with gaps.
+Bottles that move nose to tail count as standing, so the cascade is for lines with gaps between bottles.
 """
 
 from __future__ import annotations
@@ -18,25 +18,25 @@ from conveyor_sim.control.scan import Inputs, eye_signal, require, speed_command
 
 @dataclass(frozen=True)
 class CascadeZone:
-    """A belt that stops by itself.
+    """Belt that stops by itself.
 
-    eye: the full-eye, near the belt's upstream end: the zone is full once bottles stand there.
+    eye: the full-eye, near the belt's upstream end. The zone is full once bottles stand there.
     """
 
     belt: str
     eye: str
     speed: float
-    """m/s"""
+    """Speed, m/s."""
 
 
 @dataclass
 class Cascade:
-    """Zones from the first (upstream) to the last; the last delivers to the machine of the signal `takes`.
+    """Zones from the first (upstream) to the last, which delivers to the machine of the signal `takes`.
 
-    takes: a signal of type bool that is on while bottles are taken at the end of the row (machines/<m>/running).
-    full_delay: s for which an eye must be blocked until the zone counts as full: more than a bottle takes to pass.
-    clear_delay: s for which it must be free until the zone has room. start_delay: s for which there must have been
-    room ahead before a zone that was held starts.
+    takes: a bool that is on while bottles are taken at the end of the row (machines/<m>/running). full_delay: time for
+    which an eye must be blocked until the zone counts as full, s; longer than a bottle takes to pass. clear_delay: time
+    for which it must be free until the zone has room, s. start_delay: time for which there must have been room ahead
+    before a held zone starts, s.
     """
 
     zones: tuple[CascadeZone, ...]
@@ -57,7 +57,7 @@ class Cascade:
         self._names = tuple((eye_signal(zone.eye), speed_command(zone.belt)) for zone in self.zones)
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
-        """A speed for each zone's belt: its own, or 0."""
+        """Return a speed for each zone's belt: its own, or 0."""
         answer: dict[str, float] = {}
         room = inputs.on(self.takes)
         for index in reversed(range(len(self.zones))):
@@ -65,7 +65,7 @@ class Cascade:
             eye, command = self._names[index]
             full = self._full[index](inputs.on(eye), inputs.time)
             released = self._ahead[index](room, inputs.time)
-            # One that is not full itself runs on, whatever is ahead.
+            # A zone that is not full keeps running, even if there is no room ahead.
             self._held[index] = full and (not room or (self._held[index] and not released))
             answer[command] = 0.0 if self._held[index] else zone.speed
             room = not full

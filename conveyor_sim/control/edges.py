@@ -1,4 +1,4 @@
-"""What happened at a photo-eye since the last scan, from its signals blocked, rose, fell and edges."""
+"""`EyeEdges`: edges of a photo-eye since the last scan, from its signals blocked, rose, fell and edges."""
 
 from __future__ import annotations
 
@@ -9,34 +9,34 @@ from conveyor_sim.control.scan import Inputs, eye_signal
 
 @dataclass
 class EyeEdges:
-    """Read once a scan. The eye gives the time of its last edges only; `edges` counts them."""
+    """Edges of a photo-eye, read once per scan. The eye reports times of its last edges only; `edges` counts them."""
 
     eye: str
     blocked: bool = field(default=False, init=False)
     edges: int = field(default=0, init=False)
-    """In this scan, of both directions."""
+    """Number of edges in this scan, both directions."""
     rises: int = field(default=0, init=False)
-    """In this scan: bottles that came."""
+    """Number of rising edges in this scan: bottles that arrived."""
     rose: float = field(default=0.0, init=False)
-    """s, the last time at which a bottle came."""
+    """Time when a bottle last arrived, s."""
     fell: float = field(default=0.0, init=False)
-    """s, the last time at which one was gone."""
+    """Time when a bottle last left, s."""
     fell_before: float | None = field(default=None, init=False)
-    """s, when the bottle before the last one was gone; None if that was not seen."""
+    """Time when the bottle before the last one left, s; None if that was not observed."""
     _count: float | None = field(default=None, init=False, repr=False)
     _beam: bool = field(default=False, init=False, repr=False)
-    """Whether a bottle is in the beam; `blocked` comes after the eye's delays."""
+    """True while a bottle is in the beam; `blocked` follows after the delays."""
     _falls: int = field(default=0, init=False, repr=False)
 
     def read(self, inputs: Inputs) -> EyeEdges:
-        """One scan; itself. The first one has no edges."""
+        """Read the signals of one scan, and return self. The first scan has no edges."""
         blocked, count = inputs.on(eye_signal(self.eye)), inputs[eye_signal(self.eye, "edges")]
         rose, fell = inputs[eye_signal(self.eye, "rose")], inputs[eye_signal(self.eye, "fell")]
         self.edges, self.rises = 0, 0
         beam = rose > fell if rose != fell else blocked
         if self._count is not None:
             self.edges = round(count - self._count)
-            # Rises and falls take turns, so their number and the two states tell how many of each there were.
+            # Rises and falls alternate, so their number and the two states determine how many there were of each.
             self.rises = (self.edges + beam - self._beam) // 2
         falls = self.edges - self.rises
         if self.rises and beam:  # the last edge is a rise, so the last fall is the one before it

@@ -1,4 +1,4 @@
-"""Plausibility of a photo-eye: stuck on, stuck off, chattering; the alarm, and a line that is held meanwhile."""
+"""Plausibility checks of a photo-eye (stuck on, stuck off, chattering): alarms, and commands that hold the line."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from conveyor_sim.control.scan import ALARMS, Inputs, eye_signal, require, speed
 
 @dataclass
 class _Chatter:
-    """More edges than bottles can make: over `period` (s), two for each length of a bottle that the belt has moved."""
+    """Detector of more edges than bottles can make: two per bottle length of belt travel, over `period` (s)."""
 
     length: float
     period: float
@@ -25,25 +25,26 @@ class _Chatter:
         self._seen.append((time, edges, travel))
         while self._seen[0][0] <= time - self.period:
             self._seen.popleft()
-        # A bottle at either end of the period, and one that rocks at the beam, make a few more.
+        # Bottles at both ends of the period, and one that rocks in the beam, add a few edges.
         possible = 2.0 * (sum(scan[2] for scan in self._seen) / self.length + 2.0)
         return sum(scan[1] for scan in self._seen) > possible
 
 
 @dataclass
 class EyeMonitor:
-    """Watches one eye. Alarms: "<eye> stuck on", "<eye> stuck off", "<eye> chatters".
+    r"""Monitor of one photo-eye. Alarms: "<eye> stuck on", "<eye> stuck off", "<eye> chatters".
 
-    eye: its name. belt: that carries bottles through its beam. bottle: m, its length in the direction of travel.
+    eye: its name. belt: carries bottles through its beam. bottle: length of a bottle in the direction of travel, m.
 
-    - Stuck on: blocked while the belt moves by `lengths` bottles, and `queue` is off, a bool that is on while bottles
-      may stand or follow each other without a gap there (empty: they never may). It stands until the eye is free.
-    - Stuck off: `missed` bottles more have come by the next eye downstream than can have been on the way to it, at
-      `next_after` m (next_eye empty: not looked at). It stands until the eye sees a bottle.
-    - Chatters: more edges in `period` s than bottles can make. It stands while that is so.
+    - Stuck on: the eye is blocked while the belt moves by `lengths` bottles, and `queue` is off. `queue` is a bool that
+      is on while bottles may stand there or follow each other without a gap (empty: never). The alarm stands until the
+      eye is free.
+    - Stuck off: `missed` bottles more have passed the next eye downstream, `next_after` m away, than can have been
+      between the eyes (next_eye empty: not checked). The alarm stands until the eye detects a bottle.
+    - Chatters: more edges in `period` s than bottles can make. The alarm stands as long as that is so.
 
-    hold: commands given while an alarm stands, such as speeds of 0: it answers commands only then, so put it before
-    the line's other controllers in `priority`.
+    hold: commands sent while an alarm stands, such as speeds of 0. No commands are sent otherwise, so put the monitor
+    before the line's other controllers in `priority`.
     """
 
     eye: str
@@ -61,33 +62,33 @@ class EyeMonitor:
     _chatter_here: _Chatter = field(init=False, repr=False)
     _chatter_next: _Chatter = field(init=False, repr=False)
     _blocked_for: float = field(default=0.0, init=False, repr=False)
-    """m that the belt moved while the eye was blocked."""
+    """Travel of the belt while the eye was blocked, m."""
     _stuck_on: bool = field(default=False, init=False, repr=False)
     _under_way: int = field(default=0, init=False, repr=False)
-    """Bottles between the two eyes."""
+    """Number of bottles between the two eyes."""
     _since_next: float = field(default=math.inf, init=False, repr=False)
-    """m that the belt moved since a bottle came by the next eye."""
+    """Travel of the belt since a bottle passed the next eye, m."""
     _unseen: int = field(default=0, init=False, repr=False)
-    """Bottles that came by the next eye only, since this one saw one."""
+    """Number of bottles that passed only the next eye, since this one detected a bottle."""
 
     def __post_init__(self) -> None:
         require(self.bottle > 0.0, f"bottle: {self.bottle:g} m given, expected more than 0")
         require(self.lengths > 1.0, f"lengths: {self.lengths:g} given, expected more than 1")
         require(self.missed >= 1, f"missed: {self.missed} given, expected 1 or more")
         require(self.period > 0.0, f"period: {self.period:g} s given, expected more than 0")
-        given = not self.next_eye or self.next_after > 0.0
-        require(given, f"next_after: {self.next_after:g} m given, expected the distance to {self.next_eye}, above 0")
+        valid = not self.next_eye or self.next_after > 0.0
+        require(valid, f"next_after: {self.next_after:g} m given, expected the distance to {self.next_eye}, above 0")
         self._here, self._next = EyeEdges(self.eye), EyeEdges(self.next_eye)
         self._chatter_here, self._chatter_next = (_Chatter(self.bottle, self.period) for _ in range(2))
 
     @property
     def declared_alarms(self) -> tuple[Alarm, ...]:
-        """The three alarms."""
+        """Declarations of the three alarms."""
         what, tag = ("stuck on", "stuck off", "chatters"), eye_signal(self.eye)
         return tuple(Alarm(f"{self.eye} {one}", f"photo-eye {self.eye}: {one}", "error", tag=tag) for one in what)
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
-        """The three alarms, and while one of them stands what is to be held."""
+        """Return the three alarms, and the commands in `hold` while one of them stands."""
         here = self._here.read(inputs)
         travel = abs(inputs[speed_signal(self.belt)]) * inputs.length
         alarms = {
@@ -104,7 +105,7 @@ class EyeMonitor:
             self._blocked_for = 0.0
         else:
             self._blocked_for += travel
-        # Once the line is held nothing moves any more: only the eye itself ends it.
+        # A held line does not move, so only the eye itself can end the alarm.
         stuck = self._blocked_for > self.lengths * self.bottle
         self._stuck_on = here.blocked and not here.edges and (self._stuck_on or stuck)
         return self._stuck_on
@@ -113,7 +114,7 @@ class EyeMonitor:
         there = self._next.read(inputs)
         chatters = self._chatter_next(inputs.time, there.edges, travel)
         room = int(self.next_after / self.bottle) + 1
-        # Two bottles can't be closer than one is long: what chatters is not counted even before it is known to.
+        # Bottles can't be closer than their length, so chatter is not counted even before it is detected.
         self._since_next += travel
         went = int(there.rises > 0 and not chatters and self._since_next > 0.5 * self.bottle)
         if went:

@@ -1,8 +1,8 @@
-"""Jams: no passage for a time, although bottles wait and the belt runs; the alarm, and a sequence that clears them.
+"""Jams: no passage for a time, although bottles wait and the belt runs. An alarm, and a sequence that clears jams.
 
-A queue that moves on nose to tail is no jam, nor is one that stands because nothing is taken downstream. An eye whose
-beam passes at the height of the axes sees no gap between bottles that touch: let `passages` name a count that goes
-on, of a counter or of what the next machine has taken.
+A queue that moves nose to tail is no jam. Neither is a queue that stands because no bottles are taken downstream. An
+eye at the height of the bottle axes sees no gap between touching bottles: let `passages` name a count that still
+increases, of a counter or of bottles that the next machine has taken.
 """
 
 from __future__ import annotations
@@ -16,20 +16,18 @@ from conveyor_sim.control.blocks import SR, TON
 from conveyor_sim.control.scan import ALARMS, Inputs, require, speed_command, speed_signal
 
 STANDS = 0.01
-"""m/s; a belt slower than that does not run."""
+"""Speed below which a belt stands still, m/s."""
 
 
 @dataclass
 class JamAlarm:
-    """Tells of a jam at an exit.
+    """Alarm of a jam at an exit. It stands until a bottle passes.
 
-    name: of the exit, for the alarm "jam at <name>". belt: that should carry bottles through. passages: counts, one
-    of which goes up with every passage (counters/<c>/forward, outfeeds/<o>/removed, photo_eyes/<e>/edges). waiting: a
+    name: of the exit, for the alarm "jam at <name>". belt: carries bottles through the exit. passages: counts, one of
+    which increases with every passage (counters/<c>/forward, outfeeds/<o>/removed, photo_eyes/<e>/edges). waiting: a
     signal that is `waiting_from` or more while bottles wait before the exit (photo_eyes/<e>/blocked,
     zones/<z>/bottles). time: s without a passage. takes: a bool that is on while bottles are taken downstream
     (machines/<m>/running); empty: always.
-
-    The alarm stands until a bottle passes.
     """
 
     name: str
@@ -40,7 +38,7 @@ class JamAlarm:
     waiting_from: float = 0.5
     takes: str = ""
     passed: bool = field(default=False, init=False)
-    """Whether a bottle passed since the last scan."""
+    """True if a bottle passed since the last scan."""
     _counted: tuple[float, ...] | None = field(default=None, init=False, repr=False)
     _stuck: TON = field(init=False, repr=False)
     _jam: SR = field(default_factory=SR, init=False, repr=False)
@@ -52,11 +50,11 @@ class JamAlarm:
 
     @property
     def declared_alarms(self) -> tuple[Alarm, ...]:
-        """The alarm."""
+        """Declaration of the alarm."""
         return (Alarm(f"jam at {self.name}", f"no bottle leaves {self.name}", "error", tag=self.waiting),)
 
     def jammed(self, inputs: Inputs) -> bool:
-        """Whether there is a jam; once a scan."""
+        """Return True during a jam. Call it once per scan."""
         counted = tuple(inputs[name] for name in self.passages)
         before, self._counted = self._counted or counted, counted
         self.passed = any(now > then for now, then in zip(counted, before, strict=True))
@@ -67,7 +65,7 @@ class JamAlarm:
         return self._jam(stuck, self.passed)
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
-        """The alarm."""
+        """Return the alarm."""
         return {f"{ALARMS}jam at {self.name}": float(self.jammed(inputs))}
 
 
@@ -81,12 +79,12 @@ class _Phase(Enum):
 
 @dataclass
 class JamClearing:
-    """Clears a jam: stops the belt, runs it back, then jogs it forward, and again until a bottle passes in a jog.
+    """Sequence that clears a jam: stop, run back, jog forward, until a bottle passes in a jog.
 
-    Times in s, speeds in m/s (the belt's lowest speed must allow `back_speed`, which is negative). After `tries` in
-    vain the belt stands, with the alarm "jam at <name> not cleared", until somebody helps a bottle through. hold:
-    commands given as long as it acts, such as a feeder's speed of 0. It answers commands only while it acts: put it
-    before the belt's controller in `priority`.
+    Times in s, speeds in m/s; the belt's lowest speed must allow `back_speed`, which is negative. After `tries`
+    attempts the belt stands, with the alarm "jam at <name> not cleared", until a person helps a bottle through. hold:
+    commands sent during the sequence, such as a feeder's speed of 0. Commands are sent during the sequence only, so put
+    it before the belt's controller in `priority`.
     """
 
     alarm: JamAlarm
@@ -98,28 +96,28 @@ class JamClearing:
     tries: int = 3
     hold: Mapping[str, float] = field(default_factory=dict)
     tried: int = field(default=0, init=False)
-    """Times that it has run back since the last passage."""
+    """Number of attempts since the last passage."""
     _phase: _Phase = field(default=_Phase.WATCH, init=False, repr=False)
     _timer: TON = field(default_factory=lambda: TON(0.0), init=False, repr=False)
 
     def __post_init__(self) -> None:
-        given = f"{self.back_speed:g} and {self.jog_speed:g} given"
+        speeds = f"{self.back_speed:g} and {self.jog_speed:g} given"
         signs = self.back_speed < 0.0 < self.jog_speed
-        require(signs, f"back_speed, jog_speed: {given}, expected below 0 and above 0")
+        require(signs, f"back_speed, jog_speed: {speeds}, expected below 0 and above 0")
         require(self.tries >= 1, f"tries: {self.tries} given, expected 1 or more")
 
     @property
     def declared_alarms(self) -> tuple[Alarm, ...]:
-        """Both alarms."""
+        """Declarations of both alarms."""
         name = self.alarm.name
         text = f"{name} is jammed after {self.tries} tries to clear it, and waits for help"
         return (*self.alarm.declared_alarms, Alarm(f"jam at {name} not cleared", text, "error", priority=900))
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
-        """Both alarms, and while it acts the belt's speed and what is held."""
+        """Return both alarms, and during the sequence also the belt's speed and the commands in `hold`."""
         jammed = self.alarm.jammed(inputs)
         self._go_on(jammed, inputs.time)
-        # Bottles that are backed past a sensor have not left: only a passage in a jog ends the jam.
+        # Bottles that pass a sensor while the belt runs back have not left. Only a passage in a jog ends the jam.
         acts = self._phase is not _Phase.WATCH
         answer = {
             f"{ALARMS}jam at {self.alarm.name}": float(jammed or acts),
@@ -131,7 +129,7 @@ class JamClearing:
         return answer
 
     def _go_on(self, jammed: bool, time: float) -> None:
-        """To the phase of this scan."""
+        """Enter the phase of this scan."""
         if self._phase is _Phase.WATCH:
             if jammed:
                 self.tried = 0

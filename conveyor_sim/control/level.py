@@ -1,6 +1,6 @@
 """Level control of an accumulation table: the feeder is held while the table is full.
 
-The level comes from a count of bottles, from counters at its entry and exit, or from photo-eyes across it.
+The level comes from a count of bottles, from counters at entry and exit, or from photo-eyes across the table.
 """
 
 from __future__ import annotations
@@ -14,41 +14,44 @@ from conveyor_sim.control.scan import Inputs, eye_signal, require, speed_command
 
 
 class Level(Protocol):
-    """How full something is."""
+    """Fill level of a table or buffer."""
 
     def read(self, inputs: Inputs) -> float:
-        """The level at this scan; to be called once a scan."""
+        """Return the level at this scan. Call it once per scan."""
 
 
 @dataclass(frozen=True)
 class Count:
-    """The level is a signal: zones/<zone>/bottles or belts/<belt>/bottles."""
+    """Level from a signal: zones/<zone>/bottles or belts/<belt>/bottles."""
 
     signal: str
 
     def read(self, inputs: Inputs) -> float:
-        """Bottles."""
+        """Return the number of bottles."""
         return inputs[self.signal]
 
 
 @dataclass(frozen=True)
 class Counters:
-    """The level is what was there at the start and came in, less what left: counters/<counter>/forward, for example."""
+    """Level from counts: bottles at the start plus those that came in, minus those that left.
+
+    entered, left: signals such as counters/<counter>/forward.
+    """
 
     entered: tuple[str, ...]
     left: tuple[str, ...]
     at_start: float = 0.0
 
     def read(self, inputs: Inputs) -> float:
-        """Bottles."""
+        """Return the number of bottles."""
         return self.at_start + sum(inputs[name] for name in self.entered) - sum(inputs[name] for name in self.left)
 
 
 @dataclass
 class Eyes:
-    """The level is how many photo-eyes are covered: bottles stand at them.
+    """Level from the number of covered photo-eyes: bottles stand at them.
 
-    eyes: names. on, off: s for which one must be blocked or free; `on` longer than a passing bottle takes.
+    eyes: names. on, off: times for which an eye must be blocked or free, s; `on` longer than a passing bottle takes.
     """
 
     eyes: tuple[str, ...]
@@ -61,17 +64,18 @@ class Eyes:
         self._covered = tuple(COVERED(self.on, self.off) for _ in self.eyes)
 
     def read(self, inputs: Inputs) -> float:
-        """Eyes."""
+        """Return the number of covered eyes."""
         blocked = [inputs.on(eye_signal(eye)) for eye in self.eyes]
         return sum(block(on, inputs.time) for block, on in zip(self._covered, blocked, strict=True))
 
 
 @dataclass
 class LevelControl:
-    """Holds the feeder from level `high` until the level is down to `low`; the table runs fast up to `low`, slow above.
+    """Level control: the feeder is held from level `high` down to `low`; the table runs fast up to `low`, slow above.
 
-    level: bottles (Count, Counters), or covered eyes (Eyes: with one eye at the low mark and one at the high mark, low
-    is 0 and high is 2). feeder, table: belts. Speeds in m/s; slow keeps the pressure low while bottles stand.
+    level: bottles (Count, Counters), or covered eyes (Eyes). With one eye at the low mark and one at the high mark, low
+    is 0 and high is 2. feeder, table: belts. Speeds in m/s; a low `table_slow` keeps the pressure low while bottles
+    stand.
     """
 
     level: Level
@@ -90,7 +94,7 @@ class LevelControl:
         self._full = HYSTERESIS(self.low, self.high)
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
-        """Speeds of feeder and table."""
+        """Return the speeds of feeder and table."""
         level = self.level.read(inputs)
         return {
             speed_command(self.feeder): self.held_speed if self._full(level) else self.feeder_speed,
@@ -107,6 +111,9 @@ def table_level(
     table_slow: float = 0.2,
     table_fast: float = 0.3,
 ) -> LevelControl:
-    """Level control by the count of bottles on the belt `table`; as it stands, that of the paper's plant. m/s."""
+    """Return level control by the count of bottles on the belt `table`.
+
+    The defaults are those of the plant in the paper. Speeds in m/s.
+    """
     count = Count(f"belts/{table}/bottles")
     return LevelControl(count, feeder, table, high_mark, low_mark, feeder_speed, table_slow, table_fast)

@@ -1,4 +1,4 @@
-"""What a controller may know of a line before its first scan: what there is to read and to write."""
+"""`LineTags`: signals and commands of a line, which a controller can get before its first scan."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class LineTags:
-    """Kinds by name: "bool", "count", "number" or "enumeration"."""
+    """Signals and commands of a line by name, with their kinds: "bool", "count", "number" or "enumeration"."""
 
     signals: Mapping[str, str]
     commands: Mapping[str, str]
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    """Minimum and maximum that the line accepts, by command; empty: not known."""
+    """Accepted minimum and maximum by command; empty: not known."""
 
 
 def bind(controller: object, tags: LineTags) -> None:
-    """Give a controller with a method `bind` the line's tags, before its first scan. Raises as that does."""
+    """Pass the line's tags to a controller that has a method `bind`, before its first scan. Raise its exceptions."""
     method = getattr(controller, "bind", None)
     if callable(method):
         method(tags)

@@ -1,4 +1,4 @@
-"""A controller by name: "module:factory" or "file.py:factory", with parameters."""
+"""Controllers by name: "module:factory" or "file.py:factory", with parameters."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from conveyor_sim.control.scan import ControlError, Controller
 
 
 def load(reference: str, parameters: Mapping[str, object] | None = None) -> Controller:
-    """What the factory (a class, or a function) returns when called with the parameters by name.
+    """Return the controller that a factory (a class or function) builds from parameters by name.
 
-    Raises ControlError if the reference is none, the module or file can't be imported or has no such factory, the
-    parameters are not the factory's, or what it returns has no `scan`.
+    Raise ControlError for an invalid reference, a module or file that can't be imported or has no such factory,
+    parameters that the factory does not take, or a result without `scan`.
     """
     where, colon, name = reference.rpartition(":")
     if not (colon and where and name):

@@ -1,8 +1,8 @@
-"""What a controller remembers, as plain data: a checkpoint holds it, and the same controller goes on from it.
+"""Memory of a controller as plain data, for checkpoints that an equal controller continues from.
 
-One with methods `snapshot` and `restore` does that itself. Of any other its attributes are taken, and those of the
-objects within: numbers, texts, None, enumerations, lists, tuples, deques, mappings by text. What is callable is part
-of how it was made, and left out.
+A controller with methods `snapshot` and `restore` does this itself. Of any other, the attributes are stored, and those
+of the objects in it: numbers, texts, None, enumerations, lists, tuples, deques, mappings with text keys. Callables are
+part of its construction, and not stored.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ _MAKE: dict[str, Any] = {word: kind for kind, word in _LISTS.items()}
 
 
 def snapshot(controller: Controller) -> dict[str, Any]:
-    """All that a controller remembers, as JSON can hold it. Raises ControlError for what can't be held."""
+    """Return the memory of a controller as JSON can hold it. Raise ControlError if that is impossible."""
     name = type(controller).__qualname__
     return {"class": name, "state": _dump(controller, name)}
 
 
 def restore(controller: Controller, data: Mapping[str, Any]) -> None:
-    """Have a controller go on from what another of its kind, made in the same way, remembered. Raises ControlError."""
+    """Restore a controller from the memory of an equal one. Raise ControlError for data that do not fit."""
     name = type(controller).__qualname__
     if data.get("class") != name:
-        raise ControlError(f"found what a {data.get('class')} remembered, expected that of a {name}")
+        raise ControlError(f"found the memory of a {data.get('class')}, expected that of a {name}")
     try:
         _load(controller, data["state"], name)
     except (KeyError, ValueError, TypeError, AttributeError) as error:
-        raise ControlError(f"{name}: found what it can't have remembered ({error}), expected a checkpoint's") from error
+        raise ControlError(f"{name}: found invalid memory ({error}), expected that of a checkpoint") from error
 
 
 def _own(value: Any) -> bool:
@@ -50,25 +50,29 @@ def _dump(value: Any, where: str) -> Any:
         return {_LISTS[type(value)]: [_dump(one, f"{where}[{number}]") for number, one in enumerate(value)]}
     if isinstance(value, dict):
         if not all(isinstance(key, str) for key in value):
-            raise ControlError(f"{where}: found a mapping by other than texts, which a checkpoint can't hold")
+            raise ControlError(
+                f"{where}: found a mapping with other keys than texts, expected texts, as a checkpoint holds them"
+            )
         return {"dict": {key: _dump(one, f"{where}[{key!r}]") for key, one in value.items()}}
     if _own(value):
         return {"own": value.snapshot()}
     if not hasattr(value, "__dict__"):
         kind = type(value).__name__
-        raise ControlError(f"{where}: found a {kind}, expected what a checkpoint can hold, or snapshot and restore")
+        raise ControlError(
+            f"{where}: found a {kind}, expected a type that a checkpoint can hold, or snapshot and restore"
+        )
     return {"object": {name: _dump(one, f"{where}.{name}") for name, one in _attributes(value).items()}}
 
 
 def _attributes(value: Any) -> dict[str, Any]:
-    """By name; those of a dataclass also where they are still as by default, and so its class's."""
+    """Return the attributes by name, without callables. Fields of a dataclass count even at their class's defaults."""
     declared = [one.name for one in fields(value)] if is_dataclass(value) else []
-    found = {name: getattr(value, name) for name in dict.fromkeys([*declared, *vars(value)])}
-    return {name: one for name, one in found.items() if is_dataclass(one) or not callable(one)}
+    values = {name: getattr(value, name) for name in dict.fromkeys([*declared, *vars(value)])}
+    return {name: one for name, one in values.items() if is_dataclass(one) or not callable(one)}
 
 
 def _load(now: Any, data: Any, where: str) -> Any:
-    """What was dumped, put into what is like it; returns it."""
+    """Restore an object like the dumped one, and return it."""
     if not isinstance(data, dict):
         return data
     ((kind, inner),) = data.items()
@@ -89,5 +93,5 @@ def _load(now: Any, data: Any, where: str) -> Any:
         old = getattr(now, name)
         new = _load(old, one, f"{where}.{name}")
         if new is not old:
-            object.__setattr__(now, name, new)  # also of what is frozen, whose parts may change
+            object.__setattr__(now, name, new)  # frozen dataclasses included
     return now

@@ -1,4 +1,4 @@
-"""Which of a controller's variables are recorded, and what they are after a scan."""
+"""`RecordedVariables`: variables of a controller that are recorded, with their values after a scan."""
 
 from __future__ import annotations
 
@@ -8,55 +8,56 @@ from fnmatch import fnmatchcase
 from conveyor_sim.control.scan import ControlError
 
 MOST = 1000
-"""Variables that are recorded of a controller: as many numbers and names for each of its scans."""
+"""Largest number of recorded variables of a controller. Every scan records that many numbers."""
 
 PREFIX = "plc/"
-"""What names of a program's variables begin with; a pattern may leave it out."""
+"""Prefix of a program's variables. Patterns may omit it."""
 
 _LISTED = 20
 
 
 def patterns(record: str | Iterable[str]) -> tuple[str, ...]:
-    """Those that were given, one or several."""
+    """Return one or several patterns as a tuple."""
     return (record,) if isinstance(record, str) else tuple(record)
 
 
 class RecordedVariables:
-    """The variables of a controller that are recorded."""
+    """Recorded variables of a controller."""
 
     names: tuple[str, ...]
-    """In the controller's order; none where nothing is to be recorded."""
+    """Names in the controller's order; () if none is recorded."""
 
     def __init__(self, controller: object, record: Sequence[str] = ()) -> None:
-        """record: patterns beside those of the controller's own attribute `record`. * stands for anything and ? for a
-        letter; v[1] is element 1.
+        """Select the variables by patterns.
 
-        Raises ControlError for a pattern that fits none, and for more variables than MOST.
+        record: patterns beside those of the controller's attribute `record`. * matches any text and ? one character;
+        v[1] is element 1. Raise ControlError for a pattern without a match, and for more variables than MOST.
         """
         self._controller = controller
         wanted = [*getattr(controller, "record", ()), *record]
-        known = tuple(self._variables) if wanted else ()
-        found = {name for pattern in wanted for name in _fitting(pattern, known)}
-        if len(found) > MOST:
-            raise ControlError(f"record: found {len(found)} variables, expected at most {MOST}")
-        self.names = tuple(name for name in known if name in found)
+        known = tuple(self.variables) if wanted else ()
+        chosen = {name for pattern in wanted for name in _fitting(pattern, known)}
+        if len(chosen) > MOST:
+            raise ControlError(f"record: found {len(chosen)} variables, expected at most {MOST}")
+        self.names = tuple(name for name in known if name in chosen)
 
     @property
-    def _variables(self) -> Mapping[str, float]:
-        found: Mapping[str, float] = getattr(self._controller, "variables", {})
-        return found
+    def variables(self) -> Mapping[str, float]:
+        """Return all variables of the controller, by name."""
+        variables: Mapping[str, float] = getattr(self._controller, "variables", {})
+        return variables
 
     def values(self) -> tuple[float, ...]:
-        """What they are now, in the order of `names`."""
-        now = self._variables
+        """Return the present values, in the order of `names`."""
+        now = self.variables
         return tuple(float(now[name]) for name in self.names)
 
 
 def _fitting(pattern: str, known: Sequence[str]) -> list[str]:
     plain = pattern.lower().replace("[", "[[]")
-    found = [name for name in known if any(fnmatchcase(name.lower(), one) for one in (plain, PREFIX + plain))]
-    if not found:
+    names = [name for name in known if any(fnmatchcase(name.lower(), one) for one in (plain, PREFIX + plain))]
+    if not names:
         listed = ", ".join(known[:_LISTED]) + (", ..." if len(known) > _LISTED else "")
-        expected = f"a pattern of {listed}" if known else "a controller that shows variables"
+        expected = f"a pattern of {listed}" if known else "a controller with variables"
         raise ControlError(f"record: found {pattern!r}, which fits no variable, expected {expected}")
-    return found
+    return names

@@ -1,8 +1,8 @@
-"""Encoder-tracked reject: what an inspection has found bad is followed over the belt's pulses to the rejecter.
+"""Encoder-tracked reject: bad bottles of an inspection are tracked by the belt's pulses to the rejecter.
 
-A PLC keeps a shift register that is shifted by every pulse, with a bit for each bottle found bad. The same is kept here
-as the pulse counts at which those bits arrive, so the belt may run at any speed, creep or stop. A bottle is put to its
-place within a scan: when it was seen is given as a time, and the belt's speed makes pulses of what has passed since.
+A PLC uses a shift register that every pulse shifts, with one bit per bad bottle. Here the pulse counts are stored at
+which these bits arrive, so the belt may run at any speed, creep or stop. Positions are finer than one scan: the
+inspection reports a time, and the belt's speed converts the time since then to pulses.
 """
 
 from __future__ import annotations
@@ -16,14 +16,15 @@ from conveyor_sim.control.scan import Inputs, require, speed_signal
 
 @dataclass
 class TrackedReject:
-    """Fires the rejecter when a bottle found bad is before it.
+    """Rejecter that fires when a bad bottle is in front of it.
 
-    belt: with the encoder, belts/<belt>/pulses, of `pulses_per_metre`. inspection: the count of bottles found bad
-    (machines/<m>/bad). seen: a signal that gives when the last of them was seen (machines/<m>/bad_time), or the last
-    bottle at all (photo_eyes/<e>/rose), s. fire: the command (machines/<r>/fire). distance: m, from where a bottle is
-    when it is seen to where it is to be hit. stroke: m that `fire` stays on for; more than the belt moves in a scan,
-    and less than the way from one bottle to the next by two such, for a rejecter acts on what rises. response: s from
-    the end of the scan that fires until the bottle is hit, led by the belt's speed.
+    belt: with the encoder, belts/<belt>/pulses, of `pulses_per_metre`. inspection: the count of bad bottles
+    (machines/<m>/bad). seen: a signal with the time when the last of them was seen (machines/<m>/bad_time), or the last
+    bottle at all (photo_eyes/<e>/rose), s. fire: the command (machines/<r>/fire). distance: from the place where a
+    bottle is seen to the place where it is hit, m. stroke: travel for which `fire` stays on, m. It must exceed the
+    belt's travel in one scan, and be less than the distance of two bottles by two such travels, because the rejecter
+    acts on rising edges. response: time from the end of the scan that fires to the hit, s; compensated by the belt's
+    speed.
     """
 
     belt: str
@@ -35,7 +36,7 @@ class TrackedReject:
     pulses_per_metre: float
     response: float = 0.0
     _due: deque[float] = field(default_factory=deque, init=False, repr=False)
-    """Pulse counts at which bad bottles are before the rejecter, the next one first."""
+    """Pulse counts at which bad bottles reach the rejecter, the next one first."""
     _bad: float | None = field(default=None, init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -45,15 +46,15 @@ class TrackedReject:
         require(self.response >= 0.0, f"response: {self.response:g} s given, expected 0 or more")
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
-        """Whether to fire."""
+        """Return the command to fire, 0 or 1."""
         pulses, bad = inputs[f"belts/{self.belt}/pulses"], inputs[self.inspection]
         speed = inputs[speed_signal(self.belt)] * self.pulses_per_metre
-        found = 0 if self._bad is None else round(bad - self._bad)
+        new = 0 if self._bad is None else round(bad - self._bad)
         self._bad = bad
-        if found:
+        if new:
             since = inputs.time - inputs[self.seen]
             self._due.append(pulses - speed * since + self.distance * self.pulses_per_metre)
-        # A command is carried out by the end of the scan; of all scans, the nearest one is taken.
+        # A command takes effect at the end of the scan. The nearest scan is chosen.
         hits_at = pulses + speed * (self.response + 1.5 * inputs.length)
         while self._due and self._due[0] + self.stroke * self.pulses_per_metre <= hits_at:
             self._due.popleft()

@@ -1,4 +1,4 @@
-"""What a controller is: an object with `scan`, from the signals of a tick to the commands and alarms it answers."""
+"""`Controller`: an object with `scan`, which returns commands and alarms for the signals of a tick."""
 
 from __future__ import annotations
 
@@ -11,27 +11,27 @@ from conveyor_sim.control.alarm import Alarm
 from conveyor_sim.control.line_tags import LineTags, bind
 
 ALARMS = "alarms/"
-"""What a key of an answer begins with that is an alarm (0 or 1), not a command."""
+"""Prefix of a key that is an alarm (0 or 1), not a command, in the answer of a scan."""
 
 ON = 0.5
-"""A bool travels as 0 or 1: from here on it is on."""
+"""Lowest value at which a bool, sent as 0 or 1, is on."""
 
 
 class ControlError(Exception):
-    """A controller that can't be made, or can't go on; the text is a sentence meant for the user."""
+    """Failure to build or run a controller. The text is a sentence for the user."""
 
 
 class NoSuchSignal(ControlError, KeyError):
-    """A signal that the line does not have."""
+    """Access to a signal that the line does not have."""
 
     def __str__(self) -> str:
         return str(self.args[0])  # KeyError would put it in quotes
 
 
 class Inputs(Mapping[str, float]):
-    """The process image as it is read at the start of a scan: values of signals by name; a bool is 0 or 1.
+    """Process image at the start of a scan: values of signals by name; a bool is 0 or 1.
 
-    time: s, simulated. tick: its number. length: s from this scan to the next.
+    time: simulated time, s. tick: its number. length: time from this scan to the next, s.
     """
 
     __slots__ = ("_signals", "length", "tick", "time")
@@ -43,7 +43,7 @@ class Inputs(Mapping[str, float]):
         self.length = length
 
     def __getitem__(self, name: str) -> float:
-        """The value of a signal. Raises NoSuchSignal, which is a KeyError."""
+        """Return the value of a signal. Raise NoSuchSignal, which is a KeyError."""
         try:
             return self._signals[name]
         except KeyError:
@@ -56,37 +56,41 @@ class Inputs(Mapping[str, float]):
         return len(self._signals)
 
     def on(self, name: str) -> bool:
-        """Whether a signal of type bool is on. Raises NoSuchSignal."""
+        """Return True if a signal of type bool is on. Raise NoSuchSignal."""
         return self[name] >= ON
 
 
 class Controller(Protocol):
-    """Anything with a scan. One with an attribute `declared_alarms` (a sequence of Alarm) says by it what its alarms
-    are; the others are as by default. One with a method `bind` is given the line's tags (`line_tags.py`) before its
-    first scan; one with an attribute `variables` (a mapping of numbers by name) shows these to a test's conditions, and
-    by an attribute `record` (patterns) says which of them are recorded (`recorded.py`); one with an attribute
-    `left_over` (sentences) says, once it has the tags, what of them it leaves out.
+    r"""Object with a method `scan`.
+
+    Optional attributes:
+
+    - `declared_alarms`: a sequence of Alarm. Alarms without a declaration have defaults.
+    - `bind`: a method that receives the line's tags (`line_tags.py`) before the first scan.
+    - `variables`: numbers by name, available to conditions of tests.
+    - `record`: patterns of the variables to record (`recorded.py`).
+    - `left_over`: sentences about tags without use, available after `bind`.
     """
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
-        """One scan: commands by name, and alarms (keys that begin with ALARMS)."""
+        """Return commands by name, and alarms (keys that begin with ALARMS), for one scan."""
 
 
 def declared_alarms(controller: object) -> tuple[Alarm, ...]:
-    """What a controller declares of its alarms. Raises ControlError for what is no declaration, or one given twice."""
-    found = getattr(controller, "declared_alarms", ())
+    """Return a controller's declarations. Raise ControlError for invalid ones, or one that is given twice."""
+    declared = getattr(controller, "declared_alarms", ())
     name = f"{type(controller).__name__}.declared_alarms"
-    if not (isinstance(found, (list, tuple)) and all(isinstance(one, Alarm) for one in found)):
-        raise ControlError(f"{name}: {found!r:.200} given, expected a list or tuple of Alarm")
-    ids = [one.id for one in found]
+    if not (isinstance(declared, (list, tuple)) and all(isinstance(one, Alarm) for one in declared)):
+        raise ControlError(f"{name}: {declared!r:.200} given, expected a list or tuple of Alarm")
+    ids = [one.id for one in declared]
     for id in ids:
         if ids.count(id) > 1:
             raise ControlError(f"{name}: {id} declared twice, expected once")
-    return tuple(found)
+    return tuple(declared)
 
 
 def commands_of(answer: Mapping[str, float]) -> dict[str, float]:
-    """The commands of a scan's answer. Raises ControlError for what is no answer, and a value that is no number."""
+    """Return the commands in a scan's answer. Raise ControlError if it is no mapping or a value is no number."""
     if not isinstance(answer, Mapping):
         raise ControlError(f"scan: {answer!r:.200} returned, expected a mapping of commands")
     try:
@@ -96,51 +100,26 @@ def commands_of(answer: Mapping[str, float]) -> dict[str, float]:
             if not isinstance(name, str):
                 text = f"scan: {name!r:.200} returned as a name, expected that of a command or an alarm"
                 raise ControlError(text) from None
-            _number(name, value)
+            number(name, value)
         raise
 
 
-def _number(name: str, value: object) -> float:
+def number(name: str, value: object) -> float:
+    """Return a value of an answer as a number. Raise ControlError if it is none."""
     try:
         return float(value)  # type: ignore[arg-type]
     except (OverflowError, TypeError, ValueError):
         raise ControlError(f"{name}: {value!r:.200} answered by the controller, expected a number") from None
 
 
-class AlarmChanges:
-    """What of a controller's alarms is to be given to the line with its commands: all at first, then what changes."""
-
-    def __init__(self) -> None:
-        self._given: dict[str, float] = {}
-
-    def of(self, answer: Mapping[str, float]) -> dict[str, float]:
-        """The alarms of a scan's answer that come or go, 1 or 0; one that it does not have any more goes.
-
-        Raises ControlError for one that is said by what is no number.
-        """
-        alarms = {name: float(_number(name, value) >= ON) for name, value in answer.items() if name.startswith(ALARMS)}
-        now = {**dict.fromkeys(self._given, 0.0), **alarms}
-        changes = {name: value for name, value in now.items() if self._given.get(name) != value}
-        self._given = now
-        return changes
-
-    def snapshot(self) -> dict[str, float]:
-        """The alarms that were given."""
-        return dict(self._given)
-
-    def restore(self, given: Mapping[str, float]) -> None:
-        """Go on from there."""
-        self._given = {str(name): float(value) for name, value in given.items()}
-
-
 @dataclass(frozen=True)
 class Constant:
-    """Gives the same commands in every scan: `Constant({"belts/feeder/cmd_speed": 0.5})`."""
+    """Controller with the same commands in every scan: `Constant({"belts/feeder/cmd_speed": 0.5})`."""
 
     commands: Mapping[str, float]
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
-        """The commands."""
+        """Return the commands."""
         return self.commands
 
 
@@ -153,30 +132,30 @@ class _Together:
         return tuple(alarm for controller in self.controllers for alarm in declared_alarms(controller))
 
     def bind(self, tags: LineTags) -> None:
-        """Hand the line's tags on."""
+        """Pass the line's tags on."""
         for controller in self.controllers:
             bind(controller, tags)
 
     @property
     def variables(self) -> Mapping[str, float]:
-        """Those of all of them."""
+        """Variables of all controllers."""
         return _variables(self.controllers)
 
     @property
     def record(self) -> tuple[str, ...]:
-        """The patterns of all of them."""
+        """Patterns of all controllers."""
         return _record(self.controllers)
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
         merged: dict[str, float] = {}
-        given_by: dict[str, Controller] = {}
+        sender: dict[str, Controller] = {}
         for controller in self.controllers:
             for name, value in controller.scan(inputs).items():
                 if name in merged:
-                    both = f"{type(given_by[name]).__name__} and {type(controller).__name__}"
-                    raise ControlError(f"{name}: given by both {both} in one scan, expected one (or priority)")
+                    both = f"{type(sender[name]).__name__} and {type(controller).__name__}"
+                    raise ControlError(f"{name}: sent by both {both} in one scan, expected one (or priority)")
                 merged[name] = value
-                given_by[name] = controller
+                sender[name] = controller
         return merged
 
 
@@ -186,25 +165,25 @@ class _Priority:
 
     @property
     def declared_alarms(self) -> tuple[Alarm, ...]:
-        found: dict[str, Alarm] = {}
+        declared: dict[str, Alarm] = {}
         for controller in self.controllers:
             for alarm in declared_alarms(controller):
-                found.setdefault(alarm.id, alarm)
-        return tuple(found.values())
+                declared.setdefault(alarm.id, alarm)
+        return tuple(declared.values())
 
     def bind(self, tags: LineTags) -> None:
-        """Hand the line's tags on."""
+        """Pass the line's tags on."""
         for controller in self.controllers:
             bind(controller, tags)
 
     @property
     def variables(self) -> Mapping[str, float]:
-        """Those of all of them."""
+        """Variables of all controllers."""
         return _variables(self.controllers)
 
     @property
     def record(self) -> tuple[str, ...]:
-        """The patterns of all of them."""
+        """Patterns of all controllers."""
         return _record(self.controllers)
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
@@ -217,7 +196,7 @@ class _Priority:
 
 def _variables(controllers: Iterable[Controller]) -> Mapping[str, float]:
     shown: Any = [getattr(controller, "variables", {}) for controller in controllers]
-    return ChainMap(*shown)  # read only, and read when it is asked for
+    return ChainMap(*shown)  # read-only view
 
 
 def _record(controllers: Iterable[Controller]) -> tuple[str, ...]:
@@ -225,15 +204,15 @@ def _record(controllers: Iterable[Controller]) -> tuple[str, ...]:
 
 
 def together(*controllers: Controller) -> Controller:
-    """One controller that scans each of these, in order, on the same inputs, and merges their answers.
+    """Return a controller that scans several ones in order, on the same inputs, and merges their answers.
 
-    Its scan raises ControlError if two of them give the same command or alarm.
+    Its scan raises ControlError if two of them return the same command or alarm.
     """
     return _Together(controllers)
 
 
 def priority(*controllers: Controller) -> Controller:
-    """One controller that scans each of these; where several give the same command, that of the earliest holds.
+    """Return a controller that scans several ones; for a command of several, the earliest one wins.
 
     So an interlock goes first, and the controller that it interrupts after it.
     """
@@ -241,30 +220,30 @@ def priority(*controllers: Controller) -> Controller:
 
 
 def require(condition: bool, text: str) -> None:
-    """Raises ControlError with the text unless the condition holds."""
+    """Raise ControlError with the text unless the condition holds."""
     if not condition:
         raise ControlError(text)
 
 
 def speed_command(belt: str) -> str:
-    """The command that sets a belt's speed, m/s."""
+    """Return the command that sets a belt's speed, m/s."""
     return f"belts/{belt}/cmd_speed"
 
 
 def speed_signal(belt: str) -> str:
-    """The signal of a belt's actual speed, m/s."""
+    """Return the signal of a belt's actual speed, m/s."""
     return f"belts/{belt}/speed"
 
 
 def eye_signal(eye: str, what: str = "blocked") -> str:
-    """A signal of a photo-eye: blocked, rose, fell or edges."""
+    """Return a signal of a photo-eye: blocked, rose, fell or edges."""
     return f"photo_eyes/{eye}/{what}"
 
 
 def _nearest(name: str, signals: Mapping[str, float]) -> str:
-    """What of the same kind there is, in words."""
+    """Return the existing signals of the same kind, in words."""
     kind = name.split("/")[0] + "/"
     alike = [signal for signal in signals if signal.startswith(kind)]
     if alike:
         return f"expected one of {', '.join(alike)}"
-    return "which a controller has to tell in every scan" if kind == ALARMS else f"which has no {kind}"
+    return "which a controller must report in every scan" if kind == ALARMS else f"which has no {kind}"

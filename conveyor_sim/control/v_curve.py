@@ -1,9 +1,9 @@
-"""V-curve: machines on both sides of the bottleneck run faster than it, the more so the further away they are.
+"""V-curve: machines on both sides of the bottleneck run faster, the more so the further away they are.
 
-Plotted over the line, the rates make a V with the bottleneck at its tip. The surplus is used to win back what a stop
-has cost: upstream to refill the buffers before the bottleneck, downstream to empty those behind it. While a buffer is
-at its level, the machine beyond it follows the one nearer to the bottleneck. After a stop, a buffer is back at its
-level in surplus / rate difference.
+Plotted along the line, the rates form a V with the bottleneck at its tip. The surplus recovers losses of a stop:
+upstream it refills the buffers before the bottleneck, downstream it empties those behind it. While a buffer is at its
+level, the machine beyond it follows the one nearer to the bottleneck. After a stop, a buffer is back at its level in
+surplus / rate difference.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ class _Buffer(Enum):
 
 @dataclass
 class Neighbour:
-    """A machine beside the bottleneck, and the buffer between it and the next machine towards the bottleneck.
+    """Machine beside the bottleneck, and the buffer between it and the next machine towards the bottleneck.
 
-    command: what sets its rate (machines/<m>/rate, 1/s). level: of the buffer, in bottles or in covered back-up eyes;
-    no two machines share one. From `high` up there is a surplus, from `low` down a lack, each until the level is back
-    at `target`. With two back-up eyes that is 0, 1 and 2.
+    command: sets its rate (machines/<m>/rate, 1/s). level: of the buffer, in bottles or in covered back-up eyes;
+    machines must not share one. From `high` up there is a surplus, from `low` down a lack, each until the level is back
+    at `target`. With two back-up eyes these levels are 0, 1 and 2.
     """
 
     command: str
@@ -39,11 +39,11 @@ class Neighbour:
     _buffer: _Buffer = field(default=_Buffer.AT_LEVEL, init=False, repr=False)
 
     def __post_init__(self) -> None:
-        given = f"{self.low:g}, {self.target:g} and {self.high:g}"
-        require(self.low <= self.target <= self.high, f"low, target, high: {given} given, expected a rising order")
+        levels = f"{self.low:g}, {self.target:g} and {self.high:g}"
+        require(self.low <= self.target <= self.high, f"low, target, high: {levels} given, expected a rising order")
 
     def buffer(self, inputs: Inputs) -> _Buffer:
-        """How full the buffer is; once a scan."""
+        """Return the state of the buffer. Call it once per scan."""
         level = self.level.read(inputs)
         if self._buffer is _Buffer.OVER and level > self.target:
             return self._buffer
@@ -61,9 +61,9 @@ class Neighbour:
 class VCurve:
     """Rates of a line with a bottleneck.
 
-    bottleneck: the command that sets its rate. rate: 1/s. margin: of `rate`, by which a machine may be faster, or must
-    be slower, for each step that it is away; its limit must allow that. upstream, downstream: the machines on either
-    side, the nearest first.
+    bottleneck: the command that sets its rate. rate: 1/s. margin: share of `rate` per step away from the bottleneck, by
+    which a machine may be faster or must be slower; its limit must allow that. upstream, downstream: the machines on
+    either side, the nearest first.
     """
 
     bottleneck: str
@@ -78,9 +78,9 @@ class VCurve:
         require(fits, f"margin: {self.margin:g} given, expected more than 0 and less than {1.0 / furthest:g}")
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
-        """A rate for each machine, 1/s."""
+        """Return a rate for each machine, 1/s."""
         answer = {self.bottleneck: self.rate}
-        # Upstream a lack calls for more, downstream a surplus.
+        # Upstream a lack requires a higher rate, downstream a surplus.
         for machines, faster in ((self.upstream, _Buffer.SHORT), (self.downstream, _Buffer.OVER)):
             rate = self.rate
             for step, machine in enumerate(machines, 1):

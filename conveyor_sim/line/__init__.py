@@ -1,1 +1,1 @@
-"""What surrounds the physics on a line: the process image, supply and removal, watchdogs. All work at ticks."""
+"""Everything on a line except bottle motion: process image, commands, devices, machines, alarms."""

@@ -1,4 +1,4 @@
-"""Conditions of alarms on measured values: those of the scene, and of controllers that gave a limit."""
+"""Alarm conditions that the line evaluates: measured signals, passed limits, clogged outfeeds."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple, Protocol
@@ -14,24 +14,25 @@ from conveyor_sim.scene.schema import Scene
 
 
 class Signals(Protocol):
-    """What has signals: a device, or the modes of all of them."""
+    """Provider of signals: a device, or the control modes of all devices."""
 
     @property
-    def signals(self) -> Sequence[Tag]: ...
+    def signals(self) -> Sequence[Tag]:
+        """Tags of the signals."""
 
     @property
     def read(self) -> Callable[[ScanContext], Sequence[float]]:
-        """What gives their values, in their order."""
+        """Function that reads all values, in the order of `signals`."""
 
 
 class _Watched(NamedTuple):
     alarm: LineAlarm
     column: int
-    """Of its signal among those beside it."""
+    """Index of its signal in the values of the provider."""
 
 
 class MeasuredConditions:
-    """Looks at the devices whose signals have alarms, each once a tick, and at no others."""
+    """Conditions on measured signals. Each provider of such signals is read once per tick, others never."""
 
     def __init__(self, alarms: Alarms, sources: Sequence[Signals]) -> None:
         self._alarms, self._sources = alarms, sources
@@ -39,7 +40,10 @@ class MeasuredConditions:
         self._watched: list[tuple[Signals, list[_Watched]]] = []
 
     def changes(self, now: ScanContext, forced: Mapping[str, float]) -> dict[str, bool]:
-        """The conditions that have begun or ended, by id. forced: signals that are read otherwise than they are."""
+        """Return the conditions that have begun or ended, by id.
+
+        forced: values of forced signals.
+        """
         if self._of is not self._alarms.measured:
             self._find()
         changed: dict[str, bool] = {}
@@ -64,7 +68,7 @@ class MeasuredConditions:
 
 
 def beyond(alarm: LineAlarm, value: float) -> bool:
-    """Whether its condition holds at a value; where that is no number, it stays as it is."""
+    """Return True if an alarm's condition holds at a value. NaN keeps the present condition."""
     fields = alarm.fields
     band = fields.deadband if alarm.condition else 0.0
     if fields.high is not None and value > fields.high - band:
@@ -75,45 +79,51 @@ def beyond(alarm: LineAlarm, value: float) -> bool:
 
 
 LIMITS = "limits/"
-"""What the ids of the limits' alarms begin with."""
+"""Prefix of the ids of limit alarms."""
 
 CLOGGING = "clogging_time"
-"""The limit whose alarm each outfeed has for itself."""
+"""Limit with one alarm per outfeed."""
 
 PASSED_FOR = 1.0
-"""s for which the alarm of a limit stays active once it was passed: bottles pass it one by one."""
+"""Time for which a limit alarm stays active after the limit was passed, s. Bottles pass it one by one."""
 
 
 def scene_alarms(scene: Scene) -> list[Declared]:
-    """Those that the scene declares."""
+    """Return the alarms that the scene declares."""
     return [Declared(name, AlarmFields(**vars(alarm))) for name, alarm in scene.alarms.items()]
 
 
 def limit_alarms(scene: Scene) -> list[Declared]:
-    """One for each limit of the scene, and for each outfeed that can clog."""
-    found = []
+    """Return one alarm per limit of the scene, and one per outfeed that can clog."""
+    declared = []
     for kind, value in scene.limits:
         if value is not None and kind == CLOGGING:
             for name in scene.outfeeds:
                 outfeed = f"outfeeds/{name}"
-                found.append(error(f"{outfeed}/clogged", f"nothing leaves by {outfeed}", f"{outfeed}/removed"))
+                declared.append(error(f"{outfeed}/clogged", f"nothing leaves by {outfeed}", f"{outfeed}/removed"))
         elif value is not None:
             text = f"a bottle has passed limits.{kind}"
             fields = AlarmFields(text=text, latching=True, off_delay=PASSED_FOR, group=LINE_GROUP)
-            found.append(Declared(LIMITS + kind, fields))
-    return found
+            declared.append(Declared(LIMITS + kind, fields))
+    return declared
 
 
 class LimitConditions:
-    """Conditions of the alarms of limits: that one was passed in a tick; that an outfeed is clogged."""
+    """Conditions of limit alarms (passed in a tick) and of clogged outfeeds."""
 
     def __init__(self, alarms: Alarms) -> None:
-        """alarms: with those of the limits."""
+        """Find the limit alarms.
+
+        alarms: all, limits included.
+        """
         self._alarms = [alarm for alarm in alarms if alarm.own and alarm.id.startswith(LIMITS)]
         self._all = alarms
 
     def changes(self, passed: Sequence[DamageEvent], clogged: Mapping[str, bool]) -> dict[str, bool]:
-        """Those that have begun or ended, by id. passed: in the tick that ends; clogged: outfeeds."""
+        """Return the conditions that have begun or ended, by id.
+
+        passed: limits passed in the tick that ends. clogged: by outfeed.
+        """
         if not (self._alarms or clogged):
             return {}
         now = {f"outfeeds/{name}/clogged": on for name, on in clogged.items()}

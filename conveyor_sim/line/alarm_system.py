@@ -1,4 +1,4 @@
-"""`AlarmSystem`: the alarms of one line, tied to its devices, its scene and its inputs."""
+"""`AlarmSystem`: the alarms of one line, connected to its devices, scene and inputs."""
 
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
@@ -20,53 +20,56 @@ from conveyor_sim.scene.schema import Scene
 
 
 class AlarmSystem:
-    """Asks at ticks for the conditions that the line finds out by itself, and takes what others say."""
+    """Alarms of one line. Evaluates conditions at ticks, and takes those that devices and controllers report."""
 
     def __init__(self, scene: Scene, devices: Sequence[Device], modes: Signals, note: Note) -> None:
-        """devices: all others; modes: of these. Raises SceneError for alarms of a scene that can't be."""
+        """Declare the alarms of the line and the scene.
+
+        devices: all others. modes: control modes of these. Raise SceneError for invalid alarms of the scene.
+        """
         sources = (*devices, modes)
         signals = [tag.name for source in sources for tag in source.signals]
         self.alarms = Alarms(scene.tick, note, signals)
         line = [declared for device in devices for declared in device.alarms] + limit_alarms(scene)
         self.alarms.declare(0, line, "line", own=True)
-        given = scene_alarms(scene)
-        if (problem := self.alarms.declaration_problem(given)) is not None:
+        declared = scene_alarms(scene)
+        if (problem := self.alarms.declaration_problem(declared)) is not None:
             place = Places(scene).of(("alarms", problem.id, problem.field))
             raise SceneError(f"{place}: alarms.{problem.id}.{problem.field}: {problem.text}")
-        self.alarms.declare(0, given, "scene", own=True)
+        self.alarms.declare(0, declared, "scene", own=True)
         self.device = AlarmsDevice(self.alarms)
-        """What controllers read of them."""
+        """Signals of the alarms."""
         self._measured = MeasuredConditions(self.alarms, sources)
         self._limits = LimitConditions(self.alarms)
 
     def operations(self) -> dict[str, Operation]:
-        """What can be done to alarms, by name."""
+        """Return the operations on alarms, by name."""
         rows = {name: Operation(self._refusal, self._perform) for name in operations.OPERATIONS}
         return {**rows, DECLARE: Operation(self._declaration_refusal, self._declare)}
 
     def begin(self) -> None:
-        """A tick begins."""
+        """Start a tick without changes."""
         self.alarms.changed = False
 
-    def said_problem(self, names: Sequence[str], values: Sequence[float]) -> str:
-        """Why alarms among the names can't be said, "" if they can; each by itself is known to be one."""
-        said = _said(names, values)
-        for id in said:
+    def report_problem(self, names: Sequence[str], values: Sequence[float]) -> str:
+        """Return why alarms among the names can't be set, "" if they can. Each name is already checked."""
+        reported = _reported(names, values)
+        for id in reported:
             if problem := self.alarms.value_problem(id):
                 return problem
-        return self.alarms.room_problem(said) if said else ""
+        return self.alarms.room_problem(reported) if reported else ""
 
-    def say(self, tick: int, names: Sequence[str], values: Sequence[float]) -> None:
-        """What a controller says; it counts whatever became of the commands beside it. What can't be is left out."""
-        said = {id: on for id, on in _said(names, values).items() if not self.alarms.value_problem(id)}
-        if said:
-            self.alarms.say(tick, said)
+    def report(self, tick: int, names: Sequence[str], values: Sequence[float]) -> None:
+        """Set the alarms that a controller reports, even if its commands were refused. Leave out invalid alarms."""
+        reported = {id: on for id, on in _reported(names, values).items() if not self.alarms.value_problem(id)}
+        if reported:
+            self.alarms.report(tick, reported)
 
     def take(self, now: ScanContext) -> None:
-        """What devices have said."""
+        """Set the alarms that devices have reported."""
         if now.conditions:
-            said, now.conditions = now.conditions, {}
-            self.alarms.say(now.tick, said)
+            reported, now.conditions = now.conditions, {}
+            self.alarms.report(now.tick, reported)
 
     def close(
         self,
@@ -75,7 +78,10 @@ class AlarmSystem:
         clogged: Mapping[str, bool],
         forced: Mapping[str, float],
     ) -> None:
-        """A tick has ended, in which limits were passed. clogged: outfeeds; forced: signals, as they are read."""
+        """End a tick.
+
+        passed: limits passed in it. clogged: by outfeed. forced: values of forced signals.
+        """
         if measured := self._measured.changes(now, forced):
             now.conditions |= measured
         if limits := self._limits.changes(passed, clogged):
@@ -84,66 +90,69 @@ class AlarmSystem:
         self.alarms.end(now.tick)
 
     def snapshot(self) -> dict[str, Any]:
-        """All that is remembered from tick to tick, as plain data."""
+        """Return all state that lasts from tick to tick, as plain data."""
         return memory.snapshot(self.alarms)
 
-    def restore(self, tick: int, kept: Any) -> None:
-        """Stand as those of the same line did at a tick. Raises ValueError for what can't be."""
-        memory.restore(self.alarms, tick, kept)
+    def restore(self, tick: int, memory_data: Any) -> None:
+        """Restore the alarms of the same line at a tick. Raise ValueError for data that do not fit."""
+        memory.restore(self.alarms, tick, memory_data)
 
-    def _refusal(self, given: Input) -> str:
-        if given.texts:
-            return f"{len(given.texts)} texts given, expected none"
-        return operations.problem(self.alarms, given.operation, given.names, given.values)
+    def _refusal(self, request: Input) -> str:
+        if request.texts:
+            return f"{len(request.texts)} texts given, expected none"
+        return operations.problem(self.alarms, request.operation, request.names, request.values)
 
-    def _perform(self, given: Input, now: ScanContext) -> None:
-        by = _writer(given)
-        operations.perform(self.alarms, given.operation, given.names, given.values, by, now.tick)
+    def _perform(self, request: Input, now: ScanContext) -> None:
+        by = _writer(request)
+        operations.perform(self.alarms, request.operation, request.names, request.values, by, now.tick)
 
-    def _declaration_refusal(self, given: Input) -> str:
-        if given.values:
-            return f"{len(given.values)} values given, expected none"
-        declared = parse(given.names, given.texts)
+    def _declaration_refusal(self, request: Input) -> str:
+        if request.values:
+            return f"{len(request.values)} values given, expected none"
+        declared = parse(request.names, request.texts)
         if isinstance(declared, str):
             return declared
         problem = self.alarms.declaration_problem(declared)
         return "" if problem is None else str(problem)
 
-    def _declare(self, given: Input, now: ScanContext) -> None:
-        declared = parse(given.names, given.texts)
+    def _declare(self, request: Input, now: ScanContext) -> None:
+        declared = parse(request.names, request.texts)
         assert not isinstance(declared, str)  # it was not refused
-        self.alarms.declare(now.tick, declared, _writer(given))
+        self.alarms.declare(now.tick, declared, _writer(request))
 
 
-def _writer(given: Input) -> str:
-    return given.writer or given.writer_kind
+def _writer(request: Input) -> str:
+    return request.writer or request.writer_kind
 
 
-def _said(names: Sequence[str], values: Sequence[float]) -> dict[str, bool]:
-    """Alarms among names and values, by id; of what is no alarm nothing."""
+def _reported(names: Sequence[str], values: Sequence[float]) -> dict[str, bool]:
+    """Return the alarms among names and values, by id; {} if there are none."""
     if len(names) != len(values):
         return {}
-    found = _alarms_among(tuple(names))
-    return {id: values[place] == 1.0 for place, id in found if values[place] in (0.0, 1.0)} if found else {}
+    alarms = _alarms_among(tuple(names))
+    return {id: values[place] == 1.0 for place, id in alarms if values[place] in (0.0, 1.0)}
 
 
 @lru_cache(maxsize=64)
 def _alarms_among(names: tuple[str, ...]) -> tuple[tuple[int, str], ...]:
-    """Places and ids of alarms; a controller gives the same names in every scan."""
-    given = [(place, name.removeprefix(PREFIX)) for place, name in enumerate(names) if name.startswith(PREFIX)]
-    return tuple((place, id) for place, id in given if id)
+    """Return places and ids of alarms. Cached, because a controller repeats its names in every scan."""
+    alarms = [(place, name.removeprefix(PREFIX)) for place, name in enumerate(names) if name.startswith(PREFIX)]
+    return tuple((place, id) for place, id in alarms if id)
 
 
 NAME = "alarms"
 COUNTS = "alarm_counts"
-"""What the names of its counts begin with: those of alarms may be anything."""
+"""Prefix of the names of the counts, because alarms may have any name."""
 
 
 class AlarmsDevice(Device):
-    """Which alarms of line and scene stand, and how many in all. What it remembers, the alarms themselves do."""
+    """Signals of standing alarms and their counts. The state is stored by the alarms themselves."""
 
     def __init__(self, alarms: Alarms) -> None:
-        """alarms: with those of line and scene, and no others yet."""
+        """Build the signals.
+
+        alarms: those of line and scene only.
+        """
         most = len(alarms) + MOST_ALARMS
         standing = "alarms that stand, of controllers too."
         super().__init__(
@@ -161,5 +170,5 @@ class AlarmsDevice(Device):
         self._alarms = alarms
 
     def values(self, now: ScanContext) -> Sequence[float]:
-        """The counts, then 1 for each that stands."""
+        """Return the counts, then 1 for each alarm that stands."""
         return self._alarms.tag_values()

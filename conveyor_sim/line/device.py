@@ -1,4 +1,4 @@
-"""`Device`: what a controller sees and moves on a line, once a tick. Each kind is a class in a file of its own."""
+"""`Device`: part of a line that controllers read and command once per tick. Each kind is a class in a file."""
 
 from __future__ import annotations
 
@@ -22,27 +22,27 @@ from conveyor_sim.scene.parts.station import BAD
 
 @dataclass
 class ScanContext:
-    """What devices are shown of the line at a tick."""
+    """State of the line at a tick, as devices see it."""
 
     state: State
     length: float
-    """s, of a tick."""
+    """Length of a tick, s."""
     setpoints: F8
-    """(belts,), m/s, as commanded."""
+    """Commanded belt speeds, (belts,) m/s."""
     speeds: F8
-    """(belts,), m/s, of the belts through a tick; those that drive them set it as the tick begins."""
+    """Belt speeds during a tick, (belts,) m/s; drives set them at the start of the tick."""
     tick: int = 0
     by_hand: bool = False
-    """Whether the command that is being taken was given by a person."""
+    """True while a person's command is being applied."""
     bad: set[int] = field(default_factory=set)
-    """Ids of the bottles that an inspection would object to."""
+    """Ids of the bottles that an inspection rejects."""
     attributes: dict[str, dict[int, float]] = field(default_factory=dict)
-    """What stations have made of bottles, by the name of the attribute, then by id; 0 where nothing is said."""
+    """Values that stations have set on bottles, by attribute, then by bottle id; 0 if not set."""
     conditions: dict[str, bool] = field(default_factory=dict)
-    """Of alarms: those that have begun or ended, and nobody has taken yet."""
+    """Alarm conditions that have begun or ended and are not taken yet, by alarm id."""
     _carriers: NDArray[np.int32] = field(default_factory=lambda: np.empty(0, dtype=np.int32))
     _carried: NDArray[np.int32] = field(default_factory=lambda: np.empty(0, dtype=np.int32))
-    _counts: list[int] | None = None  # None: nobody has looked since the bottles moved
+    _counts: list[int] | None = None  # None: not counted since the bottles moved
     _find: Any = None
 
     @property
@@ -51,13 +51,13 @@ class ScanContext:
         return self.tick * self.state.model.tick_ns * 1e-9
 
     def attribute(self, bottle: int, name: str) -> float:
-        """An attribute of a bottle, by its id."""
+        """Return an attribute of a bottle, by its id."""
         if name == BAD:
             return float(bottle in self.bad)
         return self.attributes.get(name, {}).get(bottle, 0.0)
 
     def set_attribute(self, bottle: int, name: str, value: float) -> None:
-        """Make something of a bottle, by its id."""
+        """Set an attribute of a bottle, by its id."""
         if name != BAD:
             self.attributes.setdefault(name, {})[bottle] = value
         elif value:
@@ -66,30 +66,30 @@ class ScanContext:
             self.bad.discard(bottle)
 
     def forget(self, bottles: Iterable[int]) -> None:
-        """These bottles are gone for good."""
+        """Remove bottles that have left the line for good."""
         self.bad.difference_update(bottles)
         for values in self.attributes.values():
             for bottle in bottles:
                 values.pop(bottle, None)
 
     def alarm(self, id: str, holds: bool) -> None:
-        """Say that the condition of an alarm (`Device.alarms`) has begun, or ended."""
+        """Report that the condition of an alarm (`Device.alarms`) has begun or ended."""
         self.conditions[id] = holds
 
     def begin_scan(self) -> None:
-        """Forget what was found out about the bottles before."""
+        """Discard cached bottle counts."""
         self._counts = None
 
     def carriers(self) -> NDArray[np.int32]:
-        """Index of the belt that each slot stands on, (slots,), until the next scan; -1 for floor and free slots."""
-        self._look()
+        """Return the belt index of each slot, (slots,); -1 for floor and free slots. Valid until the next scan."""
+        self._count()
         return self._carriers
 
     def carried(self, belt: int) -> int:
-        """How many bottles stand on a belt, by its index."""
-        return self._look()[belt]
+        """Return the number of bottles on a belt, by its index."""
+        return self._count()[belt]
 
-    def _look(self) -> list[int]:
+    def _count(self) -> list[int]:
         if self._counts is None:
             world = self.state.world
             if self._carriers.size != world.bottles.id.size:
@@ -104,23 +104,29 @@ class ScanContext:
 
 
 class Device:
-    """One device while it runs. Its public attributes are what it remembers from tick to tick (checkpoints)."""
+    """One device of a running line. Public attributes last from tick to tick (checkpoints)."""
 
     blocked_ticks = 0
-    """Ticks at which it had a bottle to put onto the line and no room."""
+    """Number of ticks with a bottle to put onto the line and no room."""
 
     def __init__(self, name: str, tags: Sequence[Tag] = ()) -> None:
-        """name: as its tags begin, "photo_eyes/exit". tags: all that can be read of it, commanded and injected."""
+        """Store the tags.
+
+        name: prefix of its tags, "photo_eyes/exit". tags: signals, commands and faults.
+        """
         self._name = name
         self._take_tags(tags)
 
     def classify(self, kind: str) -> None:
-        """Have its tags say whose they are. kind: of its part of the scene."""
+        """Set device name and class in all tags.
+
+        kind: of its part of the scene.
+        """
         self._take_tags([replace(tag, device=self._name, device_class=kind) for tag in self._tags])
 
     def _take_tags(self, tags: Sequence[Tag]) -> None:
         shown = [tag.shows for tag in of_roles(tags, SIGNALS)]
-        # Signals that are attributes come after those that `values` gives.
+        # Signals that show attributes come after those that `values` returns.
         self._tags = tuple(tags) if all(shown) else tuple(sorted(tags, key=lambda tag: tag.shows != ""))
         self._signals, self._commands = of_roles(self._tags, SIGNALS), of_roles(tags, COMMANDS)
         self._faults = of_roles(tags, ("fault",))
@@ -138,7 +144,7 @@ class Device:
 
     @property
     def name(self) -> str:
-        """As its signals begin."""
+        """Prefix of its tags."""
         return self._name
 
     @property
@@ -148,34 +154,34 @@ class Device:
 
     @property
     def signals(self) -> tuple[Tag, ...]:
-        """What it shows to controllers."""
+        """Tags that controllers read."""
         return self._signals
 
     @property
     def commands(self) -> tuple[Tag, ...]:
-        """What controllers may tell it."""
+        """Tags that controllers write."""
         return self._commands
 
     @property
     def faults(self) -> tuple[Tag, ...]:
-        """What can be made to go wrong with it."""
+        """Faults that can be injected."""
         return self._faults
 
     @property
     def alarms(self) -> Sequence[Declared]:
-        """Those whose conditions it says by `ScanContext.alarm`, as they change; ids begin with its name."""
+        """Alarms that the device reports by `ScanContext.alarm`; their ids begin with its name."""
         return ()
 
     def objection(self, name: str, value: float, now: ScanContext) -> str:
-        """Why a command of its own can't be taken as it stands now, though name and value are right; "" if it can."""
+        """Return why a command with valid name and value can't be taken now; "" if it can."""
         return ""
 
     def command(self, name: str, value: float, now: ScanContext) -> None:
-        """Take an accepted command or fault of its own, by its whole name, as a tick begins."""
+        """Apply an accepted command or fault, by its full name, at the start of a tick."""
         raise NotImplementedError(f"{self.name} takes no commands")
 
     def mode_objection(self) -> str:
-        """Why its mode can't change as it stands now, "" if it can."""
+        """Return why the control mode can't change now, "" if it can."""
         return ""
 
     def stops(self, name: str, value: float) -> bool:
@@ -187,47 +193,48 @@ class Device:
         raise NotImplementedError(f"{self.name} takes no stops")
 
     def take_mode(self, mode: int, now: ScanContext) -> None:
-        """It is in other hands (authority.MODES) from this tick on; commands in force stay."""
+        """Switch to another control mode (authority.MODES) at this tick. Commands in force stay."""
 
     def restored(self, tick: int) -> None:
         """Derive again what depends on public attributes, which were restored for a tick."""
 
     @property
     def held(self) -> Sequence[int]:
-        """Ids of the bottles that it has taken off the line and will give back."""
+        """Ids of the bottles that it holds off the line and will give back."""
         return ()
 
     def rehearse(self, now: ScanContext) -> None:
-        """Call what of the engine it calls in some ticks only; nothing of it stays."""
+        """Call engine functions that it needs in some ticks only, without any effect on the state."""
 
     def begin(self, now: ScanContext) -> None:
-        """Act before the steps of a tick; `now` is the tick that they start from."""
+        """Act before the steps of a tick.
+
+        now: the tick that they start from.
+        """
 
     def end(self, now: ScanContext) -> None:
-        """Look at what the steps came to, before bottles are taken and fed. Also once at the start, after `feed`."""
+        """Evaluate the steps, before bottles are taken and fed. Called at the start too, after `feed`."""
 
     def take(self, now: ScanContext) -> None:
         """Take bottles off the line."""
 
     def feed(self, now: ScanContext) -> None:
-        """Put bottles onto the line. Also once at the start."""
+        """Put bottles onto the line. Called at the start too."""
 
     def values(self, now: ScanContext) -> Sequence[float]:
-        """The values of the signals that are no attributes (`Tag.shows`), in their order."""
+        """Return the values of the signals that show no attribute (`Tag.shows`), in their order."""
         return ()
 
     @property
     def read(self) -> Callable[[ScanContext], Sequence[float]]:
-        """What gives the values of all signals, in their order."""
+        """Function that reads all signal values, in declaration order."""
         return self._read
 
     def counts(self) -> tuple[int, int, int] | None:
-        """Bottles that it has processed, defective ones among them, and bottles that it has thrown out; None: what it
-        does is not counted.
-        """
+        """Return processed, defective and rejected bottles; None if the device has no such counts."""
         return None
 
     def states(self, now: ScanContext) -> list[float]:
-        """The values of the signals that add to "state", in their order; asked for at every tick."""
+        """Return the values of the signals that add to "state", in their order. Called in every tick."""
         signals = zip(self._signals, self._read(now), strict=True)
         return [value for signal, value in signals if signal.adds_to == "state"]

@@ -1,4 +1,4 @@
-"""The devices of a line: which class a part of the scene becomes. What a scene does not name is not there."""
+"""Table of device classes by kind of part, and the devices of a scene."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -40,11 +40,11 @@ DEVICES: Mapping[str, Callable[[str, Any, DeviceSetup], Device]] = {
     "counter": CounterDevice,
     "indicator": IndicatorDevice,
 }
-"""By the kind of a part (`DevicePart.KIND`): what makes its device, of its name (`zones/exit`), the part, and Setup."""
+"""Device class by kind of a part (`DevicePart.KIND`). Arguments: name (`zones/exit`), the part, and DeviceSetup."""
 
 
 def build_devices(scene: Scene, model: Model) -> tuple[Device, ...]:
-    """All devices of a scene, in the order in which they act and stand in the process image."""
+    """Build all devices of a scene, in the order in which they act and stand in the process image."""
     setup = DeviceSetup(scene, model)
     for (field, name), part in scene.devices():
         device = DEVICES[part.KIND](f"{field}/{name}", part, setup)

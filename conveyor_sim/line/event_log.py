@@ -1,4 +1,4 @@
-"""`EventLog`: what happens on a line, from one tick to the next."""
+"""`EventLog`: events on a line between two ticks."""
 
 import math
 from collections.abc import Sequence
@@ -11,18 +11,20 @@ from conveyor_sim.support.printable import printable
 
 
 class EventLog:
-    """Keeps what happened since the last tick, in order. Public attributes are remembered in checkpoints."""
+    """Collects events since the last tick, in order. Public attributes are stored in checkpoints."""
 
     events: list[tuple[int, str, str, int, Unchecked, str]]
-    """Since the tick before, as Event has them."""
+    """Events since the last tick, as fields of Event."""
     bottles: dict[str, int]
-    """By device, how many it has put onto the line or taken off it so far."""
+    """Number of bottles that each device has put onto the line or taken off it so far."""
     states: dict[str, list[Unchecked]]
-    """Of machines, by device, at the end of the last tick."""
+    """States of machines at the end of the last tick, by device."""
 
     def __init__(self, devices: Sequence[Device], now: ScanContext) -> None:
-        """now: at the start, with the states that machines have at first."""
-        # Each machine with its states.
+        """Start without events.
+
+        now: at the start, with the initial states of machines.
+        """
         self._machines = [
             (device.name, device, states)
             for device in devices
@@ -30,21 +32,21 @@ class EventLog:
         ]
         self.events = []
         self.total = 0
-        """Events so far."""
+        """Number of events so far."""
         self.bottles = {device.name: 0 for device in devices}
         self.states = {name: [float(value) for value in device.states(now)] for name, device, _ in self._machines}
 
     def begin(self) -> None:
-        """A tick begins."""
+        """Start a tick without events."""
         self.events = []
 
     def note(self, at: int, kind: Kind, name: str, value: float, bottle: int = -1, text: str = "") -> None:
-        """Something has happened."""
+        """Add an event."""
         self.events.append(Event(at, kind, name, bottle, value, text))
         self.total += 1
 
     def note_outcome(self, outcome: CommandOutcome) -> None:
-        """An input was applied or refused as a tick began."""
+        """Add the event of a refused input, or of a fault."""
         at, names, values = outcome.tick, outcome.names, outcome.values
         if outcome.repeated:
             return
@@ -55,25 +57,28 @@ class EventLog:
             self.note(at, "fault_injected" if values[0] else "fault_cleared", names[0], values[0])
 
     def note_alarm(self, at: int, kind: Kind, name: str, value: float, text: str) -> None:
-        """Something has happened to an alarm."""
+        """Add an event of an alarm."""
         self.note(at, kind, name, value, text=text)
 
     def note_removed(self, device: Device, bottles: Sequence[int], now: ScanContext) -> None:
-        """A device has taken bottles, by their ids."""
+        """Add events of bottles that a device has taken, by their ids."""
         rejects = any(signal.adds_to == "rejected" for signal in device.signals)
         self._note_bottles("bottle_rejected" if rejects else "bottle_removed", device, sorted(bottles), now)
 
     def note_fed(self, device: Device, first: int, now: ScanContext) -> None:
-        """A device may have given bottles. first: id of the next one before."""
+        """Add events of bottles that a device has fed.
+
+        first: id of the next bottle before it.
+        """
         self._note_bottles("bottle_fed", device, range(first, now.state.next_id), now)
 
     def note_states(self, now: ScanContext) -> None:
-        """A tick has ended."""
-        kept = self.states
+        """Add events of changed states at the end of a tick."""
+        stored = self.states
         for name, device, states in self._machines:
-            before, present = kept[name], device.states(now)
+            before, present = stored[name], device.states(now)
             if before != present:
-                kept[name] = [float(value) for value in present]
+                stored[name] = [float(value) for value in present]
                 for state, old, value in zip(states, before, present, strict=True):
                     if old != value:
                         text = state.texts.get(int(value), "")

@@ -15,7 +15,7 @@ from conveyor_sim.line.alarm_system import AlarmSystem
 from conveyor_sim.line.alarms.alarms import Alarms
 from conveyor_sim.line.commands.authority import MAY, PEOPLE, unauthorized
 from conveyor_sim.line.commands.forcing import Forcing
-from conveyor_sim.line.commands.inputs import FAULT, INJECT, SET, WATCHDOG, CommandOutcome, Input, as_kept
+from conveyor_sim.line.commands.inputs import FAULT, INJECT, SET, WATCHDOG, CommandOutcome, Input, normalized
 from conveyor_sim.line.commands.modes import Modes
 from conveyor_sim.line.commands.operation import Operation
 from conveyor_sim.line.commands.read_back import ReadBack
@@ -50,17 +50,17 @@ class _Part(NamedTuple):
 
 
 class Line:
-    """Everything about a line but its bottles' motion: what acts at ticks."""
+    """Everything on a line that acts at ticks. Bottle motion is not part of it."""
 
     def __init__(self, scene: Scene, state: State) -> None:
-        """The line of a scene with its devices as they are at first."""
+        """Build the devices of a scene in their initial state."""
         speeds = np.array([belt.speed for belt in scene.belts.values()], dtype=np.float64)
         self.now = ScanContext(state, scene.tick, speeds, speeds.copy())
         devices = build_devices(scene, state.model)
         self._log = EventLog(devices, self.now)
         self._pending: list[Input] = []
         self.modes = Modes(devices, scene.where, lambda: self._pending, self._log.note)
-        """In whose hands devices are, and who owns the line."""
+        """Control modes of devices, and ownership of the line."""
         self._alarms = AlarmSystem(scene, devices, self.modes, self._log.note_alarm)
         devices = (*devices, self._alarms.device) if devices else devices
         self._devices = devices
@@ -68,12 +68,12 @@ class Line:
         self._watched = [belt for belt in belts if belt.watchdog is not None]
         self._eyes = [device for device in devices if isinstance(device, PhotoEyeDevice)]
         self._reading = [device.read for device in devices]
-        # Nothing is called that does nothing.
+        # Only overridden methods are called.
         self._beginning = [device for device in devices if type(device).begin is not Device.begin]
         self._ending = [device for device in devices if type(device).end is not Device.end]
         self._taking = [device for device in devices if type(device).take is not Device.take]
         self._feeding = [device for device in devices if type(device).feed is not Device.feed]
-        # Of each device that counts bottles, the places of the signals that do.
+        # Devices that count bottles, with the indices of the counting signals.
         self._counting = {
             adds_to: [
                 (device, places)
@@ -83,16 +83,16 @@ class Line:
             for adds_to in ("fed", "removed", "rejected")
         }
         self.takes = bool(self._taking) and state.model.has("outfeed")
-        """Whether any device takes bottles off the line."""
+        """True if any device takes bottles off the line."""
         self.feeds = bool(self._feeding) and state.model.has("infeed")
-        """Whether any device puts bottles onto the line."""
+        """True if any device puts bottles onto the line."""
         self._outcomes: list[CommandOutcome] = []
         tags = (tag for device in devices for tag in device.tags)
         self.image = ProcessImage((*tags, *self.modes.signals, *RUN_TAGS))
         self.forcing = Forcing(self.image.signals, self._log.note)
-        """What controllers read otherwise than it is."""
+        """Forced signals."""
         self.read_back = ReadBack(self.image.commands)
-        """What commands are set to, and who set them."""
+        """Present value and writer of each command."""
         self._owner = {entry.name: device for device in devices for entry in (*device.commands, *device.faults)}
         self._commands = {tag.name: tag for tag in self.image.commands}
         self._faults = {tag.name: tag for tag in self.image.faults}
@@ -117,20 +117,20 @@ class Line:
             "alarms": _Part(self._alarms.snapshot, self._alarms.restore),
             "counters": _part("counters", self._counters.memory),
         }
-        self.now.begin_scan()  # which its look at the devices began, before there are bottles
+        self.now.begin_scan()  # because reading states above cached an empty line
 
     @property
     def fed(self) -> int:
-        """Bottles put onto the line so far."""
+        """Number of bottles put onto the line so far."""
         return sum(count for _, count in self._counted("fed"))
 
     @property
     def removed(self) -> int:
-        """Bottles taken off the line so far."""
+        """Number of bottles taken off the line so far."""
         return sum(count for kind in _REMOVED for _, count in self._counted(kind))
 
     def removed_by(self) -> dict[str, int]:
-        """Bottles taken off the line so far, by the names of the devices that take them."""
+        """Return the number of bottles taken off the line so far, by device."""
         by: dict[str, int] = {}
         for kind in _REMOVED:
             for name, count in self._counted(kind):
@@ -139,7 +139,7 @@ class Line:
 
     @property
     def blocked_ticks(self) -> int:
-        """Ticks so far at which a device had a bottle to feed and no room."""
+        """Number of ticks so far in which a device had a bottle to feed and no room."""
         return sum(device.blocked_ticks for device in self._devices)
 
     @property
@@ -148,16 +148,16 @@ class Line:
         return self._surfaces.fastest
 
     def move_belts(self) -> None:
-        """Give the belts' surfaces the speeds that their drives have."""
+        """Set the surface speeds of all belts to the speeds of their drives."""
         self._surfaces.move(self.now.speeds)
 
-    def queue(self, given: Input) -> None:
-        """Have an input applied, or refused, as the next tick begins."""
-        self._pending.append(as_kept(given))
+    def queue(self, request: Input) -> None:
+        """Queue an input for the start of the next tick."""
+        self._pending.append(normalized(request))
 
     @property
     def operations(self) -> tuple[str, ...]:
-        """What can be done to it, by name."""
+        """Names of the operations on the line."""
         return tuple(self._operations)
 
     @property
@@ -166,56 +166,56 @@ class Line:
         return tuple(self._pending)
 
     def take_waiting(self) -> list[Input]:
-        """The same, given up: they will not be applied."""
+        """Remove and return the inputs that wait for the next tick."""
         waiting, self._pending = self._pending, []
         return waiting
 
-    def refusal(self, given: Input) -> str:
-        """Why an input can't be applied as the line stands now, "" if it can."""
-        return self._refusal(as_kept(given))
+    def refusal(self, request: Input) -> str:
+        """Return why an input can't be applied now, "" if it can."""
+        return self._refusal(normalized(request))
 
-    def _refusal(self, given: Input) -> str:
-        if reason := unauthorized(given, self._operations):
+    def _refusal(self, request: Input) -> str:
+        if reason := unauthorized(request, self._operations):
             return reason
-        _, rest, reason = self.modes.divide(given)
-        return reason if rest is None else self._operations[given.operation].refusal(rest)
+        _, rest, reason = self.modes.divide(request)
+        return reason if rest is None else self._operations[request.operation].refusal(rest)
 
-    def _set_refusal(self, given: Input) -> str:
-        names, values = given.names, given.values
-        if reason := _with_texts(given) or refusal(self._commands, "command", names, values):
+    def _set_refusal(self, request: Input) -> str:
+        names, values = request.names, request.values
+        if reason := _with_texts(request) or refusal(self._commands, "command", names, values):
             return reason
         for name, value in zip(names, values, strict=True) if self._objecting else ():
             if name in self._objecting and (reason := self._objecting[name].objection(name, value, self.now)):
                 return reason
-        return self._alarms.said_problem(names, values)
+        return self._alarms.report_problem(names, values)
 
-    def _inject_refusal(self, given: Input) -> str:
-        return _with_texts(given) or refusal(self._faults, FAULT, given.names, given.values)
+    def _inject_refusal(self, request: Input) -> str:
+        return _with_texts(request) or refusal(self._faults, FAULT, request.names, request.values)
 
-    def _set(self, given: Input, now: ScanContext) -> None:
-        by_hand = self.modes.stops_by_hand(given)
-        now.by_hand = given.writer_kind in PEOPLE
-        for name, value in zip(given.names, given.values, strict=True):
+    def _set(self, request: Input, now: ScanContext) -> None:
+        by_hand = self.modes.stops_by_hand(request)
+        now.by_hand = request.writer_kind in PEOPLE
+        for name, value in zip(request.names, request.values, strict=True):
             if name in by_hand:
                 self._owner[name].stop_by_hand(name, value)
             elif name in self._owner:  # not an alarm
                 self._owner[name].command(name, value, now)
-        self.read_back.note(given, now.tick)
+        self.read_back.note(request, now.tick)
 
     def take_outcomes(self) -> list[CommandOutcome]:
-        """What became of inputs since the last call, in order."""
+        """Return the results of inputs since the last call, in order."""
         outcomes, self._outcomes = self._outcomes, []
         return outcomes
 
     def begin(self, tick: int) -> None:
-        """Apply what was queued and let the devices act before the steps from a tick."""
+        """Apply queued inputs, then let devices act before the steps from a tick."""
         self._at(tick)
         self._log.begin()
         self.read_back.begin()
         self._alarms.begin()
         pending, self._pending = self._pending, []
-        for given in pending:
-            foreign, rest, objection = self.modes.divide(given)
+        for request in pending:
+            foreign, rest, objection = self.modes.divide(request)
             if foreign is not None:
                 repeated = not self.modes.report(foreign)
                 self._note(CommandOutcome(tick, foreign, False, objection, True, rest is not None, repeated))
@@ -224,14 +224,14 @@ class Line:
                 if not reason:
                     self._operations[rest.operation].apply(rest, self.now)
                 self._note(CommandOutcome(tick, rest, not reason, reason))
-            if given.operation == SET and given.writer_kind in MAY[SET].writers:  # whatever became of its commands
-                self._alarms.say(tick, given.names, given.values)
+            if request.operation == SET and request.writer_kind in MAY[SET].writers:  # even if refused
+                self._alarms.report(tick, request.names, request.values)
         for belt in self._watched:
             if name := belt.watch(self.now):
                 stopped = Input(WATCHDOG, WATCHDOG, "line", SET, (name,), (0.0,))
                 self._outcomes.append(CommandOutcome(tick, stopped, True, ""))
                 self.read_back.note(stopped, tick)
-                self._log.note(tick, "machine_state", name, 0.0, text="stopped: no command came for its watchdog")
+                self._log.note(tick, "machine_state", name, 0.0, text="stopped: its watchdog received no command")
         before = self.now.speeds.tolist()
         for device in self._beginning:
             device.begin(self.now)
@@ -240,7 +240,7 @@ class Line:
             self.move_belts()
 
     def end(self, tick: int) -> None:
-        """Let the devices see what the steps up to a tick came to."""
+        """Let the devices evaluate the steps up to a tick."""
         self._at(tick)
         for device in self._ending:
             device.end(self.now)
@@ -248,7 +248,7 @@ class Line:
             self._alarms.take(self.now)
 
     def rehearse(self) -> None:
-        """Call what devices may call of the engine in a later tick, so that it is compiled before a run begins."""
+        """Call engine functions that devices may need in later ticks, so that they are compiled before a run begins."""
         for device in self._devices:
             device.rehearse(self.now)
 
@@ -271,7 +271,10 @@ class Line:
         self.now.begin_scan()
 
     def close(self, passed: Sequence[DamageEvent], clogged: Mapping[str, bool]) -> None:
-        """A tick has ended, in which these limits were passed; whether outfeeds are clogged, where that is watched."""
+        """End a tick.
+
+        passed: limits passed in it. clogged: by outfeed, where that is watched.
+        """
         for limit in passed:
             self._log.note(limit.tick, "limit_passed", limit.kind, limit.value, limit.bottle, limit.text)
         self._log.note_states(self.now)
@@ -280,38 +283,38 @@ class Line:
 
     @property
     def happened(self) -> Sequence[Event]:
-        """What has happened since the tick before, in order."""
+        """Events since the last tick, in order."""
         return tuple(Event(*event) for event in self._log.events)
 
     @property
     def happened_so_far(self) -> int:
-        """How many events there were since the start."""
+        """Number of events since the start."""
         return self._log.total
 
     @property
     def alarms(self) -> Alarms:
-        """All of them."""
+        """All alarms of the line."""
         return self._alarms.alarms
 
     def signals(self) -> Image:
-        """Values of all signals, in the order of the process image."""
+        """Return the values of all signals, in the order of the process image."""
         self.now.begin_scan()
         values = [value for read in self._reading for value in read(self.now)]
         return self.forcing.image(np.array(values + self.modes.values, dtype=np.float64))
 
     def counters(self) -> CounterColumns | None:
-        """What devices and the line made since they were reset, and where their time went; None if nothing counts."""
+        """Return production counts and times since the last reset; None if no device counts."""
         return self._counters.columns(self.now.tick, self.now.length)
 
     def photo_eyes(self) -> dict[str, bool]:
-        """Whether each photo-eye is blocked, as controllers read it, by the device's name."""
+        """Return whether each photo-eye is blocked, as controllers read it, by device name."""
         eyes = {eye.name: eye.blocked for eye in self._eyes}
         if self.forcing.forces:
             return {name: self.forcing.read(f"{name}/blocked", float(on)) != 0.0 for name, on in eyes.items()}
         return eyes
 
     def carriers(self) -> NDArray[np.int32]:
-        """Index of the belt that each slot stands on now, (slots,); -1 for the floor and for free slots."""
+        """Return the index of the belt under each slot, (slots,); -1 for the floor and for free slots."""
         self.now.begin_scan()
         return self.now.carriers()
 
@@ -353,7 +356,7 @@ class Line:
 
     @property
     def held(self) -> list[int]:
-        """Ids of the bottles that devices have taken off the line and will give back, in order."""
+        """Ids of the bottles that devices hold off the line and will give back, in order."""
         return sorted(bottle for device in self._devices for bottle in device.held)
 
     def _note(self, outcome: CommandOutcome) -> None:
@@ -363,7 +366,7 @@ class Line:
         self._log.note_outcome(outcome)
 
     def _counted(self, adds_to: Adds) -> Iterator[tuple[str, int]]:
-        """Devices, and what their signals that add to something come to."""
+        """Yield devices, with the sums of their signals that add to `adds_to`."""
         for device, places in self._counting[adds_to]:
             values = device.read(self.now)
             yield device.name, sum([int(values[place]) for place in places])
@@ -373,8 +376,8 @@ class Line:
         self.now.begin_scan()
 
 
-def _with_texts(given: Input) -> str:
-    return f"{len(given.texts)} texts given, expected none" if given.texts else ""
+def _with_texts(request: Input) -> str:
+    return f"{len(request.texts)} texts given, expected none" if request.texts else ""
 
 
 def _part(name: str, part: Any, *waking: Device | ReadBack | Modes | Forcing) -> _Part:
@@ -389,5 +392,5 @@ def _part(name: str, part: Any, *waking: Device | ReadBack | Modes | Forcing) ->
 
 
 def image_of(scene: Scene) -> ProcessImage:
-    """The process image of a scene that is not run. Raises SceneError for a scene that can't be."""
+    """Return the process image of a scene without running it. Raise SceneError for an invalid scene."""
     return Line(scene, State(build_model(scene), FIRST_SLOTS)).image

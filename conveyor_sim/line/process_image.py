@@ -1,4 +1,4 @@
-"""The process image: all that a controller may read and write, once a tick, by name."""
+"""The process image: all tags that a controller may read and write, once per tick, by name."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -8,13 +8,13 @@ from conveyor_sim.line.tag import COMMANDS, SIGNALS, Role, Tag
 
 @dataclass(frozen=True)
 class ProcessImage:
-    """The tags of a line, and three tables of them by role. Values travel in the order of these tuples."""
+    """Tags of a line, and tables of them by role. Values are sent in the order of these tables."""
 
     tags: tuple[Tag, ...]
     signals: tuple[Tag, ...] = field(init=False)
     commands: tuple[Tag, ...] = field(init=False)
     faults: tuple[Tag, ...] = field(init=False)
-    """Not for controllers: a test injects them."""
+    """Faults. Tests inject them, controllers don't see them."""
     signal_names: tuple[str, ...] = field(init=False)
     command_names: tuple[str, ...] = field(init=False)
     fault_names: tuple[str, ...] = field(init=False)
@@ -32,10 +32,10 @@ class ProcessImage:
 
 
 def of_roles(tags: Sequence[Tag], roles: Sequence[Role]) -> tuple[Tag, ...]:
-    """Those of some roles, in their order."""
+    """Return the tags that have one of some roles, in their order."""
     return tuple(tag for tag in tags if tag.role in roles)
 
 
 def speed_command(belt: str) -> str:
-    """Name of a belt's speed setpoint; also the topic that takes it."""
+    """Return the name of a belt's speed setpoint, which is also its topic."""
     return f"belts/{belt}/cmd_speed"

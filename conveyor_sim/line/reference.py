@@ -1,4 +1,4 @@
-"""The tables of docs/line.md that list the tags of devices, from a scene that has one of each."""
+"""Tables of tags in docs/line.md, generated from a scene with one device of each kind."""
 
 from collections.abc import Iterator
 
@@ -45,7 +45,7 @@ zones: {z: {region: [[8, 0], [8.5, 0], [8.5, 1]], full_at: 3}}
 counters: {c: {from: [8.5, 0], to: [8.5, 1]}}
 indicators: {i: {counter: c, zone: z, belt: b, backup: z, jam_time: 5}}
 """
-"""A line with one device of each kind, and with all that each may have."""
+"""Scene with one device of each kind, and all its optional features."""
 
 SECTIONS = {
     "belts": ("belts",),
@@ -60,11 +60,11 @@ SECTIONS = {
     "alarms": ("alarm_counts", "alarms"),
     "run": ("run",),
 }
-"""By the part of the page, the fields of a scene whose devices it lists."""
+"""Fields of a scene whose devices a section of the page lists, by section."""
 
 
 def tables() -> dict[str, str]:
-    """By the name of the part of the page that holds it."""
+    """Return the tables, by the name of their section of the page."""
     tags = image_of(parse_scene(EVERYTHING)).tags
     sections = {
         section: "\n".join(_rows([tag for tag in tags if tag.name.split("/")[0] in fields]))
@@ -75,21 +75,21 @@ def tables() -> dict[str, str]:
 
 def _rights() -> Iterator[str]:
     kinds = [kind for kind in WRITER_KINDS if kind != "line"]
-    yield f"| operation | {' | '.join(kinds)} | what |"
+    yield f"| operation | {' | '.join(kinds)} | meaning |"
     yield "|---|" + "---|" * len(kinds) + "---|"
     for operation, right in MAY.items():
         yield f"| `{operation}` | {' | '.join('yes' * (kind in right.writers) for kind in kinds)} | {right.what} |"
 
 
 def _data_points() -> Iterator[str]:
-    yield "| data point | number | tags | what |"
+    yield "| data point | number | tags | meaning |"
     yield "|---|---|---|---|"
     for name, point in DATA_POINTS.items():
         yield f"| `{name}` | {point.number} | {', '.join(f'`{tag}`' for tag in point.tags)} | {point.what} |"
 
 
 def _rows(tags: list[Tag]) -> Iterator[str]:
-    yield "| tag | role | kind, unit | at first | what |"
+    yield "| tag | role | kind, unit | initial | meaning |"
     yield "|---|---|---|---|---|"
     for tag in tags:
         kind = tag.kind if tag.unit == "1" else tag.unit
@@ -98,7 +98,7 @@ def _rows(tags: list[Tag]) -> Iterator[str]:
 
 
 def _pattern(tag: Tag) -> str:
-    """Its name with `<name>` for that of the device; machines are named by their kind."""
+    """Return the tag's name with `<name>` for that of the device; machines are named by their kind."""
     before, name = (PREFIX, tag.name.removeprefix(PREFIX)) if tag.name.startswith(PREFIX) else ("", tag.name)
     field, _, rest = name.partition("/")
     device, _, what = rest.partition("/")

@@ -1,6 +1,6 @@
-"""What a run is doing: for clients that must tell a line that stands from one that is not simulated.
+"""State of a run: running, paused, ended, ...
 
-It is about the simulation, not of the line: it is in no signal, no state hash and no comparison of a replay.
+It belongs to the simulation, not to the line: no signal, state hash or comparison of a replay contains it.
 """
 
 from collections.abc import Mapping
@@ -18,28 +18,29 @@ STATES: Mapping[int, str] = {
     STOPPED: "stopped",
     REPLAYING: "replaying",
 }
-"""running: time passes by itself; paused: it stands, and can go on; lockstep: a controller advances it; ended: the
-duration of the scene has passed; stopped: it can't go on, with the reason; replaying: a recording is played back."""
+"""running: time advances by itself; paused: time stands still, and can go on; lockstep: a controller advances it;
+ended: the duration of the scene has passed; stopped: the run can't go on, with the reason; replaying: a recording is
+played back."""
 
 RUN = "run"
-"""Device, and class of device, of tags about the run."""
+"""Device name and class of the run's tags."""
 
 RUN_TAGS: tuple[Tag, ...] = tuple(
     replace(tag, device=RUN, device_class=RUN)
-    for tag in (choice(f"{RUN}/state", "run", "What the simulation is doing, as in topic run_state.", STATES, PAUSED),)
+    for tag in (choice(f"{RUN}/state", "run", "State of the run, as in topic run_state.", STATES, PAUSED),)
 )
 
 
 @dataclass(frozen=True)
 class RunState:
-    """What topic `run_state` shows."""
+    """State of a run in topic `run_state`."""
 
     state: int
     """One of STATES."""
     reason: str = ""
-    """Why it is stopped, or whose lockstep it is."""
+    """Reason for a stop, or owner of the lockstep."""
 
     @property
     def text(self) -> str:
-        """The state as a word."""
+        """State as a word."""
         return STATES[self.state]

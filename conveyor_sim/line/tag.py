@@ -1,4 +1,7 @@
-"""`Tag`: what there is to know of one value of a line, whether it is read, written, or injected by a test."""
+"""`Tag`: description of one value of a line that is read, written, or injected by a test.
+
+Units have their codes of UNECE Recommendation 20, by which OPC UA and other systems identify them.
+"""
 
 from __future__ import annotations
 
@@ -9,12 +12,12 @@ from typing import Literal, NamedTuple
 
 
 class UnitOfMeasure(NamedTuple):
-    """A unit."""
+    """Unit of measurement."""
 
     code: str
-    """The common code of UNECE Recommendation 20."""
+    """Common code in UNECE Recommendation 20."""
     name: str
-    """As it is called there."""
+    """Name in UNECE Recommendation 20."""
 
 
 UNITS: Mapping[str, UnitOfMeasure] = {
@@ -31,65 +34,65 @@ UNITS: Mapping[str, UnitOfMeasure] = {
     "J": UnitOfMeasure("JOU", "joule"),
     "%": UnitOfMeasure("P1", "percent"),
 }
-"""By how a tag writes them."""
+"""Units by their symbols in tags."""
 
 
 Kind = Literal["bool", "count", "number", "enumeration"]
-"""bool: 0 or 1; count: a whole number; enumeration: a whole number that stands for a text."""
+"""bool: 0 or 1; count: whole number; enumeration: whole number that stands for a text."""
 
 Role = Literal["actual", "setpoint", "status", "command", "counter", "alarm", "fault", "run"]
-"""actual: measured; setpoint: a number that a controller gives; status: what a device is doing; command: a switch or
-push-button that a controller works; counter: how often, or for how long in all; alarm: of the line; fault: injected by
-a test; run: about the simulation itself."""
+"""actual: measured; setpoint: number from a controller; status: state of a device; command: switch or push-button
+for a controller; counter: number of occurrences or total time; alarm: of the line; fault: injected by a test; run:
+about the simulation."""
 
 Adds = Literal["", "fed", "removed", "rejected", "state"]
-"""What a signal adds to: bottles put onto the line, taken off it, thrown out of it; or whether it is the state of a
-machine, each change of which is an event; "": neither."""
+"""Sum that a signal adds to: bottles put onto the line, taken off it, or rejected. "state": each change of the
+signal is an event. "": neither."""
 
 SIGNALS: tuple[Role, ...] = ("actual", "status", "counter", "alarm")
-"""Roles of what a controller reads."""
+"""Roles of tags that a controller reads."""
 
 COMMANDS: tuple[Role, ...] = ("setpoint", "command")
-"""Roles of what it writes."""
+"""Roles of tags that a controller writes."""
 
 MOST_COUNT = 2.0**53
-"""The largest count: up to it a float64 has all whole numbers."""
+"""Largest count. A float64 represents all whole numbers up to it."""
 
 LONGEST = 2.0**31
-"""s, of times: the seconds of a message header are 32 bits."""
+"""Largest time, s. The seconds of a message header have 32 bits."""
 
 
 @dataclass(frozen=True)
 class Tag:
-    """One value of a line, by name. In docs and tables it stands as it is here: no field may be left empty."""
+    """One value of a line, by name. Docs and tables show it as it is, so no field may be empty."""
 
     name: str
-    """Whole: "machines/filler/running"."""
+    """Full name: "machines/filler/running"."""
     kind: Kind
     role: Role
     description: str
     """One short sentence."""
     unit: str = "1"
-    """One of `UNITS`; "1" where it has no dimension."""
+    """Symbol in `UNITS`; "1" without a dimension."""
     low: float = 0.0
-    """Of a command or fault: the limits of what is accepted; of a signal: the range that a display should span."""
+    """Lower limit of accepted commands and faults, or of the range that a display should span."""
     high: float = 1.0
     initial: float = 0.0
-    """At the start, before there are bottles; of a command: what is in force until one is given."""
+    """Value at the start, before there are bottles; for a command, the value in force until the first command."""
     nominal: float | None = None
-    """What it is designed for, where there is such a value: a machine's rate."""
+    """Design value, if there is one: the rate of a machine."""
     texts: Mapping[int, str] = field(default_factory=dict, hash=False)
-    """Of an enumeration: what each value stands for."""
+    """Text of each value of an enumeration."""
     adds_to: Adds = ""
     shows: str = ""
-    """Attribute of its device that is its value; "": what the device's `values` gives."""
+    """Attribute of its device that holds the value; "": `values` of the device returns it."""
     device: str = ""
-    """Filled in by the line, as `device_class`: the device that it belongs to."""
+    """Name of its device; set by the line, as is `device_class`."""
     device_class: str = ""
-    """What kind of a device that is: "photo_eye"."""
+    """Kind of its device: "photo_eye"."""
 
     def of(self, attribute: str) -> Tag:
-        """The same, of a signal whose value is an attribute of its device."""
+        """Return the tag for a signal whose value is an attribute of its device."""
         return replace(self, shows=attribute)
 
     def without_limits(self) -> Tag:
@@ -98,24 +101,24 @@ class Tag:
 
     @property
     def unece(self) -> UnitOfMeasure:
-        """Its unit in UNECE Recommendation 20."""
+        """Unit in UNECE Recommendation 20."""
         return UNITS[self.unit]
 
     @property
     def listed_texts(self) -> str:
-        """Its values with what they stand for: "0 stopped, 4 idle"; empty if it is no enumeration."""
+        """Values with their texts: "0 stopped, 4 idle"; "" if the tag is no enumeration."""
         return ", ".join(f"{value} {text}" for value, text in self.texts.items())
 
 
 def switch(name: str, role: Role, description: str, initial: float = 0.0, adds_to: Adds = "") -> Tag:
-    """A tag that is off (0) or on (1)."""
+    """Return a tag that is off (0) or on (1)."""
     return Tag(name, "bool", role, description, initial=initial, adds_to=adds_to)
 
 
 def count(
     name: str, role: Role, description: str, low: float = 0.0, high: float = MOST_COUNT, adds_to: Adds = ""
 ) -> Tag:
-    """A tag that is a whole number, 0 at the start."""
+    """Return a tag with a whole number, 0 at the start."""
     return Tag(name, "count", role, description, low=low, high=high, adds_to=adds_to)
 
 
@@ -129,18 +132,18 @@ def number(
     initial: float = 0.0,
     nominal: float | None = None,
 ) -> Tag:
-    """A tag that is any number within a range."""
+    """Return a tag with a number within a range."""
     return Tag(name, "number", role, description, unit, low, high, initial, nominal)
 
 
 def seconds(name: str, role: Role, description: str) -> Tag:
-    """A tag that is a simulated time, or for how long in all, s."""
+    """Return a tag with a simulated time or a duration, s."""
     return number(name, role, description, "s", 0.0, LONGEST)
 
 
 def choice(
     name: str, role: Role, description: str, texts: Mapping[int, str], initial: int = 0, adds_to: Adds = ""
 ) -> Tag:
-    """A tag that is one of several states."""
+    """Return a tag with one of several states."""
     low, high = min(texts), max(texts)
     return Tag(name, "enumeration", role, description, "1", low, high, float(initial), texts=texts, adds_to=adds_to)

@@ -13,14 +13,14 @@ from typing import Any
 from conveyor_sim.bag.reader import mcap_files, open_bag
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.page.bundle import one_file
-from conveyor_sim.page.difference import Comparison
-from conveyor_sim.page.recording import Detail, Recording, text
+from conveyor_sim.page.difference import RecordingComparison
+from conveyor_sim.page.recording import Detail, PageRecording, text
 from conveyor_sim.page.watch import Watch
 from conveyor_sim.support.files import FileError, write_file
 
 
 @dataclass(frozen=True)
-class Failure:
+class FailedCondition:
     """A condition that failed."""
 
     time: float
@@ -32,17 +32,17 @@ def write_page(
     bag: Path,
     file: Path,
     last: float | None = None,
-    failures: Sequence[Failure] = (),
+    failures: Sequence[FailedCondition] = (),
     watch: Watch | None = None,
     trends: Sequence[str] = (),
     other: Path | None = None,
 ) -> Path:
-    """Write a recording as one HTML file, and return it.
+    """Write a recording as one HTML file. Return its path.
 
-    last: only so many seconds at its end are drawn; None: all. What happened is listed from the beginning. watch: what
-    is drawn instead, of the same run. trends: signals that are shown at first; none: what there is most to see of.
+    last: length of the part at the end that is drawn, s; None: all. Events are listed from the beginning. watch: frames
+    of the same run that are drawn instead. trends: signals that are shown at first; none: those that change most.
     other: a recording that is shown beside it, at the same times.
-    Raises BagError, SceneError, and ConveyorError if the file can't be written, or is one of the recording's.
+    Raise BagError, SceneError, and ConveyorError if the file can't be written, or belongs to the recording.
     """
     bags = [bag] if other is None else [bag, other]
     recorded = [part for one in bags for part in (*mcap_files(one), one / "metadata.yaml") if part.exists()]
@@ -50,7 +50,7 @@ def write_page(
         raise ConveyorError(f"--html: {file} given, which is a file of the recording, expected another one")
     with ExitStack() as stack:
         opened = [stack.enter_context(open_bag(one)) for one in bags]
-        recordings = [Recording(one, Detail()) for one in opened]
+        recordings = [PageRecording(one, Detail()) for one in opened]
         if last is not None:
             end = max(recording.last for recording in recordings)
             for recording in recordings:
@@ -60,7 +60,7 @@ def write_page(
         head: dict[str, Any] = {"failures": [vars(failure) for failure in failures], "trends": list(trends)}
         parts: dict[str, bytes] = {}
         if other is not None:
-            comparison = Comparison(opened[0], opened[1], math.inf)
+            comparison = RecordingComparison(opened[0], opened[1], math.inf)
             head["compared"] = comparison.head()
             parts["difference/0"] = _deflated(text(comparison.part()))
             parts.update(_parts(recordings[1], "other/", {}))
@@ -74,9 +74,9 @@ def write_page(
 
 
 def _parts(
-    recording: Recording, prefix: str, more: Mapping[str, Any], blocks: Sequence[bytes] | None = None
+    recording: PageRecording, prefix: str, more: Mapping[str, Any], blocks: Sequence[bytes] | None = None
 ) -> Iterator[tuple[str, bytes]]:
-    """Names and content. blocks: deflated; None: those of the recording."""
+    """Yield names and content of the parts. blocks: deflated; None: those of the recording."""
     yield f"{prefix}head", _deflated(text({**recording.head(), **more}))
     yield f"{prefix}story/0", _deflated(recording.story())
     for number in range(recording.blocks) if blocks is None else ():

@@ -1,5 +1,4 @@
-"""The ROS 2 face: a node over Simulation, the PLC-like controller beside it, and the main job that runs both.
+"""ROS 2: the node of a simulation, the node of a controller, and the main job that runs both.
 
-Only the modules of this package import rclpy, and those that hold rules (lockstep, pacing, domain) do
-without it, so that they can be read and tested by themselves.
+Only modules of this package import rclpy. Rules that need no ROS (lockstep, pacing) are in `run`.
 """

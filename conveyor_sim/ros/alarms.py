@@ -1,4 +1,4 @@
-"""The topic `alarms`: a controller's alarms, published when one of them comes or goes."""
+"""Topic `alarms`: the alarms of a controller, published when one of them comes or goes."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from conveyor_sim.ros.clock import to_time
 from conveyor_sim.ros.publishers import ros_qos
 
 
-class Alarms:
-    """Publishes all alarms that the controller has: a status each, ERROR while it stands and OK else.
+class AlarmPublisher:
+    """Publishes all alarms of a controller: one status per alarm, ERROR while it stands and OK otherwise.
 
-    Latched, so that a screen that is switched on later shows what stands and what has been.
+    The topic is latched, so that late subscribers see present and past alarms.
     """
 
     def __init__(self, node: Node) -> None:
         self._publisher = node.create_publisher(DiagnosticArray, "alarms", ros_qos(TOPICS["alarms"].qos))
         self._source = node.get_name()
-        self._told: dict[str, bool] = {}
+        self._published: dict[str, bool] = {}
 
-    def tell(self, alarms: Mapping[str, bool], stamp_ns: int) -> None:
-        """What stands at a scan, by text; stamp_ns: its simulated time."""
-        if alarms == self._told:
+    def publish(self, alarms: Mapping[str, bool], stamp_ns: int) -> None:
+        """Publish the alarms of a scan, by text, if one has changed. stamp_ns: simulated time of the scan."""
+        if alarms == self._published:
             return
-        self._told = dict(alarms)
+        self._published = dict(alarms)
         message = DiagnosticArray()
         message.header.stamp = to_time(stamp_ns)
         message.status = [

@@ -1,22 +1,20 @@
-"""A controller that is a ROS node, attached to a simulation that a test steps: the other side of lockstep.
+"""`AttachedNode`: a controller that is a ROS node, attached to a simulation that a test steps.
 
-To the controller it is `sim_node` in lockstep: the latched topic `line`, the service `lockstep`. To the test it is a
-controller with `scan`. Between two of its requests nothing happens but scans that answer nothing, so the bits are
-those of the same controller as a scan function.
+To the node, it looks like `sim_node` in lockstep: the latched topic `line` and the service `lockstep`. To the test, it
+is a controller with `scan`. Scans between two requests of the node have no commands. The bits are therefore those of
+the same controller as an object of the test.
 """
 
 from __future__ import annotations
 
 import os
 import tempfile
-import threading
 import time
 import uuid
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
-from contextlib import AbstractContextManager, ExitStack, suppress
+from contextlib import ExitStack
 from pathlib import Path
-from queue import Empty, SimpleQueue
 from typing import TypeVar
 
 import rclpy
@@ -36,21 +34,26 @@ from conveyor_sim.ros.intake import Intake
 from conveyor_sim.ros.lockstep_service import LockstepService
 from conveyor_sim.ros.publishers import check_type, ros_qos
 from conveyor_sim.ros.spinner import Spinner
-from conveyor_sim.run.lockstep import Lockstep, LockstepAnswer, LockstepRequest, Refused
+from conveyor_sim.run.alarm_changes import AlarmChanges
+from conveyor_sim.run.calls import CallQueue
+from conveyor_sim.run.lockstep import LOCKSTEP, Lockstep, LockstepAnswer, LockstepRequest, Refused
+from conveyor_sim.run.scan_loop import AttachedController
 from conveyor_sim.scene import Scene, parse_overrides, parse_scene
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.child_process import Process
 
 T = TypeVar("T")
 
-LOOK = 0.05  # s of wall time between two looks at whether it still can come
+LOOK = 0.05  # s of wall time between two checks that a request can still come
 FRAME = "world"
-LAST_TICK = 10**9  # at which the run ends, as the controller sees it: when it does is up to the test
+LAST_TICK = 10**9  # end of the run for the controller; the test decides when it really ends
 ENDED = "the test has ended"
 
 
-class AttachedNode(AbstractContextManager["AttachedNode"]):
-    """Serves a controller's node from inside the test's process; it is to be scanned at every tick."""
+class AttachedNode(AttachedController):
+    """A controller's node, served from the process of the test. It must be scanned at every tick."""
+
+    source = LOCKSTEP
 
     def __init__(
         self,
@@ -61,15 +64,15 @@ class AttachedNode(AbstractContextManager["AttachedNode"]):
         domain: int | None = None,
         patience: float,
     ) -> None:
-        """command: starts the controller; it is ended by close(). Empty: others start it.
-        namespace: in which it looks for `line` and `lockstep`. domain: ROS_DOMAIN_ID; None: one of its own, on this
-        machine only. patience: s of wall time that it has for each request.
+        """command: starts the controller, which close() ends. Empty: the controller is started elsewhere.
+        namespace: that of `line` and `lockstep`. domain: ROS_DOMAIN_ID; None: a free one, on this machine only.
+        patience: longest time for each request, s of wall time.
 
-        Raises ConveyorError if there is no free domain or the message package won't do, OSError if the command can't
-        be run.
+        Raises ConveyorError if there is no free domain or the message package does not fit, OSError if the command
+        can't be run.
         """
         self.writer = ""
-        """The name of the run that its last request gave."""
+        """Name of the run in its last request."""
         self._patience = patience
         self._turns = _Turns(simulation)
         self._process: Process | None = None
@@ -89,44 +92,46 @@ class AttachedNode(AbstractContextManager["AttachedNode"]):
             stack.callback(self._turns.end)
             self._open = stack.pop_all()
 
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
     def close(self) -> None:
-        """Refuse what the controller waits for, end its process and leave the domain."""
+        """Refuse the waiting request, end the process of the controller, and leave the domain."""
         self._open.close()
 
-    def scan(self, inputs: Inputs) -> Mapping[str, float]:
-        """Answer the request for this tick and wait for the next; its commands, {} at ticks before its target.
+    def scan(self, inputs: Inputs, alarms: AlarmChanges) -> dict[str, float]:
+        """Answer the request for this tick and wait for the next one. Return the commands and alarms of that.
 
-        After a request with `release` the controller has no more part: {} from its target on.
+        A node sends alarms only when they change. At ticks before the target of the request the answer is empty, and
+        from the target of a request with `release` on. Alarms of a controller before this one go.
         Raises ControlError if no request comes, CommandError if its commands would be refused.
         """
+        answer = self._requested(inputs)
+        return {**alarms.of({}), **answer}
+
+    def _requested(self, inputs: Inputs) -> dict[str, float]:
         turns = self._turns
         if not turns.reached():
             return {}
         end = time.monotonic() + self._patience
         while turns.request is None:
-            turns.take_call(LOOK)
+            turns.take_calls(LOOK)
             if turns.request is None:
                 self._require_going_on(inputs, time.monotonic() > end)
         request = turns.request
         self.writer = request.run_id
-        for given in request.inputs:
-            # What it has no control of is refused as the tick begins, and is no error of the controller.
-            _, own, _ = turns.simulation.line.modes.divide(given)
-            if own is not None and (reason := turns.simulation.refusal(own)):
+        for command in request.inputs:
+            # Commands without control authority are refused as the tick begins. They are no error of the controller.
+            _, own, _ = turns.simulation.line.modes.divide(command)
+            if own is not None and (reason := turns.simulation.line.refusal(own)):
                 raise CommandError(f"at {inputs.time:.2f} s a command was refused: {reason}")
-            if given.operation == DECLARE:
-                turns.simulation.give(given)
+            if command.operation == DECLARE:
+                turns.simulation.give(command)
         return dict(zip(request.names, request.values, strict=True))
 
     def note(self, outcomes: Sequence[CommandOutcome]) -> None:
-        """What became of commands in the last tick, for the next answer."""
+        """Store the command results of the last tick for the next answer."""
         self._turns.outcomes += outcomes
 
     def _serve(self, stack: ExitStack, namespace: str) -> str:
-        """Start the node; the whole name of its service."""
+        """Start the node. Return the full name of its service."""
         context = Context()
         start_ros(context)
         stack.callback(rclpy.shutdown, context=context)
@@ -143,7 +148,7 @@ class AttachedNode(AbstractContextManager["AttachedNode"]):
         return node.resolve_service_name("lockstep")
 
     def _require_going_on(self, inputs: Inputs, late: bool) -> None:
-        """Raises ControlError if no request is to be expected any more."""
+        """Raise ControlError if no further request can be expected."""
         if self._error is not None:
             raise self._error
         if self._process is not None and self._process.exit_code is not None:
@@ -164,57 +169,44 @@ class AttachedNode(AbstractContextManager["AttachedNode"]):
 
 
 class _Turns:
-    """A simulation that a test steps, as the service `lockstep` sees it: asked only while the test waits to be."""
+    """A simulation that a test steps, for the service `lockstep`. Calls are made while the test waits for a request."""
 
     def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
         self.run_id = uuid.uuid4().hex
-        """As in `line`."""
+        """ID of the run, as in `line`."""
         self._lockstep = Lockstep(LAST_TICK)
         self._answer: Future[LockstepAnswer] = Future()
         self._released = False
-        self._ended = False
-        self._calls: SimpleQueue[Callable[[], None]] = SimpleQueue()
-        self._lock = threading.Lock()
+        self._calls = CallQueue(ENDED)
         self.request: LockstepRequest | None = None
-        """The one whose target is still to be reached."""
+        """Request whose target is still to be reached."""
         self.refused = ""
-        """Why the last request was refused, "" if it was not."""
+        """Reason why the last request was refused; empty if it was accepted."""
         self.outcomes: list[CommandOutcome] = []
-        """For the next answer."""
+        """Command results for the next answer."""
 
     @property
     def simulation(self) -> Simulation:
-        """The test's."""
+        """Simulation of the test."""
         return self._simulation
 
-    # As conveyor_sim.ros.lockstep_service.Stepped
+    # Interface of conveyor_sim.ros.lockstep_service.Stepped
 
     def call(self, function: Callable[[], T]) -> Future[T]:
-        """From any thread: have a function called by the thread that scans, which does so when it waits."""
-        future: Future[T] = Future()
-
-        def run() -> None:
-            try:
-                future.set_result(function())
-            except Exception as error:
-                future.set_exception(error)
-
-        with self._lock:
-            if self._ended:
-                future.set_exception(Refused(ENDED))
-            else:
-                self._calls.put(run)
-        return future
+        """Queue a function for the scanning thread, which calls it while it waits. Any thread may call this."""
+        return self._calls.request(function)
 
     def advance_lockstep(self, request: LockstepRequest) -> Future[LockstepAnswer]:
-        """Take a request, or the last one once more. Raises Refused."""
+        """Accept a request, or a repetition of the last one. Raise Refused."""
         repeated = self._lockstep.repeated(request)
         if repeated is not None:
             return repeated
         try:
-            if self._ended or self._released:
-                raise Refused(ENDED if self._ended else "the line was released; the test goes on without a controller")
+            if self._calls.ended:
+                raise Refused(ENDED)
+            if self._released:
+                raise Refused("the line was released; the test goes on without a controller")
             self._answer = self._lockstep.accept(request, self.run_id, self._simulation.tick, LAST_TICK)
         except Refused as error:
             self.refused = str(error)
@@ -223,18 +215,18 @@ class _Turns:
         return self._answer
 
     def present(self) -> LockstepAnswer:
-        """What the simulation is now, without outcomes."""
+        """Return the present state of the simulation, without command results."""
         return LockstepAnswer.of(self._simulation, self.run_id)
 
-    # By the thread that scans
+    # For the scanning thread
 
-    def take_call(self, patience: float) -> None:
-        """Carry out one call, if one comes within so many seconds of wall time."""
-        with suppress(Empty):
-            self._calls.get(timeout=patience)()
+    def take_calls(self, patience: float) -> None:
+        """Make the calls that come within `patience` (s of wall time)."""
+        self._calls.wait(patience)
+        self._calls.take()
 
     def reached(self) -> bool:
-        """Whether it is time for another request; the last one is answered then."""
+        """Return True if another request is due. The last one is answered then."""
         if self.request is not None and self._simulation.tick >= self.request.target_tick:
             outcomes, self.outcomes = tuple(self.outcomes), []
             self._released = self.request.release
@@ -243,18 +235,16 @@ class _Turns:
         return self.request is None and not self._released
 
     def end(self) -> None:
-        """Refuse whatever is asked or was."""
-        with self._lock:
-            self._ended = True
-        while not self._calls.empty():
-            self.take_call(0.0)
+        """Refuse the waiting request and all later ones."""
+        self._calls.end()
+        self._calls.drain()
         if self.request is not None:
             self.request = None
             self._answer.set_exception(Refused(ENDED))
 
 
 def _line(simulation: Simulation, run_id: str) -> Line:
-    """What `line` holds: the test's line, without the scene's end, at which a controller would leave."""
+    """Return the message `line` of the test, without the end of the scene, at which a controller would end."""
     message = deserialize_message(
         line_message(simulation, run_id, Header(simulation.tick, simulation.stamp_ns, FRAME)), Line
     )
@@ -263,6 +253,6 @@ def _line(simulation: Simulation, run_id: str) -> Line:
 
 
 def _endless(scene: Scene) -> Scene:
-    """The same scene, LAST_TICK ticks long."""
-    seconds = scene.tick_ns  # 10^9 ticks of so many ns
+    """Return the scene with a duration of LAST_TICK ticks."""
+    seconds = scene.tick_ns  # 10^9 ticks of tick_ns nanoseconds
     return parse_scene(scene.source_text, scene.name, {**parse_overrides(scene.overrides_text), "duration": seconds})

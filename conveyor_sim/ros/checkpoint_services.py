@@ -1,4 +1,4 @@
-"""The services `save_checkpoint` and `load_checkpoint`."""
+"""Services `save_checkpoint` and `load_checkpoint`."""
 
 from __future__ import annotations
 
@@ -18,17 +18,18 @@ from rclpy.node import Node
 from conveyor_sim.errors import CheckpointError, ConveyorError
 from conveyor_sim.ros.clock import to_time
 from conveyor_sim.ros.services import settled
+from conveyor_sim.run.calls import settle
 from conveyor_sim.run.lockstep import Refused
 from conveyor_sim.run.stepper import Stepper
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.printable import SENTENCE, printable
 
 LONGEST = 1000
-"""Characters of a path."""
+"""Longest path, characters."""
 
 
 class CheckpointServices:
-    """Answers requests by asking the stepper. Files are read beside it: it goes on meanwhile."""
+    """Answers requests through the stepper, which continues while a thread reads a file."""
 
     def __init__(
         self,
@@ -38,7 +39,7 @@ class CheckpointServices:
         folder: Path | None,
         read: Callable[[Path], Simulation],
     ) -> None:
-        """`folder`: which no path may leave; None: every request is refused. `read`: reads a file in it."""
+        """folder: no path may leave it; None: every request is refused. read: reads a file in it."""
         self._executor = executor
         self._stepper = stepper
         self._folder = folder
@@ -66,7 +67,7 @@ class CheckpointServices:
         except ConveyorError as error:
             return await self._refuse(response, error)
         except Exception as error:
-            # Not to end a run for a file.
+            # A bad file must not end the run.
             self._log.error(traceback.format_exc())
             return await self._refuse(response, f"{path}: can't be loaded ({type(error).__name__})")
         finally:
@@ -74,7 +75,7 @@ class CheckpointServices:
         return await self._between_ticks(response, lambda: self._stepper.load(simulation, path), f"loaded {path}")
 
     def _place(self, text: str) -> tuple[Path, Path]:
-        """The folder, and a path that is asked for in it. Whether it leaves the folder is seen when it is opened."""
+        """Return the folder, and the path of a request in it. Opening the path checks that it stays in the folder."""
         if self._folder is None:
             raise CheckpointError("the parameter checkpoint_folder is empty, expected a folder to keep checkpoints in")
         if not text.isprintable() or len(text) > LONGEST:
@@ -84,7 +85,7 @@ class CheckpointServices:
 
     async def _between_ticks(self, response: Any, what: Callable[[], None], done: str) -> Any:
         def now() -> None:
-            # The state in the answer is the one that was saved, not one some ticks later.
+            # The answer must have the state that was saved, not one some ticks later.
             try:
                 what()
                 response.success, response.message = True, done
@@ -100,24 +101,17 @@ class CheckpointServices:
 
     async def _refuse(self, response: Any, reason: object) -> Any:
         response.message = printable(reason, SENTENCE)
-        with suppress(Refused):  # the reason counts
+        with suppress(Refused):  # the response has the reason of the first refusal
             await settled(self._executor, self._stepper.call(lambda: self._stamp(response)))
         return response
 
     def _stamp(self, response: Any) -> None:
-        simulation = self._stepper.session.simulation
+        simulation = self._stepper.run.session.simulation
         response.tick, response.time = simulation.tick, to_time(simulation.stamp_ns)
 
 
 def _in_background(function: Callable[[], Simulation]) -> Future[Simulation]:
-    """Have something done in a thread of its own, which keeps nobody from ending the process."""
+    """Call a function in a daemon thread, which does not keep the process from ending."""
     future: Future[Simulation] = Future()
-
-    def run() -> None:
-        try:
-            future.set_result(function())
-        except Exception as error:
-            future.set_exception(error)
-
-    threading.Thread(target=run, name="checkpoint", daemon=True).start()
+    threading.Thread(target=settle, args=(future, function), name="checkpoint", daemon=True).start()
     return future

@@ -1,4 +1,4 @@
-"""A node of this package as a child process."""
+"""`Child`: a node of this package as a child process."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from conveyor_sim.support.child_process import Process
 
 
 class Child(Process):
-    """A node of this package."""
+    """A child process that runs a node of this package."""
 
     def __init__(
         self, name: str, parameters: Mapping[str, object], environment: Mapping[str, str], log_folder: Path
     ) -> None:
-        """Runs `conveyor_sim.ros.<name>` with ROS parameters; its output goes to `<log_folder>/<name>.log`."""
+        """Run `conveyor_sim.ros.<name>` with ROS parameters. Its output goes to `<log_folder>/<name>.log`."""
         super().__init__(name, [sys.executable, *arguments_of(name, parameters)], environment, log_folder)
 
 
 def arguments_of(name: str, parameters: Mapping[str, object]) -> list[str]:
-    """With which Python runs a node of this package."""
+    """Return the arguments with which Python runs a node of this package."""
     arguments = ["-m", f"conveyor_sim.ros.{name}", "--ros-args"]
     for parameter, value in parameters.items():
         arguments += ["-p", f"{parameter}:={_yaml(value)}"]
@@ -28,7 +28,7 @@ def arguments_of(name: str, parameters: Mapping[str, object]) -> list[str]:
 
 
 def _yaml(value: object) -> str:
-    """As `-p name:=value` reads it: texts quoted, so that a scene named `on` stays a text."""
+    """Return a value for `-p name:=value`. Texts are quoted, so that a scene named `on` stays a text."""
     if isinstance(value, bool):
         return str(value).lower()
     return repr(value) if isinstance(value, (int, float)) else "'" + str(value).replace("'", "''") + "'"

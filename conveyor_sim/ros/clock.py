@@ -1,4 +1,4 @@
-"""/clock: simulated time for every node that runs with use_sim_time."""
+"""Topic /clock: simulated time for all nodes with use_sim_time."""
 
 from __future__ import annotations
 
@@ -14,22 +14,25 @@ NS = 1_000_000_000
 
 
 def to_time(stamp_ns: int) -> Time:
-    """Nanoseconds as ROS writes them."""
+    """Return nanoseconds as a time of ROS."""
     sec, nanosec = divmod(stamp_ns, NS)
     return Time(sec=sec, nanosec=nanosec)
 
 
 class ClockPublisher:
-    """Publishes simulated time, at most `rate` times a wall second; it is asked after each tick, and while paused."""
+    """Publishes simulated time at most `rate` times per wall second."""
 
     def __init__(self, node: Node, rate: float) -> None:
         self._publisher = node.create_publisher(Clock, "/clock", ros_qos(TOPICS["/clock"].qos))
         self.topic: str = self._publisher.topic_name
-        """Its whole name, remapped or not."""
+        """Full name of the topic, after remapping."""
         self._cap = RateCap(rate)
 
     def beat(self, stamp_ns: int, now: float) -> None:
-        """`stamp_ns`: simulated time in ns, above 0. `now`: s of a steady wall clock."""
+        """Publish the time if a message is due. Called after each tick, and while paused.
+
+        stamp_ns: simulated time, ns, above 0. now: s of a steady wall clock.
+        """
         if self._cap.ready(now):
             self._cap.sent(now)
             message = Clock()

@@ -28,24 +28,24 @@ UNREADABLE = "not readable as {type}, expected its serialized form"
 
 
 def subscribe_commands(node: Node, stepper: Stepper) -> list[CommandTopic]:
-    """What passes commands on to the simulation, which judges them at the start of the next tick."""
+    """Subscribe to commands for a simulation, which checks them at the start of the next tick."""
     qos = TOPICS["commands"].qos
     return [
         CommandTopic(node, stepper, "commands", Commands, qos, _commands),
         *(
             CommandTopic(node, stepper, name, Float64, CMD_SPEED.qos, partial(_speed, name))
-            for name in map(speed_command, stepper.session.simulation.model.belts)
+            for name in map(speed_command, stepper.run.session.simulation.model.belts)
         ),
     ]
 
 
 def _commands(message: Any) -> list[Input]:
-    """Its commands, after what it declares of alarms; if it has neither, the empty commands, to be refused."""
+    """Return declared alarms, then commands. A message without either gives empty commands, which are refused."""
     name = "commands"
-    declared, given = inputs_of(name, name, message.alarm_ids, message.alarms, message.names, message.values)
+    declared, commands = inputs_of(name, name, message.alarm_ids, message.alarms, message.names, message.values)
     if is_empty(declared):
-        return [given]
-    return [declared] if is_empty(given) else [declared, given]
+        return [commands]
+    return [declared] if is_empty(commands) else [declared, commands]
 
 
 def _speed(name: str, message: Any) -> list[Input]:
@@ -53,9 +53,9 @@ def _speed(name: str, message: Any) -> list[Input]:
 
 
 class CommandTopic:
-    """One subscription, for the thread of intake.py.
+    """One subscription, used by the thread of intake.py.
 
-    Messages are taken as bytes, and looked at before Python objects are made of them.
+    Messages are taken as bytes, and their size is checked before they become Python objects.
     """
 
     def __init__(
@@ -78,7 +78,7 @@ class CommandTopic:
         )
 
     def take_all(self) -> None:
-        """Hand over what has come; at most what DDS holds, for others wait too."""
+        """Hand over the messages that have come, at most as many as DDS holds, because other topics wait."""
         for _ in range(self._most):
             taken = take_message(self.subscription)
             if taken is None:
@@ -86,7 +86,7 @@ class CommandTopic:
             self._hand_over(*taken)
 
     def _hand_over(self, data: bytes, info: dict[str, Any]) -> None:
-        inbox = self._stepper.inbox
+        inbox = self._stepper.run.inbox
         missing = self._gaps.before(info["publication_sequence_number"], self.subscription.get_publisher_count)
         if missing:
             inbox.miss(self._name, missing)
@@ -96,16 +96,16 @@ class CommandTopic:
             return
         try:
             inputs = self._read(deserialize_message(data, self._kind))
-        except Exception:  # rclpy's errors have no common base, and what was sent may be anything
+        except Exception:  # errors of rclpy have no common base, and a message may have any content
             kind = f"{self._kind.__module__.split('.')[0]}/{self._kind.__name__}"
             inbox.receive()
             inbox.turn_away(self._name, UNREADABLE.format(type=kind))
             return
-        for given in inputs:
-            if given.operation == SET:  # commands are counted
+        for command in inputs:
+            if command.operation == SET:  # commands are counted
                 inbox.receive()
-            self._stepper.give(given, len(data))
+            self._stepper.give(command, len(data))
 
     def _on_matched(self, status: Any) -> None:
         if status.current_count == 0:
-            self._gaps = Gaps()  # all publishers have left: numbers begin anew
+            self._gaps = Gaps()  # all publishers have left: numbers start again

@@ -1,4 +1,4 @@
-"""Starting ROS in a process: what rcl or DDS refuses becomes one sentence."""
+"""Start of ROS in a process. Errors of rcl and DDS become one sentence."""
 
 from __future__ import annotations
 
@@ -19,36 +19,36 @@ from rclpy.signals import SignalHandlerOptions
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.ros.parameter_types import refuse_unknown_types
 
-LAST_DOMAIN = 232  # beyond it the UDP ports of a domain (DDSI-RTPS 9.6.1.1) would be above 65535
+LAST_DOMAIN = 232  # UDP ports of higher domains (DDSI-RTPS 9.6.1.1) would be above 65535
 UNPROTECTED = (
-    "ROS_SECURITY_ENABLE is true, but ROS_SECURITY_STRATEGY is not Enforce: where ROS finds no keys, this node goes on "
+    "ROS_SECURITY_ENABLE is true, but ROS_SECURITY_STRATEGY is not Enforce: without keys, this node runs "
     "without protection"
 )
 PROFILES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")  # of Jazzy, of Kilted
-# rcl appends where in its sources an error came up, once a layer.
+# Each layer of rcl appends the place of an error in its sources.
 _SOURCES = re.compile(r",? at \S+\.(?:c|cpp|h|hpp):\d+")
 
 
 def start_ros(context: Context | None = None) -> None:
-    """rclpy.init() of a context (None: the default one), with the signals left alone.
+    """Initialise rclpy for a context (None: the default one), without its signal handlers.
 
     Raises ConveyorError if the environment or the arguments (`--ros-args ...`) keep ROS from starting.
     """
     _check_domain()
-    is_asked_for = os.environ.get("ROS_SECURITY_ENABLE") == "true"
+    is_enabled = os.environ.get("ROS_SECURITY_ENABLE") == "true"
     is_enforced = os.environ.get("ROS_SECURITY_STRATEGY") == "Enforce"
-    if is_asked_for and is_enforced:
+    if is_enabled and is_enforced:
         _check_keystore()
     _check_profile()
     with one_sentence():
         rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
-    if is_asked_for and not is_enforced:
+    if is_enabled and not is_enforced:
         get_logger("conveyor_sim").warning(UNPROTECTED)
 
 
 @contextmanager
 def running_ros() -> Iterator[None]:
-    """ROS in the default context for as long as the context lasts. Raises ConveyorError as start_ros()."""
+    """Run ROS in the default context of rclpy inside this context. Raise ConveyorError as start_ros()."""
     start_ros()
     try:
         yield
@@ -57,7 +57,7 @@ def running_ros() -> Iterator[None]:
 
 
 def new_node(name: str, **options: Any) -> Node:
-    """rclpy's Node(name, **options). Raises ConveyorError if DDS or ROS refuses it."""
+    """Return Node(name, **options) of rclpy. Raise ConveyorError if DDS or ROS refuses it."""
     with one_sentence():
         node = Node(name, **options)
     refuse_unknown_types(node)
@@ -65,29 +65,29 @@ def new_node(name: str, **options: Any) -> Node:
 
 
 def _check_domain() -> None:
-    """Fast DDS ends the process for a domain that is too high."""
-    given = os.environ.get("ROS_DOMAIN_ID", "")
-    if given and not (given.isdecimal() and int(given) <= LAST_DOMAIN):
-        raise ConveyorError(f"ROS_DOMAIN_ID: {given!r} given, expected a whole number from 0 to {LAST_DOMAIN}")
+    """Check the domain, because Fast DDS ends the process if it is too high."""
+    domain = os.environ.get("ROS_DOMAIN_ID", "")
+    if domain and not (domain.isdecimal() and int(domain) <= LAST_DOMAIN):
+        raise ConveyorError(f"ROS_DOMAIN_ID: {domain!r} given, expected a whole number from 0 to {LAST_DOMAIN}")
 
 
 def _check_keystore() -> None:
-    """ROS itself does not name every cause."""
+    """Check the keystore, because ROS does not report every cause."""
     keystore = os.environ.get("ROS_SECURITY_KEYSTORE", "")
     if not keystore:
-        found = "not set"
+        problem = "not set"
     elif not Path(keystore, "enclaves").is_dir():
-        found = f"{keystore!r} given, which has no folder enclaves/"
+        problem = f"{keystore!r} given, which has no folder enclaves/"
     else:
         return
     raise ConveyorError(
-        f"ROS_SECURITY_KEYSTORE: {found}, expected a keystore made by `ros2 security create_keystore`, "
+        f"ROS_SECURITY_KEYSTORE: {problem}, expected a keystore made by `ros2 security create_keystore`, "
         "because ROS_SECURITY_STRATEGY is Enforce"
     )
 
 
 def _check_profile() -> None:
-    """Fast DDS goes on without a profile that it can't read, and whoever it was to keep out comes in."""
+    """Check the profile, because Fast DDS ignores an unreadable one, and then lets all participants in."""
     for name in PROFILES:
         file = os.environ.get(name, "")
         try:
@@ -101,13 +101,13 @@ def _check_profile() -> None:
 
 @contextmanager
 def one_sentence() -> Iterator[None]:
-    """What rclpy raises becomes a ConveyorError."""
+    """Turn exceptions of rclpy into a ConveyorError."""
     try:
         yield
     except ConveyorError:
         raise
-    except Exception as error:  # rclpy's own classes, and RuntimeError for what a library of C++ raises
+    except Exception as error:  # classes of rclpy, and RuntimeError from C++ libraries
         text = " ".join(_SOURCES.sub("", str(error)).split())
         if "security libraries" in text:
-            text = "this Fast DDS was built without security, which ROS_SECURITY_ENABLE asks for"
+            text = "this Fast DDS was built without security, which ROS_SECURITY_ENABLE requires"
         raise ConveyorError(f"ROS can't start: {text or type(error).__name__}") from error

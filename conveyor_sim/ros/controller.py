@@ -1,8 +1,8 @@
-"""Runs a controller (conveyor_sim/control) beside a simulation, as a ROS node: in lockstep with it, or free.
+"""`ControllerRun`: a controller (conveyor_sim/control) as a ROS node beside a simulation, in lockstep or free.
 
-In lockstep every scan is one call of the service `lockstep`: commands in, process image out. The first scan is at the
-tick at which the controller comes in, 0 for a run that waits at its start, so that the run is the same as in one
-process. Free, it scans the `signals` that arrive and publishes `commands`, as a PLC would that nobody waits for.
+In lockstep, every scan is one call of the service `lockstep`: commands in, process image out. The first scan is at the
+tick at which the controller joins, 0 for a run that waits at its start. The run is then the same as in one process.
+Free, the controller scans the `signals` that arrive and publishes `commands`, like a PLC in real time.
 """
 
 from __future__ import annotations
@@ -20,41 +20,41 @@ from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.control.recorded import RecordedVariables
 from conveyor_sim.control.scan import (
     ALARMS,
-    AlarmChanges,
     ControlError,
     Controller,
     Inputs,
-    commands_of,
     declared_alarms,
 )
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.ros.alarms import Alarms
+from conveyor_sim.ros.alarms import AlarmPublisher
 from conveyor_sim.ros.lockstep_client import LockstepClient
 from conveyor_sim.ros.publishers import ros_qos
 from conveyor_sim.ros.spinner import Spinner
-from conveyor_sim.ros.variables import Variables
+from conveyor_sim.ros.variables import VariablePublisher
+from conveyor_sim.run.alarm_changes import AlarmChanges
 from conveyor_sim.scene import parse_overrides, parse_scene
 from conveyor_sim.support.printable import SENTENCE, printable
 from conveyor_sim.support.stop_request import StopRequest
 
-LOOK = 0.01  # s of wall time between two looks for the simulation
-STOP_LOOK = 0.1  # s of wall time between two looks, while it waits for an answer, at whether it is to stop
+LOOK = 0.01  # s of wall time between two searches for the simulation
+STOP_LOOK = 0.1  # s of wall time between two checks for a stop request while it waits for an answer
 PATIENCE = 1.0  # s of wall time without an answer after which the same request is sent again
 
 Make = Callable[[Any], Controller]
-"""A new controller for the line of a message (conveyor_msgs/Line). Raises ConveyorError or ControlError."""
+"""Makes a controller for the line of a message (conveyor_msgs/Line). Raises ConveyorError or ControlError."""
 
 
 class Stopped(Exception):
-    """The controller was asked to end."""
+    """Raised when the controller must end."""
 
 
 class Scanner:
-    """A controller on the line of one run: values in the line's order in, commands out, and alarms, which are published
-    too.
+    """A controller on the line of one run: values in the order of the line in, commands and alarms out.
+
+    Alarms and variables are published as well.
     """
 
-    def __init__(self, controller: Controller, line: Any, alarms: Alarms, variables: Variables) -> None:
+    def __init__(self, controller: Controller, line: Any, alarms: AlarmPublisher, variables: VariablePublisher) -> None:
         """line: conveyor_msgs/Line."""
         self._controller = controller
         self._names: Sequence[str] = line.signal_names
@@ -69,12 +69,12 @@ class Scanner:
             raise ConveyorError(str(error)) from error
 
     def take_declared(self) -> dict[str, list[str]]:
-        """The alarms that it declares, as fields of a message; none after the first time."""
+        """Return the declared alarms as fields of a message at the first call, and none later."""
         declared, self._declared = self._declared, ()
         return {"alarm_ids": [one.id for one in declared], "alarms": [one.as_text() for one in declared]}
 
     def scan(self, values: Sequence[float], tick: int, ticks: int) -> dict[str, float]:
-        """Commands by name, and alarms that come or go, for the scan at a tick that is so many ticks long.
+        """Return the commands, and the alarms that come or go, of the scan at a tick. ticks: ticks to the next scan.
 
         Raises ConveyorError.
         """
@@ -83,17 +83,17 @@ class Scanner:
             answer = self._controller.scan(
                 Inputs(signals, tick * self._tick_ns * 1e-9, tick, ticks * self._tick_ns * 1e-9)
             )
-            given = commands_of(answer) | self._changes.of(answer)
+            commands = self._changes.with_commands(answer)
         except ControlError as error:
             raise ConveyorError(f"scan at tick {tick}: {error}") from error
         stamp_ns = max(1, tick * self._tick_ns)
-        self._alarms.tell(_alarms(answer), stamp_ns)
-        self._variables.tell(self._recorded.names, self._recorded.values(), tick, stamp_ns)
-        return given
+        self._alarms.publish(_alarms(answer), stamp_ns)
+        self._variables.publish(self._recorded.names, self._recorded.values(), tick, stamp_ns)
+        return commands
 
 
 class ControllerRun:
-    """A node's part in a simulation: it finds the line, and has a controller scan until the end."""
+    """A node that finds the line of a simulation, and lets a controller scan until the end."""
 
     def __init__(
         self,
@@ -105,10 +105,10 @@ class ControllerRun:
         released: Sequence[str] = (),
         stop: StopRequest,
     ) -> None:
-        """make: called at the start, and again after every reset of the simulation.
+        """make: called at the start, and after every reset of the simulation.
 
-        scan_ticks: ticks from one scan to the next. run_id: under which the simulation is owned in lockstep, but
-        for the devices that are released, by patterns.
+        scan_ticks: ticks from one scan to the next. run_id: name of the owner in lockstep. released: patterns of the
+        devices that it does not own.
         """
         self._node = node
         self._make = make
@@ -119,8 +119,8 @@ class ControllerRun:
         self._error: Exception | None = None
         self._line: Any = None
         self._has_line = threading.Event()
-        self._alarms = Alarms(node)
-        self._variables = Variables(node)
+        self._alarms = AlarmPublisher(node)
+        self._variables = VariablePublisher(node)
         node.create_subscription(Line, "line", self._on_line, ros_qos(TOPICS["line"].qos))
         self._lockstep = LockstepClient(node)
         self._spinner = Spinner(died=self._died)
@@ -133,7 +133,7 @@ class ControllerRun:
         self._node.destroy_node()
 
     def run_lockstep(self) -> None:
-        """Scan to the end of the run. Raises ConveyorError if a scan is refused; Stopped if asked to."""
+        """Scan to the end of the run. Raise ConveyorError if a scan is refused, Stopped after a stop request."""
         log = self._node.get_logger()
         self._find(self._lockstep.is_ready)
         line, tick, last, values = None, 0, 0, list[float]()
@@ -141,7 +141,7 @@ class ControllerRun:
         while line is None or tick < last:
             if self._line is not line:  # at the start, and after a reset
                 line = self._line
-                # Stale by intent: the refusal holds the present tick, which is not 0 if this controller was restarted.
+                # Stale on purpose: the refusal has the present tick, which is not 0 if this controller was restarted.
                 present = self._call(line, 0, {})
                 if self._left(line, present):
                     continue
@@ -159,13 +159,13 @@ class ControllerRun:
             if not response.accepted:
                 raise ConveyorError(f"lockstep to tick {target} refused: {response.reason}")
             before, refusals = refusals, {_refusal(outcome) for outcome in response.outcomes if not outcome.accepted}
-            for refusal in sorted(refusals - before):  # at every scan, for as long as an operator holds a device
+            for refusal in sorted(refusals - before):  # refused at every scan while an operator controls a device
                 log.warning(refusal)
             tick, values = response.tick, response.signals.values
         log.info(f"ends at tick {tick}")
 
     def run_free(self) -> None:
-        """Scan what arrives, until asked to stop. Raises ConveyorError if a scan fails."""
+        """Scan the signals that arrive until a stop request. Raise ConveyorError if a scan fails."""
         self._find(lambda: True)
         free = _FreeScans(self._node, self._scan_ticks, self._scanner, lambda: self._line)
         self._node.create_subscription(Signals, "signals", free.on_signals, ros_qos(TOPICS["signals"].qos))
@@ -184,7 +184,7 @@ class ControllerRun:
         return Scanner(self._make(line), line, self._alarms, self._variables)
 
     def _left(self, line: Any, response: Any) -> bool:
-        """Whether the simulation is in another run than that of `line`; if so, returns once its line has come."""
+        """Return True if the simulation is in another run than that of `line`, once the new line has come."""
         if response.sim_run_id == line.run_id:
             return False
         while self._line is line:
@@ -200,8 +200,9 @@ class ControllerRun:
         declared: Mapping[str, list[str]] | None = None,
         release: bool = False,
     ) -> Any:
-        """The answer to a request in the run of a line, sent again for as long as there is none: it is safe to repeat,
-        for it names its run and its tick.
+        """Return the answer to a request in the run of a line. The request is repeated until there is an answer.
+
+        Repetition is safe, because a request has its run and tick.
         """
         request = Lockstep.Request(
             run_id=self._run_id,
@@ -240,7 +241,7 @@ class ControllerRun:
 
 
 class _FreeScans:
-    """Scans signals as they arrive, every `scan_ticks` ticks or as seldom as they come."""
+    """Scans signals as they arrive, every `scan_ticks` ticks or less often."""
 
     def __init__(self, node: Node, scan_ticks: int, scanner: Callable[[Any], Scanner], line: Callable[[], Any]) -> None:
         self._commands = node.create_publisher(Commands, "commands", ros_qos(TOPICS["commands"].qos))
@@ -252,7 +253,7 @@ class _FreeScans:
         self._last: int | None = None
 
     def on_signals(self, message: Any) -> None:
-        """One process image."""
+        """Scan one process image."""
         line = self._present()
         if self._scanner is None or line is not self._line or (self._last is not None and message.tick < self._last):
             self._line, self._last, self._scanner = line, None, self._make(line)
@@ -270,7 +271,7 @@ class _FreeScans:
 
 
 def _alarms(answer: Mapping[str, float]) -> dict[str, bool]:
-    """Alarms by their texts."""
+    """Return the alarms of an answer by text."""
     return {name.removeprefix(ALARMS): value != 0.0 for name, value in answer.items() if name.startswith(ALARMS)}
 
 
@@ -279,6 +280,6 @@ def _refusal(outcome: Any) -> str:
 
 
 def _last_tick(line: Any) -> int:
-    """The tick at which the run ends."""
+    """Return the tick at which the run ends."""
     scene = parse_scene(line.scene_text, line.scene_name, parse_overrides(line.overrides))
     return scene.duration_ticks

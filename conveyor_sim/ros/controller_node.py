@@ -1,10 +1,10 @@
-"""Executable `controller_node`: runs any controller, by name, beside the node `conveyor_sim`.
+"""Executable `controller_node`: runs a controller, found by its name, beside the node `conveyor_sim`.
 
     controller_node --ros-args -p controller:=my_line.py:make -p parameters:="{table: accumulation}"
     controller_node --ros-args -p controller:=program.st
 
-The simulation must wait (start_paused:=true) for a controller in lockstep; for one that runs free (mode:=free) it
-must play and output `signals`.
+The simulation must wait (start_paused:=true) for a controller in lockstep. For a free controller (mode:=free), it must
+play and output `signals`.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ with while_importing():
     from conveyor_sim.errors import ConveyorError
     from conveyor_sim.ros.context import new_node, running_ros
     from conveyor_sim.ros.controller import ControllerRun, Stopped
-    from conveyor_sim.ros.declared import Entry, declare_table
+    from conveyor_sim.ros.declared import DeclaredParameter, declare_table
     from conveyor_sim.run.controller_parameters import controller_parameters
     from conveyor_sim.support.printable import SENTENCE, printable, printable_lines
     from conveyor_sim.support.stop_request import StopRequest
@@ -31,26 +31,26 @@ NAME = "controller"
 MODES = ("lockstep", "free")
 
 PARAMETERS = (
-    Entry("controller", "", "program.st, library.so, module:factory or file.py:factory."),
-    Entry("parameters", "", "The factory's or program's parameters by name: a YAML mapping, or a file of one."),
-    Entry("mode", "lockstep", "lockstep: the simulation waits for every scan; free: it does not."),
-    Entry("scan_ticks", 1, "Ticks from one scan to the next.", 1, 10**6),
-    Entry("run_id", NAME, "Name under which it owns the simulation in lockstep; the same after a restart."),
-    Entry("released", "", "Devices that others may command beside it in lockstep: patterns, by commas."),
+    DeclaredParameter("controller", "", "program.st, library.so, module:factory or file.py:factory."),
+    DeclaredParameter("parameters", "", "Parameters of the factory or program by name: a YAML mapping, or its file."),
+    DeclaredParameter("mode", "lockstep", "lockstep: the simulation waits for every scan; free: it does not."),
+    DeclaredParameter("scan_ticks", 1, "Ticks from one scan to the next.", 1, 10**6),
+    DeclaredParameter("run_id", NAME, "Name under which it owns the simulation in lockstep; the same after a restart."),
+    DeclaredParameter("released", "", "Devices that others may command in lockstep: patterns, separated by commas."),
 )
 
 
 def run(stop: StopRequest) -> None:
-    """Control until the end of the run, or until asked to stop. Raises ConveyorError."""
+    """Control until the end of the run, or a stop request. Raise ConveyorError."""
     node = new_node(NAME)
-    given = declare_table(node, PARAMETERS)
-    if given["mode"] not in MODES:
-        raise ConveyorError(f"parameter mode: {given['mode']!r} given, expected {' or '.join(MODES)}")
-    parameters = controller_parameters(given["parameters"], "parameter parameters")
+    values = declare_table(node, PARAMETERS)
+    if values["mode"] not in MODES:
+        raise ConveyorError(f"parameter mode: {values['mode']!r} given, expected {' or '.join(MODES)}")
+    parameters = controller_parameters(values["parameters"], "parameter parameters")
 
     def make(line: Any) -> Controller:
         try:
-            controller = load(given["controller"], parameters)
+            controller = load(values["controller"], parameters)
             if line is not None:
                 kinds = dict(zip(line.tag_names, line.tag_kinds, strict=True))
                 signals, commands = (
@@ -65,20 +65,20 @@ def run(stop: StopRequest) -> None:
         except ControlError as error:
             raise ConveyorError(str(error)) from error
 
-    make(None)  # what can't be made is reported before there is a simulation
-    released = [pattern.strip() for pattern in given["released"].split(",") if pattern.strip()]
+    make(None)  # reports errors before there is a simulation
+    released = [pattern.strip() for pattern in values["released"].split(",") if pattern.strip()]
     controller = ControllerRun(
-        node, make, scan_ticks=given["scan_ticks"], run_id=given["run_id"], released=released, stop=stop
+        node, make, scan_ticks=values["scan_ticks"], run_id=values["run_id"], released=released, stop=stop
     )
     with closing(controller), suppress(Stopped):
-        if given["mode"] == "free":
+        if values["mode"] == "free":
             controller.run_free()
         else:
             controller.run_lockstep()
 
 
 def main() -> None:
-    """Exits with 0 at the end or after Ctrl-C or SIGTERM, with 1 and one sentence if the controller can't go on."""
+    """Exit with 0 at the end, after Ctrl-C or SIGTERM; with 1 and one sentence if the controller can't go on."""
     with StopRequest() as stop:
         try:
             with running_ros():

@@ -1,4 +1,4 @@
-"""Parameters declared from a table: name, default, description and limits, checked at start and whenever set."""
+"""Parameters declared from a table: name, default, description and limits, checked at the start and when set."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ _KINDS = {bool: "true or false", int: "a whole number", float: "a number", str: 
 
 
 @dataclass(frozen=True)
-class Entry:
-    """One parameter. A number must lie in [low, high]; it may change after the start only if it is not `fixed`."""
+class DeclaredParameter:
+    """One parameter. A number must lie in [low, high]. Only a parameter that is not `fixed` may change later."""
 
     name: str
     default: bool | int | float | str
@@ -28,7 +28,7 @@ class Entry:
     fixed: bool = True
 
     def refusal(self, value: object) -> str:
-        """Why `value` can't be this parameter's, empty if it can."""
+        """Return why `value` is invalid for this parameter, empty if it is valid."""
         kind = type(self.default)
         if kind is float and type(value) is int:  # `-p real_time_factor:=2` means 2.0
             value = float(value)
@@ -39,7 +39,7 @@ class Entry:
         return ""
 
     def descriptor(self) -> ParameterDescriptor:
-        """What `ros2 param describe` shows. refusal() judges the type, so that its sentence is shown, not rclpy's."""
+        """Return the descriptor for `ros2 param describe`. Types are checked by refusal() for its error message."""
         descriptor = ParameterDescriptor(description=self.description, read_only=self.fixed, dynamic_typing=True)
         if type(self.default) is float:
             descriptor.floating_point_range = [FloatingPointRange(from_value=self.low, to_value=self.high)]
@@ -48,11 +48,11 @@ class Entry:
         return descriptor
 
 
-def declare_table(node: Node, table: Sequence[Entry]) -> dict[str, Any]:
-    """Declare parameters on `node`, checked from now on; their values by name. Raises ConveyorError if one can't be."""
+def declare_table(node: Node, table: Sequence[DeclaredParameter]) -> dict[str, Any]:
+    """Declare parameters on `node`, with checks. Return their values by name. Raise ConveyorError if one is invalid."""
     values = {}
     for entry in table:
-        # Judged before rclpy knows the limits, so that the error is ours and says what was expected.
+        # Checked before rclpy knows the limits, so that our error states the expected values.
         value = node.declare_parameter(entry.name, entry.default, ParameterDescriptor(dynamic_typing=True)).value
         if reason := entry.refusal(value):
             raise ConveyorError(f"parameter {reason}")
@@ -64,12 +64,14 @@ def declare_table(node: Node, table: Sequence[Entry]) -> dict[str, Any]:
     entries = {entry.name: entry for entry in table}
 
     def convert(parameters: list[Parameter]) -> list[Parameter]:
-        """A whole number will do where a number is described, and becomes one."""
+        """Convert integers to floats for parameters that are numbers."""
         return [
-            Parameter(given.name, value=float(given.value))
-            if type(given.value) is int and given.name in entries and type(entries[given.name].default) is float
-            else given
-            for given in parameters
+            Parameter(parameter.name, value=float(parameter.value))
+            if type(parameter.value) is int
+            and parameter.name in entries
+            and type(entries[parameter.name].default) is float
+            else parameter
+            for parameter in parameters
         ]
 
     def check(parameters: list[Parameter]) -> SetParametersResult:

@@ -1,4 +1,4 @@
-"""/diagnostics: how the simulation fares, once a second of wall time."""
+"""Topic /diagnostics: state and counts of the simulation, once per second of wall time."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from conveyor_sim.ros.clock import to_time
 from conveyor_sim.ros.graph_watch import GraphWatch
 from conveyor_sim.ros.observer import TICK, WALL
 from conveyor_sim.ros.publishers import RosSink, ros_qos
-from conveyor_sim.run.run_state import State
+from conveyor_sim.run.run_state import SimulationState
 from conveyor_sim.run.stepper import Stepper
 from conveyor_sim.support.printable import printable
 
@@ -22,8 +22,10 @@ PERIOD = 1.0  # s of wall time
 
 
 class Diagnostics:
-    """Level WARN after a second with overruns, refused or lost commands or a word of the guard, and while others on
-    the graph mix with it; ERROR while it can not go on.
+    """Publishes one status: ERROR while the run can't go on.
+
+    WARN after a second with overruns, refused or lost commands, or reports of the guard, and while other nodes use the
+    names of this one.
     """
 
     def __init__(self, node: Node, stepper: Stepper, sink: RosSink, graph: GraphWatch) -> None:
@@ -39,28 +41,28 @@ class Diagnostics:
         self._last_refused = 0
         self._last_lost = 0
         self._last_guard_events = 0
-        # A steady clock: with use_sim_time the node's own would stand still while paused.
+        # A steady clock, because with use_sim_time the clock of the node stands still while paused.
         node.create_timer(PERIOD, self.publish, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def publish(self) -> None:
-        """How it fares now; in the thread of the executor."""
+        """Publish the present state. Called in the thread of the executor."""
         stepper = self._stepper
-        session, pacer = stepper.session, stepper.pacer
+        session, pacer = stepper.run.session, stepper.pacer
         simulation = session.simulation
         tick, counts = simulation.tick, simulation.counts
         overruns = pacer.overruns - self._last_overruns
-        counts_in, reception = stepper.inbox.counts, stepper.reception
+        counts_in, reception = stepper.run.inbox.counts, stepper.run.reception
         refusals = reception.refused + counts_in.turned_away
         refused, lost = refusals - self._last_refused, counts_in.lost - self._last_lost
-        noticed = stepper.guard_events - self._last_guard_events
+        guard_events = stepper.run.guard_events - self._last_guard_events
         status = DiagnosticStatus(name=self._name, hardware_id=simulation.model.name)
-        status.level, status.message = _verdict(stepper, overruns, refused, lost, noticed)
+        status.level, status.message = _verdict(stepper, overruns, refused, lost, guard_events)
         not_alone = self._graph.look()
         if not_alone and status.level != DiagnosticStatus.ERROR:
             status.level = DiagnosticStatus.WARN
             status.message = f"{status.message}; not alone in this ROS domain"
         values = {
-            "state": stepper.state.name,
+            "state": stepper.run.state.name,
             "run_id": session.run_id,
             TICK: tick,
             "simulated time (s)": f"{simulation.time:.9g}",
@@ -79,10 +81,10 @@ class Diagnostics:
             "lost commands": counts_in.lost,
             "waiting commands": counts_in.waiting,
             "waiting commands (bytes)": counts_in.waiting_bytes,
-            "guard events": stepper.guard_events,
-            "ticks in shorter steps": simulation.shortened_ticks,
-            "deepest overlap (of a radius)": f"{simulation.deepest_overlap:.3g}",
-            "lockstep owner": printable(stepper.lockstep.owner),
+            "guard events": stepper.run.guard_events,
+            "ticks in shorter steps": simulation.integration.shortened_ticks,
+            "deepest overlap (of a radius)": f"{simulation.integration.deepest_overlap:.3g}",
+            "lockstep owner": printable(stepper.run.lockstep.owner),
             "bottles present": counts.present,
             "bottles fed": counts.fed,
             "bottles removed": counts.removed,
@@ -95,10 +97,10 @@ class Diagnostics:
         message.header.stamp = to_time(simulation.stamp_ns)
         self._publisher.publish(message)
         self._last_overruns, self._last_refused, self._last_lost = pacer.overruns, refusals, counts_in.lost
-        self._last_guard_events = stepper.guard_events
+        self._last_guard_events = stepper.run.guard_events
 
     def _measured(self, run: str, tick: int, tick_s: float) -> float:
-        """Simulated seconds per wall second since the last message; 0 in the first one of a run."""
+        """Return the simulated seconds per wall second since the last message; 0 in the first one of a run."""
         now = time.monotonic()
         ticks = tick - self._last_tick if run == self._last_run else 0
         factor = ticks * tick_s / (now - self._last_wall)
@@ -106,12 +108,12 @@ class Diagnostics:
         return factor
 
 
-def _verdict(stepper: Stepper, overruns: int, refused: int, lost: int, noticed: int) -> tuple[bytes, str]:
-    if stepper.failure:
-        return DiagnosticStatus.ERROR, f"stopped: {stepper.failure}"
+def _verdict(stepper: Stepper, overruns: int, refused: int, lost: int, guard_events: int) -> tuple[bytes, str]:
+    if stepper.run.failure:
+        return DiagnosticStatus.ERROR, f"stopped: {stepper.run.failure}"
     warnings = [f"{overruns} overruns"] * bool(overruns) + [f"{refused} refused commands"] * bool(refused)
     warnings += [f"{lost} lost commands"] * bool(lost)
-    warnings += [f"{noticed} warnings of the guard"] * bool(noticed)
+    warnings += [f"{guard_events} warnings of the guard"] * bool(guard_events)
     if warnings:
         return DiagnosticStatus.WARN, f"{' and '.join(warnings)} since the last message"
-    return DiagnosticStatus.OK, State(stepper.state).name
+    return DiagnosticStatus.OK, SimulationState(stepper.run.state).name

@@ -1,4 +1,4 @@
-"""A ROS 2 domain of one's own, on this machine only: nothing else talks to the processes started in it."""
+"""Private ROS 2 domain on this machine: no other processes communicate with those started in it."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from conveyor_sim.errors import ConveyorError
 from conveyor_sim.support.file_lock import lock
 from conveyor_sim.support.resources import config_dir
 
-# Above 101 the UDP ports of a domain meet Linux's ephemeral ones; 0 is everybody's default.
+# Above 101, the UDP ports of a domain overlap the ephemeral ports of Linux; 0 is the default of all processes.
 _DOMAINS = range(101, 0, -1)
-# Where DDS finds the participants of a domain: 7400 + 250 domain + offset, two from 10 on for each participant
-# (DDSI-RTPS 9.6.1.1). The first participants may have left, so a few more are looked for.
+# Ports of the participants of a domain: 7400 + 250 domain + offset, two for each participant from 10 on
+# (DDSI-RTPS 9.6.1.1). More than one are checked, because the first participants may have left.
 _PORT_BASE, _PORT_STEP, _PORT_OFFSETS = 7400, 250, range(10, 50)
 
-# What a sourced ROS or a DDS set-up leaves behind and would change how the processes find each other.
+# Variables of a sourced ROS or a DDS set-up that would change how the processes find each other.
 _SCRUBBED = (
     "ROS_LOCALHOST_ONLY",
     "ROS_STATIC_PEERS",
@@ -36,10 +36,10 @@ _SCRUBBED = (
 
 @contextmanager
 def private_domain() -> Iterator[int]:
-    """Put this process's environment, and so its children's, into a ROS domain that nothing else on this machine uses.
+    """Set the environment of this process and its children to a ROS domain that is unused on this machine.
 
-    Nodes created meanwhile see each other, on this machine only. Yields the ROS_DOMAIN_ID; the environment is put back
-    at the end. Raises ConveyorError if every domain is taken.
+    Nodes created inside see each other, on this machine only. Yields the ROS_DOMAIN_ID. The environment is restored at
+    the end. Raises ConveyorError if every domain is taken.
     """
     with own_domain() as environment, in_environment(environment):
         yield int(environment["ROS_DOMAIN_ID"])
@@ -47,7 +47,7 @@ def private_domain() -> Iterator[int]:
 
 @contextmanager
 def own_domain() -> Iterator[dict[str, str]]:
-    """Hold such a domain, and leave this process's environment as it is; yields that of processes in the domain.
+    """Reserve a private domain, and yield the environment of processes in it. That of this process stays.
 
     Raises ConveyorError if every domain is taken.
     """
@@ -55,14 +55,14 @@ def own_domain() -> Iterator[dict[str, str]]:
         environment = {name: value for name, value in os.environ.items() if name not in _SCRUBBED}
         environment["ROS_DOMAIN_ID"] = str(domain)
         environment["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
-        # LOCALHOST alone keeps out only who does not name this machine as a peer.
+        # LOCALHOST alone does not exclude participants that list this machine as a peer.
         environment[_profile_variable()] = str(config_dir() / "ros" / "this_machine_only.xml")
         yield environment
 
 
 @contextmanager
 def in_environment(environment: Mapping[str, str]) -> Iterator[None]:
-    """Let this process's environment be another one; it is put back at the end."""
+    """Replace the environment of this process, and restore it at the end."""
     before = dict(os.environ)
     os.environ.clear()
     os.environ.update(environment)
@@ -74,7 +74,7 @@ def in_environment(environment: Mapping[str, str]) -> Iterator[None]:
 
 
 def _profile_variable() -> str:
-    """Fast DDS 3, in Kilted, warns of the name that Fast DDS 2, in Jazzy, knows alone."""
+    """Return the variable for the profile. Fast DDS 3 (Kilted) warns of the only name in Fast DDS 2 (Jazzy)."""
     rclpy = find_spec("rclpy")
     ros_libraries = Path(rclpy.origin).parents[3] if rclpy and rclpy.origin else Path()
     renamed = any(ros_libraries.glob("libfastdds.so*"))

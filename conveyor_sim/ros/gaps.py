@@ -1,8 +1,8 @@
-"""Messages that were sent and never came, from the numbers that DDS gives to each publisher's messages.
+"""`Gaps`: counts lost messages from the sequence numbers of DDS, which each publisher has.
 
-Fast DDS reports no message-lost event for what a full history drops, but its numbers have gaps there. rclpy gives the
-number without the publisher. With one publisher the count is exact, from the first message on that is received; with
-several, numbers are matched to publishers as they fit best, and a gap may be taken for a new publisher, once for each.
+Fast DDS reports no message-lost event for messages that a full history drops, but their numbers are missing. rclpy
+passes the number without the publisher. With one publisher, the count is exact from the first received message on. With
+several, numbers are assigned to the best fitting publisher, and a gap may look like a new publisher, once for each.
 """
 
 from __future__ import annotations
@@ -11,15 +11,15 @@ from collections.abc import Callable
 
 
 class Gaps:
-    """The numbers of one topic's messages, until all its publishers have left."""
+    """Sequence numbers of the messages of one topic, until all its publishers have left."""
 
     def __init__(self) -> None:
-        self._last: list[int] = []  # of each publisher heard of; the one heard of last is at the end
+        self._last: list[int] = []  # last number of each known publisher, the most recent one at the end
 
     def before(self, number: int | None, publishers: Callable[[], int]) -> int:
-        """How many messages are missing before one with this number (None where the middleware has none).
+        """Return the number of missing messages before a number (None if the middleware has no numbers).
 
-        publishers: how many there are now.
+        publishers: returns the present number of publishers.
         """
         if number is None:
             return 0
@@ -31,7 +31,7 @@ class Gaps:
         del self._last[: max(0, len(self._last) - present)]  # their publishers have left
         earlier = [last for last in self._last if last < number]
         if not earlier or len(self._last) < present:
-            self._last.append(number)  # the first one heard of a publisher
+            self._last.append(number)  # the first message of a publisher
             return 0
         self._last.remove(max(earlier))
         self._last.append(number)

@@ -1,14 +1,14 @@
-"""Warns of others on the ROS graph that mix with a simulation: of the same names, or with a clock of their own."""
+"""Warns of other nodes on the ROS graph with the names of a simulation, or with another clock."""
 
 from __future__ import annotations
 
 from rclpy.node import Node
 
-UNKNOWN = "_NODE_NAME_UNKNOWN_"  # of a publisher whose node has not been heard of yet
+UNKNOWN = "_NODE_NAME_UNKNOWN_"  # of a publisher whose node is not discovered yet
 
 
 class GraphWatch:
-    """Looks at what the middleware knows anyway: nothing is sent, and a look costs some microseconds."""
+    """Reads the graph that the middleware has discovered: nothing is sent, and it takes some microseconds."""
 
     def __init__(self, node: Node, clock: str | None) -> None:
         """clock: the topic on which `node` publishes simulated time; None: it does not."""
@@ -21,7 +21,7 @@ class GraphWatch:
         self._warned: list[str] = []
 
     def look(self) -> list[str]:
-        """A sentence for each thing that is wrong now; what is new is logged, and that all is well again."""
+        """Return a sentence per problem. New problems, and the end of all problems, are logged."""
         warnings = self._look()
         logger = self._node.get_logger()
         for text in warnings:
@@ -43,9 +43,9 @@ class GraphWatch:
         return warnings
 
     def _others(self, topic: str) -> list[str]:
-        """Who publishes a topic beside this node, by name."""
-        found = self._node.get_publishers_info_by_topic(topic)
-        names = [f"{one.node_namespace.rstrip('/')}/{one.node_name}" for one in found if one.node_name != UNKNOWN]
+        """Return the names of other nodes that publish a topic."""
+        publishers = self._node.get_publishers_info_by_topic(topic)
+        names = [f"{one.node_namespace.rstrip('/')}/{one.node_name}" for one in publishers if one.node_name != UNKNOWN]
         if self._name in names:
-            names.remove(self._name)  # once: what is left of that name is a namesake's
+            names.remove(self._name)  # once: any further one is another node of the same name
         return sorted(set(names))

@@ -1,7 +1,7 @@
-"""The thread that takes what comes for the line: commands and lockstep requests, none of which overtakes another.
+"""`Intake`: a thread that takes commands and lockstep requests for the line, in the order they were sent.
 
-DDS keeps the order of the messages of one topic only. But on one machine, what a process sent before a request has been
-received before it. So whoever has taken a request finds the commands sent before it, and hands them over first.
+DDS keeps the order of messages within one topic only. On one machine, messages sent by a process before a request have
+arrived before it. The thread therefore hands over all commands before a request that it has taken.
 """
 
 from __future__ import annotations
@@ -17,28 +17,29 @@ from conveyor_sim.ros.direct import WaitSet
 from conveyor_sim.ros.lockstep_service import LockstepService
 
 
-class Topic(Protocol):
+class TakenTopic(Protocol):
     """A subscription in the group `Aside`."""
 
     @property
-    def subscription(self) -> Subscription: ...
+    def subscription(self) -> Subscription:
+        """Subscription that the thread waits for."""
 
     def take_all(self) -> None:
-        """Hand over what has come."""
+        """Hand over the messages that have come."""
 
 
 class Intake:
-    """Runs from the start to close()."""
+    """Thread that runs until close()."""
 
     def __init__(
         self,
         context: Context,
         lockstep: LockstepService,
-        topics: Sequence[Topic] = (),
+        topics: Sequence[TakenTopic] = (),
         *,
         died: Callable[[Exception], None],
     ) -> None:
-        """`died` is called, from the thread, with an exception that ended it."""
+        """died: called by the thread with an exception that ended it."""
         self._lockstep = lockstep
         self._topics = topics
         self._died = died
@@ -50,7 +51,7 @@ class Intake:
         self._thread.start()
 
     def close(self) -> None:
-        """Return once nothing more is taken."""
+        """End the thread."""
         self._closing = True
         self._waiting.wake()
         self._thread.join()

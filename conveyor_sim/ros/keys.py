@@ -1,4 +1,4 @@
-"""Keys of a terminal, one by one as they are pressed."""
+"""`Keys`: keys of a terminal, as they are pressed."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ import tty
 from contextlib import AbstractContextManager
 
 NAMES = {b" ": "space", b"q": "q", b"\x1b[C": "right", b"\x1b[D": "left", b"\x1bOC": "right", b"\x1bOD": "left"}
-"""What a terminal sends for the keys that mean something (ECMA-48; arrows have two forms)."""
+"""Names of the used keys by their codes (ECMA-48; arrows have two forms)."""
 
 
 class Keys(AbstractContextManager["Keys"]):
-    """Reads a terminal without echo and without waiting for the end of a line; it is put back at the end."""
+    """Reads a terminal without echo and without waiting for the end of a line, until the context ends."""
 
     def __init__(self, terminal: int) -> None:
-        """`terminal`: its file descriptor."""
+        """terminal: file descriptor."""
         self._terminal = terminal
         self._before = termios.tcgetattr(terminal)
         self._typed = b""
         tty.setcbreak(terminal)  # Ctrl-C still interrupts
 
     def read(self, patience: float) -> list[str]:
-        """Names of the keys pressed until now, awaited for `patience` (s) at most; keys without a name are dropped."""
+        """Return the names of the keys pressed so far, after at most `patience` (s). Other keys are dropped."""
         if not select.select([self._terminal], [], [], patience)[0]:
             self._typed = b""
             return []
@@ -45,15 +45,15 @@ class Keys(AbstractContextManager["Keys"]):
 
 
 def _begins_a_key(typed: bytes) -> bool:
-    """Whether more must come before it is known which key this is."""
+    """Return True if the code of the key is not complete."""
     return any(code != typed and code.startswith(typed) for code in NAMES)
 
 
 def readable(terminal: int) -> bool:
-    """Whether it is a terminal whose keys are this process's to read: a job in the background would be stopped."""
+    """Return True for a terminal that this process may read. A job in the background would be stopped."""
     if not os.isatty(terminal):
         return False
     try:
         return os.tcgetpgrp(terminal) == os.getpgrp()
-    except OSError:  # of no session of ours: there are no jobs
+    except OSError:  # not the terminal of our session, so there are no jobs
         return True

@@ -1,4 +1,4 @@
-"""The controller's end of the service `lockstep`: one thread asks, and waits for the answer itself."""
+"""`LockstepClient`: client of the service `lockstep`, whose thread waits for the answer itself."""
 
 from __future__ import annotations
 
@@ -15,27 +15,27 @@ from conveyor_sim.ros.publishers import ros_qos
 
 
 class LockstepClient:
-    """For one thread."""
+    """Client for one thread."""
 
     def __init__(self, node: Node) -> None:
         self._client = node.create_client(Lockstep, "lockstep", qos_profile=ros_qos(ANSWERS), callback_group=Aside())
         self._waiting = WaitSet(node.context, clients=[self._client])
 
     def close(self) -> None:
-        """Ask no more."""
+        """Release the client."""
         self._waiting.close()
 
     def is_ready(self) -> bool:
-        """Whether the service has been found."""
+        """Return True if the service is available."""
         ready: bool = self._client.service_is_ready()
         return ready
 
     def send(self, request: Any) -> int:
-        """Ask; the number that the answer will have."""
+        """Send a request. Return the number of its answer."""
         return send_request(self._client, request)
 
     def response(self, numbers: Set[int], seconds: float) -> Any:
-        """The answer to one of the requests with these numbers, None if it does not come within so many seconds."""
+        """Return the answer to a request with one of these numbers; None if none comes within `seconds`."""
         until = time.monotonic() + seconds
         while (left := until - time.monotonic()) > 0.0:
             self._waiting.wait(left)

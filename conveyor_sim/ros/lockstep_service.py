@@ -1,4 +1,4 @@
-"""The service `lockstep`: conveyor_msgs/srv/Lockstep to the protocol of lockstep.py and back."""
+"""Service `lockstep`: translates conveyor_msgs/srv/Lockstep for run/lockstep.py."""
 
 from __future__ import annotations
 
@@ -27,34 +27,35 @@ from conveyor_sim.simulation import Simulation
 T = TypeVar("T")
 
 MOST_WAITING = 100
-"""Requests that wait for an answer at once; one controller has one, sent again a few times."""
+"""Requests that may wait for an answer at once. One controller has one, repeated a few times."""
 
 
 class Stepped(Protocol):
     """A simulation that one thread steps."""
 
     @property
-    def simulation(self) -> Simulation: ...
+    def simulation(self) -> Simulation:
+        """Simulation of the present run."""
 
     @property
     def run_id(self) -> str:
-        """Of the present run, as in `line`."""
+        """ID of the present run, as in `line`."""
 
     def call(self, function: Callable[[], T]) -> Future[T]:
-        """From any thread: have a function called in that thread, between two ticks."""
+        """Queue a function for the stepping thread, between two ticks. Any thread may call this."""
 
     def advance_lockstep(self, request: LockstepRequest) -> Future[LockstepAnswer]:
-        """In that thread: advance as a controller asks. Raises Refused."""
+        """Advance as a controller requests. Called in the stepping thread. Raises Refused."""
 
     def present(self) -> LockstepAnswer:
-        """In that thread: what the simulation is now, without outcomes."""
+        """Return the present state, without command results. Called in the stepping thread."""
 
 
 class LockstepService:
-    """Serves one controller's scans: requests are taken by one thread (intake.py), answered by the one that steps."""
+    """Serves the scans of one controller. The thread of intake.py takes requests; the stepping thread answers them."""
 
     def __init__(self, node: Node, stepper: Stepped, frame_id: str, *, died: Callable[[Exception], None]) -> None:
-        """`died` is called, from the stepping thread, if an answer can't be sent."""
+        """died: called by the stepping thread if an answer can't be sent."""
         self._stepper = stepper
         self._frame_id = frame_id
         self._died = died
@@ -65,12 +66,12 @@ class LockstepService:
         )
 
     def take(self) -> tuple[Any, Any] | None:
-        """The next request and the header of its answer; None if there is none."""
+        """Return the next request and the header of its answer; None if there is none."""
         return take_request(self.service)
 
     def serve(self, request: Any, header: Any) -> None:
-        """Have the stepping thread carry out a request, and answer it when that is done."""
-        asked = LockstepRequest(
+        """Pass a request to the stepping thread, which answers it when its target is reached."""
+        wanted = LockstepRequest(
             request.run_id,
             request.target_tick,
             tuple(request.names),
@@ -90,8 +91,8 @@ class LockstepService:
 
         def advance() -> None:
             try:
-                self._stepper.advance_lockstep(asked).add_done_callback(answer)
-            except Refused as error:  # answered with what is now, which only the stepping thread may look at
+                self._stepper.advance_lockstep(wanted).add_done_callback(answer)
+            except Refused as error:  # answered with the present state, which only the stepping thread may read
                 self._answer(self._filled(self._stepper.present(), str(error)), header)
 
         def answer(advanced: Future[LockstepAnswer]) -> None:
@@ -99,9 +100,9 @@ class LockstepService:
             if error is None:
                 self._answer(self._filled(advanced.result()), header)
             else:
-                given_up(error)
+                refuse(error)
 
-        def given_up(error: BaseException) -> None:
+        def refuse(error: BaseException) -> None:
             if isinstance(error, ConveyorError):
                 self._answer(self._now(str(error)), header)
             else:
@@ -109,7 +110,7 @@ class LockstepService:
 
         def called(call: Future[None]) -> None:
             if error := call.exception():
-                given_up(error)
+                refuse(error)
 
         self._stepper.call(advance).add_done_callback(called)
 
@@ -121,11 +122,11 @@ class LockstepService:
     def _send(self, response: Any, header: Any) -> None:
         try:
             self.service.send_response(response, header)
-        except Exception as error:  # rclpy's errors have no common base; a future would swallow them
+        except Exception as error:  # errors of rclpy have no common base, and a future would hide them
             self._died(error)
 
     def _now(self, reason: str) -> Any:
-        """From any thread: a refusal without signals."""
+        """Return a refusal without signals. Any thread may call this."""
         response = Lockstep.Response()
         response.reason = reason
         response.sim_run_id = self._stepper.run_id
@@ -137,7 +138,7 @@ class LockstepService:
         response = Lockstep.Response()
         response.accepted = not reason
         response.reason = reason
-        response.sim_run_id = answer.sim_run_id  # not that of now: it may have been reset since
+        response.sim_run_id = answer.sim_run_id  # not the present run: there may have been a reset since
         response.tick = answer.tick
         response.time = to_time(answer.stamp_ns)
         response.signals.header.stamp = response.time
@@ -154,7 +155,7 @@ class LockstepService:
 
 
 def _never(_: Any, response: Any) -> Any:
-    """No executor takes requests of a service that is aside."""
+    """Return the response unchanged. Never called, because no executor reads services in the group Aside."""
     return response
 
 
@@ -176,5 +177,5 @@ def _outcome(outcome: CommandOutcome, tick_ns: int, frame_id: str) -> OutcomeMes
 
 
 def _doubles(values: npt.NDArray[np.float64]) -> array.array[float]:
-    """As rclpy takes them fastest."""
+    """Return values in the form that rclpy converts fastest."""
     return array.array("d", values.tobytes())

@@ -1,4 +1,4 @@
-"""The main job (`make run`): the node and its controller as two processes in lockstep, recorded and drawn."""
+"""Main job (`make run`): the node and its controller as two processes in lockstep, recorded and drawn."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ with while_importing():
     from conveyor_sim.support.resources import scene_path
     from conveyor_sim.support.stop_request import StopRequest
 
-LOOK = 0.05  # s of wall time between two looks at the processes
+LOOK = 0.05  # s of wall time between two checks of the processes
 CONTROLLER = {"controller": "conveyor_sim.control.level:table_level", "scan_ticks": 10}
 CONTROLLED = ("feeder", "table")  # belts that it commands
-PATIENCE = 3.0  # s of wall time to wait for the node's last diagnostics, sent once a second
+PATIENCE = 3.0  # s of wall time to wait for the last diagnostics of the node, which come once per second
 
 
 def run_in_lockstep(
@@ -42,11 +42,11 @@ def run_in_lockstep(
     outside_tables: bool = False,
     started: Callable[[], None] = lambda: None,
 ) -> float | None:
-    """Run node and controller to the end of `duration` (s; None: the scene's), recorded to `bag`.
+    """Run node and controller to the end of `duration` (s; None: that of the scene), and record to `bag`.
 
     started: called once the first tick has passed.
-    Returns the wall time in s from the first tick to the last, if the node could tell it.
-    Raises ConveyorError if one of them ends before that, or on Ctrl-C or SIGTERM. Either way nothing is left running.
+    Returns the wall time from the first tick to the last (s), if the node reported it.
+    Raises ConveyorError if one of them ends earlier, or on Ctrl-C or SIGTERM. All processes are ended in any case.
     """
     file = scene_path(scene_name).resolve()
     scene = load_scene(file, {"duration": duration} if duration is not None else None, outside_tables)
@@ -104,17 +104,17 @@ def run_in_lockstep(
 
 
 def _compiling(scene: Scene) -> str:
-    """What is said if the run does not begin soon."""
-    # Imported not before: the processes that have been started need as much, and all three would wait for one.
+    """Return the sentence for a run that does not begin soon."""
+    # Imported late: the processes that have been started import the same, and all three would slow each other.
     with collected_later():
-        import conveyor_sim.report.report  # noqa: F401  # for the end
+        import conveyor_sim.report.report  # noqa: F401  # used at the end
         from conveyor_sim.run.compilation import time_to_compile
 
     return time_to_compile(scene)
 
 
 def _keep_logs(logs: Path, bag: Path) -> None:
-    """Beside the recording, if there is one."""
+    """Copy the logs to the recording, if there is one."""
     if bag.is_dir():
         (bag / "logs").mkdir(exist_ok=True)
         for log in logs.glob("*.log"):
@@ -125,13 +125,13 @@ def _keep_logs(logs: Path, bag: Path) -> None:
 @one_line()
 @click.argument("scene", default="paper_plant")
 @click.option("--out", type=click.Path(path_type=Path), help="Folder to record to (default: runs/<UTC time>).")
-@click.option("--duration", type=float, help="Simulated time in s, instead of the scene's.")
-@click.option("--outside-tables", is_flag=True, help="Let SCENE name tables (CSV) that lie outside its own folder.")
+@click.option("--duration", type=float, help="Simulated time in s, instead of that of the scene.")
+@click.option("--outside-tables", is_flag=True, help="Let SCENE refer to tables (CSV) outside its folder.")
 def main(scene: str, out: Path | None, duration: float | None, outside_tables: bool) -> None:
-    """Run SCENE as a ROS 2 node with a controller as a second one, in lockstep; record, sum up and draw it."""
+    """Run SCENE as a ROS 2 node in lockstep with a controller node; record, summarize and draw it."""
     try:
         with run_folder(out) as bag, Drawing() as drawing:
-            # Ready not before the start: the processes that start keep all cores busy.
+            # Drawing gets ready after the start, because starting processes keep all cores busy.
             wall = run_in_lockstep(scene, bag, duration, outside_tables, drawing.get_ready)
             from conveyor_sim.report.report import report
 

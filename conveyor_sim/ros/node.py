@@ -1,4 +1,4 @@
-"""The node `conveyor_sim`: wires parameters, topics and services to the stepper. What happens is decided there."""
+"""Node `conveyor_sim`: connects parameters, topics and services to the stepper, which makes all decisions."""
 
 from __future__ import annotations
 
@@ -22,38 +22,37 @@ from conveyor_sim.ros.clock import ClockPublisher
 from conveyor_sim.ros.commands import subscribe_commands
 from conveyor_sim.ros.context import new_node, one_sentence
 from conveyor_sim.ros.diagnostics import Diagnostics
-from conveyor_sim.ros.fault_service import FaultService
 from conveyor_sim.ros.graph_watch import GraphWatch
+from conveyor_sim.ros.input_services import InputServices
 from conveyor_sim.ros.intake import Intake
 from conveyor_sim.ros.lockstep_service import LockstepService
-from conveyor_sim.ros.operate_service import OperateService
 from conveyor_sim.ros.publishers import RosSink
 from conveyor_sim.ros.services import Services
 from conveyor_sim.ros.spinner import Spinner
 from conveyor_sim.run.compilation import Cancelled, Compilation
 from conveyor_sim.run.pacing import RateCap
-from conveyor_sim.run.session import Session
+from conveyor_sim.run.session import RunSession
 from conveyor_sim.run.stepper import Stepper
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.resources import scene_path
 
-REPORT = 10.0  # s of wall time between two words about what is being compiled
+REPORT = 10.0  # s of wall time between two reports on compiling
 
 
 class SimNode:
-    """The node, with the threads that run it: one spins the executor, one takes commands and scans, one steps.
+    """The node with its threads: one spins the executor, one takes commands and scans, one steps.
 
-    Another gets the kernels first, which may have to be compiled. Until they are there the node answers for its
-    parameters and its state; /clock, messages and all that is done with a run come when it starts.
+    Another thread first loads or compiles the kernels. Until then, the node serves its parameters and its state.
+    /clock, messages and the services of a run start with the run.
     """
 
     def __init__(
         self, on_stop: Callable[[], None], *, context: Context | None = None, arguments: Sequence[str] | None = None
     ) -> None:
-        """`on_stop` is called, from any thread, when the node wants to end; close() must follow.
+        """on_stop: called by any thread when the node must end; close() must follow.
 
-        Raises ConveyorError if a parameter, the scene, the message package or the record path won't do.
+        Raises ConveyorError for an invalid parameter, scene, message package or record path.
         """
         self.error: Exception | None = None
         self._on_stop = on_stop
@@ -72,7 +71,7 @@ class SimNode:
         self._starter.start()
 
     def close(self) -> None:
-        """End orderly: the tick under way is finished, the recording completed. What is being compiled is given up."""
+        """Finish the present tick, and complete the recording. Compiling is cancelled."""
         self._compilation.cancel()
         self._starter.join()
         if self._stepper is not None:
@@ -83,17 +82,19 @@ class SimNode:
         self._node.destroy_node()
 
     def _prepare(self) -> None:
-        """All that can be found wrong before anything is compiled. Raises ConveyorError."""
+        """Check parameters, scene and types before compiling. Raise ConveyorError."""
         node, executor = self._node, self._spinner.executor
-        self._given = parameters.declare(node)
+        values = self._parameters = parameters.declare(node)
         self._distro = default_distro()
-        self._scene = load_scene(scene_path(self._given.scene), self._given.overrides(), self._given.outside_tables)
-        if self._given.record is not None:
-            require_recordable(self._given.record)
+        self._scene = load_scene(
+            scene_path(self._parameters.scene), self._parameters.overrides(), self._parameters.outside_tables
+        )
+        if values.record is not None:
+            require_recordable(values.record)
         own = {name: row for name, row in OUTPUTS.items() if not row.by_controller}
         topics = {**own, **photo_eye_topics(self._scene.photo_eyes)}
-        with one_sentence():  # names may have been remapped to one that is taken
-            self._sink = RosSink(node, self._distro, {"markers": RateCap(self._given.marker_rate)}, topics)
+        with one_sentence():  # two names may have been remapped to the same one
+            self._sink = RosSink(node, self._distro, {"markers": RateCap(self._parameters.marker_rate)}, topics)
         self._compilation = Compilation(self._scene, node.get_logger().info)
         self._reports = node.create_timer(REPORT, self._report, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
@@ -103,47 +104,46 @@ class SimNode:
         self._services = Services(node, executor, waiting_for=lambda: self._compilation.progress, quit_soon=quit_soon)
 
     def _start(self) -> None:
-        """Get the kernels, and have the run started by the thread of the executor, whose callbacks it adds to."""
+        """Load the kernels, then start the run in the thread of the executor, which gets further callbacks."""
         try:
             self._compilation.run()
             self._spinner.call(self._run).result()
-        except (Cancelled, CancelledError):  # the latter: the executor has ended, and said why
+        except (Cancelled, CancelledError):  # CancelledError: the executor has ended, and reported why
             pass
         except Exception as error:
             self._die(error)
 
     def _run(self) -> None:
-        """Open the first run, offer what can be done with it, and let it go. Raises ConveyorError."""
-        node, executor, given, sink = self._node, self._spinner.executor, self._given, self._sink
+        """Open the first run, create its services, and start it. Raise ConveyorError."""
+        node, executor, values, sink = self._node, self._spinner.executor, self._parameters, self._sink
         node.destroy_timer(self._reports)
-        clock = ClockPublisher(node, given.clock_rate) if given.publish_clock else None
+        clock = ClockPublisher(node, values.clock_rate) if values.publish_clock else None
 
-        scene, threads = self._scene, given.threads or None
+        scene, threads = self._scene, values.threads or None
 
-        def open_session(runs: int, loaded: Simulation | None) -> Session:
+        def open_session(runs: int, loaded: Simulation | None) -> RunSession:
             simulation = loaded or Simulation(scene, threads)
-            return Session(simulation, sink, bag_folder(given.record, runs), given.frame_id, self._distro)
+            return RunSession(simulation, sink, bag_folder(values.record, runs), values.frame_id, self._distro)
 
         def read_checkpoint(path: Path) -> Simulation:
-            return Simulation.load(path, threads, scene, given.checkpoint_folder)
+            return Simulation.load(path, threads, scene, values.checkpoint_folder)
 
         stepper = self._stepper = Stepper(
             open_session,
-            real_time_factor=float(node.get_parameter("real_time_factor").value),  # it may have been set meanwhile
-            playing=not given.start_paused,
-            lockstep_max_ticks=given.lockstep_max_ticks,
+            real_time_factor=float(node.get_parameter("real_time_factor").value),  # it may have been changed meanwhile
+            playing=not values.start_paused,
+            lockstep_max_ticks=values.lockstep_max_ticks,
             beat=clock.beat if clock else lambda stamp_ns, now: None,
-            ended=lambda: executor.create_task(diagnostics.publish),  # nobody has to wait for the next second
+            ended=lambda: executor.create_task(diagnostics.publish),  # without waiting for the next second
             died=self._die,
             log=node.get_logger(),
         )
         with one_sentence():
             commands = subscribe_commands(node, stepper)
             self._services.serve(stepper)
-            CheckpointServices(node, executor, stepper, given.checkpoint_folder, read_checkpoint)
-            FaultService(node, executor, stepper)
-            OperateService(node, executor, stepper)
-            lockstep = LockstepService(node, stepper, given.frame_id, died=self._die)
+            CheckpointServices(node, executor, stepper, values.checkpoint_folder, read_checkpoint)
+            InputServices(node, executor, stepper)
+            lockstep = LockstepService(node, stepper, values.frame_id, died=self._die)
             self._intake = Intake(node.context, lockstep, commands, died=self._die)
             diagnostics = Diagnostics(node, stepper, sink, GraphWatch(node, clock.topic if clock else None))
 
@@ -165,7 +165,7 @@ class SimNode:
 
 
 def _greeting(stepper: Stepper) -> str:
-    session = stepper.session
+    session = stepper.run.session
     model = session.simulation.model
     bag = f", recorded to {session.bag}" if session.bag else ""
-    return f"scene {model.name}, run {session.run_id}, {stepper.state.name}, {setting_line(model)}{bag}"
+    return f"scene {model.name}, run {session.run_id}, {stepper.run.state.name}, {setting_line(model)}{bag}"

@@ -1,4 +1,4 @@
-"""`NodeSource`: a line that a node simulates, heard of by its topics, as a tag source."""
+"""`NodeSource`: a line that a node simulates, as a tag source, by the topics of the node."""
 
 from __future__ import annotations
 
@@ -28,20 +28,20 @@ from conveyor_sim.ros.spinner import Spinner
 from conveyor_sim.support.printable import SENTENCE, printable
 
 LOOK = 1.0
-"""s of wall time between two requests for a sign of life."""
+"""Time between two checks that the node is alive, s of wall time."""
 
 SILENCE = 5.0
-"""s of wall time without one after which what is shown is stale."""
+"""Time without an answer after which the shown line is stale, s of wall time."""
 
 
 class NodeSource(LineMirror, AbstractContextManager["NodeSource"]):
-    """Listens from its start until close(). The node may come, go and come back meanwhile."""
+    """Subscribes until close(). The node may start, end and restart meanwhile."""
 
     controls: frozenset[Control] = frozenset({"pause", "resume", "step", "reset"})
 
     def __init__(self, say: Callable[[str], object], namespace: str = "", drawn: bool = False) -> None:
-        """say: called with a sentence for people, by a thread of this source. namespace: of the node.
-        drawn: whether a page shows it, for which the node has more to publish.
+        """say: called with a sentence for the user, by a thread of this source. namespace: namespace of the node.
+        drawn: True if a page shows the line, for which the node publishes more topics.
 
         Raises ConveyorError if ROS can't start.
         """
@@ -73,48 +73,48 @@ class NodeSource(LineMirror, AbstractContextManager["NodeSource"]):
                 "reset": self._node.create_client(srv.ResetSimulation, "reset_simulation"),
             }
         self._lock = threading.Lock()
-        self._asked: dict[Future, Any] = {}  # with their clients
+        self._asked: dict[Future, Any] = {}  # requests without an answer, with their clients
         self._refusals: deque[Event] = deque(maxlen=MOST_WAITING)
         self._alive = self._heard = 0.0  # s of wall time
         self._sign: Future | None = None
-        self._why = ""  # it can't be shown although it is there
-        self._told = ""
+        self._why = ""  # reason why the line can't be shown although the node runs
+        self._reported = ""
         self._waiting = WaitSet(self._context, subscriptions=list(self._topics.values()))
         self._spinner.start(self._node)
         self._thread = threading.Thread(target=self._listen, name="node", daemon=True)
         self._thread.start()
 
-    def give(self, given: Input) -> str:
-        """Have an input judged and applied as the next tick begins. Why it can't wait for that, "" if it does.
+    def give(self, command: Input) -> str:
+        """Send an input to the node, which applies it as the next tick begins. Return why it was not sent, or "".
 
-        What the node refuses is among the events.
+        Refusals by the node are events.
         """
-        if reason := self._objection(given):
+        if reason := self._objection(command):
             return reason
 
         def answered(future: Future) -> None:
             answer = self._answer(future)
             if answer is not None and not answer.accepted:
-                name = given.names[0] if given.names else given.operation
-                value = given.values[0] if given.values else 0.0
+                name = command.names[0] if command.names else command.operation
+                value = command.values[0] if command.values else 0.0
                 self._refusals.append(Event(int(answer.tick), "command_refused", name, -1, value, answer.reason))
                 self._waiting.wake()
 
         request = srv.Operate.Request(
-            writer=given.writer,
-            writer_kind=given.writer_kind,
-            operation=given.operation,
-            names=given.names,
-            values=[float(value) for value in given.values],
-            texts=given.texts,
+            writer=command.writer,
+            writer_kind=command.writer_kind,
+            operation=command.operation,
+            names=command.names,
+            values=[float(value) for value in command.values],
+            texts=command.texts,
         )
         return self._ask(self._operate, request, answered)
 
     def control(self, what: Control, value: float, by: str) -> str:
-        """Ask something of the run, in the name of somebody. Why that can't be, "" if it will be done."""
+        """Request an action of the run. by: name of the user. Return why it is refused, or ""."""
         if what not in self.controls:
             return f"{what}: expected one of {', '.join(sorted(self.controls))} of a node"
-        if reason := self.shown.lost:
+        if reason := self.snapshot.lost:
             return reason
         if what == "step" and not (1.0 <= value < 2**32 and float(value).is_integer()):
             return f"step: {value:g} given, expected a whole number of ticks of at least 1"
@@ -128,7 +128,7 @@ class NodeSource(LineMirror, AbstractContextManager["NodeSource"]):
                 reason = "" if answer.success else answer.message
             else:
                 reason = answer.result.error_message
-            self._say(f"{what}, asked for by {by}" + (f", refused: {reason}" if reason else ""))
+            self._say(f"{what}, requested by {by}" + (f", refused: {reason}" if reason else ""))
 
         request = client.srv_type.Request()
         if what == "step":
@@ -136,7 +136,7 @@ class NodeSource(LineMirror, AbstractContextManager["NodeSource"]):
         return self._ask(client, request, answered)
 
     def close(self) -> None:
-        """Listen no longer."""
+        """End the subscriptions and the node."""
         self._closing = True
         self._waiting.wake()
         self._thread.join()
@@ -158,12 +158,10 @@ class NodeSource(LineMirror, AbstractContextManager["NodeSource"]):
         return ""
 
     def _answer(self, future: Future) -> Any:
-        """What was answered; None: nothing was, and nothing will be."""
+        """Return the answer; None if there will be none."""
         with self._lock:
             self._asked.pop(future, None)
         return None if future.cancelled() or future.exception() else future.result()
-
-    # The thread that listens
 
     def _listen(self) -> None:
         looked = 0.0
@@ -174,7 +172,7 @@ class NodeSource(LineMirror, AbstractContextManager["NodeSource"]):
                 if self._take_all():
                     self._heard, self._why = now, ""
                     self.show()
-            except Exception as error:  # of a node of another version, its messages may be anything
+            except Exception as error:  # messages of a node of another version may have any content
                 text = str(error) if isinstance(error, ConveyorError) else f"{type(error).__name__}: {error}"
                 self._why = printable(text, SENTENCE)
             if now > looked + LOOK:
@@ -184,7 +182,7 @@ class NodeSource(LineMirror, AbstractContextManager["NodeSource"]):
                 self._lose(self._why)
 
     def _take_all(self) -> bool:
-        """Take what has come; whether there was anything. Raises LineMirrorError."""
+        """Take the messages that have come. Return True if there were any. Raise LineMirrorError."""
         came, strange = False, None
         for name, subscription in self._topics.items():
             taken = []
@@ -208,7 +206,7 @@ class NodeSource(LineMirror, AbstractContextManager["NodeSource"]):
         return came
 
     def _look(self, now: float) -> None:
-        """Is it still there?"""
+        """Check that the node still runs."""
         if (sign := self._sign) is not None:
             if sign.done():
                 self._alive = now
@@ -221,13 +219,13 @@ class NodeSource(LineMirror, AbstractContextManager["NodeSource"]):
         self._sign = self._alive_client.call_async(srv.GetSimulationState.Request())
         if now > max(self._alive, self._heard) + SILENCE:
             self._lose(f"nothing was heard of the node for {SILENCE:g} s")
-        elif self.shown.lost and not self._why and now < self._alive + LOOK:
-            self.show()  # it stands, and shows nothing new
+        elif self.snapshot.lost and not self._why and now < self._alive + LOOK:
+            self.show()  # the simulation stands still, without new messages
 
     def _lose(self, reason: str) -> None:
-        if self._told != reason and not self.shown.lost:
+        if self._reported != reason and not self.snapshot.lost:
             self._say(reason)
-        self._told = reason
+        self._reported = reason
         self.lose(reason)
         with self._lock:
             asked, self._asked = self._asked, {}

@@ -1,4 +1,4 @@
-"""Watches a simulation from another process: how far it is (/clock), and how long it took (/diagnostics)."""
+"""`Observer`: follows a simulation in another process: its time (/clock) and wall time (/diagnostics)."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from conveyor_sim.ros.context import new_node, start_ros
 from conveyor_sim.ros.publishers import ros_qos
 
 TICK, WALL = "tick", "wall time from first to last tick (s)"
-"""Keys in /diagnostics."""
-START = 1e-6  # s, between the stamps of tick 0 and of any other
+"""Keys of /diagnostics."""
+START = 1e-6  # s, between the stamps of tick 0 and tick 1
 
 
 class Observer(AbstractContextManager["Observer"]):
-    """A node in the ROS domain that the environment names, for as long as the context lasts."""
+    """A node in the ROS domain of the environment, until the context ends."""
 
     def __init__(self, last_tick: int) -> None:
-        """`last_tick`: at which the run ends."""
+        """last_tick: tick at which the run ends."""
         self.time = 0.0  # s, simulated
         self.wall: float | None = None  # s from the first tick to the last one, once that has passed
         self._last_tick = last_tick
@@ -38,11 +38,11 @@ class Observer(AbstractContextManager["Observer"]):
 
     @property
     def started(self) -> bool:
-        """Whether the first tick has passed."""
+        """True once the first tick has passed."""
         return self.time > START
 
     def wait(self, seconds: float) -> None:
-        """Let so much wall time pass, listening."""
+        """Receive messages for `seconds` of wall time."""
         end = time.monotonic() + seconds
         while (left := end - time.monotonic()) > 0.0:
             self._executor.spin_once(timeout_sec=left)

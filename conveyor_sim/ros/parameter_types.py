@@ -1,4 +1,4 @@
-"""Parameters of a type that ROS does not have: refused. rclpy raises for them in its callback, which ends the node."""
+"""Refuses parameters of types unknown to ROS, for which the callback of rclpy raises and ends the node."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ LAST = ParameterType.PARAMETER_STRING_ARRAY
 
 
 def refuse_unknown_types(node: Node) -> None:
-    """Look at each request to set parameters of a node before rclpy does; one that is refused sets nothing."""
+    """Check each request to set parameters of a node before rclpy. A refused request sets nothing."""
     for service in node.services:
         if service.srv_type in (SetParameters, SetParametersAtomically):
             service.callback = _checked(service.callback)
@@ -23,11 +23,11 @@ def refuse_unknown_types(node: Node) -> None:
 
 def _checked(answer: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
     def checked(request: Any, response: Any) -> Any:
-        given = next((one for one in request.parameters if one.value.type > LAST), None)
-        if given is None:
+        unknown = next((one for one in request.parameters if one.value.type > LAST), None)
+        if unknown is None:
             return answer(request, response)
         expected = f"expected 0 to {LAST} (rcl_interfaces/ParameterType)"
-        text = f"{printable(given.name)}: type {given.value.type} given, {expected}"
+        text = f"{printable(unknown.name)}: type {unknown.value.type} given, {expected}"
         refusal = SetParametersResult(successful=False, reason=text)
         if isinstance(response, SetParametersAtomically.Response):
             response.result = refusal

@@ -1,4 +1,4 @@
-"""The parameters of the node `conveyor_sim`."""
+"""Parameters of the node `conveyor_sim`."""
 
 from __future__ import annotations
 
@@ -10,44 +10,46 @@ from typing import Any
 from rclpy.node import Node
 
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.ros.declared import Entry, declare_table
+from conveyor_sim.ros.declared import DeclaredParameter, declare_table
 
-_RATE_TEXT = "Hz of simulated time; -1: as the scene says, 0: never. Must divide the tick rate."
+_RATE_TEXT = "Hz of simulated time; -1: that of the scene, 0: never. Must divide the tick rate."
 RATES = ("bottles", "poses", "contacts", "belts", "signals", "ledger", "damage", "counters")
 
 TABLE = (
-    Entry("scene", "paper_plant", "Scene file, or the name of a shipped scene."),
-    Entry("duration", 0.0, "s of simulated time at which the run ends; 0: as the scene says.", 0.0, 1e9),
-    Entry("start_paused", False, "Wait at tick 0 for resume, step_simulation, set_simulation_state or lockstep."),
-    Entry(
+    DeclaredParameter("scene", "paper_plant", "Scene file, or the name of a shipped scene."),
+    DeclaredParameter("duration", 0.0, "s of simulated time at which the run ends; 0: that of the scene.", 0.0, 1e9),
+    DeclaredParameter(
+        "start_paused", False, "Wait at tick 0 for resume, step_simulation, set_simulation_state, lockstep."
+    ),
+    DeclaredParameter(
         "real_time_factor",
         1.0,
-        "Simulated seconds per wall second; 0: as fast as possible, for recording and lockstep, not for controllers "
-        "that run free.",
+        "Simulated seconds per wall second; 0: as fast as possible, for recording and lockstep, not for free "
+        "controllers.",
         0.0,
         1e6,
         fixed=False,
     ),
-    Entry("outside_tables", False, "Whether the scene may name tables that lie outside its own folder."),
-    Entry(
+    DeclaredParameter("outside_tables", False, "Whether the scene may refer to tables outside its folder."),
+    DeclaredParameter(
         "checkpoint_folder",
         "checkpoints",
-        "Folder that save_checkpoint and load_checkpoint keep to, made when first needed; empty text: both refuse.",
+        "Folder of save_checkpoint and load_checkpoint, made when first needed; empty text: both refuse.",
     ),
-    Entry("record", "", "Folder of the rosbag2 recording, new or empty; empty text: do not record."),
-    Entry("frame_id", "world", "Frame of all positions, in every header."),
-    Entry("publish_clock", True, "Whether /clock is published."),
-    Entry("clock_rate", 100.0, "At most so many /clock messages per wall second.", 1.0, 1e4),
-    Entry("marker_rate", 30.0, "At most so many markers per wall second; recordings are not thinned.", 1.0, 1e4),
-    Entry("threads", 0, "Threads to step with; 0: as many as prove fastest.", 0, 1024),
-    Entry("lockstep_max_ticks", 100_000, "Longest advance, in ticks, that a lockstep request may ask for.", 1, 10**9),
-    *(Entry(f"rates.{name}", -1.0, f"Rate of {name}: {_RATE_TEXT}", -1.0, 1e6) for name in RATES),
+    DeclaredParameter("record", "", "Folder of the rosbag2 recording, new or empty; empty text: do not record."),
+    DeclaredParameter("frame_id", "world", "Frame of all positions, in every header."),
+    DeclaredParameter("publish_clock", True, "Whether /clock is published."),
+    DeclaredParameter("clock_rate", 100.0, "Largest number of /clock messages per wall second.", 1.0, 1e4),
+    DeclaredParameter("marker_rate", 30.0, "Largest number of markers per wall second; recordings have all.", 1.0, 1e4),
+    DeclaredParameter("threads", 0, "Number of threads that step; 0: the fastest number.", 0, 1024),
+    DeclaredParameter("lockstep_max_ticks", 100_000, "Longest advance of one lockstep request, in ticks.", 1, 10**9),
+    *(DeclaredParameter(f"rates.{name}", -1.0, f"Rate of {name}: {_RATE_TEXT}", -1.0, 1e6) for name in RATES),
 )
 
 
 @dataclass(frozen=True)
 class Parameters:
-    """The values at start."""
+    """Values at the start."""
 
     scene: str
     duration: float
@@ -65,7 +67,7 @@ class Parameters:
     rates: Mapping[str, float]
 
     def overrides(self) -> dict[str, Any]:
-        """What is merged over the scene file, so that the recording can tell it to a replay."""
+        """Return the overrides of the scene file, which the recording stores for a replay."""
         changed: dict[str, Any] = {}
         if self.duration > 0.0:
             changed["duration"] = self.duration
@@ -76,7 +78,7 @@ class Parameters:
 
 
 def declare(node: Node) -> Parameters:
-    """Declare all of TABLE on `node`. Raises ConveyorError for a value that can't be."""
+    """Declare all parameters of TABLE on `node`. Raise ConveyorError for an invalid value."""
     values = declare_table(node, TABLE)
     rates = {name: values.pop(f"rates.{name}") for name in RATES}
     record, checkpoints = values.pop("record"), values.pop("checkpoint_folder")
@@ -92,4 +94,4 @@ def _folder(text: str) -> Path:
     try:
         return Path(text).expanduser()
     except RuntimeError:
-        raise ConveyorError(f"parameter: {text!r} given, expected the home of a user that is there") from None
+        raise ConveyorError(f"parameter: {text!r} given, expected the home of an existing user") from None

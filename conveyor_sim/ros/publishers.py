@@ -1,4 +1,4 @@
-"""The node's side of the outputs: a Sink that publishes the bytes that are also recorded."""
+"""`RosSink`: publishes outputs with the same bytes that are recorded."""
 
 from __future__ import annotations
 
@@ -20,12 +20,14 @@ from conveyor_sim.errors import ConveyorError
 from conveyor_sim.run.pacing import RateCap
 
 NO_EVENTS = PublisherEventCallbacks(use_default_callbacks=False)
-"""An executor asks about each event of each publisher whenever it waits: a third of a lockstep scan. The subscriber,
-which has the same event, logs that the two do not fit."""
+"""Callbacks for publishers: none, because an executor checks each event of each publisher at each wait.
+
+That would take a third of a lockstep scan. The subscriber has the same event, and logs incompatible QoS.
+"""
 
 
 def ros_qos(qos: Qos) -> QoSProfile:
-    """rclpy's profile for one of ours."""
+    """Return the profile of rclpy for one of ours."""
     return QoSProfile(
         depth=qos.depth,
         reliability=ReliabilityPolicy[qos.reliability.upper()],
@@ -34,21 +36,21 @@ def ros_qos(qos: Qos) -> QoSProfile:
 
 
 def message_class(name: str) -> Any:
-    """The class of a message type such as "std_msgs/msg/Float64"."""
+    """Return the class of a message type such as "std_msgs/msg/Float64"."""
     package, kind, short_name = name.split("/")
     return getattr(import_module(f"{package}.{kind}"), short_name)
 
 
 class RosSink:
-    """Publishes what a subscriber wants, thinned in wall time where `caps` says so.
+    """Publishes topics with subscribers, limited in wall time by `caps`.
 
-    Written to by the stepping thread; `published` may be read by any.
+    The stepping thread writes. Any thread may read `published`.
     """
 
     def __init__(self, node: Node, distro: str, caps: Mapping[str, RateCap], topics: Mapping[str, Topic]) -> None:
-        """Creates a publisher for each topic, by name.
+        """Create a publisher for each topic, by name.
 
-        Raises ConveyorError if ROS knows a message type by another definition than the one serialized here.
+        Raises ConveyorError if the installed definition of a message type differs from the one serialized here.
         """
         self.published: Counter[str] = Counter()
         self._caps = caps
@@ -62,7 +64,7 @@ class RosSink:
             self._publishers[name] = publisher
 
     def wants(self, topic: str) -> bool:
-        """Latched topics always: whoever subscribes later still gets them."""
+        """Return True for latched topics, which late subscribers receive, and for topics with subscribers."""
         if topic in self._latched:
             return True
         if not self._publishers[topic].get_subscription_count():
@@ -79,10 +81,10 @@ class RosSink:
 
 
 def check_type(node: Node, topic: str, type_name: str, distro: str) -> None:
-    """Raises ConveyorError unless the type that `node` publishes on `topic` hashes as the definition used here.
+    """Raise ConveyorError unless the type that `node` publishes on `topic` has the hash of the definition used here.
 
-    Serialized bytes are published unchecked, so a message package built from other definitions would only show as
-    garbage at the subscribers.
+    Serialized bytes are published without checks. With a message package of other definitions, subscribers would
+    receive garbage.
     """
     ours = type_hash(type_name, distro)
     for theirs in published_hashes(node, topic):
@@ -94,7 +96,7 @@ def check_type(node: Node, topic: str, type_name: str, distro: str) -> None:
 
 
 def published_hashes(node: Node, topic: str) -> list[str]:
-    """RIHS01 hashes of the types that `node` publishes on `topic`: one for each of its publishers."""
+    """Return the RIHS01 hashes of the types that `node` publishes on `topic`, one per publisher."""
     own = (node.get_name(), node.get_namespace())
     endpoints = node.get_publishers_info_by_topic(topic)
     return [str(one.topic_type_hash) for one in endpoints if (one.node_name, one.node_namespace) == own]

@@ -1,4 +1,4 @@
-"""`conveyor-sim replay --publish`: plays a recording to its end, with a bar and keys where there is a terminal."""
+"""`conveyor-sim replay --publish`: plays a recording to its end, with a progress bar and keys on a terminal."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from conveyor_sim.support.progress import ProgressBar
 from conveyor_sim.support.stop_request import StopRequest
 
 TERMINAL = 0  # the standard input
-LOOK = 0.1  # s of wall time between two looks at the keys
+LOOK = 0.1  # longest wait for a key, s of wall time
 JUMPS = {"left": -5.0, "right": 5.0}  # s of the recording
 
 
 def publish_bag(path: Path, rate: float, start: float | None, paused: bool, arguments: Sequence[str]) -> None:
-    """Publish a bag over ROS until its end, Ctrl-C, SIGTERM or the key q; `arguments`: ROS's own (`--ros-args ...`).
+    """Publish a bag over ROS until its end, Ctrl-C, SIGTERM or the key q. arguments: of ROS (`--ros-args ...`).
 
     Raises ConveyorError if it can't be played back.
     """
@@ -45,7 +45,7 @@ def publish_bag(path: Path, rate: float, start: float | None, paused: bool, argu
 
 
 def _watch(node: ReplayNode, path: Path, stop: StopRequest, keys: Keys) -> None:
-    """Until the end or the key q."""
+    """Show progress and handle keys until the end or the key q."""
     player = node.player
     with ProgressBar(f"replay {path}", player.span[1], counted="s") as bar:
         while not stop.requested:

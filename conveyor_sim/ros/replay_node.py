@@ -1,10 +1,9 @@
-"""The node `conveyor_replay`: publishes a recording as a live node would; answers `pause`, `resume` and `seek`."""
+"""Node `conveyor_replay`: publishes a recording like a live node, and serves `pause`, `resume` and `seek`."""
 
 from __future__ import annotations
 
 import threading
 import time
-from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from typing import Any, TypeVar
@@ -26,20 +25,20 @@ from conveyor_sim.ros.graph_watch import GraphWatch
 from conveyor_sim.ros.publishers import message_class, published_hashes, ros_qos
 from conveyor_sim.ros.services import settled
 from conveyor_sim.ros.spinner import Spinner
-from conveyor_sim.run.lockstep import Refused
-from conveyor_sim.run.playback import Message, Playback, Topic
+from conveyor_sim.run.calls import CallQueue
+from conveyor_sim.run.playback import Playback, PlayedMessage, PlayedTopic
 from conveyor_sim.run.player import Player
 from conveyor_sim.support.printable import printable
 
 T = TypeVar("T")
 
-CLOCK_RATE = 100.0  # messages a wall second at most, as the live node's default
-LOOK = 1.0  # s of wall time between two looks at who else is there
-LAST_WORDS = 1.0  # s of wall time that reliable subscribers have to receive the last messages
+CLOCK_RATE = 100.0  # largest number of messages per wall second, as by default in the live node
+LOOK = 1.0  # s of wall time between two checks of the ROS graph
+LAST_WORDS = 1.0  # longest wait for reliable subscribers to receive the last messages, s of wall time
 
 
 class ReplayNode:
-    """The node, with the two threads that run it: one spins the executor, one plays."""
+    """The node with its two threads: one spins the executor, one plays."""
 
     def __init__(
         self,
@@ -52,16 +51,14 @@ class ReplayNode:
         context: Context | None = None,
         arguments: Sequence[str] = (),
     ) -> None:
-        """`rate`: recorded seconds per wall second, 0 for as fast as possible. `start`: s; None: the recording's start.
+        """rate: recorded seconds per wall second, 0 for as fast as possible. start: s; None: start of the recording.
 
-        `on_end` is called, from any thread, when the recording has been played or can't go on; close() must follow.
-        Raises ConveyorError if the bag can't be played back, or holds nothing that can.
+        on_end: called by any thread when the recording has been played or can't go on; close() must follow.
+        Raises ConveyorError if the bag, or all of its topics, can't be played back.
         """
         self.error: Exception | None = None
         self._on_end = on_end
-        self._calls: deque[Callable[[], None]] = deque()
-        self._wake = threading.Condition()
-        self._quit = False
+        self._calls = CallQueue("the recording has been played")
         playback = Playback(bag)
         self._spinner = Spinner(context, died=self._die)
         self._node = new_node(
@@ -76,7 +73,7 @@ class ReplayNode:
             self._node.destroy_node()
             raise
         watch = GraphWatch(self._node, clock.topic)
-        # A steady clock: with use_sim_time the node's own would stand still while paused.
+        # A steady clock, because with use_sim_time the clock of the node stands still while paused.
         self._node.create_timer(LOOK, watch.look, clock=Clock(clock_type=ClockType.STEADY_TIME))
         group = ReentrantCallbackGroup()
         self._node.create_service(Trigger, "pause", self._pause, callback_group=group)
@@ -87,10 +84,8 @@ class ReplayNode:
         self._thread.start()
 
     def close(self) -> None:
-        """End between two ticks; what was published is given time to arrive."""
-        with self._wake:
-            self._quit = True
-            self._wake.notify()
+        """End between two ticks, and wait until published messages have arrived."""
+        self._calls.end()
         self._thread.join()
         end = time.monotonic() + LAST_WORDS
         for publisher in self._publishers.values():
@@ -99,25 +94,11 @@ class ReplayNode:
         self._node.destroy_node()
 
     def call(self, function: Callable[[], T]) -> Future[T]:
-        """From any thread: have `function` called between two ticks; Refused, in the future, once playing has ended."""
-        future: Future[T] = Future()
+        """Call `function` between two ticks. The future raises Refused once playing has ended. For any thread."""
+        return self._calls.request(function)
 
-        def run() -> None:
-            try:
-                future.set_result(function())
-            except Exception as error:
-                future.set_exception(error)
-
-        with self._wake:
-            if self._quit:
-                future.set_exception(Refused("the recording has been played"))
-            else:
-                self._calls.append(run)
-                self._wake.notify()
-        return future
-
-    def _advertise(self, bag: Bag, topics: Sequence[Topic]) -> dict[str, Publisher]:
-        """A publisher for each topic of which this ROS has the recorded type; it warns of the others."""
+    def _advertise(self, bag: Bag, topics: Sequence[PlayedTopic]) -> dict[str, Publisher]:
+        """Create a publisher for each topic whose recorded type is installed. Log a warning for each other topic."""
         publishers = {}
         for topic in topics:
             try:
@@ -127,7 +108,7 @@ class ReplayNode:
                 self._node.get_logger().warning(f"{left_out}: left out, {kind_name} is not installed here")
                 continue
             publisher = self._node.create_publisher(kind, topic.name, ros_qos(topic.qos))
-            # Bytes are published as they were recorded: of another definition they would be garbage.
+            # Bytes are published as recorded. With another definition, they would be garbage.
             if topic.type_hash and topic.type_hash not in published_hashes(self._node, publisher.topic_name):
                 self._node.destroy_publisher(publisher)
                 self._node.get_logger().warning(
@@ -139,7 +120,7 @@ class ReplayNode:
             raise BagError(f"{bag.path}: no topic of a type that is installed here, expected at least one")
         return publishers
 
-    def _publish(self, message: Message) -> None:
+    def _publish(self, message: PlayedMessage) -> None:
         if publisher := self._publishers.get(message.topic):
             publisher.publish(message.data)
 
@@ -147,30 +128,24 @@ class ReplayNode:
         try:
             self._loop()
             time.sleep(1.0 / CLOCK_RATE)
-            self.player.step(time.monotonic())  # the end's time, where /clock's cap has held it back
+            self.player.step(
+                time.monotonic()
+            )  # publishes the final time, which the rate limit of /clock may have held back
         except Exception as error:
             self._die(error)
         else:
             self._on_end()
         finally:
-            with self._wake:
-                self._quit = True
-            self._take_calls()
+            self._calls.end()
+            self._calls.drain()
 
     def _loop(self) -> None:
-        while not self._quit:
-            self._take_calls()
+        while not self._calls.ended:
+            self._calls.take()
             wait = self.player.step(time.monotonic())
             if self.player.ended and not self.player.paused:
                 return
-            if wait > 0.0:
-                with self._wake:
-                    if not self._calls and not self._quit:
-                        self._wake.wait(wait)
-
-    def _take_calls(self) -> None:
-        while self._calls:
-            self._calls.popleft()()
+            self._calls.wait(wait)
 
     def _die(self, error: Exception) -> None:
         self.error = error

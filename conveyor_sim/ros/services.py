@@ -1,8 +1,8 @@
-"""Services with simulation_interfaces' names and meaning, plus pause and resume.
+"""Services with the names and meaning of simulation_interfaces, plus pause and resume.
 
-Each is served with conveyor_msgs' own type, and beside it, under `simulation_interfaces/`, with the real type where
-that package is installed: a service's type must not depend on what is installed. The two kinds of types have the same
-fields, so one handler serves both.
+Each service has the type of conveyor_msgs. If simulation_interfaces is installed, the service exists with the type of
+that package as well, under `simulation_interfaces/`. The type of a service therefore does not depend on installed
+packages. Both types have the same fields, so one handler serves both.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from std_srvs.srv import Trigger
 from conveyor_sim import __version__
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.run.lockstep import Refused
-from conveyor_sim.run.run_state import State
+from conveyor_sim.run.run_state import SimulationState
 from conveyor_sim.run.stepper import Stepper
 
 T = TypeVar("T")
@@ -39,18 +39,18 @@ SCOPE_DEFAULT, SCOPE_TIME, SCOPE_STATE = 0, 1, 2
 
 PREFIX = "simulation_interfaces/"
 PROMPT = 0.001
-"""s of wall time that the executor waits for an answer itself: most come sooner than it could be woken for them."""
+"""Time that the executor waits for an answer itself, s of wall time. Most answers take less than waking it."""
 
 
 async def settled(executor: Executor, future: Future[T]) -> T:
-    """Result of a future that another thread sets, awaited in a callback of `executor`."""
+    """Return the result of a future that another thread sets. Awaited in a callback of `executor`."""
     if wait([future], PROMPT).done:
         return future.result()
     arrived = RosFuture(executor=executor)
 
     def wake(_: Future[T]) -> None:
         arrived.set_result(None)
-        executor.wake()  # it would sleep on otherwise: nothing else wakes it when the callback can go on
+        executor.wake()  # nothing else wakes the executor when the callback can go on
 
     future.add_done_callback(wake)
     await arrived
@@ -58,19 +58,19 @@ async def settled(executor: Executor, future: Future[T]) -> T:
 
 
 class Services:
-    """Answers requests by asking the stepper. Before there is one: what the simulator is, and that it is STOPPED."""
+    """Answers requests through the stepper. Without one, it reports its features and the state STOPPED."""
 
     def __init__(
         self, node: Node, executor: Executor, *, waiting_for: Callable[[], str], quit_soon: Callable[[], None]
     ) -> None:
-        """`waiting_for`: why there is no run yet. `quit_soon`: ends the node once the answer has been sent."""
+        """waiting_for: returns why there is no run yet. quit_soon: ends the node once the answer has been sent."""
         self._node = node
         self._executor = executor
         self._waiting_for = waiting_for
         self._quit_soon = quit_soon
         self._quitting = False
         self._stepper: Stepper | None = None
-        # Reentrant: a service that waits for its ticks must not hold up the others.
+        # Reentrant, because a service that waits for ticks must not block the others.
         self._group = ReentrantCallbackGroup()
         self._real_srv = _real_types()
         self._create("GetSimulatorFeatures", self._get_features)
@@ -78,7 +78,7 @@ class Services:
         self._create("SetSimulationState", self._set_state)
 
     def serve(self, stepper: Stepper) -> None:
-        """There is a run: offer what can be done with it, too."""
+        """Create the services of a run."""
         self._stepper = stepper
         self._create("StepSimulation", self._step)
         self._create("ResetSimulation", self._reset)
@@ -95,7 +95,7 @@ class Services:
 
     @property
     def _run(self) -> Stepper:
-        """What steps the run. Raises Refused if there is none yet."""
+        """Stepper of the run. Raises Refused if there is no run yet."""
         if self._stepper is None:
             raise Refused(f"{self._waiting_for()}; expected once get_simulation_state answers PAUSED or PLAYING")
         return self._stepper
@@ -104,36 +104,40 @@ class Services:
         return await settled(self._executor, self._run.call(function))
 
     def _get_features(self, _: Any, response: Any) -> Any:
-        # conveyor_msgs' response is flat; the real one keeps its fields in `features`.
+        # The response of conveyor_msgs is flat; that of simulation_interfaces has the fields in `features`.
         features = response if isinstance(response, own_srv.GetSimulatorFeatures.Response) else response.features
         features.features = FEATURES
         features.custom_info = f"conveyor_sim {__version__}; also offers lockstep and checkpoints, see docs/ros.md"
         return response
 
     def _get_state(self, _: Any, response: Any) -> Any:
-        state = State.STOPPED if self._stepper is None else self._stepper.state
-        response.state.state = int(State.QUITTING if self._quitting else state)
+        state = SimulationState.STOPPED if self._stepper is None else self._stepper.run.state
+        response.state.state = int(SimulationState.QUITTING if self._quitting else state)
         return _set(response, OK, self._waiting_for() if self._stepper is None else "")
 
     async def _set_state(self, request: Any, response: Any) -> Any:
         wanted = request.state.state
-        if wanted == State.QUITTING:
+        if wanted == SimulationState.QUITTING:
             self._quitting = True
             if self._stepper is not None:
-                self._stepper.state = State.QUITTING
+                self._stepper.run.state = SimulationState.QUITTING
             self._quit_soon()
             return _set(response, OK)
         try:
             stepper = self._run
         except Refused as error:
             return _set(response, INCORRECT_STATE, str(error))
-        actions = {State.STOPPED: stepper.stop, State.PLAYING: stepper.play, State.PAUSED: stepper.pause}
+        actions = {
+            SimulationState.STOPPED: stepper.stop,
+            SimulationState.PLAYING: stepper.play,
+            SimulationState.PAUSED: stepper.pause,
+        }
         if wanted not in actions:
             text = f"state: {wanted} given, expected STOPPED (0), PLAYING (1), PAUSED (2) or QUITTING (3)"
             return _set(response, UNSUPPORTED, text)
-        if wanted == stepper.state:
-            return _set(response, ALREADY_IN_TARGET_STATE, f"the simulation is {State(wanted).name} already")
-        return await self._carry_out(response, self._ask(actions[State(wanted)]), STATE_TRANSITION_ERROR)
+        if wanted == stepper.run.state:
+            return _set(response, ALREADY_IN_TARGET_STATE, f"the simulation is {SimulationState(wanted).name} already")
+        return await self._carry_out(response, self._ask(actions[SimulationState(wanted)]), STATE_TRANSITION_ERROR)
 
     async def _step(self, request: Any, response: Any) -> Any:
         async def step() -> None:

@@ -17,7 +17,7 @@ with while_importing():
 
 
 def main() -> None:
-    """Exits with 0 after an orderly end, with 1 and one sentence if the node can't start or go on."""
+    """Exit with 0 after an orderly end, with 1 and one sentence if the node can't start or go on."""
     with StopRequest() as stop:
         try:
             start_ros()

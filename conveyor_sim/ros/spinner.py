@@ -1,4 +1,4 @@
-"""A SingleThreadedExecutor in a thread of its own, with an orderly end."""
+"""`Spinner`: a SingleThreadedExecutor in a thread, with an orderly end."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
+from conveyor_sim.run.calls import settle
+
 T = TypeVar("T")
 
 
@@ -18,7 +20,7 @@ class Spinner:
     """Runs the callbacks of one node from start() to close()."""
 
     def __init__(self, context: Context | None = None, died: Callable[[Exception], None] | None = None) -> None:
-        """`died` is called, from the thread, with the exception of a callback that ended it."""
+        """died: called by the thread with the exception of a callback that ended it."""
         self.executor = SingleThreadedExecutor(context=context)
         self._died = died
         self._closing = threading.Event()
@@ -26,20 +28,17 @@ class Spinner:
         self._thread = threading.Thread(target=self._spin, name="executor", daemon=True)
 
     def start(self, node: Node) -> None:
-        """Begin to run the callbacks of `node`."""
+        """Start to run the callbacks of `node`."""
         self.executor.add_node(node)
         self._thread.start()
 
     def call(self, function: Callable[[], T]) -> Future[T]:
-        """From any other thread: have `function` called between two callbacks; cancelled if that thread has ended."""
+        """Call `function` between two callbacks. The future is cancelled if the thread has ended. For other threads."""
         future: Future[T] = Future()
 
         def run() -> None:
             if future.set_running_or_notify_cancel():
-                try:
-                    future.set_result(function())
-                except Exception as error:
-                    future.set_exception(error)
+                settle(future, function)
 
         self._calls.append(future)
         self.executor.create_task(run)
@@ -48,8 +47,8 @@ class Spinner:
         return future
 
     def close(self) -> None:
-        """Return once the callback under way has ended and none will follow."""
-        # Not Executor.shutdown() yet: it takes away what the thread uses. And a task: wake() does not end spin_once.
+        """End the thread after the present callback."""
+        # Not Executor.shutdown() yet: it destroys objects that the thread uses. wake() does not end spin_once.
         self._closing.set()
         self.executor.create_task(lambda: None)
         if self._thread.is_alive():

@@ -1,4 +1,4 @@
-"""The topic `variables`: those of a controller's variables that are to be recorded, after each of its scans."""
+"""Topic `variables`: the recorded variables of a controller, after each of its scans."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from conveyor_sim.ros.clock import to_time
 from conveyor_sim.ros.publishers import ros_qos
 
 
-class Variables:
-    """Publishes them, from the first scan on at which there are any."""
+class VariablePublisher:
+    """Publishes variables. The publisher is created at the first scan with variables."""
 
     def __init__(self, node: Node) -> None:
         self._node = node
         self._publisher: Publisher | None = None
 
-    def tell(self, names: Sequence[str], values: Sequence[float], tick: int, stamp_ns: int) -> None:
-        """What they are after the scan at a tick; stamp_ns: its simulated time."""
+    def publish(self, names: Sequence[str], values: Sequence[float], tick: int, stamp_ns: int) -> None:
+        """Publish the values after the scan at a tick. stamp_ns: simulated time of the scan."""
         if not names:
             return
         if self._publisher is None:

@@ -1,4 +1,4 @@
-"""Functions that other threads want called by the stepping thread, between two ticks, in the order of their arrival."""
+"""Functions of other threads, called by the stepping thread between two ticks in the order of their arrival."""
 
 from __future__ import annotations
 
@@ -12,59 +12,74 @@ from conveyor_sim.run.lockstep import Refused
 
 T = TypeVar("T")
 MOST_CALLS = 100
-"""Requests that may wait for their answers at once; a reset that records takes 0.1 s of the stepping thread."""
+"""Requests that may wait for their answers at once. A reset of a run that is recorded takes 0.1 s."""
 
 
-class Calls:
-    """A queue that the stepping thread empties; all but `take` and `wait` may be called by any thread."""
+class CallQueue:
+    """Queue of functions. Any thread may call its methods, but `take` and `wait` are for the stepping thread."""
 
-    def __init__(self) -> None:
+    def __init__(self, end: str = "the thread has ended") -> None:
+        """end: why calls after the end are refused."""
+        self._end = end
         self.ended = False
-        """Whether the stepping thread is to end."""
+        """True once the stepping thread must end."""
         self._waiting: deque[Callable[[], None]] = deque()
-        self._requests = 0  # of those that wait, the ones that came by `request`
+        self._requests = 0  # number of waiting functions that came by `request`
         self._wake = threading.Condition()
 
     def request(self, function: Callable[[], T]) -> Future[T]:
-        """Have a function called, and get what it returns; Refused, in the future, if too many wait already."""
+        """Queue a function. Return a future of its result, or of Refused if too many wait, or after the end."""
         future: Future[T] = Future()
-        with self._wake:
-            full = self._requests >= MOST_CALLS
-            self._requests += not full
-        if full:
-            future.set_exception(Refused(f"{MOST_CALLS} requests wait for their answers already, expected fewer"))
-            return future
 
         def run() -> None:
             with self._wake:
                 self._requests -= 1
-            try:
-                future.set_result(function())
-            except Exception as error:
-                future.set_exception(error)
+            settle(future, function)
 
-        self.put(run)
+        with self._wake:
+            reason = self._end if self.ended else ""
+            if self._requests >= MOST_CALLS:
+                reason = f"{MOST_CALLS} requests wait for their answers already, expected fewer"
+            if not reason:
+                self._requests += 1
+                self._waiting.append(run)
+                self._wake.notify()
+        if reason:
+            future.set_exception(Refused(reason))
         return future
 
     def put(self, function: Callable[[], None]) -> None:
-        """Have a function called that answers nobody."""
+        """Queue a function without a result."""
         with self._wake:
             self._waiting.append(function)
             self._wake.notify()
 
     def end(self) -> None:
-        """Have the stepping thread end after what it is at."""
+        """End the stepping thread after the function that it is in."""
         with self._wake:
             self.ended = True
             self._wake.notify()
 
     def take(self) -> None:
-        """Call all that wait, until the end."""
+        """Call all functions that wait, until `end` is called."""
         while self._waiting and not self.ended:
             self._waiting.popleft()()
 
+    def drain(self) -> None:
+        """Call all functions that wait at the end."""
+        while self._waiting:
+            self._waiting.popleft()()
+
     def wait(self, seconds: float) -> None:
-        """Until something comes, or so long."""
+        """Block until a function arrives or `seconds` have passed."""
         with self._wake:
             if not self._waiting and not self.ended:
                 self._wake.wait(seconds)
+
+
+def settle(future: Future[T], function: Callable[[], T]) -> None:
+    """Set the result of a future to that of a function, or to its exception."""
+    try:
+        future.set_result(function())
+    except Exception as error:
+        future.set_exception(error)

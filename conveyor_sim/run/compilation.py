@@ -1,7 +1,7 @@
-"""The kernels of a scene, compiled by a process of its own.
+"""`Compilation`: a child process compiles the kernels of a scene.
 
-The compiler can't be interrupted, and it holds up every other thread. A process can be ended at any time; it leaves its
-kernels in the cache, from which this process loads them in less than a second.
+The compiler can't be interrupted, and it blocks every other thread. A process can be ended at any time. Its kernels
+stay in the cache, from which this process loads them in less than a second.
 """
 
 from __future__ import annotations
@@ -26,29 +26,32 @@ from conveyor_sim.support.child_process import die_with_parent, pipes_of_child, 
 from conveyor_sim.support.garbage import collected_later
 
 BASE_SECONDS, EFFECT_SECONDS = 3.0, 0.75
-"""s of a core to compile, and for each effect that is on: a fit to scenes of 5 to 14 effects, measured in 2026."""
+"""Core time to compile the kernels without effects, and per enabled effect, s.
 
-# As it ends, Python looks through all objects for garbage: numba's are so many that it takes half a second.
+Fitted in 2026 to scenes with 5 to 14 effects.
+"""
+
+# Python collects garbage as it ends. With the many objects of numba, that would take half a second.
 atexit.register(gc.freeze)
 
 
 def compile_kernels(scene: Scene) -> None:
-    """Have numba compile the kernels that a scene needs, or read them from its cache; nothing of it stays but that."""
+    """Compile the kernels that a scene needs, or read them from the cache, by one tick of a simulation."""
     rehearsal = Simulation(scene)
     rehearsal.advance(1)
     rehearsal.bottles()
     rehearsal.contacts()
     rehearsal.ledger()
     rehearsal.signals()
-    rehearsal.rehearse()
+    rehearsal.line.rehearse()
 
 
 class Cancelled(Exception):
-    """The kernels are not wanted any more."""
+    """Raised when the kernels are no longer needed."""
 
 
 def seconds_to_compile(model: Model) -> float:
-    """How long compiling will take, roughly, s of wall time; longer where other processes want the cores."""
+    """Return the approximate time to compile, s of wall time, including the load by other processes."""
     cores = len(os.sched_getaffinity(0))
     crowd = max(1.0, (os.getloadavg()[0] + 1.0) / cores)
     return crowd * (BASE_SECONDS + EFFECT_SECONDS * sum(effect.on for effect in model.effects))
@@ -61,15 +64,15 @@ def time_to_compile(scene: Scene) -> str:
 
 def compiling(seconds: float) -> str:
     """Return one sentence about kernels that take `seconds` to compile."""
-    kept = "" if KERNELS.path is None else "; the next start finds them in the cache"
-    return f"compiling the kernels for this kind of scene, about {seconds:.0f} s{kept}"
+    cached = "" if KERNELS.path is None else "; the next start finds them in the cache"
+    return f"compiling the kernels for this kind of scene, about {seconds:.0f} s{cached}"
 
 
 class Compilation:
-    """Gets the kernels that a scene needs into this process: from the cache, or else compiled."""
+    """Brings the kernels that a scene needs into this process: from the cache, or compiled by a child process."""
 
     def __init__(self, scene: Scene, say: Callable[[str], object]) -> None:
-        """say: called with a sentence if something has to be compiled."""
+        """say: called with a sentence if kernels must be compiled."""
         self._scene = scene
         self._say = say
         self._lock = threading.Lock()
@@ -80,15 +83,15 @@ class Compilation:
 
     @property
     def progress(self) -> str:
-        """What is under way."""
+        """Present activity, in words."""
         if not self._compiles:
             return "loading the kernels"
         return f"compiling the kernels, {time.monotonic() - self._began:.0f} s of about {self._expected:.0f} s"
 
     def run(self) -> None:
-        """Return once the kernels are here; interrupted by Ctrl-C in the main thread within a moment.
+        """Return once this process has the kernels. Ctrl-C in the main thread interrupts it within a moment.
 
-        Raises Cancelled, and SimulationError if the scene does not get through its first tick.
+        Raises Cancelled, and SimulationError if the first tick of the scene fails.
         """
         KERNELS.before_read = self._require_wanted
         try:
@@ -104,7 +107,7 @@ class Compilation:
             KERNELS.received.clear()
 
     def cancel(self) -> None:
-        """From any thread: have run() end within a moment."""
+        """End `run` within a moment. Any thread may call this."""
         with self._lock:
             self._cancelled = True
             if self._process is not None:
@@ -115,7 +118,7 @@ class Compilation:
             raise Cancelled
 
     def _load(self) -> bool:
-        """Take the kernels from the cache, if all are there."""
+        """Load the kernels from the cache. Return False if the cache lacks one."""
         try:
             with cached_only(), collected_later():
                 compile_kernels(self._scene)
@@ -124,7 +127,7 @@ class Compilation:
         return True
 
     def _compile_aside(self) -> None:
-        """Have the kernels compiled; what goes wrong in that is found again by compiling in this process."""
+        """Compile the kernels in a child process. Its errors are ignored: compiling in this process reports them."""
         pipe, its_pipe = Pipe()
         with pipe:
             with its_pipe, self._lock:
@@ -147,7 +150,7 @@ class Compilation:
 
 
 def main() -> None:
-    """Compile for the parent: a scene comes through the pipe; kernels that can't be cached go back."""
+    """Compile for the parent: receive a scene through the pipe, and send back kernels that can't be cached."""
     die_with_parent()
     (pipe,) = pipes_of_child()
     try:

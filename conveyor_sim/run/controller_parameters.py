@@ -1,4 +1,4 @@
-"""The parameters of a controller as somebody names them: a mapping in YAML, or a file that holds it."""
+"""Parameters of a controller, from YAML text or a file."""
 
 from __future__ import annotations
 
@@ -10,19 +10,22 @@ from conveyor_sim.support.files import MB, FileError, read_file
 
 SUFFIXES = (".yaml", ".yml", ".json")
 MOST = 8 * MB
-"""Bytes of a file."""
+"""Largest file, bytes."""
 
 
-def controller_parameters(given: str, option: str) -> dict[str, object]:
-    """By name; "" is none. option: what it is called where it was given. Raises ConveyorError."""
-    text, name = given, option
-    if given.endswith(SUFFIXES):
-        name = given
+def controller_parameters(value: str, option: str) -> dict[str, object]:
+    """Return parameters by name from a YAML mapping or the path of a file that holds one; {} for "".
+
+    option: name of the option or parameter that held the value, for errors. Raises ConveyorError.
+    """
+    text, name = value, option
+    if value.endswith(SUFFIXES):
+        name = value
         try:
-            text = read_file(Path(given), MOST).decode("utf-8-sig")
+            text = read_file(Path(value), MOST).decode("utf-8-sig")
         except (FileError, UnicodeDecodeError) as error:
-            raise ConveyorError(f"{option}: {given}: {error}, expected a mapping in YAML") from error
+            raise ConveyorError(f"{option}: {value}: {error}, expected a mapping in YAML") from error
     data = Document(text, name).data if text.strip() else {}
     if not isinstance(data, dict):
-        raise ConveyorError(f"{name}: {given!r:.200} given, expected a mapping in YAML, or a .yaml file that holds one")
+        raise ConveyorError(f"{name}: {value!r:.200} given, expected a mapping in YAML, or a .yaml file that holds one")
     return data

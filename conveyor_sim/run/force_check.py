@@ -1,4 +1,4 @@
-"""What a run reached, against what its predicted error rests on: forces up to those that were expected."""
+"""Forces reached in a run, compared with the forces that its time step and predicted error assume."""
 
 from __future__ import annotations
 
@@ -13,33 +13,33 @@ from conveyor_sim.physics.timestep.prediction import percent
 from conveyor_sim.simulation import Simulation
 
 WINDOW = 1.0
-"""s, over which loads are means: no impact lasts so long."""
+"""Time over which loads are averaged, s. Impacts are much shorter."""
 
 HARDER = 1.05
-"""Times the expected force that is still as expected: damping may add to the peak of an impact."""
+"""Tolerated ratio of reached to expected force, because damping may add to the peak of an impact."""
 
 
 @dataclass(frozen=True)
 class ForceCheck:
-    """The largest normal contact force of a run, and what it says."""
+    """Largest normal contact force of a run, compared with the expected force."""
 
     peak_force: float
     """N"""
     expected_force: float
-    """N, that the bounds on the time step and the predicted error rest on."""
+    """Force that the bounds on the time step and the predicted error assume, N."""
     expected_of: str
-    """What presses so."""
+    """Cause of the expected force, in words."""
     overlap: float
-    """At most so much of the smaller bottle's diameter, by the elastic laws of the contacts that there are."""
+    """Largest overlap over the smaller diameter at the peak force, by the elastic laws of the contacts."""
 
     @property
     def as_expected(self) -> bool:
-        """Whether the force stayed below what the prediction rests on."""
+        """True if the force stayed within the expected one, with the tolerance HARDER."""
         return self.peak_force <= HARDER * self.expected_force
 
     @property
     def sentence(self) -> str:
-        """All of it."""
+        """Result, in words."""
         expected = f"the {self.expected_force:.3g} N that the predicted error rests on ({self.expected_of})"
         verdict = f"within {expected}" if self.as_expected else f"more than {expected}, which may be exceeded, too"
         return (
@@ -50,22 +50,23 @@ class ForceCheck:
 
 @dataclass(frozen=True)
 class Pressed:
-    """What pressed on a bottle for long, against the load that explicit friction in contacts is stable at."""
+    """Largest lasting load on a bottle, compared with the load at which explicit contact friction is stable."""
 
     load: float
-    """N, half of the normal forces on a bottle, as two contacts share them in a file; mean over WINDOW."""
+    """Half of the sum of normal forces on a bottle, as two contacts share it in a row; mean over WINDOW, N."""
     expected: float
     """N"""
     expected_of: str
+    """Cause of the expected load, in words."""
 
     @property
     def as_expected(self) -> bool:
-        """Whether the load stayed below what the bound on the time step rests on."""
+        """True if the load stayed within the expected one."""
         return self.load <= self.expected
 
     @property
     def sentence(self) -> str:
-        """All of it."""
+        """Result, in words."""
         bound = f"the {self.expected:.3g} N that friction in contacts is stable at ({self.expected_of})"
         pressed = f"pressed for {WINDOW:g} s with at most {self.load:.3g} N"
         if self.as_expected:
@@ -76,17 +77,17 @@ class Pressed:
 
 
 class PressWatch:
-    """What pressed for long, from the impulses that bottles had from one output to the next."""
+    """Measures lasting loads, from the impulses on bottles between two outputs."""
 
     def __init__(self) -> None:
         self.load: float | None = None
-        """N, as in `Pressed`; None before the first WINDOW has passed, or where impulses are not known."""
+        """Largest load as in `Pressed`, N; None before the first WINDOW has passed, or without impulses."""
         self._began: float | None = None
         self._ids: list[NDArray[np.uint64]] = []
         self._impulses: list[NDArray[np.float64]] = []
 
     def take(self, time: float, ids: NDArray[np.uint64], impulses: NDArray[np.float64]) -> None:
-        """At a time in s: bottles, and what they were pushed by since the last call, N s."""
+        """Take the bottles present at a time (s), and the impulses on them since the last call (N s)."""
         if self._began is None:
             self._began = time
             return
@@ -104,21 +105,21 @@ class PressWatch:
 
 
 class PeakWatch:
-    """The largest contact force of a run; looked up after every tick, for peaks begin anew with outputs."""
+    """Measures the largest contact force and lasting load of a run, at every tick, because outputs reset peaks."""
 
     def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
         self.force = simulation.peak_force
-        """N, so far; None where the scene has no effect `peaks`."""
+        """Largest force so far, N; None without the effect `peaks`."""
         self._pressing = PressWatch()
 
     @property
     def load(self) -> float | None:
-        """N, that pressed for long, as in `Pressed`."""
+        """Largest lasting load as in `Pressed`, N."""
         return self._pressing.load
 
     def after_tick(self) -> None:
-        """Look."""
+        """Take the peaks of a tick."""
         simulation = self._simulation
         now = simulation.peak_force
         if now is not None and self.force is not None:
@@ -129,7 +130,7 @@ class PeakWatch:
 
 
 def achieved(model: Model, peak_force: float | None) -> ForceCheck | None:
-    """What a run came to with its largest normal contact force (N); None if it is not known, or nothing can touch."""
+    """Return the check of the largest normal contact force (N); None if it is unknown, or no contact can occur."""
     if peak_force is None or not model.impacts:
         return None
     overlap = max(impact.overlap(peak_force) / impact.diameter for impact in model.impacts)
@@ -137,7 +138,7 @@ def achieved(model: Model, peak_force: float | None) -> ForceCheck | None:
 
 
 def pressed(model: Model, load: float | None) -> Pressed | None:
-    """What pressed for long (N) beside what was expected; None where no bound on the time step rests on it."""
+    """Return the check of the largest lasting load (N); None if no bound on the time step depends on it."""
     if load is None or not any(bound.name == "contact friction" for bound in model.bounds):
         return None
     return Pressed(load, model.load.force, model.load.reason)

@@ -1,8 +1,8 @@
-"""What became of all commands that were sent to the node, and how many may wait for the next tick.
+"""`Inbox`: counts of the commands sent to a node, and bounds for those that wait for the next tick.
 
-While the simulation is paused nothing takes commands away, so what waits is bounded, by count and by bytes. What is
-over, what can't be read and what DDS lost is counted, and reported in one outcome for many, so that the reports are
-bounded too.
+While the simulation is paused, no tick takes commands from the queue. Their number and bytes are therefore bounded.
+Commands beyond the bounds, unreadable ones, and ones lost by DDS are counted. One command result reports many of them,
+so that reports are bounded as well.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from conveyor_sim.line.commands.inputs import Input
 from conveyor_sim.run.lockstep import Refused
 
 MESSAGE_BYTES = 256 * 1024
-"""Of one command as it is sent: thousands of names. What a PLC sends in a scan has some hundred bytes."""
+"""Largest command as it is sent: room for thousands of names. A scan of a PLC sends some hundred bytes."""
 MOST_WAITING = 1000
-"""Commands that may wait for the next tick: those of 10 s, from a controller that sends one every 10 ms."""
+"""Commands that may wait for the next tick: 10 s of a controller that sends one every 10 ms."""
 MOST_BYTES = 4 * 1024 * 1024
-"""Of all that wait, as they were sent."""
+"""Largest sum of the sizes of waiting commands, as they were sent."""
 VALUE_BYTES = 16
-"""What a value, or a text, takes beside its letters and those of its name, about."""
+"""Approximate size of a value or a text, without the letters of the text and of its name."""
 
 FULL = (
     f"the queue was full, which holds {MOST_WAITING} commands and {MOST_BYTES} bytes until the next tick; "
@@ -32,12 +32,12 @@ TOO_LARGE = f"larger than {MESSAGE_BYTES} bytes, expected at most that for one c
 
 
 @dataclass(frozen=True)
-class Counts:
-    """Commands since the node was started, those of lockstep requests among them."""
+class InboxCounts:
+    """Commands since the start of the node, including those of lockstep requests."""
 
     received: int
     lost: int
-    """Known to have been sent, and not received."""
+    """Sent but not received, by the sequence numbers of DDS."""
     turned_away: int
     """Received, and refused before they reached the queue."""
     waiting: int
@@ -45,7 +45,7 @@ class Counts:
 
 
 class Inbox:
-    """Counts, and room for what waits. From any thread."""
+    """Counts and bounds of the queue of commands. Any thread may use it."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -55,18 +55,18 @@ class Inbox:
         self._missed: Counter[str] = Counter()
 
     @property
-    def counts(self) -> Counts:
-        """As they are now."""
+    def counts(self) -> InboxCounts:
+        """Present counts."""
         with self._lock:
-            return Counts(self._received, self._lost, self._turned_away, self._waiting, self._bytes)
+            return InboxCounts(self._received, self._lost, self._turned_away, self._waiting, self._bytes)
 
     def receive(self) -> None:
-        """Count a command that came; what becomes of it is counted by one of the others."""
+        """Count a command that arrived. Other methods count its result."""
         with self._lock:
             self._received += 1
 
     def admit(self, size: int) -> str:
-        """Take room in the queue for a command of so many bytes; why there is none, "" if there is."""
+        """Reserve room in the queue for a command of `size` bytes. Return the reason if there is none, else ""."""
         if size > MESSAGE_BYTES:
             return TOO_LARGE
         with self._lock:
@@ -77,31 +77,31 @@ class Inbox:
         return ""
 
     def occupy(self, count: int, size: int) -> None:
-        """Take room for commands that a checkpoint brought, whether there is room or not."""
+        """Reserve room for `count` commands of a checkpoint, even beyond the bounds."""
         with self._lock:
             self._waiting += count
             self._bytes += size
 
     def release(self, count: int, size: int) -> None:
-        """Give room back: commands of so many bytes together wait no longer."""
+        """Free the room of `count` commands, of `size` bytes together."""
         with self._lock:
             self._waiting -= count
             self._bytes -= size
 
     def turn_away(self, source: str, reason: str) -> None:
-        """Count a command that is refused before it reaches the queue. reason: one of a few."""
+        """Count a command that is refused before it reaches the queue. reason: a fixed text."""
         with self._lock:
             self._turned_away += 1
             self._refused[source, reason] += 1
 
     def miss(self, source: str, count: int) -> None:
-        """Count commands that were sent and did not come."""
+        """Count commands that were sent but did not arrive."""
         with self._lock:
             self._lost += count
             self._missed[source] += count
 
     def take_notes(self) -> list[str]:
-        """What was refused or lost since the last call, a sentence for each source and reason."""
+        """Return a sentence per source and reason on commands refused or lost since the last call."""
         if not self._refused and not self._missed:
             return []
         with self._lock:
@@ -115,15 +115,15 @@ class Inbox:
         return notes
 
 
-def size_of(given: Input) -> int:
-    """Bytes of an input, about as it is sent."""
-    words = sum(map(len, given.names)) + sum(map(len, given.texts))
-    return words + VALUE_BYTES * max(len(given.names), len(given.values), len(given.texts))
+def size_of(command: Input) -> int:
+    """Return the approximate bytes of an input as it is sent."""
+    words = sum(map(len, command.names)) + sum(map(len, command.texts))
+    return words + VALUE_BYTES * max(len(command.names), len(command.values), len(command.texts))
 
 
 def sizes_of(inputs: Iterable[Input]) -> list[int]:
-    """The same of each of those that come together. Raises Refused if they are too large for one command."""
-    sizes = [size_of(given) for given in inputs]
+    """Return the size of each input of one request. Raise Refused if together they are too large for one command."""
+    sizes = [size_of(command) for command in inputs]
     if sum(sizes) > MESSAGE_BYTES:
         raise Refused(f"its commands are {TOO_LARGE}")
     return sizes

@@ -1,8 +1,8 @@
-"""The lockstep protocol: one owner advances the simulation to absolute ticks, and may repeat a request safely.
+"""Lockstep protocol: one owner advances the simulation to absolute ticks, and may repeat a request safely.
 
-A request says everything (who, to which tick, with which commands), so the same request again can only mean that its
-answer was lost: it gets the stored answer. Anything else that does not lead on from the present tick is refused, with
-the reason. No rule looks at wall time.
+A request is complete: it holds its owner, target tick and commands. A repeated request therefore means that its answer
+was lost, and gets the stored answer. A request that does not lead on from the present tick is refused with the reason.
+No rule depends on wall time.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 LOCKSTEP = "lockstep"
-"""Source of its commands."""
+"""Source of commands in lockstep."""
 
 
 def inputs_of(
@@ -34,23 +34,23 @@ def inputs_of(
     names: Sequence[str],
     values: Sequence[float],
 ) -> tuple[Input, Input]:
-    """What a message of a controller gives the line: alarms that it declares, then commands; either may be empty."""
+    """Return the inputs of a message of a controller: declared alarms, then commands. Either may be empty."""
     declared = Input(source, writer, "controller", DECLARE, tuple(alarm_ids), (), tuple(alarms))
     return declared, Input(source, writer, "controller", SET, tuple(names), tuple(values))
 
 
-def is_empty(given: Input) -> bool:
-    """Whether there is nothing in it."""
-    return not (given.names or given.values or given.texts)
+def is_empty(command: Input) -> bool:
+    """Return True if an input has no names, values or texts."""
+    return not (command.names or command.values or command.texts)
 
 
 class Refused(ConveyorError):
-    """What was asked can't be done now; the text is the reason."""
+    """A request that can't be carried out now. The text is the reason."""
 
 
 @dataclass(frozen=True)
 class LockstepRequest:
-    """What a controller asks: as Lockstep.srv."""
+    """Request of a controller, as in Lockstep.srv."""
 
     run_id: str
     target_tick: int
@@ -63,14 +63,14 @@ class LockstepRequest:
     released: tuple[str, ...] = ()
 
     def same_as(self, other: LockstepRequest | None) -> bool:
-        """Equal bit for bit, so that a request with a NaN is equal to its own repetition."""
+        """Return True if both are equal bit for bit, so that a request with a NaN equals its repetition."""
         return other is not None and self._key() == other._key()
 
     @property
     def inputs(self) -> list[Input]:
-        """What it gives the line: alarms that it declares, then its commands; neither where there is none."""
-        given = inputs_of(LOCKSTEP, self.run_id, self.alarm_ids, self.alarms, self.names, self.values)
-        return [one for one in given if not is_empty(one)]
+        """Inputs of the request that are not empty: declared alarms, then commands."""
+        inputs = inputs_of(LOCKSTEP, self.run_id, self.alarm_ids, self.alarms, self.names, self.values)
+        return [command for command in inputs if not is_empty(command)]
 
     def _key(self) -> tuple[object, ...]:
         bits = struct.pack(f"<{len(self.values)}d", *self.values)
@@ -89,28 +89,29 @@ class LockstepRequest:
 
 @dataclass(frozen=True)
 class LockstepAnswer:
-    """What the simulation was at the target tick."""
+    """State of the simulation at the target tick."""
 
     sim_run_id: str
     tick: int
     stamp_ns: int
     signals: Image
     state_hash: int
-    outcomes: tuple[CommandOutcome, ...]  # since the last answer
+    outcomes: tuple[CommandOutcome, ...]
+    """Command results since the last answer."""
 
     @staticmethod
     def of(simulation: Simulation, run: str, outcomes: tuple[CommandOutcome, ...] = ()) -> LockstepAnswer:
-        """What a simulation is now, in a run (Line.run_id)."""
+        """Return the present state of a simulation. run: ID of the run (Line.run_id)."""
         return LockstepAnswer(
             run, simulation.tick, simulation.stamp_ns, simulation.line.signals(), simulation.state_hash(), outcomes
         )
 
 
 class Lockstep:
-    """Who owns the simulation, and the answer to the last request that was accepted."""
+    """Owner of the simulation, and the answer to the last accepted request."""
 
     def __init__(self, max_ticks: int) -> None:
-        """`max_ticks`: the longest advance that one request may ask for."""
+        """max_ticks: longest advance of one request."""
         self._max_ticks = max_ticks
         self._owner = ""
         self._last: LockstepRequest | None = None
@@ -118,16 +119,17 @@ class Lockstep:
 
     @property
     def owner(self) -> str:
-        """The run_id that owns the simulation, empty if none does."""
+        """The run_id that owns the simulation; empty if there is no owner."""
         return self._owner
 
     def repeated(self, request: LockstepRequest) -> Future[LockstepAnswer] | None:
-        """The answer, given or still to come, if this is the last accepted request once more."""
+        """Return the answer, present or future, if a request repeats the last accepted one."""
         return self._answer if request.same_as(self._last) else None
 
     def accept(self, request: LockstepRequest, run: str, tick: int, last_tick: int) -> Future[LockstepAnswer]:
-        """Take a new request; its answer is to be set later. run: the simulation's run id (Line.run_id), which is at
-        `tick` and ends at `last_tick`.
+        """Accept a new request, and return the future of its answer.
+
+        run: ID of the run (Line.run_id), which is at `tick` and ends at `last_tick`.
 
         Raises Refused.
         """
@@ -140,7 +142,7 @@ class Lockstep:
         return self._answer
 
     def clear(self) -> None:
-        """Forget the owner and its last request: the simulation was reset."""
+        """Forget the owner and its last request after a reset."""
         self._owner, self._last, self._answer = "", None, None
 
     def _refusal(self, request: LockstepRequest, run: str, tick: int, last_tick: int) -> str:

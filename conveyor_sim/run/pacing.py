@@ -1,31 +1,33 @@
-"""Simulated time against wall time: when the next tick is due, and how often something may be sent.
+"""Simulated time against wall time: when the next tick is due, and how often messages may be sent.
 
-Wall times are passed in, as seconds of any steady clock, so these rules need no clock of their own.
+Callers pass wall times, as seconds of any steady clock.
 """
 
 from __future__ import annotations
 
-# Beyond this lag the ticks missed are given up rather than caught up at full speed.
-MAX_LAG = 0.1  # s of wall time
+MAX_LAG = 0.1
+"""Lag up to which missed ticks are caught up at full speed, s of wall time. More is dropped."""
 
 
 class Pacer:
     """Keeps simulated time no faster than `factor` times wall time, and counts the ticks that came late.
 
-    A tick is an overrun if it ended after the next one was due. Lag up to MAX_LAG is caught up; what is beyond is
-    given up and added to `lost`.
+    A tick is an overrun if it ended after the next one was due. Lag up to MAX_LAG is caught up. More lag is dropped,
+    and added to `lost`.
     """
 
     def __init__(self, factor: float, tick: float) -> None:
-        """`factor`: simulated seconds per wall second, 0 for as fast as possible. `tick`: s."""
+        """factor: simulated seconds per wall second, 0 for as fast as possible. tick: length of a tick, s."""
         self.tick = tick
         self.overruns = 0
-        self.lost = 0.0  # s of wall time given up
+        self.lost = 0.0
+        """Dropped lag, s of wall time."""
         self._factor = factor
         self._due: float | None = None
 
     @property
     def factor(self) -> float:
+        """Simulated seconds per wall second; 0 for as fast as possible."""
         return self._factor
 
     @factor.setter
@@ -34,16 +36,16 @@ class Pacer:
         self._due = None
 
     def restart(self) -> None:
-        """Forget the past: the next tick is due when it is asked for."""
+        """Forget the lag: the next tick is due at the next call of `wait`."""
         self._due = None
 
     def catch_breath(self, now: float) -> None:
-        """Whoever drives the ticks was waited for: that is no lag of ours."""
+        """Forget the time spent waiting for the client that drives the ticks: it is no lag."""
         if self._due is not None and self._due < now:
             self._due = now
 
     def wait(self, now: float) -> float:
-        """Seconds until the next tick may start; 0 if at once."""
+        """Return the seconds until the next tick may start."""
         if self._factor == 0.0:
             return 0.0
         if self._due is None:
@@ -51,7 +53,7 @@ class Pacer:
         return max(0.0, self._due - now)
 
     def ticked(self, now: float) -> None:
-        """One tick has just ended."""
+        """Count a tick that has just ended."""
         if self._factor == 0.0 or self._due is None:
             return
         self._due += self.tick / self._factor
@@ -63,15 +65,16 @@ class Pacer:
 
 
 class RateCap:
-    """Says yes at most `rate` times a wall second in the mean, and always if `rate` is 0."""
+    """Limits messages to `rate` per wall second on average; 0 for no limit."""
 
     def __init__(self, rate: float) -> None:
         self._period = 1.0 / rate if rate > 0.0 else 0.0
         self._due = 0.0
 
     def ready(self, now: float) -> bool:
-        """Whether something may be sent now; half a period early counts as in time, so jitter thins nothing."""
+        """Return True if a message may be sent now. Half a period early is in time, so that jitter drops no message."""
         return now >= self._due - 0.5 * self._period
 
     def sent(self, now: float) -> None:
+        """Count a message sent now."""
         self._due = max(self._due + self._period, now)

@@ -1,4 +1,4 @@
-"""A recording as a stream to be published: what belongs to each tick, and what holds at a tick that is gone to."""
+"""`Playback`: the messages of a recording by tick, and the state at a tick that is sought."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from conveyor_sim.line.run_state import REPLAYING, RunState
 from conveyor_sim.support.printable import printable
 
 OWN = frozenset({"/clock", "/rosout", "/parameter_events"})
-"""What a node that plays back publishes of itself."""
+"""Topics that the node that plays back publishes itself."""
 
 RUN_STATE = "run_state"
-"""The topic that says of a playback that it is one; what was recorded of it is left out."""
+"""Topic that reports a playback as such. Its recorded messages are left out."""
 
 WALL_CLOCK = 10**18
-"""ns: later log times are dates (from 2001 on), not simulated times."""
+"""Later log times are dates (from 2001 on), not simulated times, ns."""
 
 LOOK_BACK = 10**9
-"""ns: how far a search for the state at a time looks back first."""
+"""Time that a search for a state covers first, ns."""
 
 
-class Message(NamedTuple):
+class PlayedMessage(NamedTuple):
     """A serialized message to be published."""
 
     topic: str
@@ -37,37 +37,37 @@ class Message(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Topic:
-    """A topic that is played back: its name as in OUTPUTS, from the root if it was outside the bag's namespace."""
+class PlayedTopic:
+    """A topic that is played back. Its name is that in OUTPUTS, or absolute if outside the namespace of the bag."""
 
     name: str
     type: str
     qos: Qos
     type_hash: str | None
-    """RIHS01 hash of the type its bytes were recorded with; None: made here."""
+    """RIHS01 hash of the recorded type; None if messages are made here."""
 
     @property
     def latched(self) -> bool:
-        """Whether its last message holds until the next one, for whoever joins late."""
+        """True if late subscribers receive the last message."""
         return self.qos.latched
 
     @property
     def event(self) -> bool:
-        """Whether each message counts for its own moment only, and none holds a state."""
+        """True if messages report events, not states."""
         row = topics.TOPICS.get(self.name)
         return row is not None and row.each_counts
 
 
 class Playback:
-    """The messages of an open bag by ticks: `cue` goes to a tick, `take` then yields tick after tick.
+    """The messages of an open bag by tick: `cue` goes to a tick, `take` then yields tick after tick.
 
-    What is not recorded, because other topics hold it, is made from these and comes right before them: commands from
-    outcomes (`belts/<belt>/cmd_speed` for what came that way, else `commands`; refused ones too, for they were sent),
-    and `photo_eyes/<eye>` from signals.
+    Some topics are not recorded because others hold their content. Their messages are made from these, and precede
+    them. Commands come from `outcomes`: on `belts/<belt>/cmd_speed` if they were sent there, else on `commands`, even
+    refused ones. `photo_eyes/<eye>` come from `signals`.
     """
 
     def __init__(self, bag: Bag, only: Collection[str] | None = None) -> None:
-        """only: the recorded topics that are wanted, and nothing is made; None: all.
+        """only: recorded topics to play, without topics made from others; None: all topics.
 
         Raises BagError if the bag's times are not simulated times of one run.
         """
@@ -84,36 +84,36 @@ class Playback:
         self.last_tick = -(-last_ns // self.tick_ns)
         qos = bag.qos
         recorded = [
-            Topic(name, kind, qos[name], bag.type_hash(name))
+            PlayedTopic(name, kind, qos[name], bag.type_hash(name))
             for name, kind in bag.types.items()
             if (name if name.startswith("/") else f"{bag.namespace}/{name}") not in OWN and name != RUN_STATE
             if only is None or name in only
         ]
         known = {topic.name for topic in recorded}
-        made = [Topic(RUN_STATE, encode.RUN_STATE, LATCHED, None)]
+        made = [PlayedTopic(RUN_STATE, encode.RUN_STATE, LATCHED, None)]
         if "outcomes" in known and only is None:
-            made.append(Topic("commands", encode.COMMANDS, EVENTS, None))
-            made += [Topic(speed_command(belt), encode.SPEED, EVENTS, None) for belt in bag.line.belts]
+            made.append(PlayedTopic("commands", encode.COMMANDS, EVENTS, None))
+            made += [PlayedTopic(speed_command(belt), encode.SPEED, EVENTS, None) for belt in bag.line.belts]
         eyes = _photo_eyes(bag.line.signal_names) if "signals" in known and only is None else {}
-        made += [Topic(eye, encode.BOOL, LATCHED, None) for eye in eyes]
+        made += [PlayedTopic(eye, encode.BOOL, LATCHED, None) for eye in eyes]
         self.topics = (*recorded, *(topic for topic in made if topic.name not in known))
         self._recorded = known
         self._made = {topic.name for topic in self.topics} - known
         self._eyes = {eye: column for eye, column in eyes.items() if eye in self._made}
-        self._seen: dict[str, bool] = {}  # what was published of each eye since the last cue
+        self._seen: dict[str, bool] = {}  # last published state of each photo-eye since the last cue
         self._latched = {topic.name for topic in recorded if topic.latched}
         self._states = {topic.name for topic in recorded if not topic.latched and not topic.event}
         self._cued_ns = 0
-        self._due: list[Message] = []
+        self._due: list[PlayedMessage] = []
         self._stream: Iterator[tuple[str, int, bytes]] = iter(())
         self._next: tuple[str, int, bytes] | None = None
 
     def stamp_ns(self, tick: int) -> int:
-        """Simulated time of a tick, ns; tick 0 is stamped 1, for ROS reads 0 as "not set"."""
+        """Return the simulated time of a tick, ns. Tick 0 is stamped 1, because ROS reads 0 as "not set"."""
         return max(1, tick * self.tick_ns)
 
-    def cue(self, tick: int) -> list[Message]:
-        """Go to a tick; returns what is latched there. The next `take` begins with the state at that tick."""
+    def cue(self, tick: int) -> list[PlayedMessage]:
+        """Go to a tick. Return its latched messages. The next `take` begins with the state at that tick."""
         after_ns = self.stamp_ns(tick - 1) if tick > self.first_tick else -1
         self._cued_ns = self.stamp_ns(tick)
         self._seen.clear()
@@ -125,10 +125,10 @@ class Playback:
         self._next = next(self._stream, None)
         header = Header(tick, self._cued_ns, "")
         replaying = encode.run_state_message(RunState(REPLAYING, printable(self._bag.path)), header)
-        return [*latched, Message(RUN_STATE, replaying)]
+        return [*latched, PlayedMessage(RUN_STATE, replaying)]
 
-    def take(self, tick: int) -> Iterator[Message]:
-        """What is left up to a tick, in the order of recording."""
+    def take(self, tick: int) -> Iterator[PlayedMessage]:
+        """Yield the remaining messages up to a tick, in the order of recording."""
         due, self._due = self._due, []
         for message in due:
             yield from self._with_made(message)
@@ -138,10 +138,10 @@ class Playback:
             self._next = next(self._stream, None)
             if topic in self._latched and stamp <= self._cued_ns:
                 continue
-            yield from self._with_made(Message(topic, data))
+            yield from self._with_made(PlayedMessage(topic, data))
 
-    def _with_made(self, message: Message) -> Iterator[Message]:
-        """What is made from a message, and the message."""
+    def _with_made(self, message: PlayedMessage) -> Iterator[PlayedMessage]:
+        """Yield the messages made from a message, then the message."""
         if message.topic == "outcomes":
             yield from self._sent(message.data)
         elif message.topic == "signals" and self._eyes:
@@ -150,51 +150,51 @@ class Playback:
                 blocked = bool(signals.values[column])
                 if self._seen.get(eye) is not blocked:
                     self._seen[eye] = blocked
-                    yield Message(eye, encode.bool_message(blocked, _header(signals)))
+                    yield PlayedMessage(eye, encode.bool_message(blocked, _header(signals)))
         yield message
 
-    def _last_before(self, stop_ns: int, topics: set[str]) -> list[Message]:
-        """The last message of each topic before a time, in their order."""
-        found: dict[str, tuple[int, int, bytes]] = {}
+    def _last_before(self, stop_ns: int, topics: set[str]) -> list[PlayedMessage]:
+        """Return the last message of each topic before a time, in the order of recording."""
+        last: dict[str, tuple[int, int, bytes]] = {}
         span, missing = LOOK_BACK, set(topics)
         first_ns, _ = self._bag.span_ns
         while missing and stop_ns > first_ns:
             start_ns = stop_ns - span
             for place, (topic, stamp, data) in enumerate(self._bag.raw(missing, start_ns, stop_ns)):
-                found[topic] = (stamp, place, data)
-            missing -= found.keys()
+                last[topic] = (stamp, place, data)
+            missing -= last.keys()
             stop_ns, span = start_ns, 2 * span
-        return [Message(topic, found[topic][2]) for topic in sorted(found, key=lambda name: found[name][:2])]
+        return [PlayedMessage(topic, last[topic][2]) for topic in sorted(last, key=lambda name: last[name][:2])]
 
-    def _first_after(self, start_ns: int, topics: set[str]) -> list[Message]:
-        """The first message of each topic from a time on, in their order."""
-        found: dict[str, bytes] = {}
+    def _first_after(self, start_ns: int, topics: set[str]) -> list[PlayedMessage]:
+        """Return the first message of each topic from a time on, in the order of recording."""
+        first: dict[str, bytes] = {}
         for topic, _, data in self._bag.raw(topics, start_ns) if topics else ():
-            found.setdefault(topic, data)
-            if len(found) == len(topics):
+            first.setdefault(topic, data)
+            if len(first) == len(topics):
                 break
-        return [Message(topic, data) for topic, data in found.items()]
+        return [PlayedMessage(topic, data) for topic, data in first.items()]
 
-    def _sent(self, data: bytes) -> Iterator[Message]:
-        """The command of an outcome, if it was one and the bag does not hold it itself."""
+    def _sent(self, data: bytes) -> Iterator[PlayedMessage]:
+        """Yield the command of a command result, if it was sent as one and its topic is not recorded."""
         message = self._bag.decode("outcomes", data)
         outcome: Outcome = to_outcome(message)
-        if outcome.operation != SET or outcome.input.by_line:  # nobody sent it as a command
+        if outcome.operation != SET or outcome.input.by_line:  # it was not sent as a command
             return
         if outcome.source in self._made and outcome.names == (outcome.source,) and len(outcome.values) == 1:
-            yield Message(outcome.source, encode.speed_message(outcome.values[0]))
+            yield PlayedMessage(outcome.source, encode.speed_message(outcome.values[0]))
         elif "commands" in self._made and outcome.source not in self._recorded:
-            yield Message("commands", encode.commands_message(outcome.names, message.values, _header(message)))
+            yield PlayedMessage("commands", encode.commands_message(outcome.names, message.values, _header(message)))
 
 
 def _header(message: Any) -> Header:
-    """The header of a decoded message."""
+    """Return the header of a decoded message."""
     stamp = message.header.stamp
     return Header(message.tick, stamp.sec * 10**9 + stamp.nanosec, message.header.frame_id)
 
 
 def _photo_eyes(signal_names: Sequence[str]) -> dict[str, int]:
-    """Where in the signals each photo-eye says that it is blocked, by the eye's own topic."""
+    """Return the column of the signal `blocked` of each photo-eye, by topic."""
     ends = ("photo_eyes/", "/blocked")
     return {
         name.removesuffix(ends[1]): column

@@ -1,6 +1,6 @@
-"""Plays a recording tick by tick against wall time: at a rate, with pause and seek.
+"""`Player`: plays a recording tick by tick against wall time, with pause and seek.
 
-Wall times are passed in, as seconds of any steady clock.
+Callers pass wall times, as seconds of any steady clock.
 """
 
 from __future__ import annotations
@@ -9,13 +9,14 @@ from collections.abc import Callable
 
 from conveyor_sim.run.lockstep import Refused
 from conveyor_sim.run.pacing import Pacer
-from conveyor_sim.run.playback import Message, Playback
+from conveyor_sim.run.playback import Playback, PlayedMessage
 
-IDLE = 0.01  # s of wall time between two beats while no tick is due
+IDLE = 0.01
+"""Time between two beats while no tick is due, s of wall time."""
 
 
 class Player:
-    """Publishes what a recording holds. Not for several threads: whoever steps it owns it."""
+    """Publishes the messages of a recording. Only one thread may use it."""
 
     def __init__(
         self,
@@ -24,14 +25,13 @@ class Player:
         *,
         start: float | None,
         paused: bool,
-        publish: Callable[[Message], None],
+        publish: Callable[[PlayedMessage], None],
         beat: Callable[[int, float], None],
     ) -> None:
-        """`rate`: recorded seconds per wall second, 0 for as fast as possible. `start`: s, simulated; None: where it
-        begins.
+        """Publish latched messages at once, and the first tick with the first step that is not paused.
 
-        What is latched is published at once, the first tick with the first step that is not paused.
-        `beat`: called after each tick and while idle, with the simulated time in ns and the wall time in s.
+        rate: recorded seconds per wall second, 0 for as fast as possible. start: simulated time, s; None for the
+        beginning. beat: called after each tick and while idle, with the simulated time in ns and the wall time in s.
         Raises Refused if `start` is not within the recording.
         """
         self._playback = playback
@@ -45,7 +45,7 @@ class Player:
 
     @property
     def time(self) -> float:
-        """Simulated time that has been reached, s."""
+        """Simulated time of the last tick published, s."""
         return self._seconds(self._shown)
 
     @property
@@ -55,21 +55,21 @@ class Player:
 
     @property
     def ended(self) -> bool:
-        """Whether the last tick has been played."""
+        """True once the last tick has been played."""
         return self._next > self._playback.last_tick
 
     def pause(self) -> None:
-        """Time stands still; /clock goes on telling it."""
+        """Stop simulated time; /clock continues to publish it."""
         self.paused = True
 
     def resume(self) -> None:
-        """Go on at the rate."""
+        """Continue at the rate."""
         if self.paused:
             self._pacer.restart()
             self.paused = False
 
     def set_rate(self, rate: float) -> None:
-        """From the next tick on: recorded seconds per wall second, 0 for as fast as possible."""
+        """Set the recorded seconds per wall second from the next tick on, 0 for as fast as possible."""
         self._pacer.factor = rate
 
     def toggle(self) -> None:
@@ -80,21 +80,21 @@ class Player:
             self.pause()
 
     def seek(self, time: float) -> None:
-        """Go to a time (s) and publish what is latched and the state there, paused or not.
+        """Go to a time (s) and publish latched messages and the state there, even while paused.
 
-        Raises Refused if it is not within the recording; nothing has changed then.
+        Raises Refused if the time is outside the recording; nothing has changed then.
         """
         self._cue(self._tick_at("time", time))
         self._play_tick()
         self._pacer.restart()
 
     def jump(self, by: float) -> None:
-        """Seek so many seconds ahead, or back if negative, but not beyond the recording."""
+        """Seek `by` seconds ahead, or back if negative, but not beyond the recording."""
         first, last = self.span
         self.seek(min(max(self.time + by, first), last))
 
     def step(self, now: float) -> float:
-        """Play the next tick if it is due at `now`; the seconds until the next step is worth making."""
+        """Play the next tick if it is due at `now`. Return the seconds until the next call is useful."""
         wait = IDLE if self.paused or self.ended else self._pacer.wait(now)
         if wait == 0.0:
             self._play_tick()

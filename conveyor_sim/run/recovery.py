@@ -1,4 +1,4 @@
-"""The command `recover`: a recording is repaired, or made of the inputs that a killed test has left."""
+"""Command `recover`: repairs a recording, or makes one from the inputs that a killed test left."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from conveyor_sim.support.progress import ProgressBar
 
 
 def recover_bag(bag: Path) -> None:
-    """Repair a recording. Raises BagError, also where what is left of it can't be replayed."""
+    """Repair a recording. Raise BagError if that fails, or if the rest can't be replayed."""
     report = recover(bag)
     for sentence in report.damage:
         click.echo(printable(sentence, SENTENCE))
@@ -38,9 +38,9 @@ def recover_bag(bag: Path) -> None:
 
 
 def recover_runs(folder: Path) -> bool:
-    """Make the bags of the runs whose inputs are in a folder, in folders `bag` beside them; False: there are none.
+    """Make the bags of all runs whose inputs are in a folder, in folders `bag` beside them. Return False if none are.
 
-    Raises BagError, also for a bag that is not of the same run, which stays; SceneError, CheckpointError.
+    Raises BagError, also for a bag of another run, which stays; SceneError, CheckpointError.
     """
     folders = input_folders(folder)
     for place in folders:

@@ -1,4 +1,4 @@
-"""What a run may be doing, and where it reports it."""
+"""State of a stepped run, and the log that it writes."""
 
 from enum import IntEnum
 from typing import Protocol
@@ -8,8 +8,8 @@ from conveyor_sim.line.run_state import RunState
 from conveyor_sim.support.printable import SENTENCE, printable
 
 
-class State(IntEnum):
-    """As simulation_interfaces/msg/SimulationState."""
+class SimulationState(IntEnum):
+    """State of a run; the numbers of simulation_interfaces/msg/SimulationState."""
 
     STOPPED = 0
     PLAYING = 1
@@ -17,22 +17,30 @@ class State(IntEnum):
     QUITTING = 3
 
 
-def run_state_of(state: State, failure: str, ended: bool, owner: str) -> RunState:
-    """What topic `run_state` shows. failure: why it can't go on; ended: at the end of the scene; owner: of lockstep."""
+def run_state_of(state: SimulationState, failure: str, ended: bool, owner: str) -> RunState:
+    """Return the content of topic `run_state`.
+
+    failure: reason why the run can't go on. ended: the scene has ended. owner: owner in lockstep.
+    """
     if failure:
         return RunState(run_state.STOPPED, printable(failure, SENTENCE))
     if ended:
         return RunState(run_state.ENDED)
     if owner:
         return RunState(run_state.LOCKSTEP, printable(owner))
-    if state is State.STOPPED:
+    if state is SimulationState.STOPPED:
         return RunState(run_state.STOPPED, "reset and stopped on request")
-    return RunState(run_state.RUNNING if state is State.PLAYING else run_state.PAUSED)
+    return RunState(run_state.RUNNING if state is SimulationState.PLAYING else run_state.PAUSED)
 
 
 class Log(Protocol):
-    """Where the stepper writes what happened; a ROS logger or one of `logging`."""
+    """Log of a stepper: a ROS logger or one of `logging`."""
 
-    def info(self, message: str) -> object: ...
-    def warning(self, message: str) -> object: ...
-    def error(self, message: str) -> object: ...
+    def info(self, message: str) -> object:
+        """Log progress."""
+
+    def warning(self, message: str) -> object:
+        """Log a problem that the run survives."""
+
+    def error(self, message: str) -> object:
+        """Log the reason why a run stops."""

@@ -1,4 +1,4 @@
-"""Runs a scene without ROS, as fast as it goes, into the same bag that the node records."""
+"""`run_scene`: runs a scene without ROS at full speed, and records the bag that the node would record."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
-from conveyor_sim.bag.outputs import Outputs
+from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.control.scan import Controller
 from conveyor_sim.errors import ConveyorError, SimulationError
 from conveyor_sim.line.run_state import ENDED, RUNNING, STOPPED, RunState
-from conveyor_sim.run.controlled import Controlled
 from conveyor_sim.run.force_check import PeakWatch
+from conveyor_sim.run.scan_loop import ScanLoop
 from conveyor_sim.run.speed import Spent
 from conveyor_sim.run.stopped import keep_stopped
 from conveyor_sim.scene import Scene
@@ -28,23 +28,23 @@ from conveyor_sim.support.signals import HandledOnce
 
 @dataclass(frozen=True)
 class Run:
-    """What `run_scene` did."""
+    """Result of `run_scene`."""
 
     bag: Path | None
     simulated: float
     """s"""
     wall: float
-    """s, from the first tick to the end of the recording; kernels not compiled yet (`compile_kernels`) are in it."""
+    """Time from the first tick to the end of the recording, s; includes compiling (`compile_kernels` avoids that)."""
     interrupted: bool
-    """Ended early by Ctrl-C or a request to terminate."""
+    """True if Ctrl-C or a request to terminate ended the run early."""
     peak_force: float | None
-    """N, the largest normal contact force; None where the scene has no effect `peaks`."""
+    """Largest normal contact force, N; None without the effect `peaks`."""
     load: float | None
-    """N, that pressed on a bottle for long (`force_check.Pressed`); None where it is not known."""
+    """Largest lasting load on a bottle (`force_check.Pressed`), N; None if it is unknown."""
     guard: tuple[str, ...]
-    """What the guard said."""
+    """Reports of the guard."""
     spent: Spent
-    """What `wall` went to."""
+    """Breakdown of `wall` by phase."""
 
 
 def run_scene(
@@ -54,27 +54,27 @@ def run_scene(
     threads: int | None = None,
     controller: Controller | None = None,
     record: Sequence[str] = (),
-    told: Callable[[str], None] | None = None,
+    say: Callable[[str], None] | None = None,
 ) -> Run:
-    """Runs a scene for its duration and records it to the folder `bag`, if given.
+    """Run a scene for its duration, and record it to the folder `bag`, if one is passed.
 
-    progress(simulated time, s) is called after every tick. threads: to step with, None has them chosen.
+    progress: called with the simulated time (s) after every tick. threads: number of threads; None to choose it.
     controller: scans at every tick. record: patterns of its variables that are recorded (`control/recorded.py`).
-    told: what a controller has no tag for, and the commands that it does not give.
-    Ctrl-C ends the run at the next tick, with a whole bag; a second one ends the process.
+    say: called with a sentence for each variable without a tag, and each command that the controller never gives.
+    Ctrl-C ends the run at the next tick, with an intact bag; a second one ends the process.
+
     Raises SceneError, SimulationError, BagError if the recording can't be written, and ConveyorError for a controller
-    that can't go on; one that can't begin leaves no recording.
+    that can't go on. A controller that can't begin leaves no recording.
     """
     simulation = Simulation(scene, threads)
-    controlled = None if controller is None else Controlled(simulation, controller, record)
-    if controlled is not None:
-        if told is not None:
-            for sentence in controlled.left_over:
-                told(sentence)
-        controlled.scan()
+    scans = ScanLoop(simulation, controller, record)
+    if say is not None:
+        for sentence in getattr(controller, "left_over", ()):
+            say(sentence)
+    scans.scan_tick()
     recorder = Recorder(bag) if bag is not None else None
     with recorder or nullcontext(), _stop_request() as stop:
-        outputs = Outputs(simulation, [recorder] if recorder else [], run_id=uuid.uuid4().hex)
+        outputs = OutputWriter(simulation, [recorder] if recorder else [], run_id=uuid.uuid4().hex)
         outputs.start()
         outputs.show_run(RunState(RUNNING))
         peaks = PeakWatch(simulation)
@@ -82,8 +82,7 @@ def run_scene(
         while simulation.tick < scene.duration_ticks and not stop.is_set():
             began = time.perf_counter()
             try:
-                if controlled is not None:
-                    controlled.before_tick(outputs)
+                scans.before_tick(outputs)
                 simulation.advance(1)
             except SimulationError as error:
                 outputs.after_failure()
@@ -93,26 +92,24 @@ def run_scene(
                 outputs.show_run(RunState(STOPPED, printable(error, SENTENCE)))
                 raise
             stepping += time.perf_counter() - began
-            outcomes = outputs.after_tick()
-            if controlled is not None:
-                controlled.after_tick(outcomes)
+            scans.after_tick(outputs.after_tick())
             peaks.after_tick()
             if progress is not None:
                 progress(simulation.time)
-        asked = RunState(STOPPED, "on request") if simulation.tick < scene.duration_ticks else RunState(ENDED)
-        outputs.show_run(asked)
+        stopped = simulation.tick < scene.duration_ticks
+        outputs.show_run(RunState(STOPPED, "on request") if stopped else RunState(ENDED))
         if recorder is not None:
             recorder.close()
         wall = time.monotonic() - start
-        noticed = tuple(event.text for event in outputs.take_noticed())
-        kernels = simulation.kernel_seconds
+        guard = tuple(event.text for event in outputs.take_noticed())
+        kernels = simulation.integration.kernel_seconds
         spent = Spent(kernels, stepping - kernels, 0.0 if recorder is None else wall - stepping)
-        return Run(bag, simulation.tick * scene.tick, wall, stop.is_set(), peaks.force, peaks.load, noticed, spent)
+        return Run(bag, simulation.tick * scene.tick, wall, stop.is_set(), peaks.force, peaks.load, guard, spent)
 
 
 @contextmanager
 def _stop_request() -> Iterator[threading.Event]:
-    """An event that Ctrl-C and SIGTERM set; a KeyboardInterrupt could strike in the middle of a write."""
+    """Yield an event that Ctrl-C and SIGTERM set. A KeyboardInterrupt could interrupt a write."""
     stop = threading.Event()
     with HandledOnce((signal.SIGINT, signal.SIGTERM), lambda _number, _frame: stop.set()):
         yield stop

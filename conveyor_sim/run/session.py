@@ -1,4 +1,4 @@
-"""One run of a scene, from tick 0 or a checkpoint to its end: the simulation, what it publishes and what it records."""
+"""One run of a scene, from tick 0 or a checkpoint to its end: its simulation, publishers and recording."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import time
 import uuid
 from pathlib import Path
 
-from conveyor_sim.bag.outputs import Outputs, Sink
+from conveyor_sim.bag.outputs import MessageSink, OutputWriter
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.line.commands.inputs import CommandOutcome, Input
@@ -17,11 +17,11 @@ from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.printable import SENTENCE, printable
 
 
-class Session:
-    """A simulation with its sinks. Not for several threads: whoever steps it owns it."""
+class RunSession:
+    """A simulation with its sinks. Only the thread that steps it may use it."""
 
-    def __init__(self, simulation: Simulation, sink: Sink, bag: Path | None, frame_id: str, distro: str) -> None:
-        """Starts the run from where `simulation` is; `bag` is the folder to record to, if any.
+    def __init__(self, simulation: Simulation, sink: MessageSink, bag: Path | None, frame_id: str, distro: str) -> None:
+        """Start the run at the present tick of `simulation`. bag: folder to record to, or None.
 
         Raises BagError if the folder can't be written; nothing has been published then.
         """
@@ -29,14 +29,15 @@ class Session:
         self.bag = bag
         self._sink = sink
         self._frame_id = frame_id
-        self.wall = 0.0  # s of wall time from the start of the first tick to the end of the last one
+        self.wall = 0.0
+        """Time from the start of the first tick to the end of the last one, s of wall time."""
         self._first_tick_at: float | None = None
         self.simulation = simulation
         self._began = simulation.time
         keep_start = simulation.save if simulation.tick > 0 else None
         self._recorder = Recorder(bag, distro=distro, start=keep_start) if bag else None
         sinks = [sink] if self._recorder is None else [self._recorder, sink]
-        self.outputs = Outputs(self.simulation, sinks, frame_id=frame_id, run_id=self.run_id)
+        self.outputs = OutputWriter(self.simulation, sinks, frame_id=frame_id, run_id=self.run_id)
         self.outputs.start()
         self._peaks = PeakWatch(self.simulation)
         self._last_outcomes: list[CommandOutcome] = []
@@ -47,7 +48,10 @@ class Session:
         return self.simulation.scene.duration_ticks
 
     def tick(self) -> list[CommandOutcome]:
-        """Advance by one tick and write what is due; what became of the commands. Raises SimulationError, BagError."""
+        """Advance by one tick and write all topics that are due. Return the command results.
+
+        Raises SimulationError, BagError.
+        """
         if self._first_tick_at is None:
             self._first_tick_at = time.monotonic()
         try:
@@ -62,7 +66,7 @@ class Session:
 
     @property
     def account(self) -> str:
-        """How fast the run was, and what its forces say of its accuracy, in one line."""
+        """Speed of the run, and the check of its forces, in one line."""
         simulation = self.simulation
         simulated = simulation.time - self._began
         account = f"{simulated:g} s simulated in {self.wall:.2f} s"
@@ -73,32 +77,32 @@ class Session:
 
     @property
     def to_bag(self) -> str:
-        """Where it is recorded to, as the end of a sentence; empty: it is not."""
+        """Folder of the recording, as the end of a sentence; empty if the run is not recorded."""
         return f", recorded to {self.bag}" if self.bag else ""
 
     def take_last_outcomes(self) -> list[CommandOutcome]:
-        """What became of the commands of a tick that failed."""
+        """Return the command results of a tick that failed."""
         outcomes, self._last_outcomes = self._last_outcomes, []
         return outcomes
 
     def tell(self, outcome: CommandOutcome) -> None:
-        """Write an outcome that no tick brought. Raises BagError."""
+        """Write a command result that belongs to no tick. Raise BagError."""
         self.outputs.tell(outcome)
 
-    def refuse(self, given: Input, reason: str) -> None:
-        """Tell those who listen that an input came too late to be applied; the recording is closed by then."""
-        kept = given._replace(names=shown(given.names))
-        self.outputs.tell(CommandOutcome(self.simulation.tick, kept, False, printable(reason, SENTENCE)))
+    def refuse(self, request: Input, reason: str) -> None:
+        """Publish the refusal of an input that came too late for a tick. The recording is closed by then."""
+        shortened = request._replace(names=shown(request.names))
+        self.outputs.tell(CommandOutcome(self.simulation.tick, shortened, False, printable(reason, SENTENCE)))
 
     def flush(self) -> None:
-        """Hand what was recorded to the operating system. Raises BagError."""
+        """Pass recorded messages on to the operating system. Raise BagError."""
         if self._recorder is not None:
             self._recorder.flush()
 
     def close(self) -> None:
-        """End the recording; nothing more is recorded. Raises BagError if it can't be completed."""
+        """Complete the recording. Raise BagError if that fails."""
         if self._recorder is not None:
             recorder, self._recorder = self._recorder, None
-            # Outcomes of commands that come too late are still published.
-            self.outputs = Outputs(self.simulation, [self._sink], frame_id=self._frame_id, run_id=self.run_id)
+            # Results of commands that come too late are still published.
+            self.outputs = OutputWriter(self.simulation, [self._sink], frame_id=self._frame_id, run_id=self.run_id)
             recorder.close()

@@ -1,4 +1,4 @@
-"""How fast a run went or will go, what bounds it, and what to change: three lines."""
+"""Speed of a run, measured or expected: three lines with the speed, its bound, and the change that helps."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from conveyor_sim.physics.model.remedies import StepLimit
 
-NAMED = 2
-"""Topics that are named, those of most bytes."""
+LISTED = 2
+"""Number of topics that are listed, those of most bytes."""
 
 NO_BOUND = "nothing in the scene bounds the time step"
 NO_REMEDY = "no single change of the scene that is known to help takes fewer steps"
@@ -25,7 +25,7 @@ class TopicCount:
 
 @dataclass(frozen=True)
 class Spent:
-    """Wall time of a run, s, by what it went to."""
+    """Wall time of a run by phase, s."""
 
     kernels: float
     """Steps."""
@@ -36,11 +36,11 @@ class Spent:
 
 
 MANY = 100
-"""Bottles that are reckoned with where a scene is fed without end."""
+"""Assumed number of bottles of a scene with an endless infeed."""
 
 
 def expected(limit: StepLimit) -> list[str]:
-    """Before a run."""
+    """Return the lines for a run that was not made yet."""
     bottles = MANY if limit.bottles is None else max(1, limit.bottles)
     factor = 1.0 / limit.seconds(bottles)
     times = f"{factor:.2g}" if factor < 100.0 else f"{factor:.0f}"
@@ -59,9 +59,10 @@ def measured(
     limit: StepLimit | None,
     topics: Mapping[str, TopicCount],
 ) -> list[str]:
-    """After a run of `simulated` s that took `wall` s, and was drawn in `pictures` s beyond that; None: not known.
+    """Return the lines for a run of `simulated` s that took `wall` s; None: not known.
 
-    topics: what was recorded; limit: what sets the steps, None if this version would choose others.
+    pictures: further time for the summary and the pictures, s. topics: recorded messages. limit: bound of the time
+    step, None if this version would choose another one.
     """
     text = (
         "speed: not known"
@@ -92,15 +93,15 @@ def measured(
 
 def _by_steps(limit: StepLimit | None) -> list[str]:
     if limit is None:
-        return ["bound: the steps", "change: not known, for this version would choose other steps than were recorded"]
+        return ["bound: the steps", "change: not known: this version would choose other steps than were recorded"]
     return [f"bound: {limit.bound or NO_BOUND}", f"change: {limit.change or NO_REMEDY}"]
 
 
 def _by_recording(topics: Mapping[str, TopicCount]) -> list[str]:
-    whole = sum(count.bytes for count in topics.values()) or 1
-    most = sorted(topics, key=lambda name: -topics[name].bytes)[:NAMED]
-    named = " and ".join(f"{name} ({100.0 * topics[name].bytes / whole:.0f} %)" for name in most)
+    total = sum(count.bytes for count in topics.values()) or 1
+    most = sorted(topics, key=lambda name: -topics[name].bytes)[:LISTED]
+    listed = " and ".join(f"{name} ({100.0 * topics[name].bytes / total:.0f} %)" for name in most)
     return [
-        f"bound: the recording, {whole / 1e6:.3g} MB of messages, most of them {named}",
+        f"bound: the recording, {total / 1e6:.3g} MB of messages, most of them {listed}",
         f"change: lower rates of {' and '.join(most)} under `outputs`, or --no-record",
     ]

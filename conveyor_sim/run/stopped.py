@@ -1,4 +1,4 @@
-"""The state in which the guard stopped a run, kept beside its recording for inspection."""
+"""Saves the state in which the guard stopped a run, beside its recording."""
 
 from pathlib import Path
 
@@ -10,12 +10,12 @@ FILE_NAME = "stopped.npz"
 
 
 def keep_stopped(simulation: Simulation, folder: Path | None, error: SimulationError) -> SimulationError:
-    """Write the state at the beginning of the tick that failed into a folder, if given; an error that says where."""
+    """Write the state before the failed tick into a folder, if one is passed. Return the error with the path."""
     if folder is None:
         return error
     path = folder / FILE_NAME
     try:
         simulation.save(path)
     except CheckpointError as failed:
-        return SimulationError(f"{error}; the state before that tick was not kept: {failed}", error.kind)
+        return SimulationError(f"{error}; the state before that tick was not saved: {failed}", error.kind)
     return SimulationError(f"{error}; the state before that tick is in {path}", error.kind)

@@ -103,7 +103,7 @@ class Stops:
 
     def after_tick(self) -> None:
         """Observe the events of the tick."""
-        for event in self._simulation.happened:
+        for event in self._simulation.line.happened:
             machine, _, which = event.name.rpartition("/")
             if event.kind == "machine_state" and which == "category" and machine in self._machines:
                 self._stops += self._running[machine] and event.text != "running"

@@ -7,12 +7,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from conveyor_sim.errors import StudyError
-from conveyor_sim.run.controlled import Controlled
+from conveyor_sim.run.scan_loop import ScanLoop
 from conveyor_sim.statistics.warm_up import warm_up
 from conveyor_sim.studies.engine import Engine
 from conveyor_sim.studies.journal import Journal
 from conveyor_sim.studies.line_of import controller_of, scene_of
-from conveyor_sim.studies.row import Pilot, Row, Status, point_text
+from conveyor_sim.studies.row import Pilot, RunRow, Status, point_text
 from conveyor_sim.studies.run import Work, begun, failure_of, load_kernels, make_tick, reset_counters
 from conveyor_sim.support.worker_pool import DiedError
 
@@ -28,7 +28,7 @@ def find_warm_up(
     engine: Engine,
     journal: Journal,
     say: Callable[[str], object],
-    progress: Callable[[int, int, float | None, Row | None], None],
+    progress: Callable[[int, int, float | None, RunRow | None], None],
 ) -> float:
     """s: that of the point and metric that take longest, one for all runs, so that they stay pairs.
 
@@ -86,14 +86,14 @@ def _pilot(work: Work) -> Pilot:
     ticks = scene.duration_ticks - simulation.tick
     if ticks < PARTS:
         raise StudyError(f"runs of {ticks} ticks given, expected {PARTS} at least to see a warm-up in them")
-    controlled = None if controller is None else Controlled(simulation, controller)
+    scans = ScanLoop(simulation, controller)
     watched = {name: metric.series for name, metric in setup.kept.items() if metric.series is not None}
     series: dict[str, list[float]] = {name: [] for name in watched}
     for _ in range(PARTS):
         reset_counters(simulation)
         gauges = {name: make(simulation) for name, make in watched.items()}
         for _ in range(ticks // PARTS):
-            make_tick(simulation, controlled, None)
+            make_tick(simulation, scans, None)
             for gauge in gauges.values():
                 gauge.after_tick()
         for name, gauge in gauges.items():

@@ -11,19 +11,19 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from conveyor_sim.bag.outputs import Outputs, forget_past
+from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.errors import BagError, ConveyorError, StudyError
 from conveyor_sim.line.commands.inputs import Input
 from conveyor_sim.line.run_state import ENDED, RUNNING, STOPPED, RunState
 from conveyor_sim.physics.model import Model
 from conveyor_sim.run.compilation import compile_kernels
-from conveyor_sim.run.controlled import Controlled
+from conveyor_sim.run.scan_loop import ScanLoop
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.studies.gauges import Averaged, Gauge, half_width
 from conveyor_sim.studies.line_of import controller_of, scene_of
-from conveyor_sim.studies.row import BAGS, Job, Row, Status
+from conveyor_sim.studies.row import BAGS, Job, RunRow, Status
 from conveyor_sim.studies.setup import Setup
 from conveyor_sim.support.printable import SENTENCE, printable
 
@@ -43,10 +43,10 @@ class Work:
     """Folder of the study, for recordings; None: no recordings."""
 
 
-def make_row(work: Work) -> Row:
+def make_row(work: Work) -> RunRow:
     """Make a run and return its row; a failure is recorded in the row."""
     job, clock = work.job, _Clock()
-    row = Row(job.point, job.seed, dict(job.parameters), "failed", asked=work.setup.asked)
+    row = RunRow(job.point, job.seed, dict(job.parameters), "failed", asked=work.setup.asked)
     try:
         work.setup.require_same_versions()
     except StudyError as error:  # of this process, not of the run
@@ -93,17 +93,16 @@ def warm_start(work: Work) -> bytes:
     work.setup.require_same_versions()
     scene = scene_of(work.setup, {}, job.seed)
     simulation = Simulation(scene, threads=1)
-    controller = controller_of(work.setup, {})
-    controlled = None if controller is None else Controlled(simulation, controller)
+    scans = ScanLoop(simulation, controller_of(work.setup, {}))
     for _ in range(round((study.warm_start or 0.0) / scene.tick)):
-        make_tick(simulation, controlled, None)
+        make_tick(simulation, scans, None)
     with TemporaryDirectory() as folder:
         path = Path(folder) / "start.npz"
         simulation.save(path)
         return path.read_bytes()
 
 
-def simulate(work: Work, bag: Path | None, clock: _Clock | None = None) -> Row:
+def simulate(work: Work, bag: Path | None, clock: _Clock | None = None) -> RunRow:
     """Simulate one run, recorded to `bag` unless None. Raise any exception of the run, after closing the recording."""
     study, job = work.setup.study, work.job
     scene = scene_of(work.setup, job.parameters, job.seed)
@@ -114,12 +113,12 @@ def simulate(work: Work, bag: Path | None, clock: _Clock | None = None) -> Row:
     keep_start = None if work.start is None else simulation.save
     recorder = None if bag is None else Recorder(bag, start=keep_start)
     try:
-        outputs = Outputs(simulation, [recorder] if recorder else [], run_id=uuid.uuid4().hex)
+        outputs = OutputWriter(simulation, [recorder] if recorder else [], run_id=uuid.uuid4().hex)
         if work.start is not None:
-            forget_past(simulation)
+            simulation.take_events()  # of the warm start
         outputs.start()
         outputs.show_run(RunState(RUNNING))
-        controlled = None if controller is None else Controlled(simulation, controller)
+        scans = ScanLoop(simulation, controller)
         if isinstance(study.warm_up, str):
             raise StudyError(f"warm_up: {study.warm_up} given, expected seconds, as pilot runs have found them")
         first, last = simulation.tick, scene.duration_ticks
@@ -128,12 +127,12 @@ def simulate(work: Work, bag: Path | None, clock: _Clock | None = None) -> Row:
             raise StudyError(f"warm_up: {study.warm_up:g} s given, expected less than a run takes")
         try:
             while simulation.tick < measured:
-                make_tick(simulation, controlled, outputs)
+                make_tick(simulation, scans, outputs)
             if simulation.tick:
                 reset_counters(simulation)
             gauges = _gauges(work.setup, simulation)
             while simulation.tick < last:
-                make_tick(simulation, controlled, outputs)
+                make_tick(simulation, scans, outputs)
                 for gauge in gauges.values():
                     gauge.after_tick()
         except Exception as error:
@@ -144,7 +143,7 @@ def simulate(work: Work, bag: Path | None, clock: _Clock | None = None) -> Row:
     finally:
         if recorder is not None:
             recorder.close()
-    return Row(
+    return RunRow(
         job.point,
         job.seed,
         dict(job.parameters),
@@ -169,14 +168,11 @@ def begun(scene: Scene, start: Path | bytes | None) -> Simulation:
         return Simulation.load(path, threads=1, scene=scene)
 
 
-def make_tick(simulation: Simulation, controlled: Controlled | None, outputs: Outputs | None) -> None:
-    """One tick of a run, with a scan of its controller."""
-    if controlled is not None:
-        controlled.before_tick(outputs)
+def make_tick(simulation: Simulation, scans: ScanLoop, outputs: OutputWriter | None) -> None:
+    """Make one tick of a run, with a scan of its controller."""
+    scans.before_tick(outputs)
     simulation.advance(1)
-    outcomes = simulation.take_outcomes() if outputs is None else outputs.after_tick()
-    if controlled is not None:
-        controlled.after_tick(outcomes)
+    scans.after_tick(simulation.take_outcomes() if outputs is None else outputs.after_tick())
 
 
 def reset_counters(simulation: Simulation) -> None:

@@ -5,7 +5,7 @@
         plant.attach(MyController())
         plant.eventually(lambda s: s["belts/table/bottles"] > 20, within=60)
 
-docs/testing_control_logic.md shows how. pytest finds the plugin by itself.
+docs/testing_control_logic.md explains it. pytest loads the plugin by its entry point.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ __all__ = ["Scenario"]
 
 
 def __getattr__(name: str) -> Any:
-    """Imports `Scenario` when it is first asked for: pytest loads this package in every run, used or not."""
+    """Import `Scenario` at its first use, because pytest loads this package in every run."""
     if name == "Scenario":
         from conveyor_sim.testing.scenario import Scenario
 

@@ -1,4 +1,4 @@
-"""Conditions of the present signals: what they read, and how a failure shows them."""
+"""Conditions of the present signals: the names they read, and their text in a failure."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from typing import Any
 from conveyor_sim.control.scan import Inputs
 
 Condition = Callable[["Present"], Any]
-"""A plain function of the present signals, true or false: `lambda s: s["belts/table/bottles"] < 40`."""
+"""Function of the present signals that returns true or false: `lambda s: s["belts/table/bottles"] < 40`."""
 
 
 _PLAIN = (str, int, float)
 
 
 class Present(Inputs):
-    """Signals and alarms at a tick, by name; notes which of them are read."""
+    """Signals and alarms at a tick, by name. Records the names that are read."""
 
     __slots__ = ("read",)
 
@@ -29,14 +29,14 @@ class Present(Inputs):
         """Names, in the order of the first reading."""
 
     def __getitem__(self, name: str) -> float:
-        """The value of a signal, or of an alarm by its whole name. Raises NoSuchSignal, which is a KeyError."""
+        """Return the value of a signal, or of an alarm by its full name. Raise NoSuchSignal, which is a KeyError."""
         value = super().__getitem__(name)
         self.read[name] = None
         return value
 
 
 def text_of(condition: Condition) -> str:
-    """What a condition says: the text of a lambda, the name of a function."""
+    """Return the text of a lambda, or the name of a function."""
     code = getattr(condition, "__code__", None)
     if not isinstance(code, CodeType):
         return repr(condition)
@@ -52,7 +52,7 @@ def text_of(condition: Condition) -> str:
         constants = {value for value in code.co_consts if isinstance(value, _PLAIN)}
         here = [node for node in here if _constants(node) == constants]
     texts = {" ".join((ast.get_source_segment(source, node.body) or "").split()) for node in here}
-    # Two on a line that differ in nothing but an operator can't be told apart.
+    # Two lambdas on one line that differ in an operator only are both listed.
     return " or ".join(sorted(texts)) or f"the lambda in line {code.co_firstlineno} of {code.co_filename}"
 
 
@@ -63,7 +63,7 @@ def _constants(node: ast.Lambda) -> set[object]:
 
 @dataclass(frozen=True)
 class Assertion:
-    """A condition that is asserted, from a time on."""
+    """A condition that is asserted from a time on."""
 
     condition: Condition
     word: str
@@ -73,14 +73,14 @@ class Assertion:
 
     @property
     def text(self) -> str:
-        """What it says, as the test calls it."""
+        """The assertion as the test states it."""
         return f"{self.word}({text_of(self.condition)})"
 
 
 def values(
     names: Iterable[str], present: Mapping[str, float], units: Callable[[str], str], forced: Collection[str] = ()
 ) -> str:
-    """One line a signal: name, value and unit, and whether it is forced."""
+    """Return one line per signal: name, value and unit, and a note if it is forced."""
     lines = [
         f"    {name} = {present[name]:g} {units(name)}".rstrip() + " (forced)" * (name in forced) for name in names
     ]

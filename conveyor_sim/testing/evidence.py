@@ -1,4 +1,4 @@
-"""What is kept of a scenario that failed: its bag, a page of its last seconds, a picture of the moment of failure."""
+"""Files saved from a failed scenario: its bag, a page of its last seconds, a picture of the moment of failure."""
 
 from __future__ import annotations
 
@@ -9,29 +9,29 @@ import numpy as np
 
 from conveyor_sim.bag.rerun import rerun
 from conveyor_sim.control.scan import ALARMS
-from conveyor_sim.page.one_file import Failure, write_page
+from conveyor_sim.page.one_file import FailedCondition, write_page
 from conveyor_sim.page.watch import Watch
 from conveyor_sim.report.figures import style
-from conveyor_sim.report.figures.data import Frame, Plant
-from conveyor_sim.report.figures.moment import Event, Trace, moment_figure
+from conveyor_sim.report.figures.data import PlantFrame, StaticGeometry
+from conveyor_sim.report.figures.moment import MarkedEvent, Trace, moment_figure
 from conveyor_sim.report.figures.recording import contact_lines
-from conveyor_sim.testing.history import History, Mark
+from conveyor_sim.testing.history import HistoryMark, ScenarioHistory
 from conveyor_sim.testing.scenario import Scenario
 
 PICTURE = "line.png"
 PAGE = "line.html"
 SHOWN = 120.0
-"""s at the end of the run that the page draws."""
+"""Time at the end of the run that the page draws, s."""
 
 EYES = "photo_eyes/"
 
-_BEFORE = 20.0  # s of traces, before what was asserted
+_BEFORE = 20.0  # s of traces before the time of the assertion
 _MOST_ROWS = 10
 _MOST_EVENTS = 4
 
 
 def draw_moment(scenario: Scenario, path: Path) -> Path:
-    """Draw the line as it is now, and the last seconds of the signals that its test and controller look at, as a PNG.
+    """Draw the present line, and the last seconds of the signals that its test and controller read, as a PNG.
 
     Raises ConveyorError if the file can't be written.
     """
@@ -43,14 +43,14 @@ def draw_moment(scenario: Scenario, path: Path) -> Path:
         Trace(name, history.unit(name), history.kind(name), history[name][shown], name in forced)
         for name in traced(scenario)
     ]
-    events = [Event(mark.time, _words(mark)) for mark in history.marks][-_MOST_EVENTS:]
+    events = [MarkedEvent(mark.time, _words(mark)) for mark in history.marks][-_MOST_EVENTS:]
     if failed is not None and failed.since < scenario.time:
-        events.append(Event(failed.since, f"{failed.word} asserted"))
+        events.append(MarkedEvent(failed.since, f"{failed.word} asserted"))
     eyes = [name for name in history.names if name.startswith(EYES) and name.endswith("/blocked")]
     blocked = {name.split("/")[1] for name in eyes if history[name][-1]}
     with style.look():
         figure = moment_figure(
-            Plant.of(scenario.scene),
+            StaticGeometry.of(scenario.scene),
             _frame(scenario),
             scenario.scene.name,
             scenario.failure,
@@ -64,10 +64,10 @@ def draw_moment(scenario: Scenario, path: Path) -> Path:
 
 
 def keep_bag(scenario: Scenario, inputs: Path, folder: Path, watch: Watch) -> str:
-    """End a scenario, run it again with its inputs and record that to a folder, in place of one of that name.
+    """End a scenario, repeat it with its inputs, and record the repetition to a folder, which is replaced.
 
-    watch: looks at that run. Returns the folder, and why what is in it is not the same run, if so. Raises as `rerun`,
-    and OSError.
+    watch: observes the repetition. Returns the folder, with the first departure from the scenario, if there is one.
+    Raises as `rerun`, and OSError.
     """
     scenario.close()
     folder.parent.mkdir(parents=True, exist_ok=True)
@@ -79,39 +79,39 @@ def keep_bag(scenario: Scenario, inputs: Path, folder: Path, watch: Watch) -> st
 
 
 def keep_page(scenario: Scenario, bag: Path, path: Path, watch: Watch) -> Path:
-    """Write the last seconds of a scenario as a page, with what happened from its start, from its bag.
+    """Write a page from the bag of a scenario: its last seconds, and the events since its start.
 
     Raises BagError, and ConveyorError if the file can't be written.
     """
-    failure = Failure(scenario.time, scenario.failure or "the test failed")
+    failure = FailedCondition(scenario.time, scenario.failure or "the test failed")
     known = {*scenario.simulation.process_image.signal_names, *watch.variables}
     trends = [name for name in traced(scenario) if name in known]
     return write_page(bag, path, failures=[failure], watch=watch, trends=trends)
 
 
 def traced(scenario: Scenario) -> list[str]:
-    """What to trace: what the last conditions read, the alarms, the commands in force, what the controller reads."""
+    """Return the names to trace: read by the last conditions, alarms, commands in force, read by the controller."""
     history = scenario.history
     commands = [name for name in scenario.simulation.process_image.command_names if np.isfinite(history[name][-1])]
     alarms = came(history)
-    wanted = dict.fromkeys([*scenario.read_by_conditions, *alarms, *commands, *scenario.read_by_controller])
-    return list(wanted)[:_MOST_ROWS]
+    names = dict.fromkeys([*scenario.read_by_conditions, *alarms, *commands, *scenario.read_by_controller])
+    return list(names)[:_MOST_ROWS]
 
 
-def came(history: History) -> list[str]:
-    """Names of the alarms that stood at any time, in the order in which they came."""
+def came(history: ScenarioHistory) -> list[str]:
+    """Return the names of the alarms that stood at any time, in the order of their first time."""
     columns = {name: history[name] for name in history.names if name.startswith(ALARMS)}
     return sorted((name for name, column in columns.items() if column.any()), key=lambda name: columns[name].argmax())
 
 
-def _words(mark: Mark) -> str:
+def _words(mark: HistoryMark) -> str:
     return mark.name if np.isnan(mark.value) else f"{mark.name} = {mark.value:g}"
 
 
-def _frame(scenario: Scenario) -> Frame:
+def _frame(scenario: Scenario) -> PlantFrame:
     simulation = scenario.simulation
     bottles = simulation.bottles()
-    return Frame(
+    return PlantFrame(
         time=simulation.time,
         x=bottles.x,
         y=bottles.y,

@@ -1,4 +1,4 @@
-"""The SCADA faces of lines under test: servers in a thread of their own, for as long as a test runs."""
+"""Protocol servers of lines under test. They run in one thread until the test ends."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ MODBUS_MISSING = "pymodbus is not installed: pip install 'conveyor_sim[scada]'"
 OPCUA_MISSING = "asyncua is not installed: pip install 'conveyor_sim[scada]'"
 
 
-class _Faces:
-    """Those of one test."""
+class _Servers:
+    """Servers of one test."""
 
     def __init__(self) -> None:
         self._thread: ServerThread | None = None
@@ -37,7 +37,7 @@ class _Faces:
         self._servers.append(server)
 
     def close(self) -> None:
-        """End all of them."""
+        """End all servers."""
         if self._thread is not None:
             for server in self._servers:
                 self._thread.run(server.stop())
@@ -45,22 +45,22 @@ class _Faces:
             self._thread, self._servers = None, []
 
 
-class ModbusFaces(_Faces, AbstractContextManager["ModbusFaces"]):
-    """What the fixture `modbus` is: called, it serves a line to Modbus TCP clients on this machine."""
+class ModbusFaces(_Servers, AbstractContextManager["ModbusFaces"]):
+    """Fixture `modbus`: a function that serves a line to Modbus TCP clients on this machine."""
 
     def __call__(
         self, line: Scenario, role: WriterKind | None = None, rows: Sequence[Row] | None = None
     ) -> ModbusServer:
-        """Serve a line from now on; `.port` of what is returned is where.
+        """Serve a line until the test ends. The port is `.port` of the returned server.
 
-        role: what clients that write are, "controller" or "operator"; None: they can't. rows: the map of addresses;
-        None: that of `conveyor-sim tags --modbus`. What clients write acts at the next tick that the test lets pass.
+        role: role of clients that write, "controller" or "operator"; None: read only. rows: map of addresses; None:
+        that of `conveyor-sim tags --modbus`. Writes of clients act at the next tick that the test makes.
         Raises ServerError if there is no port, ImportError without pymodbus.
         """
         from conveyor_sim.protocols.modbus.server import ModbusServer
 
         source = line.source()
-        server = ModbusServer(source, modbus_map(source.about.tags) if rows is None else rows, role)
+        server = ModbusServer(source, modbus_map(source.info.tags) if rows is None else rows, role)
         self._start(server)
         return server
 
@@ -68,8 +68,8 @@ class ModbusFaces(_Faces, AbstractContextManager["ModbusFaces"]):
         self.close()
 
 
-class OpcUaFaces(_Faces, AbstractContextManager["OpcUaFaces"]):
-    """What the fixture `opcua` is: called, it serves a line to OPC UA clients on this machine."""
+class OpcUaFaces(_Servers, AbstractContextManager["OpcUaFaces"]):
+    """Fixture `opcua`: a function that serves a line to OPC UA clients on this machine."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -78,11 +78,11 @@ class OpcUaFaces(_Faces, AbstractContextManager["OpcUaFaces"]):
     def __call__(
         self, line: Scenario, users: Mapping[str, tuple[Role, str]] | None = None, stamps: Stamps = "simulated"
     ) -> OpcUaServer:
-        """Serve a line from now on; `.address` of what is returned is where.
+        """Serve a line until the test ends. The address is `.address` of the returned server.
 
-        users: who may do more than read, by name, each with role and password. stamps: what the times of values are.
-        What clients write acts at the next tick that the test lets pass. The certificate is one for the test. Raises
-        ServerError if there is no port, ImportError without asyncua.
+        users: role and password of each user who may do more than read, by name. stamps: meaning of the times of
+        values. Writes of clients act at the next tick that the test makes. The certificate is made for the test.
+        Raises ServerError if there is no port, ImportError without asyncua.
         """
         from conveyor_sim.protocols.opcua.server import OpcUaServer
         from conveyor_sim.protocols.server.users import new_user

@@ -1,4 +1,4 @@
-"""`History`: what every signal, command, fault and alarm was at every tick of a scenario, as arrays."""
+"""`ScenarioHistory`: every signal, command, fault and alarm at every tick of a scenario, as arrays."""
 
 from __future__ import annotations
 
@@ -21,29 +21,30 @@ F8 = NDArray[np.float64]
 _FIRST_ROWS = 1024
 
 _MARKED = {MODE: "mode", FORCE: "forced", UNFORCE: "unforced"}
-"""What is marked of operations that give no commands."""
+"""Words for operations other than commands and faults that are marked."""
 
 
 @dataclass(frozen=True)
-class Mark:
-    """What was done to the line from outside its controller, or went wrong with it."""
+class HistoryMark:
+    """An input of the test, an operation of a person, or a fault."""
 
     time: float
     """s"""
     name: str
+    """Tag, with the operation if it is no command or fault."""
     value: float
-    """NaN: none."""
+    """NaN if the operation takes no value."""
 
 
-class History:
-    """Columns by name, one entry a tick from the scenario's first to its present one, or the last ones of them.
+class ScenarioHistory:
+    """Columns by name, with one entry per tick, from the first tick of the scenario or for the last ticks only.
 
-    A signal is what it was at the tick. A command is what was in force from the tick on, NaN until it was first given;
-    a fault likewise, 0 until it was first injected. An alarm ("alarms/<name>") is 1 while it stood.
+    A signal has its value at the tick. A command has the value in force from the tick on, NaN until first given. A
+    fault has the same, 0 until first injected. An alarm ("alarms/<name>") is 1 while it stands.
     """
 
     def __init__(self, image: ProcessImage, most: int | None = None) -> None:
-        """most: ticks to keep, at least one, those before are forgotten; None: all."""
+        """most: number of last ticks to store, at least one; None: all."""
         self._index = {name: column for column, name in enumerate(image.signal_names)}
         entries = (*image.signals, *image.commands, *image.faults)
         self._unit = {entry.name: entry.unit for entry in entries}
@@ -55,21 +56,21 @@ class History:
         self._now: F8 = np.array([math.nan] * len(image.commands) + [0.0] * len(image.faults))
         self._others = np.empty((len(self._signals), len(self._now)))
         self._given: dict[str, float] = {}
-        self.marks: list[Mark] = []
+        self.marks: list[HistoryMark] = []
         """Faults injected and commands given by the test, in order."""
 
     def __len__(self) -> int:
-        """Ticks in it."""
+        """Return the number of ticks stored."""
         return self._rows - self._first
 
     @property
     def _first(self) -> int:
-        """The first row that is kept."""
+        """First row that is stored."""
         return 0 if self._most is None else max(self._rows - self._most, 0)
 
     @property
     def names(self) -> tuple[str, ...]:
-        """All that there is: signals, commands, faults, then the alarms that were raised."""
+        """Names of all columns: signals, commands, faults, then the alarms that were raised."""
         return (*self._index, *self._other_index)
 
     @property
@@ -78,7 +79,7 @@ class History:
         return np.array(self._times[self._first :])
 
     def __getitem__(self, name: str) -> F8:
-        """A column (n,), in the unit of the process image. Raises ConveyorError for a name that there is not."""
+        """Return a column (n,), in the unit of the process image. Raise ConveyorError for an unknown name."""
         if name in self._index:
             return self._signals[self._first : self._rows, self._index[name]].copy()
         if name in self._other_index:
@@ -86,16 +87,16 @@ class History:
         raise ConveyorError(f"{name}: not in the history, expected one of {', '.join(self.names)}")
 
     def unit(self, name: str) -> str:
-        """The unit of a column, "" where it has none."""
+        """Return the unit of a column, "" if it has none."""
         unit = self._unit.get(name, "1")
         return "" if unit == "1" else unit
 
     def kind(self, name: str) -> Kind:
-        """The type of a column; of an alarm it is bool, of a controller's variable number."""
+        """Return the type of a column: bool for alarms, number for variables of a controller."""
         return "bool" if name.startswith(ALARMS) else self._kind.get(name, "number")
 
     def begin_tick(self, time: float, signals: F8) -> None:
-        """A tick is reached; commands, faults and alarms go on as they are."""
+        """Add a row for a tick. Commands, faults and alarms keep their values."""
         if self._rows == len(self._signals) and self._most is not None:
             for rows in (self._signals, self._others):
                 rows[: self._most] = rows[self._first :]
@@ -109,29 +110,29 @@ class History:
         self._times.append(time)
 
     def take(self, outcome: CommandOutcome, from_test: bool) -> None:
-        """What was applied at the last tick. from_test: by the test itself, not by the controller."""
+        """Add an input that the last tick applied. from_test: it came from the test, not from the controller."""
         if what := _MARKED.get(outcome.operation):
             names, values = outcome.names or ("all",), outcome.values or (math.nan,) * max(1, len(outcome.names))
             self.marks += [
-                Mark(self._times[-1], f"{name} {what}", value) for name, value in zip(names, values, strict=True)
+                HistoryMark(self._times[-1], f"{name} {what}", value) for name, value in zip(names, values, strict=True)
             ]
         if outcome.operation not in (SET, INJECT):
             return
         for name, value in zip(outcome.names, outcome.values, strict=True):
-            if name.startswith(ALARMS):  # noted as the controller gave it
+            if name.startswith(ALARMS):  # added by `alarms`
                 continue
             if self._given.get(name) != value:
                 self._given[name] = value
                 self._set(name, value)
             if from_test or outcome.operation == INJECT:
-                self.marks.append(Mark(self._times[-1], name, value))
+                self.marks.append(HistoryMark(self._times[-1], name, value))
 
     def alarms(self, alarms: Mapping[str, float]) -> None:
-        """The alarms of the last tick, by their whole names."""
+        """Add the alarms of the last tick, by their full names."""
         self._note(alarms, 0.0)
 
     def watch(self, variables: Mapping[str, float]) -> None:
-        """Variables of the controller at the last tick, by name; NaN until this is called with them."""
+        """Add variables of the controller at the last tick, by name. They are NaN before their first call."""
         self._note(variables, math.nan)
 
     def _note(self, columns: Mapping[str, float], before: float) -> None:

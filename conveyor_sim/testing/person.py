@@ -1,4 +1,4 @@
-"""`Person`: an operator or an engineer at the line of a scenario, who does between two ticks what a panel allows."""
+"""`PanelUser`: an operator or an engineer at the line of a scenario, who uses its panel between two ticks."""
 
 from __future__ import annotations
 
@@ -9,24 +9,24 @@ from conveyor_sim.line.commands.authority import MODES
 from conveyor_sim.line.commands.inputs import FORCE, MODE, SET, UNFORCE, Input, WriterKind
 
 NUMBERS = {text.lower(): number for number, text in MODES.items()}
-"""Of modes, by their names."""
+"""Numbers of the modes, by name."""
 
 
-class Person:
-    """What one does takes effect at the next tick. Each method raises CommandError if it would be refused then."""
+class PanelUser:
+    """An operator or engineer. Operations act at the next tick; CommandError is raised if it would refuse them."""
 
     def __init__(self, source: str, kind: WriterKind, give: Callable[[Input], None]) -> None:
-        """source: of the inputs. kind: of writer, and the name. give: takes an input, raises CommandError."""
+        """source: of the inputs. kind: kind and name of the writer. give: takes an input, or raises CommandError."""
         self._source = source
         self._kind = kind
         self._give = give
 
     def set(self, name: str, value: float) -> None:
-        """Give a command, of a device that is in the person's hands."""
+        """Give a command to a device that the person controls."""
         self.operate(SET, [name], [value])
 
     def mode(self, device: str, mode: int | str) -> None:
-        """Put a device ("belts/table") into a mode, by its number or as "automatic", "maintenance" or "manual"."""
+        """Set the mode of a device ("belts/table"), by number or as "automatic", "maintenance" or "manual"."""
         if isinstance(mode, str):
             if mode not in NUMBERS:
                 raise CommandError(f"{device}: mode {mode!r} given, expected one of {', '.join(NUMBERS)}")
@@ -34,35 +34,35 @@ class Person:
         self.operate(MODE, [device], [mode])
 
     def force(self, signal: str, value: float) -> None:
-        """Have controllers read this value of a signal, whatever the line has, until it is unforced."""
+        """Force a signal: controllers read this value until the signal is unforced."""
         self.operate(FORCE, [signal], [value])
 
     def unforce(self, *signals: str) -> None:
-        """Have them read what the line has again; without names: of all signals."""
+        """Unforce signals; without names: all signals."""
         self.operate(UNFORCE, signals)
 
     def acknowledge(self, *alarms: str) -> None:
-        """Acknowledge alarms, by their ids; without: all that wait to be."""
+        """Acknowledge alarms by ID; without IDs: all unacknowledged alarms."""
         self.operate("acknowledge", alarms)
 
     def reset(self, *alarms: str) -> None:
-        """Clear alarms that have latched and whose condition is gone, by their ids; without: all of them."""
+        """Reset latched alarms whose condition has ended, by ID; without IDs: all of them."""
         self.operate("reset", alarms)
 
     def shelve(self, alarm: str, seconds: float = 0.0) -> None:
-        """Shelve an alarm for so long; 0: until its condition ends next."""
+        """Shelve an alarm for `seconds`; 0: until its condition ends next."""
         self.operate("shelve", [alarm], [seconds])
 
     def unshelve(self, *alarms: str) -> None:
-        """Take alarms off the shelf; without: all."""
+        """Unshelve alarms by ID; without IDs: all."""
         self.operate("unshelve", alarms)
 
     def reset_counters(self, *devices: str) -> None:
-        """Have the counters and times of devices begin anew; without: of all."""
+        """Reset the counters and times of devices; without names: of all devices."""
         self.operate("reset_counters", devices)
 
     def operate(
         self, operation: str, names: Sequence[str] = (), values: Sequence[float] = (), texts: Sequence[str] = ()
     ) -> None:
-        """Use any operation of the line, as the service `operate` does."""
+        """Give any operation of the line, like the service `operate`."""
         self._give(Input(self._source, self._kind, self._kind, operation, tuple(names), tuple(values), tuple(texts)))

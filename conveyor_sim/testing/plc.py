@@ -1,6 +1,6 @@
-"""`AttachedPlc`: a soft PLC as the controller of a line under test, as a client of a server that the test runs.
+"""`AttachedPlc`: a soft PLC as the controller of a line under test, and a client of a server of the test.
 
-It goes in lockstep by two tags (protocols/tags/handshake.py), so the test has the same bits however fast the PLC is.
+It runs in lockstep by two tags (protocols/tags/handshake.py), so its speed does not change the bits of the test.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ import os
 import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager, ExitStack
+from contextlib import ExitStack
 from pathlib import Path
 
 from conveyor_sim.control.scan import ControlError, Inputs
@@ -19,23 +19,26 @@ from conveyor_sim.protocols.modbus.address_map import modbus_map
 from conveyor_sim.protocols.server.interface import ProtocolServer
 from conveyor_sim.protocols.tags.handshake import TARGET, HandshakeTagProvider
 from conveyor_sim.protocols.tags.tag_provider import TagProvider
+from conveyor_sim.run.alarm_changes import AlarmChanges
+from conveyor_sim.run.scan_loop import AttachedController
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.child_process import Process
 from conveyor_sim.support.modbus_rows import Row
 
 ADDRESS = "CONVEYOR_SIM_ADDRESS"
-"""Environment variable of the PLC's process: where the server is, "modbus://127.0.0.1:49152"."""
+"""Environment variable of the PLC process: address of the server, such as "modbus://127.0.0.1:49152"."""
 
 PASSWORD = "CONVEYOR_SIM_PASSWORD"
-"""The same of an OPC UA client: the password of the user "plc"."""
+"""Environment variable of an OPC UA client: password of the user "plc"."""
 
 USER = "plc"
 
-LOOK = 0.2  # s of wall time between two looks at whether the PLC's process still runs
+LOOK = 0.2
+"""Time between two checks that the PLC process runs, s of wall time."""
 
 
-class AttachedPlc(AbstractContextManager["AttachedPlc"]):
-    """To the test, a controller; it is to be scanned at every tick."""
+class AttachedPlc(AttachedController):
+    """A PLC that is a client of a server of the test. It must be scanned at every tick."""
 
     def __init__(
         self,
@@ -45,15 +48,18 @@ class AttachedPlc(AbstractContextManager["AttachedPlc"]):
         environment: Mapping[str, str],
         patience: float,
     ) -> None:
-        """make: the server, not started, which may keep files in a folder. command: starts the PLC; empty: others do.
-        environment: of it, besides. patience: s of wall time that it has for each scan.
+        """Start the server, and the PLC by a command.
 
-        Raises ServerError if the server can't be, OSError if the command can't be run.
+        make: returns the server, not started, which may write files to a folder. command: starts the PLC; empty: the
+        PLC is started elsewhere. environment: further environment variables of the PLC. patience: longest time for each
+        scan, s of wall time.
+
+        Raises ServerError if the server can't start, OSError if the command can't be run.
         """
         self.writer = "plc"
-        """Who its commands are recorded under: the client that wrote last."""
+        """Writer of its commands: the client that wrote last."""
         self.source = ""
-        """By which way they came."""
+        """Source of its commands: the protocol of that client."""
         self._simulation = simulation
         self._patience = patience
         self._tags = HandshakeTagProvider(simulation)
@@ -66,22 +72,19 @@ class AttachedPlc(AbstractContextManager["AttachedPlc"]):
             thread.run(face.start())
             stack.callback(lambda: thread.run(face.stop()))
             self.address = face.address
-            """Where the server is."""
+            """Address of the server."""
             if command:
-                whole = {**os.environ, **environment, ADDRESS: face.address, "PYTHONUNBUFFERED": "1"}
-                self._process = Process("PLC", command, whole, logs)
+                variables = {**os.environ, **environment, ADDRESS: face.address, "PYTHONUNBUFFERED": "1"}
+                self._process = Process("PLC", command, variables, logs)
                 stack.callback(self._process.stop)
             self._open = stack.pop_all()
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def close(self) -> None:
         """End the PLC's process and the server."""
         self._open.close()
 
-    def scan(self, inputs: Inputs) -> Mapping[str, float]:
-        """What the PLC wrote before it let the line go beyond this tick; waits until it does.
+    def scan(self, inputs: Inputs, alarms: AlarmChanges) -> dict[str, float]:
+        """Wait until the PLC lets the line go beyond this tick. Return the commands and alarms it wrote before that.
 
         Raises ControlError if it does not.
         """
@@ -92,13 +95,13 @@ class AttachedPlc(AbstractContextManager["AttachedPlc"]):
         while (taken := self._tags.take(min(LOOK, self._patience))) is None:
             self._require_going_on(inputs, time.monotonic() > end)
         commands: dict[str, float] = {}
-        for given in taken:
-            if given.operation == SET and given.writer_kind == "controller":
-                commands.update(zip(given.names, given.values, strict=True))
-                self.writer, self.source = given.writer, given.source
+        for request in taken:
+            if request.operation == SET and request.writer_kind == "controller":
+                commands.update(zip(request.names, request.values, strict=True))
+                self.writer, self.source = request.writer, request.source
             else:
-                self._simulation.give(given)
-        return commands
+                self._simulation.give(request)
+        return alarms.with_commands(commands)
 
     def _require_going_on(self, inputs: Inputs, late: bool) -> None:
         if self._process is not None and self._process.exit_code is not None:
@@ -114,16 +117,16 @@ class AttachedPlc(AbstractContextManager["AttachedPlc"]):
 
 
 def modbus(rows: Sequence[Row] | None, port: int) -> Callable[[TagProvider, Path], ProtocolServer]:
-    """What makes the server of a Modbus client. Raises ImportError without pymodbus."""
+    """Return a function that makes the server of a Modbus client. Raise ImportError without pymodbus."""
     from conveyor_sim.protocols.modbus.server import ModbusServer
 
     return lambda source, _: ModbusServer(
-        source, modbus_map(source.about.tags) if rows is None else rows, "controller", port=port
+        source, modbus_map(source.info.tags) if rows is None else rows, "controller", port=port
     )
 
 
 def opcua(password: str, port: int) -> Callable[[TagProvider, Path], ProtocolServer]:
-    """What makes the server of an OPC UA client. Raises ImportError without asyncua."""
+    """Return a function that makes the server of an OPC UA client. Raise ImportError without asyncua."""
     from conveyor_sim.protocols.opcua.server import OpcUaServer
     from conveyor_sim.protocols.server.users import new_user
 

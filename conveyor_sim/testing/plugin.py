@@ -1,7 +1,7 @@
-"""The pytest plugin: fixtures (`line`, `warm_start`, `modbus`, `opcua`), and what tests leave that fail or are killed.
+"""Plugin of pytest: fixtures (`line`, `warm_start`, `modbus`, `opcua`), and files of tests that fail or are killed.
 
-pytest loads it in every run by the entry point pytest11, so nothing of the simulation is imported until a test asks
-for a fixture. setup.py names it there by its module, so that `-p` of the same name does not load it twice.
+pytest loads it in every run by the entry point pytest11. Modules of the simulation are therefore imported when a test
+requests a fixture. The entry point in setup.py has the name of the module, so that `-p` does not load it twice.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ _LONGEST_NAME = 120
 
 
 class Lines:
-    """What the fixture `line` is: called, it makes a Scenario whose inputs are written as it runs."""
+    """Fixture `line`: a function that makes a Scenario, whose inputs are written as it runs."""
 
     def __init__(self, place: Path) -> None:
-        """place: folder for what is left if the test fails; while it runs, the inputs are in one beside it."""
+        """place: folder for the files of a failed test. While the test runs, the inputs are in a folder beside it."""
         self._place = place
         self._folder: Path | None = None
         self.made: list[tuple[Scenario, Path]] = []
@@ -45,7 +45,7 @@ class Lines:
         start: str | PathLike[str] | None = None,
         history: float | None = None,
     ) -> Scenario:
-        """A Scenario; arguments and errors as there."""
+        """Return a Scenario. Parameters and exceptions are those of `Scenario`."""
         from conveyor_sim.testing.scenario import Scenario
         from conveyor_sim.testing.unfinished import make_folder
 
@@ -70,9 +70,9 @@ class Lines:
                 remove_folder(folder)
 
     def keep(self, place: Path) -> list[str]:
-        """Keep bags, pages and pictures in a folder; one line each, to be shown: where it is, or why it is not.
+        """Write bags, pages and pictures to a folder. Return one line per file: its path, or why it is missing.
 
-        Inputs of which no bag could be made stay where they are.
+        Inputs stay if no bag could be made from them.
         """
         from conveyor_sim.errors import ConveyorError
         from conveyor_sim.page.watch import Watch
@@ -86,11 +86,11 @@ class Lines:
                 ("page", partial(keep_page, scenario, part / "bag", part / PAGE, watch)),
                 ("picture", partial(draw_moment, scenario, part / PICTURE)),
             ):
-                # A plugin that limits a test's time ends by `Failed` what is done for its report, too.
+                # A plugin that limits the time of tests raises `Failed` even while the report is made.
                 try:
                     lines.append(f"{what}: {keep()}")
                 except (ConveyorError, OSError, pytest.fail.Exception) as error:
-                    lines.append(f"{what}: not kept: {error}")
+                    lines.append(f"{what}: not saved: {error}")
                     if what == "bag":
                         lines.append(f"inputs: {inputs} (`conveyor-sim recover` makes the bag)")
                         self._folder = None
@@ -98,14 +98,14 @@ class Lines:
 
 
 class WarmStarts:
-    """What the fixture `warm_start` is: called, it warms up a line and gives the checkpoint to start from."""
+    """Fixture `warm_start`: a function that warms up a line, and returns a checkpoint to start from."""
 
     def __init__(self, folder: Path, place: Path) -> None:
-        """folder: for the checkpoints. place: as for Lines, of a warm-up that fails."""
+        """folder: folder of the checkpoints. place: as for Lines, for a warm-up that fails."""
         self._folder = folder
         self._made: dict[tuple[str, Callable[[Scenario], object]], Path] = {}
         self.lines = Lines(place)
-        """Those that are being warmed up."""
+        """Lines that are being warmed up."""
 
     def __call__(
         self,
@@ -113,9 +113,9 @@ class WarmStarts:
         warm_up: Callable[[Scenario], object],
         overrides: Mapping[str, Any] | None = None,
     ) -> Path:
-        """The checkpoint of a line that `warm_up` has run, for `line(scene, overrides, start=...)`.
+        """Return the checkpoint of a line after `warm_up`, for `line(scene, overrides, start=...)`.
 
-        It is called once for a scene, however often this is. Raises as Scenario, and whatever `warm_up` raises.
+        `warm_up` is called once per scene. Raises the exceptions of Scenario and of `warm_up`.
         """
         from conveyor_sim.control.scan import ControlError
         from conveyor_sim.testing.scene_of import scene_of
@@ -128,7 +128,7 @@ class WarmStarts:
             path = self._folder / f"{digest}_{len(self._made) + 1}.npz"
             try:
                 plant.save(path)
-            except ControlError:  # one that can't be held: tests attach a new one, as they may
+            except ControlError:  # its memory can't be saved: tests attach a new controller
                 plant.simulation.save(path)
             self.lines.close()
             self._made[digest, warm_up] = path
@@ -140,23 +140,23 @@ _WARMING = pytest.StashKey[Lines]()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """The option --line-failures."""
+    """Add the option --line-failures."""
     parser.getgroup("conveyor_sim").addoption(
         "--line-failures",
         metavar="DIR",
         default=DEFAULT_FOLDER,
-        help="folder for the bag, the page and the picture of every line whose test failed, a folder a test "
+        help="folder for the bag, the page and the picture of every line whose test failed, one folder per test "
         "(default: %(default)s)",
     )
 
 
 @pytest.fixture
 def line(request: pytest.FixtureRequest) -> Iterator[Lines]:
-    """Makes lines under test: `line("accumulation_table")`, `line("my_line.yaml", {"seed": 2})` is a Scenario.
+    """Make lines under test: `line("accumulation_table")`, `line("my_line.yaml", {"seed": 2})` is a Scenario.
 
-    `start="warm.npz"` begins from a checkpoint. The inputs are written as the line runs. If the test fails, a bag is
-    made of them and kept with a page and a picture (option --line-failures); if it passes, nothing is. A test that is
-    killed leaves its inputs.
+    `start="warm.npz"` begins from a checkpoint. The inputs are written as the line runs. If the test fails, a bag, a
+    page and a picture are made from them (option --line-failures). If it passes, the inputs are removed. A test that
+    is killed leaves its inputs.
     """
     lines = Lines(_root(request.config) / _name(request.node))
     request.node.stash[_LINES] = lines
@@ -166,7 +166,7 @@ def line(request: pytest.FixtureRequest) -> Iterator[Lines]:
 
 @pytest.fixture
 def modbus() -> Iterator[ModbusFaces]:
-    """Serves lines to Modbus TCP clients: `modbus(my_line, role="operator").port`. Skips a test without pymodbus."""
+    """Serve lines to Modbus TCP clients: `modbus(my_line, role="operator").port`. Skip the test without pymodbus."""
     from conveyor_sim.testing.faces import MODBUS_MISSING, ModbusFaces
 
     if find_spec("pymodbus") is None:
@@ -177,8 +177,9 @@ def modbus() -> Iterator[ModbusFaces]:
 
 @pytest.fixture
 def opcua() -> Iterator[OpcUaFaces]:
-    """Serves lines to OPC UA clients: `opcua(my_line, users={"jo": ("operator", "secret")}).address`. Skips a test
-    without asyncua.
+    """Serve lines to OPC UA clients: `opcua(my_line, users={"jo": ("operator", "secret")}).address`.
+
+    Skip the test without asyncua.
     """
     from conveyor_sim.testing.faces import OPCUA_MISSING, OpcUaFaces
 
@@ -190,10 +191,10 @@ def opcua() -> Iterator[OpcUaFaces]:
 
 @pytest.fixture(scope="session")
 def warm_start(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[WarmStarts]:
-    """Warms up a line once for many tests: `warm_start("my_line.yaml", fill)` calls `fill` with a Scenario.
+    """Warm up a line once for many tests: `warm_start("my_line.yaml", fill)` calls `fill` with a Scenario.
 
-    It returns a checkpoint of what that leaves, from which each test starts: `line("my_line.yaml", start=...)`. The
-    files are temporary; processes of pytest-xdist have their own.
+    It returns a checkpoint, from which each test starts: `line("my_line.yaml", start=...)`. The files are temporary.
+    Each process of pytest-xdist makes its own.
     """
     starts = WarmStarts(tmp_path_factory.mktemp("warm_start"), _root(request.config) / "warm_start")
     request.config.stash[_WARMING] = starts.lines
@@ -205,7 +206,7 @@ def warm_start(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPath
 def pytest_runtest_makereport(
     item: pytest.Item, call: pytest.CallInfo[None]
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """Keep what is to be kept while the lines are as they were, and tell where in the report."""
+    """Write the files of a failed test while its lines exist, and list them in the report."""
     report = yield
     lines, warming = item.stash.get(_LINES, None), item.config.stash.get(_WARMING, None)
     place = _root(item.config) / _name(item)
@@ -220,14 +221,14 @@ def pytest_runtest_makereport(
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
-    """Say what tests that were killed have left."""
+    """List inputs left by killed tests."""
     root = _root(config)
     if not root.is_dir():
         return
     from conveyor_sim.testing.unfinished import left_over
 
     if folders := left_over(root):
-        terminalreporter.section("inputs that killed tests have left")
+        terminalreporter.section("inputs left by killed tests")
         for folder in folders:
             terminalreporter.write_line(f"{folder}: `conveyor-sim recover {folder}` makes the bag")
 

@@ -1,4 +1,4 @@
-"""The scene that a test names."""
+"""The scene of a test."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from conveyor_sim.support.resources import scene_path
 
 
 def scene_of(scene: Scene | str | PathLike[str], overrides: Mapping[str, Any] | None) -> Scene:
-    """The scene that a Scenario's arguments mean; raises as that does."""
+    """Return the scene for the arguments of a Scenario. Raise the exceptions of Scenario."""
     if not isinstance(scene, Scene):
         return load_scene(scene_path(Path(scene)), overrides)
     if overrides is not None:

@@ -1,4 +1,4 @@
-"""Folders with the inputs of tests that are under way: a test that is killed leaves its own."""
+"""Folders with the inputs of running tests. A test that is killed leaves its folder."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ UNFINISHED = ".unfinished"
 
 
 def make_folder(place: Path) -> Path:
-    """A new folder beside the one for what a failed test leaves; in the system's temporary folder if it can't be."""
+    """Return a new folder beside the folder for a failed test, or else in the temporary folder of the system."""
     try:
         for number in count(1):
             folder = place.with_name(f"{place.name}{UNFINISHED}{'' if number == 1 else f'_{number}'}")
             place.parent.mkdir(parents=True, exist_ok=True)
-            # Another process may have one of this name, or just have removed the empty folder above.
+            # Another process may have made this folder, or just have removed the empty folder above.
             with suppress(FileExistsError, FileNotFoundError):
                 folder.mkdir()
                 return folder
@@ -31,7 +31,7 @@ def make_folder(place: Path) -> Path:
 
 
 def remove_folder(folder: Path) -> None:
-    """Remove such a folder, and the one above if nothing else is in it."""
+    """Remove a folder of `make_folder`, and the folder above if it is empty."""
     shutil.rmtree(folder, ignore_errors=True)
     if UNFINISHED in folder.name:
         with suppress(OSError):
@@ -39,7 +39,7 @@ def remove_folder(folder: Path) -> None:
 
 
 def left_over(root: Path) -> list[Path]:
-    """The folders that killed tests have left and of which no bag was made."""
+    """Return the folders that killed tests left, without those from which a bag was made."""
     return [folder for folder in sorted(root.glob(f"*{UNFINISHED}*")) if _is_left(folder)]
 
 

@@ -47,7 +47,14 @@ def measure(path: Path, duration: float = HOUR) -> None:
             fastest = float(max((bottles.vx**2 + bottles.vy**2) ** 0.5, default=0.0))
             line = (simulation.tick // MINUTE, counts.fed, counts.present, counts.fed - counts.present, f"{energy:.4g}")
             share = f"{residual(simulation):.3g}"
-            line += (f"{fastest:.4g}", share, simulation.shortened_ticks, f"{_memory():.1f}", f"{wall:.2f}", SOURCES)
+            line += (
+                f"{fastest:.4g}",
+                share,
+                simulation.integration.shortened_ticks,
+                f"{_memory():.1f}",
+                f"{wall:.2f}",
+                SOURCES,
+            )
             table.writerow(line)
             file.flush()
 

@@ -45,7 +45,7 @@ class Stubborn:
 
 
 def check(plant: Scenario, controller: Controller) -> None:
-    """The scenario: a lane taken, slowed down and handed back."""
+    """Check the scenario: a lane is taken over, slowed down and handed back."""
     plant.attach(controller)
     plant.run_for(1.0)
     plant.operator.mode(LANE, "manual")
@@ -73,7 +73,7 @@ def test_the_rest_of_the_controllers_scan_goes_on_and_its_refusals_are_events(li
     refused = []
     for _ in range(100):
         plant.run_for(TICK)
-        refused += [event.name for event in plant.simulation.happened if event.kind == "command_refused"]
+        refused += [event.name for event in plant.simulation.line.happened if event.kind == "command_refused"]
     assert refused == [SPEED]  # once, though it was refused a hundred times
     assert plant.history[FILLER][-1] == 1.5
     assert plant.history[SPEED][-1] == SLOW

@@ -1,4 +1,4 @@
-"""Long runs over processes: the same whoever makes them, and none is lost or repeated when something is killed."""
+"""Long runs over processes: equal results from any process, and no run lost or repeated after a kill."""
 
 import os
 import signal
@@ -51,7 +51,7 @@ run_until_decided(load_scene(scene), [candidate], reference, 0.5, 1e9, Path(fold
 
 
 def silent(done: int, total: int, left: float | None) -> None:
-    """Nobody is told."""
+    """Ignore the progress."""
 
 
 def filling(**fields: object) -> Scene:
@@ -104,7 +104,7 @@ def children_of(pid: int) -> set[int]:
 
 
 def workers_of(pid: int) -> set[int]:
-    """Of them, those that a pool has started."""
+    """Return the child processes that a pool started."""
     found = set()
     for child in children_of(pid):
         try:
@@ -137,7 +137,7 @@ def study(it: Scene, folder: Path, per_tick: tuple[int, int]) -> Iterator[subpro
 
 
 def test_samples_are_those_of_runs_made_one_by_one(tmp_path: Path) -> None:
-    """Whatever the number of processes, and in the order wanted."""
+    """The samples do not depend on the number of processes, and come in the requested order."""
     it, wanted = filling(), runs_of(FINE, COARSE, seeds=3)
     told: list[tuple[int, int, float | None]] = []
     made = []

@@ -139,7 +139,7 @@ def two_settings(count: int, difference: float) -> list[Sample]:
 
 
 def test_the_first_look_that_decides_stands() -> None:
-    """More runs, of whatever values, do not change it."""
+    """More runs, with any values, do not change it."""
     first = decide(two_settings(16, 0.0), [CHEAP], REFERENCE, TOLERANCE)
     assert [(row.runs, row.verdict) for row in first] == [(8, "equivalent")]
     later = [replace(sample, values={"0": 9.0}) if sample.seed >= 8 else sample for sample in two_settings(64, 0.0)]

@@ -77,4 +77,4 @@ def test_a_scene_without_moving_rails_has_no_exercise() -> None:
     assert not Exercise(it)
     run = variant(it, Setting("semi_implicit_euler", 10))
     Exercise(it).command(run)
-    assert list(run.waiting) == []
+    assert list(run.line.waiting) == []

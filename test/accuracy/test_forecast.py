@@ -1,4 +1,4 @@
-"""What is predicted of settings before anything runs."""
+"""Predictions for settings before anything runs."""
 
 from __future__ import annotations
 

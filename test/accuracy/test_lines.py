@@ -10,13 +10,13 @@ from accuracy.studies import CHOSEN, study
 from facts import missing
 
 from conveyor_sim.accuracy.report.lines import summary, three_lines
-from conveyor_sim.accuracy.results import Comparison, Study
+from conveyor_sim.accuracy.results import AccuracyStudy, Comparison
 
 FORCES_ONLY = ("impacts and resting forces only",)
 JARGON = ("integrator", "euler", "verlet", "rk4", "step", "rms", "dt", "order", "convergence")
 
 
-def with_runs(*rows: Comparison, accepted: bool = False) -> Study:
+def with_runs(*rows: Comparison, accepted: bool = False) -> AccuracyStudy:
     of = study()
     assert of.answer is not None
     return replace(of, comparisons=rows, answer=replace(of.answer, accepted=accepted))
@@ -73,7 +73,7 @@ def test_few_runs_compare_nothing(rows: tuple[Comparison, ...]) -> None:
 
 
 def test_a_setting_that_others_were_compared_with_was_compared_with_none() -> None:
-    """Cheaper ones were found different from it; how good it is itself nobody has looked at."""
+    """Cheaper settings differed from it; its own error was not measured."""
     of = replace(with_runs(), ensemble_reference=CHOSEN)
     facts = ["Throughput", "cheaper settings", "differ", "long runs", "none", *FORCES_ONLY]
     assert missing(three_lines(of)[1], facts) == []

@@ -1,4 +1,4 @@
-"""Where two messages differ first."""
+"""First difference of two messages."""
 
 import math
 from dataclasses import replace
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from bag.hand_made import HEADER, bottles, contacts
 
-from conveyor_sim.bag.compare import Difference, first_difference, outcome_difference
+from conveyor_sim.bag.compare import ReplayDifference, first_difference, outcome_difference
 from conveyor_sim.bag.messages import encode
 from conveyor_sim.bag.messages.encode import Outcome
 from conveyor_sim.bag.messages.topics import TOPICS
@@ -36,7 +36,7 @@ def of_contacts(columns: ContactColumns) -> Any:
     return typestore().deserialize_cdr(TOPICS["contacts"].pack(columns, HEADER), TOPICS["contacts"].type)
 
 
-def compare_x(then: float, now: float, *, exact: bool) -> Difference | None:
+def compare_x(then: float, now: float, *, exact: bool) -> ReplayDifference | None:
     """Two Bottles that differ in x of bottle 2 only."""
     x = bottles(4).x.copy()
     one, two = x.copy(), x.copy()
@@ -51,7 +51,7 @@ def test_equal_messages_have_no_difference() -> None:
 
 def test_last_bit_is_a_difference_that_names_bottle_field_and_values() -> None:
     found = compare_x(1.0, math.nextafter(1.0, 2.0), exact=True)
-    assert found == Difference(
+    assert found == ReplayDifference(
         tick=1234,
         time=1234 * 10_000_000 * 1e-9,
         topic="bottles",

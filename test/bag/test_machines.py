@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from conveyor_sim.bag.input_log import START_NAME
-from conveyor_sim.bag.outputs import Outputs, forget_past
+from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.bag.replay import replay
 from conveyor_sim.scene import Scene, load_scene
@@ -38,7 +38,7 @@ def scene() -> Scene:
 
 def record(simulation: Simulation, folder: Path, ticks: int) -> None:
     with Recorder(folder) as recorder:
-        outputs = Outputs(simulation, [recorder], run_id="run", frame_id="hall")
+        outputs = OutputWriter(simulation, [recorder], run_id="run", frame_id="hall")
         outputs.start()
         for _ in range(ticks):
             if simulation.tick in COMMANDS:
@@ -68,7 +68,7 @@ def test_a_recording_that_begins_at_a_checkpoint_replays_from_it(tick: int, tmp_
         simulation.advance()
     simulation.save(tmp_path / "there")
     loaded = Simulation.load(tmp_path / "there")
-    forget_past(loaded)
+    loaded.take_events()
     record(loaded, tmp_path / "bag", 400)
     shutil.copy(tmp_path / "there", tmp_path / "bag" / START_NAME)
     report = replay(tmp_path / "bag")

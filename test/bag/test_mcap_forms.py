@@ -26,7 +26,7 @@ from mcap.reader import NonSeekingReader, make_reader
 from mcap.records import Channel, Message, Metadata, Schema
 
 from conveyor_sim.bag.mcap.salvage import Salvage
-from conveyor_sim.bag.mcap_source import McapSource
+from conveyor_sim.bag.mcap_reader import McapFilesReader
 from conveyor_sim.bag.recover import RecoverReport, recover
 from conveyor_sim.errors import BagError
 
@@ -58,7 +58,7 @@ def recovered(place: Path, content: bytes) -> RecoverReport:
 def read(place: Path, content: bytes) -> list[tuple[str, int, bytes]]:
     file = place / "form.mcap"
     file.write_bytes(content)
-    source = McapSource(file, [file])
+    source = McapFilesReader(file, [file])
     try:
         return list(source.messages({recorded.topic for recorded in source.topics}, None, None))
     finally:

@@ -1,4 +1,4 @@
-"""Damage is seen: no flipped bit is called whole or replayed; sound chunks are kept, what is lost is named."""
+"""Damage is detected: no flipped bit is called intact or replayed; valid chunks are kept, losses are reported."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from mcap.writer import CompressionType, IndexType, Writer
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as StockWriter
 
-from conveyor_sim.bag.mcap.file import McapFile, Schema
+from conveyor_sim.bag.mcap.writer import McapFileWriter, Schema
 from conveyor_sim.bag.messages.topics import OUTPUTS
 from conveyor_sim.bag.messages.typestore import definition, typestore
 from conveyor_sim.bag.reader import open_bag
@@ -237,7 +237,7 @@ def test_a_size_that_is_wrong_takes_no_memory(folder: Path) -> None:
 
 
 def test_what_carries_no_checksum_is_never_called_whole(folder: Path, tmp_path: Path) -> None:
-    """As stock recorders write: without a checksum over all data, or without any."""
+    """Stock recorders write files without a checksum over all data, or without any checksum."""
     partly = tmp_path / "partly.mcap"
     with file_of(folder).open("rb") as source, partly.open("wb") as stream:
         writer = Writer(stream, compression=CompressionType.LZ4, chunk_size=30_000, index_types=IndexType.ALL)
@@ -331,7 +331,7 @@ def test_a_bag_of_several_files_is_read_and_repaired_as_one(folder: Path, tmp_pa
     for number, part in enumerate((before[:half], before[half:])):
         name = f"split_{number}.mcap"
         with (split / name).open("wb") as stream:
-            file = McapFile(stream, name, "jazzy")
+            file = McapFileWriter(stream, name, "jazzy")
             topics = {
                 topic: file.add_topic(
                     f"/{topic}", Schema(output.type, "ros2msg", definition(output.type).encode()), "cdr", {}
@@ -371,7 +371,7 @@ def test_the_example_tells_of_a_damaged_bag_in_one_line(scene: Scene, tmp_path: 
 def test_a_damaged_attachment_is_left_out_and_its_name_escaped(tmp_path: Path) -> None:
     file = tmp_path / "notes.mcap"
     with file.open("wb") as stream:
-        writer = McapFile(stream, file.name, "jazzy")
+        writer = McapFileWriter(stream, file.name, "jazzy")
         channel = writer.add_topic("/on", Schema("std_msgs/msg/Bool", "ros2msg", b"bool data"), "cdr", {})
         writer.add_message(channel, b"\x00\x01\x00\x00\x01", log_time=1, publish_time=1)
         for name in ("good", "bad\x1b[2J\nforged"):

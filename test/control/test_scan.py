@@ -1,4 +1,4 @@
-"""Controllers put together."""
+"""Combined controllers."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ import pytest
 from control.scans import Scans
 
 from conveyor_sim.control import Constant, ControlError, Inputs, priority, together
-from conveyor_sim.control.scan import AlarmChanges, commands_of
+from conveyor_sim.control.scan import commands_of
+from conveyor_sim.run.alarm_changes import AlarmChanges
 
 
 def test_together_merges_what_all_answer() -> None:
@@ -17,7 +18,7 @@ def test_together_merges_what_all_answer() -> None:
 
 
 def test_together_refuses_two_that_command_the_same() -> None:
-    with pytest.raises(ControlError, match=r"belts/a/cmd_speed: given by both Constant and Constant in one scan"):
+    with pytest.raises(ControlError, match=r"belts/a/cmd_speed: sent by both Constant and Constant in one scan"):
         Scans(together(Constant({"belts/a/cmd_speed": 0.5}), Constant({"belts/a/cmd_speed": 0.5}))).scan({})
 
 
@@ -58,28 +59,9 @@ def test_inputs_tell_bools_and_what_is_missing() -> None:
 )
 def test_what_is_no_answer_is_said(answer: Any, message: str) -> None:
     with pytest.raises(ControlError) as raised:
-        commands_of(answer) | AlarmChanges().of(answer)
+        AlarmChanges().with_commands(answer)
     assert str(raised.value) == message
 
 
 def test_commands_are_numbers_without_the_alarms() -> None:
     assert commands_of({"gates/g/open": True, "alarms/jam": 1.0}) == {"gates/g/open": 1.0}
-
-
-def test_of_its_alarms_the_line_is_given_what_changes() -> None:
-    changes = AlarmChanges()
-    given = [
-        changes.of(answer)
-        for answer in (
-            {"alarms/a": 0.0, "alarms/b": True, "belts/x/cmd_speed": 1.0},
-            {"alarms/a": 0.0, "alarms/b": 1.0},
-            {"alarms/a": 1.0},
-            {},
-        )
-    ]
-    assert given == [
-        {"alarms/a": 0.0, "alarms/b": 1.0},
-        {},
-        {"alarms/a": 1.0, "alarms/b": 0.0},
-        {"alarms/a": 0.0},
-    ]

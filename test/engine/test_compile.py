@@ -42,8 +42,8 @@ sim = Simulation(scene)
 sim.advance(2)
 sim.contacts()
 names = [module.name for module in pkgutil.walk_packages(conveyor_sim.engine.__path__, "conveyor_sim.engine.")]
-found = [value for name in names for value in vars(importlib.import_module(name)).values()]
-kernels = {id(value): value for value in found if isinstance(value, Dispatcher)}
+values = [value for name in names for value in vars(importlib.import_module(name)).values()]
+kernels = {id(value): value for value in values if isinstance(value, Dispatcher)}
 print(sum(sum(kernel.stats.cache_hits.values()) for kernel in kernels.values()))
 print(sum(sum(kernel.stats.cache_misses.values()) for kernel in kernels.values()))
 print(len(said))
@@ -96,7 +96,7 @@ def test_a_better_comment_throws_no_kernels_away(copied: Path) -> None:
     friction, before = copied / "conveyor_sim" / "engine" / "contact" / "friction.py", hash_of(copied)
     text = friction.read_text()
     friction.write_text(
-        text.replace("Two curves p", "Two better curves p", 1).replace("\n\n\n", "\n\n\n# Better.\n", 1)
+        text.replace("two curves p", "two better curves p", 1).replace("\n\n\n", "\n\n\n# Better.\n", 1)
     )
     assert len(friction.read_text()) == len(text) + len("better ") + len("# Better.\n")
     assert hash_of(copied) == before

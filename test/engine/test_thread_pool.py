@@ -21,7 +21,7 @@ def crowd(**fields: Any) -> Scene:
     width, height = COLUMNS * PITCH + 0.1, ROWS * PITCH + 0.1
     box = [(0.0, 0.0), (width, 0.0), (width, height), (0.0, height)]
     laws = {"damping": ("normal", 1.0), "friction": 0.2}
-    given: dict[str, Any] = {
+    base_fields: dict[str, Any] = {
         "bottle_types": {"bottle": kind(), "slim": kind(0.06, 0.15)},
         "contacts": [contact(5000.0, **laws), contact(8000.0, "steel", **laws)],
         "base": base(0.4),
@@ -38,7 +38,7 @@ def crowd(**fields: Any) -> Scene:
         "accuracy": {"per_tick": 50},
         "effects": COMMON,
     }  # fmt: skip
-    return scene(**with_bends({**given, **fields}))
+    return scene(**with_bends({**base_fields, **fields}))
 
 
 VARIANTS: dict[str, dict[str, Any]] = {
@@ -58,13 +58,13 @@ VARIANTS: dict[str, dict[str, Any]] = {
 @pytest.mark.parametrize("name", VARIANTS)
 def test_the_same_bits_on_any_number_of_threads(name: str) -> None:
     """The run is long enough for impacts and rebuilds; there may be more threads than blocks."""
-    ticks, given = 15, crowd(**VARIANTS[name])
-    one = Simulation(given, threads=1)
+    ticks, tested = 15, crowd(**VARIANTS[name])
+    one = Simulation(tested, threads=1)
     one.advance(ticks)
     assert one._state.world.bottles.id.size > 2 * BLOCK
     assert one.contacts().kind.size > 100
     for threads in (2, 3, 7):
-        other = Simulation(given, threads=threads)
+        other = Simulation(tested, threads=threads)
         other.advance(ticks)
         assert other.full_state_hash() == one.full_state_hash(), threads
         np.testing.assert_array_equal(other.bottles().peak_force, one.bottles().peak_force)
@@ -73,14 +73,14 @@ def test_the_same_bits_on_any_number_of_threads(name: str) -> None:
 
 
 def test_the_number_may_change_from_tick_to_tick() -> None:
-    given = crowd()
-    one, other = Simulation(given, threads=1), Simulation(given, threads=3)
+    tested = crowd()
+    one, other = Simulation(tested, threads=1), Simulation(tested, threads=3)
     one.advance(9)
-    pool, sizes = other._integration._pool, [1, 3, 2, 2, 1, 3, 1, 2, 3]
+    pool, sizes = other.integration._pool, [1, 3, 2, 2, 1, 3, 1, 2, 3]
     for size in sizes:
         steps = other.model.steps_per_tick
         other._line.begin(other.tick)
-        assert pool.advance(size, other._integration._advance, other._state.world, steps, other.model.dt, 0) == steps
+        assert pool.advance(size, other.integration._advance, other._state.world, steps, other.model.dt, 0) == steps
         other.tick += 1
     assert other.state_hash() == one.state_hash()
 
@@ -101,7 +101,7 @@ def test_a_thread_that_fails_is_heard_and_the_crew_goes_on() -> None:
         return 0
 
     sim = Simulation(crowd(), threads=2)
-    pool, world = sim._integration._pool, sim._state.world
+    pool, world = sim.integration._pool, sim._state.world
     pool._entries[failing] = failing
     with pytest.raises(ArithmeticError, match="rank 1"):
         pool.advance(2, failing, world, 1, 1e-5, 0)
@@ -115,9 +115,9 @@ def test_a_process_of_another_number_has_threads_of_its_own() -> None:
     """A fork copies queues, not threads, so a pool in a child process must not wait for threads of the parent."""
     sim, other = Simulation(crowd(), threads=2), Simulation(crowd(), threads=1)
     sim.advance(2)
-    tasks = list(sim._integration._pool._tasks)
-    sim._integration._pool._process = -1  # as in a child process
+    tasks = list(sim.integration._pool._tasks)
+    sim.integration._pool._process = -1  # as in a child process
     sim.advance(1)
-    assert sim._integration._pool._tasks[0] is not tasks[0]
+    assert sim.integration._pool._tasks[0] is not tasks[0]
     other.advance(3)
     assert sim.full_state_hash() == other.full_state_hash()

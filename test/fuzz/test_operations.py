@@ -35,7 +35,7 @@ def test_whatever_acts_on_a_line_it_is_answered_and_replayed(seed: int, tmp_path
 )
 def test_an_answer_that_can_not_be_is_noticed(given: Input, change: dict[str, object], kind: str) -> None:
     sim = TrueLine(drawn(random.Random(1)), threads=1)
-    watch, expected = Watch(sim), sim.refusal(given)
+    watch, expected = Watch(sim), sim.line.refusal(given)
     sim.give(given)
     sim.advance()
     (made,) = sim.take_outcomes()

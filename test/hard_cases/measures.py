@@ -141,7 +141,12 @@ def _stepped(case: Case, scene: Scene, ticks: int) -> Simulation:
 
 def _end(simulation: Simulation) -> tuple[Any, ...]:
     """What a run came to, to the bit."""
-    books = (repr(simulation.ledger()), simulation.peak_force, simulation.deepest_overlap, simulation.shortened_ticks)
+    books = (
+        repr(simulation.ledger()),
+        simulation.peak_force,
+        simulation.integration.deepest_overlap,
+        simulation.integration.shortened_ticks,
+    )
     return (simulation.tick, simulation.state_hash(), *books)
 
 
@@ -242,8 +247,8 @@ class _Watch:
         mass = simulation.model.type_mass[bottles.type]
         found = {
             **self._most,
-            "overlap": max(self._most["overlap"], simulation.deepest_overlap),
-            "shortened_ticks": float(simulation.shortened_ticks),
+            "overlap": max(self._most["overlap"], simulation.integration.deepest_overlap),
+            "shortened_ticks": float(simulation.integration.shortened_ticks),
             "final_speed": float(np.max(np.hypot(bottles.vx, bottles.vy), initial=0.0)),
             "final_spin": float(np.max(np.abs(bottles.omega), initial=0.0)),
             "momentum": float(np.hypot(mass @ bottles.vx, mass @ bottles.vy)),

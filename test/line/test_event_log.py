@@ -1,4 +1,4 @@
-"""What happens on a line is noted at its tick, in order, once."""
+"""Events of a line are recorded at their ticks, in order, once."""
 
 from pathlib import Path
 
@@ -23,11 +23,11 @@ def setting(name: str, value: float) -> Input:
 
 
 def run(sim: Simulation, ticks: int) -> list[Event]:
-    """All that happens in so many ticks."""
+    """Return all events within a number of ticks."""
     events = []
     for _ in range(ticks):
         sim.advance()
-        events += sim.happened
+        events += sim.line.happened
     return events
 
 
@@ -42,14 +42,14 @@ def of(events: list[Event], kind: str) -> list[tuple[int, str, int, float]]:
 def test_bottles_fed_and_taken_are_those_that_come_and_go() -> None:
     sim = Simulation(FUNNEL)
     present = set(sim.bottles().id.tolist())
-    assert not sim.happened  # what stands there at the start was not fed
+    assert not sim.line.happened  # what stands there at the start was not fed
     for _ in range(400):
         sim.advance()
         now = set(sim.bottles().id.tolist())
-        come = {e.bottle for e in sim.happened if e.kind == "bottle_fed"}
-        gone = {e.bottle for e in sim.happened if e.kind == "bottle_removed"}
+        come = {e.bottle for e in sim.line.happened if e.kind == "bottle_fed"}
+        gone = {e.bottle for e in sim.line.happened if e.kind == "bottle_removed"}
         assert (come, gone) == (now - present, present - now)
-        assert {e.at for e in sim.happened} <= {sim.tick}
+        assert {e.at for e in sim.line.happened} <= {sim.tick}
         present = now
     assert sim.line.happened_so_far > 10
 
@@ -68,7 +68,7 @@ def test_a_bottle_thrown_out_is_rejected_not_removed() -> None:
         sim.advance()
         if value(sim, "machines/rejecter/rejected"):
             break
-    assert [(e.kind, e.name, e.value) for e in sim.happened if e.bottle >= 0 and e.kind != "bottle_fed"] == [
+    assert [(e.kind, e.name, e.value) for e in sim.line.happened if e.bottle >= 0 and e.kind != "bottle_fed"] == [
         ("bottle_rejected", "machines/rejecter", 1.0)
     ]
 
@@ -94,7 +94,7 @@ def test_an_alarm_is_noted_when_it_comes_and_when_it_goes() -> None:
         if given is not None:
             sim.command(("alarms/full",), (given,))
         sim.advance()
-        seen.append(([e.kind for e in sim.happened if e.name == "alarms/full"], set(sim.alarms)))
+        seen.append(([e.kind for e in sim.line.happened if e.name == "alarms/full"], set(sim.alarms)))
     assert seen == [
         ([], set()),
         (["alarm_raised"], {"full"}),
@@ -111,29 +111,29 @@ def test_an_alarm_beside_a_refused_command_is_noted() -> None:
     sim.command(("alarms/full", "belts/line/cmd_speed"), (1.0, 1e9))
     sim.advance()
     assert [o.accepted for o in sim.take_outcomes()] == [False]
-    assert [e.kind for e in sim.happened] == ["command_refused", "alarm_raised"]
+    assert [e.kind for e in sim.line.happened] == ["command_refused", "alarm_raised"]
 
 
 def test_an_alarm_that_somebody_injects_is_refused_and_not_raised() -> None:
     sim = Simulation(REJECT)
     sim.inject("alarms/full", 1.0)
     sim.advance()
-    assert [e.kind for e in sim.happened] == ["command_refused"]
+    assert [e.kind for e in sim.line.happened] == ["command_refused"]
     assert not sim.alarms
 
 
 @pytest.mark.parametrize("given", [0.5, float("nan"), -1.0, 2.0])
 def test_an_alarm_is_zero_or_one(given: float) -> None:
     sim = Simulation(REJECT)
-    assert sim.refusal(setting("alarms/full", given)) == f"alarms/full: {given:g} given, expected 0 or 1"
-    assert sim.refusal(setting("alarms/full", 1.0)._replace(operation=INJECT))  # nobody injects one
+    assert sim.line.refusal(setting("alarms/full", given)) == f"alarms/full: {given:g} given, expected 0 or 1"
+    assert sim.line.refusal(setting("alarms/full", 1.0)._replace(operation=INJECT))  # nobody injects one
 
 
 @pytest.mark.parametrize(
     ("name", "shown"), [("alarms/a\nb", r"a\nb"), (f"alarms/{'a' * 300}", f"{'a' * 192}…"), ("alarms/voll ü", "voll ü")]
 )
 def test_an_alarm_is_kept_as_it_can_be_shown(name: str, shown: str) -> None:
-    """So that a recording, which holds that name, replays to the same one."""
+    """So a recording, which holds that name, replays to the same one."""
     sim = Simulation(REJECT)
     for _ in range(2):
         sim.command((name,), (1.0,))
@@ -147,7 +147,7 @@ def test_an_alarm_is_kept_as_it_can_be_shown(name: str, shown: str) -> None:
 
 def test_an_alarm_has_a_name() -> None:
     expected = "alarms/: given, expected the name of an alarm behind it"
-    assert Simulation(REJECT).refusal(setting("alarms/", 1.0)) == expected
+    assert Simulation(REJECT).line.refusal(setting("alarms/", 1.0)) == expected
 
 
 def test_the_alarms_that_stand_are_bounded() -> None:
@@ -180,8 +180,8 @@ def test_a_checkpoint_remembers_alarms_states_and_what_has_just_happened(scene: 
     sim.command(("alarms/late",), (1.0,))
     sim.save(tmp_path / "there")
     loaded = Simulation.load(tmp_path / "there")
-    assert (loaded.happened, loaded.line.happened_so_far, loaded.alarms) == (
-        sim.happened,
+    assert (loaded.line.happened, loaded.line.happened_so_far, loaded.alarms) == (
+        sim.line.happened,
         sim.line.happened_so_far,
         sim.alarms,
     )

@@ -1,4 +1,4 @@
-"""The alarms of a line: its own, its scene's, its controllers', and what operators do with them."""
+"""Alarms of a line, its scene and its controllers, and operations on them."""
 
 import json
 from pathlib import Path
@@ -18,16 +18,16 @@ FEEDER = "belts/feeder/cmd_speed"
 
 
 def line(**changes: Any) -> Simulation:
-    """The table of the scenarios' tests."""
+    """Return the table of the scenarios' tests."""
     return Simulation(load_scene(TABLE, changes))
 
 
 def alarm_events(sim: Simulation, ticks: int) -> list[tuple[int, str, str]]:
-    """Tick, kind and id of what happens to alarms."""
+    """Return tick, kind and id of alarm events."""
     found = []
     for _ in range(ticks):
         sim.advance()
-        found += [_short(event) for event in sim.happened if event.kind.startswith("alarm_")]
+        found += [_short(event) for event in sim.line.happened if event.kind.startswith("alarm_")]
     return found
 
 
@@ -47,7 +47,7 @@ def value(sim: Simulation, name: str) -> float:
 def test_a_belt_that_its_watchdog_stops_is_an_alarm_until_a_command_comes() -> None:
     sim = line(belts={"feeder": {"watchdog": 0.5}})
     assert alarm_events(sim, 60) == [(50, "raised", "belts/feeder/watchdog")]
-    assert sim.line.alarms["belts/feeder/watchdog"].text == "belts/feeder stopped: no command came for its watchdog"
+    assert sim.line.alarms["belts/feeder/watchdog"].text == "belts/feeder stopped: its watchdog received no command"
     assert value(sim, "alarms/belts/feeder/watchdog") == value(sim, "alarm_counts/errors") == 1
     sim.command((FEEDER,), (0.2,))
     assert alarm_events(sim, 10) == [(60, "cleared", "belts/feeder/watchdog")]
@@ -92,7 +92,7 @@ def test_the_scene_s_alarms_are_on_signals() -> None:
 
 
 def test_an_alarm_on_a_mode_says_that_a_device_is_in_other_hands(tmp_path: Path) -> None:
-    """Of the scene, and of a controller; from a checkpoint too."""
+    """For alarms of the scene and of a controller; also from a checkpoint."""
     belt = "belts/feeder"
     sim = line(alarms={"by_hand": {"tag": f"{belt}/mode", "high": 1.5, "alarm_class": "message"}})
     declare(sim, automatic={"tag": f"{belt}/mode", "low": 1.5})
@@ -111,7 +111,10 @@ def test_an_alarm_on_a_mode_says_that_a_device_is_in_other_hands(tmp_path: Path)
 
 
 def test_an_alarm_with_a_limit_goes_by_what_is_read_the_line_s_own_by_what_is() -> None:
-    """Of the scene, and of a controller: a forced value is judged as controllers read it, until it is unforced."""
+    """A forced value counts as controllers read it, until it is unforced.
+
+    This holds for alarms of the scene and of a controller.
+    """
     sim = line(alarms={"full": {"tag": ON_TABLE, "high": 40}}, belts={"feeder": {"drive": {"acceleration": 1.0}}})
     declare(sim, empty={"tag": ON_TABLE, "low": -1.0})
     sim.advance()
@@ -153,7 +156,7 @@ def test_a_clogged_outfeed_is_an_alarm() -> None:
     assert came[1:] == ("raised", "outfeeds/out/clogged")
     again = len(went) // 2  # after moments at which none waits
     assert [kind for _, kind, _ in went] == ["cleared", "raised"] * again
-    assert [event.kind for event in sim.take_damage_events()] == ["clogging_time"] * (1 + again)
+    assert [event.kind for event in sim.take_events().damage] == ["clogging_time"] * (1 + again)
 
 
 def test_a_controller_that_only_says_an_alarm_has_one_as_by_default() -> None:
@@ -180,7 +183,7 @@ def test_declared_first_then_said() -> None:
     sim.operate("acknowledge", writer="anna")
     sim.operate("reset", ["alarms/full"], writer="ben")
     assert alarm_events(sim, 1) == [(11, "acknowledged", "full"), (11, "reset", "full")]
-    assert [event.text for event in sim.happened] == ["by anna", "by ben"]
+    assert [event.text for event in sim.line.happened] == ["by anna", "by ben"]
     assert not sim.alarms and value(sim, "alarm_counts/first_out") == 0
 
 
@@ -216,7 +219,7 @@ def test_a_controller_can_have_a_value_watched() -> None:
 )
 def test_what_can_not_be_is_refused(given: Input, reason: str) -> None:
     sim = line(alarms={"high": {"tag": ON_TABLE, "high": 10}})
-    assert sim.refusal(given).startswith(reason)
+    assert sim.line.refusal(given).startswith(reason)
     sim.give(given)
     sim.advance()
     (outcome,) = sim.take_outcomes()
@@ -243,7 +246,7 @@ def test_a_scene_s_alarm_that_can_not_be(alarm: dict[str, Any], problem: str) ->
 
 
 def busy(sim: Simulation) -> None:
-    """Something of everything."""
+    """Return a line after events of all kinds."""
     declare(sim, full={"latching": True, "group": "table", "on_delay": 0.1}, late={"on_delay": 3.0, "group": "table"})
     sim.command(("alarms/full", "alarms/late", "alarms/other"), (1.0, 1.0, 1.0))
     sim.operate("shelve", ["other"], [2.0], writer="anna")
@@ -284,7 +287,7 @@ def test_a_checkpoint_that_claims_what_can_not_be_is_refused(tmp_path: Path) -> 
     sim.advance()
     sim.line.alarms["late"].due = 10**8
     sim.save(tmp_path / "edited.npz")
-    with pytest.raises(CheckpointError, match="late, that has a delay that can't be"):
+    with pytest.raises(CheckpointError, match="late, that has an impossible delay"):
         Simulation.load(tmp_path / "edited.npz")
 
 

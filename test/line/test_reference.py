@@ -1,4 +1,4 @@
-"""The tables of docs/line.md have every device."""
+"""The tables of docs/line.md contain every device."""
 
 from conveyor_sim.line.device_kinds import DEVICES
 from conveyor_sim.line.line import image_of
@@ -17,4 +17,4 @@ def test_every_class_of_device_is_in_a_table() -> None:
         if line.startswith("| `")
     ]
     assert len(rows) == len(tags)
-    assert "| `photo_eyes/<e>/delay` | fault | s | 0 | All that it sees comes so much later. |" in rows
+    assert "| `photo_eyes/<e>/delay` | fault | s | 0 | Delay of all changes. |" in rows

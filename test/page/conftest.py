@@ -13,7 +13,7 @@ from page.line import LINE, record
 from page.live_line import PASSWORD, PEOPLE, Live
 from protocols.waiting import PATIENCE
 
-from conveyor_sim.page.one_file import Failure, write_page
+from conveyor_sim.page.one_file import FailedCondition, write_page
 from conveyor_sim.protocols.server.users import keep_user, new_user
 from conveyor_sim.protocols.tags.scene_messages import SceneTask
 from conveyor_sim.protocols.tags.scene_provider import SceneTagProvider
@@ -30,14 +30,14 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def other_bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The same, but the gate does not close at 6 s. Not to be written to."""
+    """Return a recording in which the gate does not close at 6 s. Tests must not write to it."""
     return record(tmp_path_factory.mktemp("view") / "other", closes=False)
 
 
 @pytest.fixture(scope="session")
 def html(bag: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The same as one file, with a condition that failed at 22 s."""
-    failures = [Failure(22.0, "always: no more than 20 bottles <script>alert(3)</script>")]
+    """Return the page of `bag` as one file, with a condition that failed at 22 s."""
+    failures = [FailedCondition(22.0, "always: no more than 20 bottles <script>alert(3)</script>")]
     return write_page(bag, tmp_path_factory.mktemp("page") / "line.html", failures=failures)
 
 
@@ -63,7 +63,7 @@ def page(browser: Any, html: Path) -> Iterator[Any]:
 
 @contextmanager
 def opened_page(browser: Any, html: Path, size: tuple[int, int] = (1280, 720)) -> Iterator[Any]:
-    """As `page`, on some file, in a window of some size in px."""
+    """Open a file as `page` does, in a window of a size in px."""
     context = browser.new_context(viewport={"width": size[0], "height": size[1]}, offline=True)
     context.set_default_timeout(60_000)
     opened, wrong = context.new_page(), []

@@ -14,7 +14,7 @@ from page.test_page import clock, press, settled
 from protocols.waiting import until
 
 from conveyor_sim.page.bundle import text
-from conveyor_sim.page.one_file import Failure, write_page
+from conveyor_sim.page.one_file import FailedCondition, write_page
 
 PANELS = ("line", "alarms", "events", "device", "bottle")
 
@@ -88,7 +88,7 @@ FAINT = """() => {
 
 @pytest.fixture(scope="module")
 def html(bag: Path, other_bag: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    failures = [Failure(22.0, "always: no more than 20 bottles")]
+    failures = [FailedCondition(22.0, "always: no more than 20 bottles")]
     return write_page(bag, tmp_path_factory.mktemp("access") / "pair.html", failures=failures, other=other_bag)
 
 
@@ -149,7 +149,7 @@ def test_a_line_that_runs_is_commanded_by_keys_alone(open_page: Callable[[str], 
     for value, now in (("on", 1.0), ("off", 0.0)):
         page.focus(f"[aria-label='Inject photo_eyes/exit/stuck_on {value}']")
         page.keyboard.press("Enter")
-        soon(page, lambda now=now: live.source.shown.values["photo_eyes/exit/blocked"] == now, value)
+        soon(page, lambda now=now: live.source.snapshot.values["photo_eyes/exit/blocked"] == now, value)
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])

@@ -1,4 +1,4 @@
-"""What a page is packed of: small, whole, and no larger than it may be."""
+"""Packed data of a page: complete, and no larger than its limit."""
 
 from __future__ import annotations
 
@@ -14,10 +14,9 @@ from conveyor_sim.bag.messages.typestore import typestore
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.columns.bottles import BottleColumns, ContactColumns
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.page.block import Content, levels, pack
+from conveyor_sim.page.block import BlockContent, levels, pack, varints
 from conveyor_sim.page.one_file import write_page
-from conveyor_sim.page.recording import Detail, Recording
-from conveyor_sim.page.varints import varints
+from conveyor_sim.page.recording import Detail, PageRecording
 
 BOTTLES, SECONDS, RATE = 300, 60.0, 25.0
 ALLOWED = 1_000_000
@@ -53,7 +52,7 @@ def test_a_minute_of_a_crowd_that_is_pushed_about_stays_below_a_megabyte() -> No
     ids = np.arange(BOTTLES, dtype=np.uint64)
     rows = np.stack([np.arange(BOTTLES) % 20 * 0.08, np.arange(BOTTLES) // 20 * 0.07], axis=1)
     velocity, shaken = np.zeros((BOTTLES, 2)), rows.copy()
-    size, content = 0, Content()
+    size, content = 0, BlockContent()
     for frame in range(int(SECONDS * RATE)):
         velocity = 0.8 * velocity + rng.normal(0.0, 0.004, velocity.shape)
         shaken += velocity / RATE
@@ -69,7 +68,7 @@ def test_a_minute_of_a_crowd_that_is_pushed_about_stays_below_a_megabyte() -> No
             content.contacts.append((4 * frame, ContactColumns(kind, a, b, none, none, none, none, none, normal, none)))
         if frame % 100 == 99:
             size += len(zlib.compress(pack(content, 4 * (frame - 99)), 9))
-            content = Content()
+            content = BlockContent()
     assert size * 4 / 3 < ALLOWED
 
 
@@ -106,7 +105,7 @@ def test_what_stock_rosbag2_recorded_gives_the_same_blocks(bag: Path, tmp_path: 
         for topic, stamp, data in opened.raw():
             writer.write(connections[topic], 1_700_000_000_000_000_000 + stamp // 2, data)
     with open_bag(bag) as opened, open_bag(folder) as other:
-        ours, theirs = Recording(opened, Detail()), Recording(other, Detail())
+        ours, theirs = PageRecording(opened, Detail()), PageRecording(other, Detail())
         for recording in (ours, theirs):
             recording.begin_before(recording.last, 15.0)
         assert (ours.first, ours.last, ours.story()) == (theirs.first, theirs.last, theirs.story())

@@ -14,13 +14,13 @@ from page.states import STATES
 from page.test_page import settled
 from PIL import Image
 
-from conveyor_sim.page.one_file import Failure, write_page
+from conveyor_sim.page.one_file import FailedCondition, write_page
 
 IMAGES = Path(__file__).resolve().parents[2] / "docs" / "images"
 BLOCK = 20
-"""px of a block that one colour stands for: about a word."""
+"""Size of a block that is reduced to one colour, px: about a word."""
 OFF = 30.0
-"""Of 255, in the mean over the colours: such a block looks different."""
+"""Least difference of a block that looks different, of 255, as the mean over the colours."""
 ALLOWED = 0.06
 """Share of blocks that may. In other fonts (serif, monospaced, a fifth larger) 0.04 do, for words shift by a block;
 between two of the states at least 0.1."""
@@ -41,7 +41,7 @@ def different(one: np.ndarray, other: np.ndarray) -> float:
 @pytest.fixture(scope="module")
 def pages(bag: Path, other_bag: Path, tmp_path_factory: pytest.TempPathFactory) -> Mapping[str, Path]:
     folder = tmp_path_factory.mktemp("states")
-    failure = Failure(22.0, "always: no more than 20 bottles")
+    failure = FailedCondition(22.0, "always: no more than 20 bottles")
     return {
         "line": write_page(bag, folder / "line.html"),
         "failed": write_page(bag, folder / "failed.html", failures=[failure]),

@@ -25,14 +25,14 @@ from protocols.waiting import until
 from conveyor_sim.bag.mcap.chunk import next_chunk
 from conveyor_sim.bag.messages.encode import Header
 from conveyor_sim.bag.messages.topics import TOPICS
-from conveyor_sim.bag.outputs import Outputs
+from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.columns.bottles import BottleColumns
 from conveyor_sim.columns.events import Event, event_columns
 from conveyor_sim.errors import BagError, ConveyorError
 from conveyor_sim.page.one_file import write_page
-from conveyor_sim.page.recording import Recording
+from conveyor_sim.page.recording import PageRecording
 from conveyor_sim.page.server import MOST_CONNECTIONS, SERVED, RecordingServer, _Handler
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
@@ -56,7 +56,7 @@ def get(server: RecordingServer, path: str, **headers: str) -> tuple[int, bytes,
 
 def test_parts_of_a_recording_are_answered_by_name(server: RecordingServer, bag: Path) -> None:
     with open_bag(bag) as opened:
-        recording = Recording(opened, SERVED)
+        recording = PageRecording(opened, SERVED)
         assert zlib.decompress(get(server, "/data/block/3")[1]) == recording.block(3)
         assert zlib.decompress(get(server, "/data/story/0")[1]) == recording.story(0)
 
@@ -185,7 +185,7 @@ def written(folder: Path, seconds: float, bottles: int = 300, rejected: int = 0)
     ids, zeros = np.arange(bottles, dtype=np.uint64), np.zeros(bottles)
     kinds, belts = np.zeros(bottles, np.uint16), np.zeros(bottles, np.int32)
     with Recorder(folder) as recorder:
-        Outputs(simulation, [recorder], run_id="run").start()
+        OutputWriter(simulation, [recorder], run_id="run").start()
         if rejected:
             events = event_columns(
                 [Event(10, "bottle_rejected", "machines/x", one, 1.0, "") for one in range(rejected)], rejected
@@ -299,7 +299,7 @@ def test_only_the_chunks_of_a_moment_are_read_of_a_long_recording(
     bag = written(tmp_path / "bag", 120.0)
     monkeypatch.setattr(reader, "breakup_chunk", noted)
     with open_bag(bag, by_index=True) as opened:
-        recording = Recording(opened, SERVED)
+        recording = PageRecording(opened, SERVED)
         recording.head()
         assert len(read) <= 2, "what is latched is at the beginning"
         before = len(read)

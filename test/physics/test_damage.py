@@ -160,8 +160,8 @@ def test_the_index_of_tipping_is_that_of_a_load_that_lasts(done: Done) -> None:
 def test_what_goes_beyond_a_limit_is_told_once_with_bottle_place_and_time() -> None:
     sim = simulation(**experiments())
     sim.advance(100)
-    events = sim.take_damage_events()
-    assert sim.take_damage_events() == []
+    events = sim.take_events().damage
+    assert sim.take_events().damage == []
     told = {(event.kind, event.bottle): event for event in events}
     assert len(told) == len(events)
     beyond = {kind: {bottle for told_kind, bottle in told if told_kind == kind} for kind in LIMITS}
@@ -189,12 +189,12 @@ def test_an_outfeed_clogs_when_bottles_wait_before_it() -> None:
     exits = {"end": {"region": [[21.2, -0.5], [21.8, -0.5], [21.8, 0.5], [21.2, 0.5]]}}
     sim = simulation(**experiments(outfeeds=exits, limits={**LIMITS, "clogging_time": 0.3}))
     sim.advance(100)
-    (event,) = [event for event in sim.take_damage_events() if event.kind == "clogging_time"]
+    (event,) = [event for event in sim.take_events().damage if event.kind == "clogging_time"]
     assert (event.tick, event.bottle) == (30, HELD)
     assert "outfeed end has removed nothing for 0.3 s" in event.text
     sim.command(["belts/stop/cmd_speed", "belts/press/cmd_speed"], [0.0, 0.0])
     sim.advance(100)
-    assert [event for event in sim.take_damage_events() if event.kind == "clogging_time"] == []
+    assert [event for event in sim.take_events().damage if event.kind == "clogging_time"] == []
 
 
 ASKED: dict[str, Any] = {"outputs": {**NO_OUTPUTS, "damage": 1}, "limits": {"impact_speed": 0.05, "tipping": 0.1}}
@@ -224,7 +224,7 @@ def test_to_look_changes_nothing_and_threads_and_checkpoints_do_not_show(tmp_pat
     parted.save(tmp_path / "parted")
     parted = Simulation.load(tmp_path / "parted", 2)
     parted.advance(185)
-    assert plain.damage() is None and plain.rail_wear() is None and plain.take_damage_events() == []
+    assert plain.damage() is None and plain.rail_wear() is None and plain.take_events().damage == []
     assert one.state_hash() == two.state_hash() == parted.state_hash() == plain.state_hash()
     assert one.counts.removed > 5
     damage, wear = damage_of(one), wear_of(one)
@@ -232,9 +232,9 @@ def test_to_look_changes_nothing_and_threads_and_checkpoints_do_not_show(tmp_pat
     assert all(wear.impulse[wear.rail == one.model.rails.index(rail)].any() for rail in ("fence", "left", "outer"))
     assert_same(one, two)
     assert_same(one, parted)
-    events = one.take_damage_events()
+    events = one.take_events().damage
     assert {event.kind for event in events} == {"impact_speed", "tipping"}
-    assert two.take_damage_events() == parted.take_damage_events() == events
+    assert two.take_events().damage == parted.take_events().damage == events
 
 
 def test_a_tick_done_again_in_shorter_steps_is_noted_once() -> None:
@@ -243,9 +243,9 @@ def test_a_tick_done_again_in_shorter_steps_is_noted_once() -> None:
     again, short = (simulation(**experiments(bottles=bottles, accuracy={"per_tick": steps})) for steps in (50, 200))
     for sim in (again, short):
         sim.advance(20)
-    assert (again.shortened_ticks, short.shortened_ticks) == (20, 0)
+    assert (again.integration.shortened_ticks, short.integration.shortened_ticks) == (20, 0)
     assert_same(again, short)
-    assert again.take_damage_events() == short.take_damage_events()
+    assert again.take_events().damage == short.take_events().damage
 
 
 def test_absent_effects_have_no_arrays() -> None:

@@ -215,7 +215,7 @@ def crowd(threads: int | None = None) -> Simulation:
         contacts=laws(20.0),
         threads=threads,
     )
-    sim._integration._chatter_ticks = 0
+    sim.integration._chatter_ticks = 0
     sim.command(["pushers/p/push"], [1])
     sim.advance(48)
     return sim
@@ -240,7 +240,7 @@ def test_held_up_it_has_the_same_bits_however_the_run_is_divided(stalled: Path) 
         (crowd(2), 40, 0),
         (Simulation.load(stalled), 40, 3),
     ):
-        sim._integration._chatter_ticks = listening
+        sim.integration._chatter_ticks = listening
         blocked = []
         for _ in range(pieces):
             sim.advance(40 // pieces)
@@ -262,5 +262,5 @@ def test_a_tick_is_done_again_from_how_the_drive_was() -> None:
         sim.command(["pushers/p/push"], [1])
         sim.advance(2)
         sims.append(sim)
-    assert [sim.shortened_ticks for sim in sims] == [1, 0]
+    assert [sim.integration.shortened_ticks for sim in sims] == [1, 0]
     assert sims[0].state_hash() == sims[1].state_hash()

@@ -46,7 +46,7 @@ def energies(steps: float, integrator: str) -> np.ndarray:
     sim.advance(round(BOUNCES * (FLIGHT + steps) * dt / 0.01))
     state = sim.bottles()
     free = np.abs(state.x[::3]) < 0.5 * way
-    assert sim.shortened_ticks == 0
+    assert sim.integration.shortened_ticks == 0
     assert free.sum() > 0.8 * LANES
     return (state.vx[::3][free] / SPEED) ** 2
 

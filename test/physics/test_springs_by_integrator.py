@@ -260,7 +260,7 @@ def test_the_same_bits_however_it_is_run(integrator: str, tmp_path: Path) -> Non
     # As the guard does it: the tick is taken back, and done again.
     memory = WorldSnapshot()
     memory.take(state.world)
-    going_on._integration._take_steps(4)
+    going_on.integration._take_steps(4)
     assert state.springs() != springs
     memory.restore(state)
     assert state.springs() == springs

@@ -291,7 +291,7 @@ def test_the_guard_takes_springs_back() -> None:
     state, memory = sim._state, WorldSnapshot()
     before, hashed = state.springs(), sim.state_hash()
     memory.take(state.world)
-    sim._integration._take_steps(1)
+    sim.integration._take_steps(1)
     assert state.springs() != before
     memory.restore(state)
     assert (state.springs(), sim.state_hash()) == (before, hashed)

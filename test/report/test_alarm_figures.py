@@ -1,4 +1,4 @@
-"""What a run's alarms amount to."""
+"""Figures of the alarms of a run."""
 
 import numpy as np
 from facts import missing

@@ -9,11 +9,11 @@ import pytest
 from bag.small_line import SMALL_LINE
 from click.testing import CliRunner, Result
 
-from conveyor_sim.bag.mcap.file import McapFile, Schema
+from conveyor_sim.bag.mcap.writer import McapFileWriter, Schema
 from conveyor_sim.bag.messages.encode import Header, bool_message
 from conveyor_sim.bag.messages.topics import OUTPUTS
 from conveyor_sim.bag.messages.typestore import definition
-from conveyor_sim.bag.outputs import Outputs
+from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.cli import main
@@ -31,7 +31,7 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     sim = Simulation(load_scene(SMALL_LINE))
     given = {10: ("alarms/table full", 1.0), 20: ("belts/no\nwhere", 1.0), 50: ("alarms/table full", 0.0)}
     with Recorder(folder) as recorder:
-        outputs = Outputs(sim, [recorder], run_id="run")
+        outputs = OutputWriter(sim, [recorder], run_id="run")
         outputs.start()
         while sim.tick < 100:
             if sim.tick in given:
@@ -149,7 +149,7 @@ def test_an_older_or_damaged_bag_is_refused_in_one_sentence(bag: Path, tmp_path:
             if topic != "events":
                 recorder.write(topic, data, log_time)
     with (tmp_path / "other.mcap").open("wb") as stream, open_bag(bag) as opened:
-        file = McapFile(stream, "other.mcap", "jazzy")
+        file = McapFileWriter(stream, "other.mcap", "jazzy")
         for topic, kind in (("line", OUTPUTS["line"].type), ("events", "std_msgs/msg/Bool")):
             channel = file.add_topic(f"/{topic}", Schema(kind, "ros2msg", definition(kind).encode()), "cdr", {})
             data = bool_message(True, Header(0, 1, "")) if topic == "events" else next(opened.raw({"line"}))[2]

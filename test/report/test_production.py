@@ -1,4 +1,4 @@
-"""How a recorded line produced: read from its bag, printed and drawn."""
+"""Production of a recorded line: read from its bag, printed and drawn."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from bag.small_line import SMALL_LINE
 from click.testing import CliRunner
 from facts import missing, stating
 
-from conveyor_sim.bag.outputs import Outputs
+from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.bag.replay import replay
 from conveyor_sim.cli import main
@@ -41,7 +41,7 @@ def record(
     scene = scene or load_scene(FAILING_LINE)
     sim = Simulation(scene) if start is None else Simulation.load(start, scene=scene)
     with Recorder(folder) as recorder:
-        outputs = Outputs(sim, [recorder], run_id="run")
+        outputs = OutputWriter(sim, [recorder], run_id="run")
         outputs.start()
         if forced:
             sim.give(Input("operate", "Jo", "engineer", FORCE, (forced,), (1.0,)))
@@ -64,7 +64,7 @@ def production(bag: Path) -> Production:
 
 
 def test_periods_are_where_the_counted_time_went(production: Production) -> None:
-    """Those of each machine follow one another from start to end, and sum up to its counters."""
+    """Periods of each machine are contiguous from start to end, and sum up to its counters."""
     assert tuple(production.periods) == MACHINES
     for index, (machine, periods) in enumerate(production.periods.items()):
         assert (periods[0].begin, periods[-1].end) == (production.start, production.end), machine
@@ -103,11 +103,11 @@ def test_bottles_of_the_report_are_those_of_the_counters(production: Production)
 
 
 def test_alarms_are_counted(bag: Path, tmp_path: Path) -> None:
-    """Those that a controller raises and clears; one stands at the end."""
+    """A controller raises and clears alarms; one is active at the end."""
     scene = load_scene(FAILING_LINE)
     sim = Simulation(scene)
     with Recorder(tmp_path / "bag") as recorder:
-        outputs = Outputs(sim, [recorder], run_id="run")
+        outputs = OutputWriter(sim, [recorder], run_id="run")
         outputs.start()
         for tick in range(500):
             if tick % 20 == 0 and tick < 480:
@@ -209,7 +209,7 @@ def test_a_client_that_joins_late_sees_the_same(bag: Path, tmp_path: Path) -> No
 def test_a_recording_without_counters_is_refused_in_a_sentence(tmp_path: Path) -> None:
     sim = Simulation(load_scene(SMALL_LINE, {"outputs": {"counters": 0.0}}))
     with Recorder(tmp_path / "bag") as recorder:
-        outputs = Outputs(sim, [recorder], run_id="run")
+        outputs = OutputWriter(sim, [recorder], run_id="run")
         outputs.start()
         for _ in range(10):
             sim.advance()

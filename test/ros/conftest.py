@@ -19,7 +19,7 @@ from std_srvs.srv import Trigger
 from conveyor_sim.bag.messages.typestore import default_distro
 from conveyor_sim.ros.child import Child
 from conveyor_sim.ros.domain import private_domain
-from conveyor_sim.run.session import Session
+from conveyor_sim.run.session import RunSession
 from conveyor_sim.run.stepper import Stepper
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
@@ -82,8 +82,8 @@ def line(shared_node: Child, client: LineClient) -> LineClient:
     return client
 
 
-class Nobody:
-    """A sink to which nobody listens."""
+class NullSink:
+    """A sink that wants no topic."""
 
     def wants(self, topic: str) -> bool:
         return False
@@ -97,7 +97,7 @@ def stepper() -> Iterator[Stepper]:
     """Paused, and not started."""
     scene = load_scene(SMALL_LINE)
     made = Stepper(
-        lambda runs, loaded: Session(Simulation(scene), Nobody(), None, "world", default_distro()),
+        lambda runs, loaded: RunSession(Simulation(scene), NullSink(), None, "world", default_distro()),
         real_time_factor=0.0,
         playing=False,
         lockstep_max_ticks=1,

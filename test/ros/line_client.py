@@ -22,7 +22,7 @@ from conveyor_sim.ros.publishers import ros_qos
 from conveyor_sim.ros.spinner import Spinner
 from conveyor_sim.support.child_process import Process
 
-PATIENCE = 60.0  # s of wall time; only a failing test waits so long
+PATIENCE = 60.0  # s of wall time; only a failing test waits to the end
 
 
 def until(condition: Callable[[], Any], what: str) -> Any:
@@ -120,9 +120,9 @@ class LineClient:
         return int(self.call(srv.GetSimulationState, "get_simulation_state").state.state)
 
     def compiling(self) -> str:
-        """What keeps the run from starting, "" once it has started."""
+        """Return why the run has not started, "" once it has."""
         client = self.client(srv.GetSimulationState, "get_simulation_state")
-        # A node that has not yet found the client whose question it hears loses the answer; ROS has it so.
+        # A node that has not discovered the client of a request loses the answer, as ROS defines it.
         response = until(lambda: client.call(srv.GetSimulationState.Request(), timeout_sec=5.0), "an answer")
         return "" if response.state.state != SimulationState.STATE_STOPPED else str(response.result.error_message)
 

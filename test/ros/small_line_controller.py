@@ -11,7 +11,7 @@ BOTTLES = "belts/table/bottles"
 
 
 class TableFull:
-    """Tells when the table carries so many bottles."""
+    """Raises an alarm while the table carries `high` bottles or more."""
 
     def __init__(self, high: float) -> None:
         self.high = high

@@ -43,7 +43,7 @@ def scenario() -> Iterator[Scenario]:
 
 def test_a_node_gives_the_bits_of_its_scan_function(scenario: Scenario) -> None:
     environment = dict(os.environ)
-    with Scenario(SMALL_LINE, {"duration": 1.0}) as other:  # a test is as long as it says, whatever the scene says
+    with Scenario(SMALL_LINE, {"duration": 1.0}) as other:  # the test decides the duration, not the scene
         scenario.attach(make(HIGH))
         other.attach_node(NODE, namespace="/cell")
         assert os.environ == environment

@@ -21,7 +21,7 @@ from std_srvs.srv import Trigger
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.replay import replay
 from conveyor_sim.errors import BagError
-from conveyor_sim.physics.state.checkpoint import sealed
+from conveyor_sim.physics.state.checkpoint import to_bytes
 from conveyor_sim.ros.child import Child
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
@@ -70,7 +70,7 @@ def test_what_was_saved_goes_on_to_the_same_bits(
     tmp_path: Path,
     request: pytest.FixtureRequest,
 ) -> None:
-    """In the same node, in another one with other threads, and without ROS; each run has a recording of its own."""
+    """In the same node, in another one with other threads, and without ROS. Each run has a separate recording."""
     file = folder / "checkpoint"
     node = start_node(record=tmp_path / "bag", threads=1, checkpoint_folder=folder)
     scans(client, 10, 150)
@@ -207,7 +207,7 @@ def test_a_file_is_read_while_the_simulation_goes_on(line: LineClient, folder: P
 
 
 def test_what_is_no_checkpoint_neither_stops_nor_ends_a_run(line: LineClient, shared_node: Child, folder: Path) -> None:
-    """A pipe that nobody writes to, a device without end, a header without its fields, arrays cut short, NaN.
+    """A pipe without a writer, a device without end, a header without its fields, arrays cut short, NaN.
 
     The last test of the shared node.
     """
@@ -219,7 +219,7 @@ def test_what_is_no_checkpoint_neither_stops_nor_ends_a_run(line: LineClient, sh
     x = arrays["bottles.x"]
 
     def written(name: str, header: dict[str, Any], **changes: Any) -> str:
-        (folder / name).write_bytes(sealed(json.dumps(header), {**arrays, **changes}))
+        (folder / name).write_bytes(to_bytes(json.dumps(header), {**arrays, **changes}))
         return name
 
     os.mkfifo(folder / "pipe")

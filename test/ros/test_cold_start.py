@@ -32,7 +32,7 @@ def cold(cache: Path) -> dict[str, str]:
 
 
 def finished(cache: Path) -> bool:
-    """Whether compiling came to its end."""
+    """Return True if compiling has finished."""
     return bool(list(cache.rglob(COMPILED_LAST)))
 
 
@@ -131,5 +131,5 @@ def test_a_folder_that_cannot_be_recorded_to_is_found_before_compiling(tmp_path:
 
 
 def _is_zombie(process: int) -> bool:
-    """Ended, and not yet taken note of by whoever has adopted it."""
+    """Return True if a process has ended, and its parent has not collected it yet."""
     return " Z " in Path(f"/proc/{process}/stat").read_text()

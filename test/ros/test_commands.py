@@ -100,7 +100,7 @@ def test_a_declaration_of_an_alarm_comes_before_the_commands_beside_it(sender: S
     outcome = sender.outcome_of(sender.commands, Commands(alarm_ids=["declared"], alarms=['{"class": 1}']))
     assert not outcome.accepted
     assert outcome.reason.startswith("alarm declared: class: no such field")
-    with sender.line.listen(AlarmStates, "alarm_states") as states:  # whoever comes late
+    with sender.line.listen(AlarmStates, "alarm_states") as states:  # a late subscriber
         message = until(lambda: states.messages and states.messages[-1], "alarm_states")
     at = list(message.id).index("declared")
     assert (message.text[at], message.state[at], message.declared_by[at]) == ("it is there", 0, "commands")

@@ -31,7 +31,7 @@ def resident(process: int) -> int:
 
 
 def counts(line: LineClient) -> dict[str, int]:
-    """What diagnostics tell of commands: received, applied, refused, lost, waiting."""
+    """Return the numbers of commands in diagnostics: received, applied, refused, lost, waiting."""
     _, values = line.diagnostics()
     return {name.removesuffix(" commands"): int(values[name]) for name in values if name.endswith(" commands")}
 
@@ -95,7 +95,7 @@ def test_the_queue_of_a_paused_simulation_is_bounded_by_count(
 
 
 def test_large_commands_take_little_memory(line: LineClient, shared_node: Child, commands: Any) -> None:
-    """What took 1 GB: 120 messages of 100 000 names."""
+    """An earlier version took 1 GB for these 120 messages of 100 000 names."""
     large = Commands(names=[f"belts/{number}/cmd_speed" for number in range(100_000)], values=[0.0] * 100_000)
     before, memory = counts(line), resident(shared_node.pid)
     for _ in range(120):
@@ -175,7 +175,7 @@ def test_a_message_that_says_nothing_is_refused(line: LineClient, commands: Any,
 
 
 def test_refusals_do_not_flood_the_log(line: LineClient, shared_node: Child, commands: Any) -> None:
-    """And nothing in a name makes a line of its own."""
+    """A line break in a name does not make a separate line."""
     before, begin = counts(line), len(shared_node.log.read_text())
     forged = Commands(names=["x\n[ERROR] [conveyor_sim]: forged\x1b[31m" + "y" * 5000], values=[1.0])
     publish_slowly(line, commands, forged, 500)

@@ -1,4 +1,4 @@
-"""What is missing, by the numbers of what came."""
+"""Missing messages, by the numbers of received ones."""
 
 from collections.abc import Callable, Sequence
 

@@ -78,7 +78,7 @@ def test_a_foreign_clock_is_told(start_node: Callable[..., Child], client: LineC
 def test_namespaces_keep_simulations_apart_but_for_the_clock_unless_that_is_remapped(
     client: LineClient, tmp_path: Path
 ) -> None:
-    """What every node with use_sim_time listens to is /clock, whatever its namespace; the same rule moves it there."""
+    """Nodes with use_sim_time subscribe to /clock in any namespace; the same remapping rule moves it."""
 
     def heard(namespace: str) -> str:
         with client.listen(DiagnosticArray, "/diagnostics", "diagnostics") as listener:

@@ -140,7 +140,7 @@ def test_refusals_of_a_held_belt_are_one_line_and_then_a_count(
         for _ in range(count):
             stepper.give(Input("commands", "commands", "controller", SET, (FEEDER, TABLE), (0.3, 0.3)), 100)
             stepper._calls.take()
-            stepper._tick()
+            stepper._loop.tick()
 
     def mode(number: float) -> None:
         stepper.simulation.give(Input("operate", "Jo", "operator", MODE, ("belts/feeder",), (number,)))
@@ -155,6 +155,6 @@ def test_refusals_of_a_held_belt_are_one_line_and_then_a_count(
         "expected Automatic for a controller's commands",
         "49 more commands were refused for want of control; each outcome says why",
     ]
-    reception, counts = stepper.reception, stepper.inbox.counts
+    reception, counts = stepper.run.reception, stepper.run.inbox.counts
     assert (reception.applied, reception.refused, reception.without_control) == (100, 0, 50)
     assert counts.waiting == 0

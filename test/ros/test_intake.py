@@ -41,7 +41,7 @@ class Noting(LockstepService):
         self.errors = list[Exception]()
         super().__init__(node, stepper, "world", died=self.errors.append)
         self.received = list[int]()
-        self._inbox = stepper.inbox
+        self._inbox = stepper.run.inbox
 
     def serve(self, request: Any, header: Any) -> None:
         self.received.append(self._inbox.counts.received)

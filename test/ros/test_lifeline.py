@@ -60,7 +60,7 @@ def test_a_command_is_interrupted_and_its_own_children_too(tmp_path: Path) -> No
 
 
 def test_the_thread_that_started_a_command_may_end(tmp_path: Path) -> None:
-    """As a test's thread that attaches a node does."""
+    """The thread of a test that attaches a node may end as well."""
     started: list[Process] = []
     command = [sys.executable, "-c", "import time; print('here', flush=True); time.sleep(600)"]
     thread = threading.Thread(target=lambda: started.append(Process("child", command, os.environ, tmp_path)))

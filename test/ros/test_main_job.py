@@ -28,7 +28,7 @@ def children_of(process: int) -> list[int]:
 
 @pytest.fixture
 def nothing_left() -> Iterator[None]:
-    """Afterwards this process has no child that it had not before (multiprocessing keeps one of its own)."""
+    """Check afterwards that this process has no new child (multiprocessing keeps one)."""
     before = children_of(os.getpid())
     yield
     assert set(children_of(os.getpid())) <= set(before)

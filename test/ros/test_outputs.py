@@ -1,4 +1,4 @@
-"""What is published: equal to the engine's, only where somebody listens, in the quality of service that is stated."""
+"""Published messages: equal to those of the engine, only with subscribers, in the stated quality of service."""
 
 from __future__ import annotations
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from rclpy.parameter import Parameter, parameter_dict_from_yaml_file
 
-from conveyor_sim.ros.declared import Entry
+from conveyor_sim.ros.declared import DeclaredParameter
 from conveyor_sim.ros.parameters import RATES, TABLE
 from conveyor_sim.scene import Scene
 
@@ -21,7 +21,7 @@ def test_the_documented_file_holds_every_default() -> None:
 
 
 @pytest.mark.parametrize("entry", TABLE, ids=lambda entry: entry.name)
-def test_every_default_is_accepted_and_described(entry: Entry) -> None:
+def test_every_default_is_accepted_and_described(entry: DeclaredParameter) -> None:
     assert entry.refusal(entry.default) == ""
     assert entry.descriptor().description == entry.description != ""
 

@@ -1,4 +1,4 @@
-"""What of a recording is published when, told to a list: order, rate, pause, seek, and the commands in it."""
+"""Messages of a played recording, collected in a list: order, rate, pause, seek, and the commands in it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 from bag.small_line import SPEED, TURN
 from ros.recording import EYE, MADE, TICKS, record
 
-from conveyor_sim.bag.mcap.file import McapFile, Schema
+from conveyor_sim.bag.mcap.writer import McapFileWriter, Schema
 from conveyor_sim.bag.messages import encode as types
 from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.bag.messages.typestore import definition, typestore
@@ -18,7 +18,7 @@ from conveyor_sim.bag.reader import Bag, open_bag
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.errors import BagError
 from conveyor_sim.run.lockstep import Refused
-from conveyor_sim.run.playback import Message, Playback
+from conveyor_sim.run.playback import Playback, PlayedMessage
 from conveyor_sim.run.player import Player
 
 
@@ -39,7 +39,7 @@ class Played:
     """A player with what it has published and the times it has told; `now` is the wall time it is given."""
 
     def __init__(self, bag: Bag, rate: float, *, start: float | None = None, paused: bool = False) -> None:
-        self.messages: list[Message] = []
+        self.messages: list[PlayedMessage] = []
         self.clock: list[int] = []
         self.now = 100.0
         self.player = Player(
@@ -57,16 +57,16 @@ class Played:
         while self.now < end and not self.player.ended:
             self.now = min(end, self.now + self.player.step(self.now))
 
-    def take(self) -> list[Message]:
-        """What was published since the last time."""
+    def take(self) -> list[PlayedMessage]:
+        """Return the messages published since the last call."""
         taken, self.messages[:] = list(self.messages), []
         return taken
 
 
-def recorded(bag: Bag, after_tick: int = -1) -> list[Message]:
+def recorded(bag: Bag, after_tick: int = -1) -> list[PlayedMessage]:
     """The recorded messages of later ticks, without the latched ones."""
     after_ns = max(1, after_tick * 10_000_000) if after_tick >= 0 else 0
-    return [Message(topic, data) for topic, stamp, data in bag.raw() if stamp > after_ns and topic not in LATCHED]
+    return [PlayedMessage(topic, data) for topic, stamp, data in bag.raw() if stamp > after_ns and topic not in LATCHED]
 
 
 CHANGING = {"readback", "alarm_states"}
@@ -93,7 +93,7 @@ def test_all_is_published_once_in_order_latched_topics_first(bag: Bag) -> None:
     assert played.player.ended
     published = [message for message in played.take()[len(LATCHED) :] if message.topic not in MADE]
     assert [message for message in published if message.topic not in CHANGING] == recorded(bag)
-    later = [Message(topic, data) for topic, stamp, data in bag.raw({"readback"}) if stamp > 1]
+    later = [PlayedMessage(topic, data) for topic, stamp, data in bag.raw({"readback"}) if stamp > 1]
     assert [message for message in published if message.topic == "readback"] == later
     assert len(later) == 4  # one command was refused; the watchdog has set one
     assert played.clock == [max(1, tick * 10_000_000) for tick in range(TICKS + 1)]
@@ -233,7 +233,7 @@ def test_a_jump_stays_within_the_recording(bag: Bag) -> None:
 def test_topics_outside_the_namespace_stay_there_and_the_clock_is_the_players_own(bag: Bag, tmp_path: Path) -> None:
     _, _, line = next(bag.raw({"line"}))
     with (tmp_path / "bag.mcap").open("xb") as stream:
-        file = McapFile(stream, "bag.mcap", "jazzy")
+        file = McapFileWriter(stream, "bag.mcap", "jazzy")
         for name, kind in {
             "/hall/line": types.LINE,
             "/hall/belts": "conveyor_msgs/msg/Belts",

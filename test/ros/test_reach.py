@@ -1,4 +1,4 @@
-"""What another machine on the network can do (docs/ros.md, Security). Network namespaces stand for machines."""
+"""Access by another machine on the network (docs/ros.md, Security). Network namespaces stand for machines."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ print("result", future.result().result.result, flush=True)
 
 
 class Machine:
-    """A network and a shared memory of its own."""
+    """A machine with its own network and shared memory."""
 
     def __init__(self, stack: ExitStack) -> None:
         """Raises OSError if this is not allowed here."""

@@ -1,4 +1,4 @@
-"""What the node records, and that every end leaves a bag that can be read."""
+"""Recordings of the node. Every end leaves a readable bag."""
 
 from __future__ import annotations
 

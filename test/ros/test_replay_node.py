@@ -20,7 +20,7 @@ from ros.recording import MADE, TICKS, record
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
-from conveyor_sim.bag.mcap.file import McapFile, Schema
+from conveyor_sim.bag.mcap.writer import McapFileWriter, Schema
 from conveyor_sim.bag.messages import encode as types
 from conveyor_sim.bag.messages.qos import EVENTS
 from conveyor_sim.bag.messages.topics import TOPICS
@@ -28,7 +28,7 @@ from conveyor_sim.bag.messages.typestore import definition
 from conveyor_sim.bag.reader import Bag, open_bag
 from conveyor_sim.ros.publishers import message_class, ros_qos
 from conveyor_sim.ros.replay_node import ReplayNode
-from conveyor_sim.run.playback import Message, Playback
+from conveyor_sim.run.playback import Playback, PlayedMessage
 
 
 @pytest.fixture(scope="module")
@@ -55,9 +55,9 @@ def nanoseconds(clock: Any) -> int:
 
 
 def played(bag: Bag) -> dict[str, list[bytes]]:
-    """What the whole recording comes to, by topic."""
+    """Return all messages of a played recording, by topic."""
     playback = Playback(bag)
-    told: list[Message] = [*playback.cue(0), *playback.take(TICKS)]
+    told: list[PlayedMessage] = [*playback.cue(0), *playback.take(TICKS)]
     return {topic: [message.data for message in told if message.topic == topic] for topic in {**bag.types, **MADE}}
 
 
@@ -162,7 +162,7 @@ def test_topics_of_types_that_are_not_installed_so_are_left_out(
     """Bytes that are read by another definition than they were written by would be garbage."""
     _, _, line = next(bag.raw({"line"}))
     with (tmp_path / "bag.mcap").open("xb") as stream:
-        file = McapFile(stream, "bag.mcap", "jazzy")
+        file = McapFileWriter(stream, "bag.mcap", "jazzy")
         definitions = {
             "line": (types.LINE, definition(types.LINE)),
             "signals": (types.SIGNALS, "uint64 tick\nfloat32[] values\n"),

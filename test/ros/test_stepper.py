@@ -20,7 +20,7 @@ from conveyor_sim.line.commands.inputs import CommandOutcome
 from conveyor_sim.ros.child import Child
 from conveyor_sim.run.calls import MOST_CALLS
 from conveyor_sim.run.lockstep import LockstepRequest, Refused
-from conveyor_sim.run.session import Session
+from conveyor_sim.run.session import RunSession
 from conveyor_sim.run.stepper import Stepper
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
@@ -98,10 +98,10 @@ class Watcher:
 
 
 def test_what_the_run_is_doing_is_said_whenever_that_changes() -> None:
-    """Lockstep is a state of its own, so that a line that waits for its controller is not taken for a paused one."""
+    """Lockstep is a separate state, so that a line that waits for its controller does not look paused."""
     scene, watcher = load_scene(Path(__file__).with_name("small_line.yaml"), {"duration": 0.05}), Watcher()
     stepper = Stepper(
-        lambda runs, loaded: Session(Simulation(scene), watcher, None, "world", default_distro()),
+        lambda runs, loaded: RunSession(Simulation(scene), watcher, None, "world", default_distro()),
         real_time_factor=0.0,
         playing=False,
         lockstep_max_ticks=10,
@@ -144,7 +144,7 @@ def test_what_the_run_is_doing_is_said_whenever_that_changes() -> None:
 def test_a_run_that_cant_go_on_says_why() -> None:
     scene, watcher = load_scene(Path(__file__).with_name("small_line.yaml")), Watcher()
 
-    class Broken(Session):
+    class Broken(RunSession):
         def tick(self) -> list[CommandOutcome]:
             raise SimulationError("it broke")
 

@@ -1,4 +1,4 @@
-"""What is shipped for RViz2 and Foxglove shows topics that there are, asked for as they are offered."""
+"""Files for RViz2 and Foxglove show existing topics, with the offered quality of service."""
 
 from __future__ import annotations
 

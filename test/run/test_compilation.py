@@ -1,4 +1,4 @@
-"""What a run may need of the engine is there before it begins."""
+"""All kernels that a run may need are compiled before it begins."""
 
 from __future__ import annotations
 

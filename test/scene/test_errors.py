@@ -150,7 +150,7 @@ def test_a_scene_that_is_no_regular_file_is_refused_at_once(tmp_path: Path) -> N
 
 
 def test_a_name_of_a_scene_may_be_anything(tmp_path: Path) -> None:
-    """Names that are no regular files are refused by the reader with the reason."""
+    """Paths that are no regular files are left to the reader, which reports their kind."""
     os.mkfifo(tmp_path / "pipe")
     assert scene_path(tmp_path / "pipe") == tmp_path / "pipe"
     for name in ("x" * 5000, "~nobody-of-this-name/scene.yaml", "a\0b", ""):

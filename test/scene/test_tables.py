@@ -91,7 +91,7 @@ def test_a_table_can_be_an_override(tmp_path: Path) -> None:
 
 
 def test_lines_stay_those_of_the_scene(tmp_path: Path) -> None:
-    """Contacts with a table from a file are not reported as overrides."""
+    """Reading a table does not turn the contacts into overrides."""
     places = Places(load_scene(written(tmp_path, "0.001,5\n"), {"seed": 3}))
     assert places.line_of(("contacts", 1, "table")) == LINE
     assert places.line_of(("seed",)) is None
@@ -151,7 +151,7 @@ def naming(folder: Path, path: str) -> Path:
 
 
 def test_a_table_that_is_no_regular_file_is_refused_at_once(tmp_path: Path) -> None:
-    """A pipe without a writer, a device without end, a link round itself, a file that is too large."""
+    """A pipe without a writer, a device without end, a link to itself, a file that is too large."""
     scene = naming(tmp_path, "table")
     table = tmp_path / "scenes" / "table"
     os.mkfifo(tmp_path / "scenes" / "pipe")

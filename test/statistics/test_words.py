@@ -1,4 +1,4 @@
-"""What is said of intervals and differences."""
+"""Sentences on intervals and differences."""
 
 import math
 

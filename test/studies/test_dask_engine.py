@@ -24,7 +24,7 @@ from conveyor_sim.studies import dask_engine
 from conveyor_sim.studies.alone import run_alone
 from conveyor_sim.studies.dask_engine import DaskEngine
 from conveyor_sim.studies.results import read_results
-from conveyor_sim.studies.row import Job, Row
+from conveyor_sim.studies.row import Job, RunRow
 from conveyor_sim.studies.runs import Runs
 from conveyor_sim.studies.setup import Setup
 from conveyor_sim.studies.sweep import sweep
@@ -87,7 +87,7 @@ class Cluster:
 
 @contextmanager
 def cluster(folder: Path, workers: int) -> Iterator[tuple[Cluster, str]]:
-    """With so many workers."""
+    """Start a cluster with `workers` workers."""
     made = Cluster(folder)
     try:
         address = made.scheduler()
@@ -110,9 +110,9 @@ def running(folder: Path) -> set[int]:
 
 
 @contextmanager
-def swept(setup: Setup, folder: Path, address: str) -> Iterator[list[Row]]:
+def swept(setup: Setup, folder: Path, address: str) -> Iterator[list[RunRow]]:
     """A study under way in a thread; its rows are there as the context ends."""
-    rows: list[Row] = []
+    rows: list[RunRow] = []
     failed: list[BaseException] = []
 
     def work() -> None:
@@ -132,7 +132,7 @@ def swept(setup: Setup, folder: Path, address: str) -> Iterator[list[Row]]:
 
 @pytest.fixture(scope="module")
 def expected(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, float]]:
-    """What the runs amount to, made here."""
+    """Return the metrics of the runs, made in this process."""
     setup = setup_of(tmp_path_factory.mktemp("expected"), parameters=RATES, duration=1.0)
     jobs = [Job(point, {"rate": rate}, seed) for point, rate in enumerate((4.0, 5.0, 6.0)) for seed in (1, 2)]
     return [dict(run_alone(setup, job, None).metrics) for job in jobs]

@@ -1,4 +1,4 @@
-"""What is wrong with a study is said before it runs: file, line, field, value and what was expected."""
+"""Errors of a study are reported before it runs: file, line, field, value and expectation."""
 
 from __future__ import annotations
 

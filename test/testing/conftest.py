@@ -15,7 +15,7 @@ FEEDER = "belts/feeder/cmd_speed"
 STOP = "machines/packer/stop"
 
 LINE = "scenarios/zoned_line"
-"""That of the soft PLCs."""
+"""Line of the soft PLCs."""
 
 
 @pytest.fixture(scope="session")

@@ -127,7 +127,7 @@ FIRST = [0xFFFF, 0xFFFF, *[0] * 20]
 
 
 class ModbusPlc(SoftPlc):
-    """Its program reads and writes the registers of its own server, as a client."""
+    """A soft PLC whose program reads and writes the registers of its server as a client."""
 
     async def start(self, port: int) -> str:
         from pymodbus.client import AsyncModbusTcpClient

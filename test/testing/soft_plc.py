@@ -1,6 +1,6 @@
-"""A soft PLC as a process of its own: holds the first zone while bottles are on the second. By Modbus or OPC UA.
+"""A soft PLC in a separate process: it holds the first zone while bottles are on the second. By Modbus or OPC UA.
 
-Its argument: after how many scans it ends without a word, "" for never.
+Argument: number of scans after which it ends without output, "" for never.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ SECURITY = "Basic256Sha256,SignAndEncrypt,{},{}"
 
 
 async def own_certificate() -> tuple[str, str]:
-    """Of this client: certificate and key, in the working folder."""
+    """Make certificate and key of this client in the working folder, and return their paths."""
     from asyncua.crypto.cert_gen import setup_self_signed_certificate
     from cryptography.x509.oid import ExtendedKeyUsageOID
 

@@ -1,4 +1,4 @@
-"""How conditions are told."""
+"""Texts of conditions."""
 
 from conveyor_sim.testing.conditions import Present, text_of
 

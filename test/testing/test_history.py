@@ -41,7 +41,7 @@ def test_commands_and_faults_from_when_they_are_in_force(table: Scenario) -> Non
     command, speed = table.history[SPEED], table.history["belts/table/speed"]
     assert np.isnan(command[:10]).all()
     assert (command[10:20] == 0.1).all() and (command[20:] == 0.3).all()
-    # The belt's speed is told at the end of the tick for which it was commanded.
+    # The belt reports its speed at the end of the tick for which it was commanded.
     assert (speed[11:21] == command[10:20]).all() and speed[10] == 0.4
     assert table.history[STOP].tolist() == [0.0] * 10 + [1.0] * 21
     marks = [(round(mark.time, 9), mark.name, mark.value) for mark in table.history.marks]
@@ -71,7 +71,7 @@ def test_names_units_and_types(table: Scenario) -> None:
 
 
 def test_a_long_run_keeps_the_last_seconds_alone() -> None:
-    """What is kept is what a whole history ends with, at any tick, and takes no more room as time goes on."""
+    """A limited history equals the end of an unlimited one at any tick, and does not grow with time."""
     whole, last = (Scenario(TABLE, history=length) for length in (None, 0.5))
     with whole, last:
         for ticks in (20, 29, 1, 1, 48, 51, 100, 333):

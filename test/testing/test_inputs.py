@@ -181,7 +181,7 @@ def test_of_another_version_the_versions_are_named(tmp_path: Path) -> None:
         (lambda lines: [*lines, '{"tick": 50, "hash": 1}'], r"is damaged \(ticks out of order\)"),
         (
             lambda lines: [*lines, '{"tick": 1000, "inputs": [["watchdog", "watchdog", "line", "set", [], [], []]]}'],
-            "nobody gives such",
+            "of the line itself",
         ),
     ],
 )

@@ -58,7 +58,7 @@ def pytest_command(*arguments: str) -> list[str]:
 
 
 def end_by(kind: signal.Signals, folder: Path) -> None:
-    """Run the test that hangs in a pytest of its own, in a folder, and end that by a signal at a known tick."""
+    """Run the test that hangs in a separate pytest, in a folder, and end that by a signal at a known tick."""
     (folder / "test_killed.py").write_text(TESTS)
     with Scenario(TABLE) as table:
         table.run_for(FIRST * 0.01)
@@ -122,9 +122,7 @@ def test_the_next_run_says_what_is_left_and_lets_it_be(killed: Path, pytester: p
     pytester.makepyfile(test_killed=TESTS)
     result = pytester.runpytest_inprocess(*PLUGIN, "-k", "passes")
     result.assert_outcomes(passed=1, deselected=1)
-    result.stdout.fnmatch_lines(
-        ["*inputs that killed tests have left*", f"{left}: `conveyor-sim recover {left}` makes *"]
-    )
+    result.stdout.fnmatch_lines(["*inputs left by killed tests*", f"{left}: `conveyor-sim recover {left}` makes *"])
     assert sorted(file.name for file in left.iterdir()) == ["inputs.jsonl", "start.npz"]
     assert sorted(root.iterdir()) == [left]
 

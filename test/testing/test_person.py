@@ -1,4 +1,4 @@
-"""What operators and engineers do in a scenario, and what of it a report shows."""
+"""Operations of operators and engineers in a scenario, and their report."""
 
 from pathlib import Path
 
@@ -24,7 +24,7 @@ def test_a_controllers_refusals_are_no_error_those_of_a_person_are(table: Scenar
         table.operator.set("belts/table/cmd_speed", 0.1)
     with pytest.raises(CommandError, match="belts/feeder: mode 'off' given, expected one of automatic, maintenance, "):
         table.operator.mode(FEEDER, "off")
-    table.command(SPEED, 0.1)  # a test's, in whatever mode
+    table.command(SPEED, 0.1)  # of the test, accepted in any mode
     table.run_for(0.01)
     assert table.history[SPEED][-1] == 0.1
     table.attach(Constant({SPEED: 99.0, "belts/table/cmd_speed": 99.0}))  # wrong wherever it has control

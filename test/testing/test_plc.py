@@ -21,7 +21,7 @@ SECONDS = 4.0
 
 
 class Twin:
-    """The same program, in this process."""
+    """Controller in this process with the same program."""
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
         return {SETPOINT: speed(inputs[BOTTLES])}

@@ -23,9 +23,9 @@ from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.replay import replay
 from conveyor_sim.cli import main
 from conveyor_sim.control.scan import ControlError, Inputs
-from conveyor_sim.protocols.attach.free_running import PlcFace
-from conveyor_sim.protocols.attach.link import LinkError
-from conveyor_sim.protocols.attach.links import all_of, link
+from conveyor_sim.protocols.attach.free_running import FreeRunningPlc
+from conveyor_sim.protocols.attach.links import plc_link
+from conveyor_sim.protocols.attach.plc_link import PlcLinkError
 from conveyor_sim.protocols.attach.tag_map import TagMapError, read_tag_map
 from conveyor_sim.protocols.hosting.server_thread import ServerThread
 from conveyor_sim.testing.scenario import Scenario
@@ -34,7 +34,7 @@ SECONDS = 4.0
 
 
 class Twin:
-    """The same program, in this process."""
+    """Controller in this process with the same program."""
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
         answer, full = program(inputs[BOTTLES])
@@ -52,7 +52,7 @@ class Plc:
         self.tags = write_map(folder / "tags.csv", self.places)
 
     def start_again(self) -> None:
-        """Where it was, after `made.stop`."""
+        """Start it again at the same address, after `made.stop`."""
         self.thread.run(self.made.start(int(self.url.rpartition(":")[2])))
         self.thread.run(self.made.scan())
 
@@ -80,7 +80,7 @@ def plcs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[str], P
 
 @pytest.fixture(params=["modbus", "opcua"])
 def plc(request: pytest.FixtureRequest, plcs: Callable[[str], Plc]) -> Iterator[Plc]:
-    """It scans, and nobody has written to it."""
+    """Start a PLC that scans, without any written value."""
     plc = plcs(request.param)
     plc.thread.run(plc.made.scan())
     yield plc
@@ -126,7 +126,7 @@ def test_a_plc_that_does_not_scan_is_waited_for_so_long(plc: Plc) -> None:
 
 def test_a_plc_that_is_not_there_is_said(plc: Plc) -> None:
     url = f"{plc.url.rpartition(':')[0]}:1"
-    with Scenario(LINE) as plant, pytest.raises(LinkError, match=f"^{url}: "):
+    with Scenario(LINE) as plant, pytest.raises(PlcLinkError, match=f"^{url}: "):
         plant.attach_plc(url, plc.tags)
 
 
@@ -170,13 +170,13 @@ def test_attach_says_that_there_is_no_plc(tmp_path: Path, caplog: pytest.LogCapt
     [
         ("", "line 1: nothing given, expected tag,theirs"),
         ("ours,theirs\n", "line 1: ours,theirs given, expected tag,theirs"),
-        ("tag,theirs\n", "names no tag, expected one or more"),
+        ("tag,theirs\n", "has no tag, expected one or more"),
         ("tag,theirs\nbelts/zone9/speed,x\n", "line 2: belts/zone9/speed given, expected a signal or command"),
         ("tag,theirs\nbelts/zone1/trip,x\n", "line 2: belts/zone1/trip given, expected a signal or command"),
         ("tag,theirs\nalarms/,x\n", "line 2: alarms/ given, expected a signal or command"),
         ("tag,theirs\nalarms/a,x\nalarms/a,y\n", "line 3: alarms/a given twice"),
-        ("tag,theirs\nalarms/a\n", "line 2: alarms/a given, expected a tag and what it is in the PLC"),
-        ("tag,theirs\nalarms/a,coil 0 bool\n", "run/tick and run/target_tick are not both in it"),
+        ("tag,theirs\nalarms/a\n", "line 2: alarms/a given, expected a tag and its place in the PLC"),
+        ("tag,theirs\nalarms/a,coil 0 bool\n", "run/tick or run/target_tick is missing"),
     ],
 )
 def test_a_map_that_can_t_be_is_refused(tmp_path: Path, lines: str, said: str) -> None:
@@ -203,7 +203,7 @@ def test_a_place_in_modbus_that_can_t_be_is_refused(tmp_path: Path, theirs: str,
     with Scenario(LINE) as plant:
         mapped = read_tag_map(tags, plant.simulation.process_image.tags)
     with pytest.raises(TagMapError) as refused:
-        link("modbus://127.0.0.1:1", all_of(mapped))
+        plc_link("modbus://127.0.0.1:1", mapped.all)
     assert str(refused.value).startswith(f"{tags}: line 2: ") and said in str(refused.value)
 
 
@@ -215,7 +215,7 @@ def test_a_signal_is_not_written_where_nothing_can_be(tmp_path: Path) -> None:
         Scenario(LINE) as plant,
         pytest.raises(TagMapError, match=stating("line 2", BOTTLES, "written", "input registers")),
     ):
-        link("modbus://127.0.0.1:1", all_of(read_tag_map(tags, plant.simulation.process_image.tags)))
+        plc_link("modbus://127.0.0.1:1", read_tag_map(tags, plant.simulation.process_image.tags).all)
 
 
 def test_a_place_that_the_plc_lacks_is_said_at_once(plcs: Callable[[str], Plc], tmp_path: Path) -> None:
@@ -223,15 +223,15 @@ def test_a_place_that_the_plc_lacks_is_said_at_once(plcs: Callable[[str], Plc], 
     tags = write_map(tmp_path / "tags.csv", plc.places | {SETPOINT: "holding register 900 float32"})
     with (
         Scenario(LINE) as plant,
-        pytest.raises(LinkError, match=stating("holding register 900", "refused", "exception 2")),
+        pytest.raises(PlcLinkError, match=stating("holding register 900", "refused", "exception 2")),
     ):
         plant.attach_plc(plc.url, tags)
 
 
 @pytest.mark.parametrize("url", ["http://127.0.0.1:1", "127.0.0.1", "opc.tcp://", "modbus://[", "modbus://a:b"])
 def test_a_url_that_can_t_be_is_refused(url: str) -> None:
-    with pytest.raises(LinkError, match=stating("opc.tcp://host:port", "modbus://host:port")):
-        link(url, ())
+    with pytest.raises(PlcLinkError, match=stating("opc.tcp://host:port", "modbus://host:port")):
+        plc_link(url, ())
 
 
 def test_a_variable_that_the_plc_lacks_is_named(plcs: Callable[[str], Plc], tmp_path: Path) -> None:
@@ -249,9 +249,9 @@ class FreeRunning:
         self.said: list[str] = []
         self.observed: list[Mapping[str, float]] = []
         self.source = plant.source()
-        tags = read_tag_map(plc.tags, self.source.about.tags)
-        way = partial(link, plc.url, all_of(tags))
-        self.face = PlcFace(self.source, plc.url, tags, way, 0.005, self.said.append, self.observed.append)
+        tags = read_tag_map(plc.tags, self.source.info.tags)
+        way = partial(plc_link, plc.url, tags.all)
+        self.face = FreeRunningPlc(self.source, plc.url, tags, way, 0.005, self.said.append, self.observed.append)
         thread.run(self.face.start())
 
     def until(self, done: Callable[[], object]) -> None:
@@ -274,7 +274,7 @@ def free(plc: Plc) -> Iterator[FreeRunning]:
 
 
 def test_a_free_running_plc_commands_a_line_and_is_reached_again(free: FreeRunning) -> None:
-    """Real time has no bits to compare: what it sees reaches it, what it says acts, and its loss is told."""
+    """In real time there are no bits to compare: inputs arrive, outputs act, and its loss is reported."""
     plant, plc, face, said = free.plant, free.plc, free.face, free.said
     free.until(lambda: plant.signals[BOTTLES] > 2)
     free.until(lambda: plant.simulation.line.read_back.values[0] == 0.0 and ALARM in plant.signals)
@@ -284,10 +284,10 @@ def test_a_free_running_plc_commands_a_line_and_is_reached_again(free: FreeRunni
     assert 0.0 < free.observed[-1][OWN] <= plant.simulation.tick + 1
     plc.thread.run(plc.made.stop())
     free.until(lambda: said and face.status().clients == 0)
-    assert said[0].endswith("it commands nothing until it is reached again")
+    assert said[0].endswith("it commands nothing until it is connected again")
     plc.start_again()
     free.until(lambda: face.status().clients == 1 and face.status().writes > status.writes)
-    assert said[-1] == f"{plc.url}: reached again"
+    assert said[-1] == f"{plc.url}: connected again"
 
 
 @pytest.mark.parametrize("plc", ["opcua"], indirect=True)
@@ -313,7 +313,7 @@ def test_what_the_plc_calls_bad_is_no_command(free: FreeRunning) -> None:
     assert free.plant.signals["belts/zone1/speed"] != 0.25
     set_speed(0.25, ua.StatusCodes.Good)
     free.until(lambda: free.plant.signals["belts/zone1/speed"] == 0.25)
-    assert free.said[-1] == f"{free.plc.url}: reached again"
+    assert free.said[-1] == f"{free.plc.url}: connected again"
 
 
 @pytest.mark.parametrize("plc", ["opcua"], indirect=True)

@@ -85,7 +85,7 @@ def test_a_failure_leaves_bag_and_picture_and_tells_where(run: pytest.RunResult,
     second = kept / "test_table.py_test_of_two_lines_a_b_c" / "line_2"
     assert (second / "line.png").exists() and (second / "bag" / "metadata.yaml").exists()
     # What can't be made again is said so.
-    run.stdout.fnmatch_lines([f"bag: {kept}/test_table.py_test_moves_*/bag (the run made again is another at 2.00 s *"])
+    run.stdout.fnmatch_lines([f"bag: {kept}/test_table.py_test_moves_*/bag (the repeated run differs at 2.00 s *"])
     # The report ends where the test does, not inside of the kit.
     assert "scenario.py" not in run.stdout.str()
 
@@ -95,7 +95,7 @@ def test_what_cannot_be_kept_is_told(pytester: pytest.Pytester) -> None:
     (pytester.path / "kept").write_text("a file in the way")
     result = pytester.runpytest_inprocess(*PLUGIN, "--line-failures", "kept", "-k", "test_fails")
     result.assert_outcomes(failed=1, deselected=5)
-    result.stdout.fnmatch_lines(["bag: not kept: *", "page: not kept: *", "picture: not kept: *"])
+    result.stdout.fnmatch_lines(["bag: not saved: *", "page: not saved: *", "picture: not saved: *"])
 
 
 def test_another_run_replaces_what_the_last_one_left(pytester: pytest.Pytester) -> None:
@@ -108,7 +108,7 @@ def test_another_run_replaces_what_the_last_one_left(pytester: pytest.Pytester) 
 
 
 def test_pytest_finds_it_by_itself() -> None:
-    """As installed: after an edit of setup.py, `make` brings the environment up to date."""
+    """The installed entry point; after an edit of setup.py, `make` updates it."""
     assert PLUGIN[1] in {entry.value for entry in entry_points(group="pytest11")}
 
 

@@ -19,7 +19,7 @@ from conveyor_sim.testing import Scenario
 
 @dataclass
 class Hold:
-    """Holds the feeder while there are so many bottles on the table; remembers its scans."""
+    """Controller that holds the feeder while `high` bottles or more are on the table; stores its scans."""
 
     high: float
     ticks: list[int] = field(default_factory=list)

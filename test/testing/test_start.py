@@ -27,7 +27,7 @@ def warm(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 class Pulse:
-    """Has the feeder run and stand in turn, by a count of its own scans."""
+    """Starts and stops the feeder in turn, by the count of its scans."""
 
     def __init__(self) -> None:
         self.scans = 0

@@ -77,7 +77,7 @@ def test_one_warm_up_for_many_tests_each_with_a_line_of_its_own(pytester: pytest
 
 
 def test_processes_of_xdist_do_not_tread_on_each_other(tmp_path: Path) -> None:
-    """In a process of its own, with the kernels that this one has compiled."""
+    """Runs in another process, with the kernels that this one has compiled."""
     found = []
     for workers in ("0", "2"):
         folder = tmp_path / workers

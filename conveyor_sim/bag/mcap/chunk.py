@@ -1,4 +1,4 @@
-"""A chunk of an MCAP file: found, decompressed within limits, and checked."""
+"""Chunks of an MCAP file: search, decompression within limits, verification."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SIZE = struct.Struct("<Q")
 READ = 1 << 20
 """Bytes decompressed at a time."""
 CUT_READ = 4096
-"""The same in a chunk that was cut: what an error in its middle can cost."""
+"""Bytes decompressed at a time from a chunk that was cut; an error loses up to this many."""
 HELD = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
 """Known records that a chunk may hold."""
 MESSAGE = struct.Struct("<HIQQ")
@@ -37,7 +37,7 @@ LONGEST_NAME = 32
 
 @dataclass(frozen=True)
 class Chunk:
-    """Where a chunk is, and what its head says."""
+    """Place of a chunk in a file, and the fields of its head."""
 
     start: int
     """Byte at which its record begins."""
@@ -46,19 +46,19 @@ class Chunk:
     content: int
     """Byte at which its compressed content begins."""
     content_stop: int
-    """Byte after the content; what follows up to `stop` are fields of a later version."""
+    """Byte after the content; the bytes from here to `stop` are fields of a later version."""
     start_ns: int
     end_ns: int
     size: int
-    """Of the content, uncompressed."""
+    """Bytes of the uncompressed content."""
     crc: int
-    """Of the same; 0: none."""
+    """CRC-32 of the uncompressed content; 0: none."""
     compression: str
 
 
 @dataclass(frozen=True)
-class Content:
-    """What a sound chunk holds, without the messages' bytes."""
+class ChunkContent:
+    """Overview of a valid chunk's content, without the bytes of messages."""
 
     digest: int
     schemas: tuple[Schema, ...]
@@ -121,8 +121,8 @@ def next_chunk(data: Data, position: int, stop: int) -> Chunk | None:
     Zeros behind a counter look like an empty chunk. One with appended fields counts only if its content has the
     checksum that it states: other bytes look like one, too.
     """
-    while (found := BEGINNING.search(data, position, stop + RECORD_HEAD.size - 1)) is not None:
-        chunk = chunk_at(data, found.start())
+    while (match := BEGINNING.search(data, position, stop + RECORD_HEAD.size - 1)) is not None:
+        chunk = chunk_at(data, match.start())
         if (
             chunk is not None
             and chunk.size > 0
@@ -130,7 +130,7 @@ def next_chunk(data: Data, position: int, stop: int) -> Chunk | None:
             and (chunk.stop == chunk.content_stop or _verified(data, chunk))
         ):
             return chunk
-        position = found.start() + 1
+        position = match.start() + 1
     return None
 
 
@@ -145,7 +145,7 @@ def _verified(data: Data, chunk: Chunk) -> bool:
 
 
 def read_content(data: Data, chunk: Chunk) -> bytes:
-    """A chunk's uncompressed content. Raises Malformed if it is not what the chunk's head says."""
+    """Return a chunk's uncompressed content. Raise Malformed if it contradicts the chunk's head."""
     if max(chunk.size, chunk.content_stop - chunk.content) > LIMIT:
         raise Malformed(f"it states {chunk.size} bytes, more than the {LIMIT} that are accepted")
     content = bytearray()
@@ -157,14 +157,14 @@ def read_content(data: Data, chunk: Chunk) -> bytes:
     except (zstandard.ZstdError, RuntimeError, MemoryError) as error:  # lz4 raises RuntimeError
         raise Malformed("it can't be decompressed") from error
     if len(content) != chunk.size:
-        raise Malformed("its content has not the size that it states")
+        raise Malformed("its content differs from the size that it states")
     if chunk.crc and zlib.crc32(content) != chunk.crc:
         raise Malformed("its checksum is wrong")
     return bytes(content)
 
 
 def read_cut(data: Data, chunk: Chunk) -> bytes:
-    """As much as can be had of a chunk that the end of the file cuts; of that, nothing can be verified."""
+    """Return the readable content of a chunk that the end of the file cuts. It can't be verified."""
     content = bytearray()
     try:
         for piece in _decompressed(data[chunk.content : chunk.content + LIMIT], chunk.compression, CUT_READ):
@@ -172,11 +172,11 @@ def read_cut(data: Data, chunk: Chunk) -> bytes:
             if len(content) >= min(chunk.size, LIMIT):
                 break
     except (zstandard.ZstdError, RuntimeError, MemoryError):
-        pass  # what came before the error is taken
+        pass  # the content before the error is returned
     return bytes(content)
 
 
-def survey(content: bytes) -> Content:
+def survey(content: bytes) -> ChunkContent:
     """Return an overview of a chunk's content. Raises Malformed unless it consists of records that a chunk may hold."""
     schemas: list[Schema] = []
     channels: list[Channel] = []
@@ -205,11 +205,11 @@ def survey(content: bytes) -> Content:
             elif isinstance(record, Channel):
                 channels.append(record)
         position = end
-    return Content(zlib.crc32(content), tuple(schemas), tuple(channels), places, tuple(unknown))
+    return ChunkContent(zlib.crc32(content), tuple(schemas), tuple(channels), places, tuple(unknown))
 
 
 def inside(content: bytes) -> Iterator[McapRecord]:
-    """The whole records of a chunk's content, which may be cut."""
+    """Yield the complete records of a chunk's content, which may be cut."""
     position = 0
     while position + RECORD_HEAD.size <= len(content):
         opcode, length = RECORD_HEAD.unpack_from(content, position)
@@ -243,7 +243,7 @@ def messages_of(content: bytes, names: Mapping[int, str]) -> Iterator[tuple[str,
 
 
 def _decompressed(data: bytes, compression: str, size: int) -> Iterator[bytes]:
-    """The content in pieces of a size at most, so that no more is made than somebody takes."""
+    """Yield the content in pieces of a size at most. Only the pieces that the caller takes are decompressed."""
     if compression == "":
         yield data
         return

@@ -12,7 +12,7 @@ IDL = ("ros2idl", "omgidl")
 ROS_SCHEMAS = ("ros2msg", *IDL, "")
 """Schema encodings of ROS 2 messages; "": the definition was not available to the recorder."""
 NAMED = 5
-"""Channels and opcodes that are named at most."""
+"""Channels or opcodes that are listed, at most."""
 
 
 def is_ros(channel: Channel, schemas: Mapping[int, Schema]) -> bool:

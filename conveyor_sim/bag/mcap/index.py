@@ -1,4 +1,4 @@
-"""The end of an MCAP file: its index (the summary section), and the two checksums that together cover every byte."""
+"""End of an MCAP file: the index (summary section), and the two checksums that together cover every byte."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ HELD = (
 
 @dataclass
 class Index:
-    """What the summary section says."""
+    """Content of the summary section."""
 
     start: int
     """Byte at which it begins."""
     stop: int
     """Byte after the file's end mark."""
     stated: int
-    """Byte at which it begins as the footer states it; 0: there is no index."""
+    """Byte at which it begins according to the footer; 0: there is no index."""
     verified: bool
     """Its checksum holds; False: it carries none."""
     schemas: dict[int, Schema] = field(default_factory=dict)
@@ -77,8 +77,8 @@ def chained_to(data: Data) -> int | None:
     return end
 
 
-def sealed(data: Data) -> bool:
-    """Whether both checksums are there and hold: then every byte is as it was written."""
+def is_complete(data: Data) -> bool:
+    """Return True if both checksums exist and are right. Then every byte is as it was written."""
     size = len(data)
     footer = size - len(MAGIC) - FOOTER.size
     if footer < len(MAGIC) + DATA_END.size or data[: len(MAGIC)] != MAGIC or data[size - len(MAGIC) :] != MAGIC:
@@ -94,7 +94,7 @@ def sealed(data: Data) -> bool:
 
 
 def read_index(data: Data) -> Index | None:
-    """The index, wherever in the file it has come to lie; None if there is none, or it is damaged."""
+    """Return the index, wherever in the file it lies; None if there is none, or it is damaged."""
     end = data.rfind(MAGIC)
     footer = end - FOOTER.size
     if footer < len(MAGIC):

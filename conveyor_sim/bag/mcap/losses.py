@@ -29,7 +29,7 @@ def seconds(time_ns: int) -> str:
 
 
 def lose(losses: list[Loss], loss: Loss, starts: Sequence[int]) -> None:
-    """Add a loss. One that follows upon the last is joined to it, unless a valid chunk starts between (`starts`)."""
+    """Add a loss. Join it to the last one, unless a valid chunk starts between them (`starts`)."""
     last = losses[-1] if losses else None
     if last is not None and _adjoin(last, loss, starts):
         known = last.messages is not None and loss.messages is not None

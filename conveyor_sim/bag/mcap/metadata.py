@@ -12,14 +12,17 @@ from textwrap import dedent, indent
 from typing import Any
 
 import yaml
-from ruamel.yaml import YAML
+
+from conveyor_sim.errors import BagError, SceneError
+from conveyor_sim.scene.yaml_lines import Document
+from conveyor_sim.support.files import FileError, write_file
 
 FILE_NAME = "metadata.yaml"
 VERSION = 9
 SIZE_LIMIT = 1 << 24
 """Bytes of the file, at most."""
 _BEHIND = 1 << 18
-"""Bytes at the end of a recording's file, the index among them, in which its metadata is looked for."""
+"""Bytes at the end of a recording's file, beside its metadata itself, that are searched for the metadata."""
 _WIDTH = 1 << 30
 """Characters in a line, at most: no text is broken."""
 _HEAD = "rosbag2_bagfile_information:\n"
@@ -52,7 +55,7 @@ class FileInfo:
 
 
 def bag_information(topics: Sequence[TopicInfo], files: Sequence[FileInfo], distro: str) -> dict[str, Any]:
-    """The mapping under `rosbag2_bagfile_information`, in the order in which rosbag2 writes it."""
+    """Return the mapping under `rosbag2_bagfile_information`, in the order in which rosbag2 writes it."""
     filled = [file for file in files if file.message_count]
     start = min((file.start_ns for file in filled), default=0)
     end = max((file.end_ns for file in filled), default=0)
@@ -107,26 +110,27 @@ def to_yaml(value: Any) -> str:
 
 @lru_cache(maxsize=64)
 def from_yaml(text: str) -> Any:
-    """Parses YAML; None if it is none. Not to be changed: topics share what their profiles are parsed to."""
+    """Parse YAML. Return None for text that is not YAML. Callers share the result and must not change it."""
     try:
-        return YAML(typ="safe").load(text)
-    except Exception:  # damaged text makes the parser raise more than its own YAMLError
+        return Document(text, FILE_NAME).data
+    except SceneError:
         return None
 
 
 def write_metadata(folder: Path, information: str) -> None:
-    """Writes metadata.yaml into the folder, whole or not at all; information: `bag_information` as YAML."""
-    temporary = folder / f"{FILE_NAME}.tmp"
+    """Write metadata.yaml into the folder, complete or not at all. information: `bag_information` as YAML.
+
+    Raise OSError, by which a recorder distinguishes a full disk from a missing folder; BagError for other reasons.
+    """
+    file = folder / FILE_NAME
     try:
-        temporary.write_text(_HEAD + indent(information, "  "), encoding="utf-8")
-        temporary.replace(folder / FILE_NAME)
-    except OSError:
-        temporary.unlink(missing_ok=True)
-        raise
+        write_file(file, (_HEAD + indent(information, "  ")).encode())
+    except FileError as error:
+        raise error.__cause__ if isinstance(error.__cause__, OSError) else BagError(f"{file}: {error}") from error
 
 
 def read_metadata(folder: Path) -> dict[str, Any] | None:
-    """What metadata.yaml says under `rosbag2_bagfile_information`; None if it is missing or broken."""
+    """Return the mapping under `rosbag2_bagfile_information` in metadata.yaml; None if it is missing or broken."""
     file = folder / FILE_NAME
     try:
         if not file.is_file() or file.stat().st_size > SIZE_LIMIT:
@@ -139,9 +143,9 @@ def read_metadata(folder: Path) -> dict[str, Any] | None:
 
 
 def is_stated_in(file: Path) -> bool:
-    """Whether the metadata.yaml beside an MCAP file is of that file alone, and the text that it states at its end.
+    """Return True if the metadata.yaml beside an MCAP file is about that file only, and equals its metadata record.
 
-    Then there is nothing to parse, which takes a twentieth of a second. Raises OSError and UnicodeDecodeError.
+    Then metadata.yaml need not be parsed, which takes a twentieth of a second. Raise OSError and UnicodeDecodeError.
     """
     beside = file.parent / FILE_NAME
     if not beside.is_file() or beside.stat().st_size > SIZE_LIMIT:
@@ -155,7 +159,7 @@ def is_stated_in(file: Path) -> bool:
 
 
 def fits(information: Mapping[str, Any], expected: Mapping[str, Any]) -> bool:
-    """Whether a metadata.yaml says of its bag what it must: files, times, and topics with their types and counts."""
+    """Return True if a metadata.yaml states the expected files, times, and topics with their types and counts."""
     try:
         return _essence(information) == _essence(expected)
     except (KeyError, TypeError, AttributeError, IndexError):
@@ -163,14 +167,14 @@ def fits(information: Mapping[str, Any], expected: Mapping[str, Any]) -> bool:
 
 
 def file_names(information: Mapping[str, Any]) -> list[str]:
-    """The storage files; older versions tell them with their folder. Raises TypeError or KeyError."""
+    """Return the names of the storage files; older versions state them with their folder. Raise TypeError, KeyError."""
     return [PurePath(path).name for path in information["relative_file_paths"]]
 
 
 def _essence(information: Mapping[str, Any]) -> tuple[Any, ...]:
     topics = {}
     for topic in information["topics_with_message_count"]:
-        if count := topic["message_count"]:  # of the others, a recorder may name some or none
+        if count := topic["message_count"]:  # recorders differ in listing topics without messages
             entry = topic["topic_metadata"]
             topics[entry["name"]] = (entry["type"], entry["serialization_format"], _profiles(entry), count)
     return (
@@ -185,6 +189,6 @@ def _essence(information: Mapping[str, Any]) -> tuple[Any, ...]:
 
 
 def _profiles(topic: Mapping[str, Any]) -> Any:
-    """Quality of service; up to version 8 it is text."""
+    """Return the quality of service, which is text in versions up to 8."""
     profiles = topic.get("offered_qos_profiles")
     return from_yaml(profiles) if isinstance(profiles, str) else profiles

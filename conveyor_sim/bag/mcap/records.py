@@ -1,4 +1,4 @@
-"""Records of an MCAP file, read from bytes that may be damaged: nothing here trusts a length."""
+"""Records of an MCAP file, read from bytes that may be damaged. Each length is checked before it is used."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ MAGIC = b"\x89MCAP0\r\n"
 RECORD_HEAD = struct.Struct("<BQ")
 """Opcode, length of what follows."""
 LIMIT = 1 << 28
-"""Bytes of one record or one chunk's content, at most, so that a damaged size can't ask for more; 1 MiB is usual."""
+"""Bytes of one record or one chunk's content, at most, as a limit for damaged sizes; 1 MiB is usual."""
 PIECE = 1 << 20
-"""Bytes taken into a checksum at a time."""
+"""Bytes added to a checksum at a time."""
 
 Data = mmap.mmap | bytes
 
@@ -58,12 +58,12 @@ _READERS = {
 
 
 class Malformed(Exception):
-    """Bytes that are not what they should be; the message is a phrase that says why."""
+    """Invalid bytes; the message is a phrase with the reason."""
 
 
 @contextmanager
 def mapped(path: Path) -> Iterator[Data]:
-    """A file's bytes, not read before they are used. Raises BagError if it can't be opened."""
+    """Map a file into memory, where its bytes are read when they are used. Raise BagError if it can't be opened."""
     try:
         with path.open("rb") as file:
             empty = path.stat().st_size == 0
@@ -78,7 +78,7 @@ def mapped(path: Path) -> Iterator[Data]:
 
 
 def checksum(data: Data, start: int, stop: int) -> int:
-    """CRC-32 of a span of bytes."""
+    """Return the CRC-32 of a span of bytes."""
     value = 0
     for position in range(start, stop, PIECE):
         value = zlib.crc32(data[position : min(position + PIECE, stop)], value)
@@ -86,7 +86,7 @@ def checksum(data: Data, start: int, stop: int) -> int:
 
 
 def head_at(data: Data, position: int, stop: int) -> tuple[int, int] | None:
-    """Opcode of the record that begins at a byte, and where it ends; None if it would end after `stop`."""
+    """Return the opcode of the record that begins at a byte, and the byte after it; None if it ends after `stop`."""
     start = position + RECORD_HEAD.size
     if start > stop:
         return None
@@ -94,11 +94,11 @@ def head_at(data: Data, position: int, stop: int) -> tuple[int, int] | None:
     return (opcode, start + length) if start + length <= stop and length <= LIMIT else None
 
 
-class _Whole(ReadDataStream):
-    """A stream that ends with an error: mcap's own gives less than was asked for, and says nothing."""
+class _CompleteReads(ReadDataStream):
+    """A stream that raises an error at its end; the library's stream returns fewer bytes without an error."""
 
     def read(self, length: int) -> bytes:
-        """So many bytes. Raises EndOfFile."""
+        """Return `length` bytes. Raise EndOfFile."""
         data = super().read(length)
         if len(data) < length:
             raise EndOfFile
@@ -115,7 +115,7 @@ def parse_part(opcode: int, body: bytes) -> tuple[McapRecord | None, int]:
 
     A record may be longer: the specification lets later versions append fields, which readers ignore.
     """
-    stream = _Whole(BytesIO(body))
+    stream = _CompleteReads(BytesIO(body))
     try:
         if opcode == Opcode.MESSAGE:
             message: McapRecord = Message.read(stream, len(body))
@@ -127,7 +127,7 @@ def parse_part(opcode: int, body: bytes) -> tuple[McapRecord | None, int]:
 
 
 def records(data: Data, start: int, stop: int) -> Iterator[tuple[int, int, McapRecord | None]]:
-    """Position, opcode and content of the records that fill a span without a gap. Raises Malformed."""
+    """Yield position, opcode and content of the records that fill a span without a gap. Raise Malformed."""
     position = start
     while position < stop:
         head = head_at(data, position, stop)

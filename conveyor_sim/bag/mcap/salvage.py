@@ -1,4 +1,4 @@
-"""The verdict on an MCAP file that may be damaged anywhere: its valid parts, its damage, and its losses."""
+"""Verdict on an MCAP file that may be damaged anywhere: valid parts, damage, and losses."""
 
 from __future__ import annotations
 

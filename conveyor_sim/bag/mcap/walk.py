@@ -1,4 +1,4 @@
-"""A walk over the records of an MCAP file that may be damaged anywhere."""
+"""Walk over the records of an MCAP file that may be damaged anywhere."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from mcap.records import Attachment, Channel, McapRecord, Message, MessageIndex,
 from conveyor_sim.bag.mcap.chunk import (
     MESSAGE,
     Chunk,
-    Content,
+    ChunkContent,
     chunk_at,
     foreign_compression,
     inside,
@@ -116,7 +116,7 @@ class Walk:
         """Record lengths lead from the first record to a proper end."""
         self._trusted = end is not None and self._right_checksum(end)  # then lengths are as they were written
         self._digests: set[tuple[int, int]] = set()
-        self._last: Content | None = None  # of the chunk before, if it is valid
+        self._last: ChunkContent | None = None  # of the chunk before, if it is valid
         self._loose_names: list[McapRecord] = []
         self._holes: list[tuple[int, int | None]] = []  # after how many valid chunks, how many messages
         self._ended = self._walk()
@@ -257,7 +257,7 @@ class Walk:
         elif self._last is not None and not self._is_index_of(record, self._last):
             self._once(MISMATCH)
 
-    def _is_index_of(self, record: MessageIndex, content: Content) -> bool:
+    def _is_index_of(self, record: MessageIndex, content: ChunkContent) -> bool:
         """Return True for the index of a chunk's messages. Writers may put the entries in the order of time."""
         return sorted(record.records) == sorted(content.places.get(record.channel_id, []))
 

@@ -1,4 +1,4 @@
-"""Columns to messages: CDR bytes to publish and to record alike."""
+"""Serialization of columns as messages: CDR bytes that are published and recorded alike."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ MARKERS = "visualization_msgs/msg/MarkerArray"
 
 @dataclass(frozen=True)
 class Header:
-    """What every message starts with."""
+    """First fields of every message."""
 
     tick: int
     stamp_ns: int
@@ -45,12 +45,12 @@ def _pack(type_name: str, header: Header, values: dict[str, Any]) -> bytes:
 
 
 def columns_message(type_name: str, columns: Any, header: Header) -> bytes:
-    """A message of the fields of a dataclass; of something with a tick of its own, the header belongs to that."""
+    """Return a message with the fields of a dataclass. If the object has a tick, the header must be of that tick."""
     return packer(type_name).pack(header.frame_id, header.stamp_ns, header.tick, partial(getattr, columns))
 
 
 def to_image(message: Any) -> Image:
-    """The process image that a Signals message holds; in an older one nothing is forced."""
+    """Return the process image of a Signals message; in an older message nothing is forced."""
     if not hasattr(message, "forced"):
         return Image(message.values, *NOTHING_FORCED)
     return Image(message.values, message.forced, message.actual)
@@ -71,54 +71,54 @@ class Outcome:
     texts: tuple[str, ...]
 
     @staticmethod
-    def of(given: Input, accepted: bool, reason: str) -> Outcome:
-        """That of an input."""
-        source, writer, kind, operation, names, values, texts = given
+    def of(request: Input, accepted: bool, reason: str) -> Outcome:
+        """Return the outcome of an input."""
+        source, writer, kind, operation, names, values, texts = request
         return Outcome(source, names, values, accepted, reason, writer, kind, operation, texts)
 
     @property
     def input(self) -> Input:
-        """What was given."""
+        """The input."""
         return Input(self.source, self.writer, self.writer_kind, self.operation, self.names, self.values, self.texts)
 
 
 def outcome_message(outcome: CommandOutcome, header: Header) -> bytes:
-    """conveyor_msgs/CommandOutcome."""
+    """Return a conveyor_msgs/CommandOutcome."""
     values = {**outcome.input._asdict(), "accepted": outcome.accepted, "reason": outcome.reason}
     return _pack(OUTCOME, header, values)
 
 
 def to_outcome(message: Any) -> Outcome:
-    """The outcome that a CommandOutcome message holds; of an older one, without a writer, as its source says."""
+    """Return the outcome of a CommandOutcome message. In an older one, the writer follows from the source."""
     names, values = tuple(message.names), tuple(float(value) for value in message.values)
     if hasattr(message, "operation"):
-        given = Input(
+        request = Input(
             message.source, message.writer, message.writer_kind, message.operation, names, values, tuple(message.texts)
         )
     else:
-        given = recorded_input(message.source, names, values)
-    return Outcome.of(given, bool(message.accepted), message.reason)
+        request = recorded_input(message.source, names, values)
+    return Outcome.of(request, bool(message.accepted), message.reason)
 
 
 def commands_message(names: Sequence[str], values: NDArray[np.float64], header: Header) -> bytes:
-    """conveyor_msgs/Commands, without declarations of alarms."""
+    """Return a conveyor_msgs/Commands, without declarations of alarms."""
     return _pack(COMMANDS, header, {"names": names, "values": values, "alarm_ids": (), "alarms": ()})
 
 
 def speed_message(speed: float) -> bytes:
-    """std_msgs/Float64 of a belt's speed, m/s."""
+    """Return a std_msgs/Float64 with a belt's speed, m/s."""
     writer = CdrWriter()
     writer.pack("d", speed)
     return writer.finish()
 
 
 def run_state_message(run: RunState, header: Header) -> bytes:
-    """conveyor_msgs/RunState."""
+    """Return a conveyor_msgs/RunState."""
     return _pack(RUN_STATE, header, {"state": run.state, "text": run.text, "reason": run.reason})
 
 
 def poses_message(columns: BottleColumns, header: Header) -> bytes:
-    """geometry_msgs/PoseArray of the bottles' axes, ordered by id, at the height of the belts (z = 0)."""
+    """Return a geometry_msgs/PoseArray of the bottles' axes, ordered by id, at the height of the belts (z = 0)."""
     writer = CdrWriter()
     writer.header(header.stamp_ns, header.frame_id)
     writer.rows(pose_rows(columns.x, columns.y, columns.theta))
@@ -126,14 +126,14 @@ def poses_message(columns: BottleColumns, header: Header) -> bytes:
 
 
 def bool_message(value: bool, header: Header) -> bytes:
-    """std_msgs/Bool, which has no header."""
+    """Return a std_msgs/Bool, which has no header."""
     writer = CdrWriter()
     writer.pack("?", value)
     return writer.finish()
 
 
 def line_message(sim: Simulation, run_id: str, header: Header) -> bytes:
-    """conveyor_msgs/Line: what the indices mean, and all that is needed to run the same line again."""
+    """Return a conveyor_msgs/Line: the meaning of indices, and all data needed to run the same line again."""
     scene, model, image = sim.scene, sim.model, sim.process_image
     values = {
         "run_id": run_id,

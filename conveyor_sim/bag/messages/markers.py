@@ -1,4 +1,4 @@
-"""visualization_msgs/MarkerArray for RViz2 and Foxglove: the plant, drawn once, and what moves, drawn at a rate."""
+"""visualization_msgs/MarkerArray for RViz2 and Foxglove: the plant, drawn once, and moving parts, drawn at a rate."""
 
 from __future__ import annotations
 
@@ -47,12 +47,12 @@ ARC_STEP = math.radians(4.0)
 ARROW_SPACING = 0.5
 """m along a belt from one arrow to the next."""
 RAIL_THICKNESS = 0.012
-"""m, of the line that stands for a rail."""
+"""Thickness of the line that represents a rail, m."""
 
 
 @dataclass(frozen=True)
 class Marker:
-    """What is used here of visualization_msgs/Marker; points are rows (n, 3) in m."""
+    """Used fields of visualization_msgs/Marker; points are rows (n, 3) in m."""
 
     ns: str
     id: int
@@ -69,8 +69,9 @@ CLEAR = Marker("", 0, ARROW, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0), action=DELET
 
 
 def marker_array(markers: Sequence[Marker], header: Header) -> bytes:
-    """A MarkerArray as CDR bytes: the whole picture. It begins by deleting what the topic has shown before, which may
-    be of another scene: a viewer stays open while simulations come and go.
+    """Return a MarkerArray as CDR bytes: the complete drawing.
+
+    Its first marker deletes earlier ones of the topic, which may be of another scene that the viewer has shown before.
     """
     writer = CdrWriter()
     writer.pack("I", 1 + len(markers))
@@ -99,7 +100,7 @@ def _before_points(
     scale: tuple[float, float, float],
     colour: Colour,
 ) -> bytes:
-    """A Marker's fields from behind the stamp to the points, where a message has come to a phase of its alignment."""
+    """Return a Marker's fields between the stamp and the points, for a phase of the message's alignment."""
     writer = CdrWriter(phase)
     writer.string(frame_id)
     writer.string(ns)
@@ -114,7 +115,7 @@ def _before_points(
 
 @lru_cache(maxsize=1024)
 def _behind_points(phase: int, text: str) -> bytes:
-    """Those behind the points."""
+    """Return a Marker's fields behind the points, for a phase of the message's alignment."""
     writer = CdrWriter(phase)
     writer.pack("I", 0)  # colors: one colour for all points
     writer.string("")  # texture_resource
@@ -133,7 +134,7 @@ def _behind_points(phase: int, text: str) -> bytes:
 def bottles_markers(
     columns: BottleColumns, radii: NDArray[np.float64], moving: Sequence[RailShape], header: Header
 ) -> bytes:
-    """What moves: one SPHERE_LIST a bottle type that has bottles, resting on the belts (z = 0); and rails that move."""
+    """Return the markers of moving parts: one SPHERE_LIST per bottle type present, resting on z = 0; moving rails."""
     markers = []
     for index, radius in enumerate(radii):
         chosen = np.flatnonzero(columns.type == index)
@@ -150,7 +151,7 @@ def bottles_markers(
 def plant_markers(
     belts: Sequence[BeltShape], rails: Sequence[RailShape], marks: Sequence[Mark], header: Header
 ) -> bytes:
-    """The plant: belt surfaces, arrows along positive speed, rails at rest, marks of devices, names."""
+    """Return the markers of the plant: belt surfaces, arrows along positive speed, fixed rails, device marks, names."""
     markers = [*_belt_surfaces(belts), *_arrows(belts), *_rails("rails", rails), *_names(belts), *_marks(marks)]
     return marker_array(markers, header)
 
@@ -166,7 +167,7 @@ def _belt_surfaces(belts: Sequence[BeltShape]) -> Iterator[Marker]:
 
 
 def _edges(belt: BeltShape) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The right and left edge of a belt, seen along positive speed: (n, 2) each."""
+    """Return the right and left edge of a belt, seen along positive speed: (n, 2) each."""
     if belt.kind == "straight":
         along = np.array([math.cos(belt.angle), math.sin(belt.angle)])
         left = np.array([-along[1], along[0]])
@@ -194,7 +195,7 @@ def _arrows(belts: Sequence[BeltShape]) -> Iterator[Marker]:
 
 
 def _along(line: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Points of a polyline (k, 2) at distances from its start, m."""
+    """Return the points of a polyline (k, 2) at distances from its start, m."""
     steps = np.hypot(*np.diff(line, axis=0).T)
     distance = np.concatenate(([0.0], np.cumsum(steps)))
     return np.column_stack([np.interp(places, distance, line[:, axis]) for axis in (0, 1)])
@@ -228,7 +229,7 @@ def _marks(marks: Sequence[Mark]) -> Iterator[Marker]:
 
 
 def _triangle(mark: Mark) -> NDArray[np.float64]:
-    """Corners (3, 2) of an entry: its tip is where bottles appear, and points where they go."""
+    """Return the corners (3, 2) of an entry: its tip is where bottles appear, and points in their direction."""
     ahead = np.array([math.cos(mark.direction), math.sin(mark.direction)])
     left = np.array([-ahead[1], ahead[0]])
     base = mark.points[0] - ENTRY_SIZE * ahead

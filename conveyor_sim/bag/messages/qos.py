@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from typing import Literal
 
 INFINITE = {"sec": 9223372036, "nsec": 854775807}
-"""How ROS 2 writes a duration without end."""
+"""Infinite duration as ROS 2 writes it."""
 
 
 @dataclass(frozen=True)
 class Qos:
-    """History is always "keep last"; deadline, lifespan and lease are without end; liveliness is automatic."""
+    """Quality of service. History is "keep last"; deadline, lifespan, lease are infinite; liveliness is automatic."""
 
     depth: int
     reliability: Literal["reliable", "best_effort"] = "reliable"
@@ -19,11 +19,11 @@ class Qos:
 
     @property
     def latched(self) -> bool:
-        """Whether the last messages hold for whoever joins late."""
+        """True if subscribers that join late receive the last messages."""
         return self.durability == "transient_local"
 
     def as_rosbag2(self) -> dict[str, object]:
-        """The mapping that rosbag2 writes for one offered profile (metadata version 9)."""
+        """Return the mapping that rosbag2 writes for one offered profile (metadata version 9)."""
         return {
             "history": "keep_last",
             "depth": self.depth,
@@ -38,16 +38,16 @@ class Qos:
 
 
 DATA = Qos(depth=5)
-"""What is published at a rate."""
+"""For topics that are published at a rate."""
 LATCHED = Qos(depth=1, durability="transient_local")
-"""What is published once: a subscriber that joins late still gets it."""
+"""For topics that are published once: a subscriber that joins late still receives them."""
 EVENTS = Qos(depth=100)
-"""Commands, what the guard reports, limits that are passed: each one counts."""
+"""For commands, reports of the guard, and exceeded limits, each of which counts."""
 OUTCOMES = Qos(depth=1000)
-"""As many as one tick may bring (run/inbox.py)."""
+"""For results of commands: the depth is the maximum per tick (run/inbox.py)."""
 ALARMS = Qos(depth=100, durability="transient_local")
-"""A controller's alarms: who joins late still gets what came and went before."""
+"""For alarms of controllers: a subscriber that joins late still receives earlier changes."""
 ANSWERS = Qos(depth=1000)
-"""Of the service `lockstep`: each client is sent the answers to all, and a short history could lose it its own."""
+"""For the service `lockstep`: each client receives the answers to all, so a short history could drop its own."""
 CLOCK = Qos(depth=1)
-"""Reliable, because that also matches subscribers that ask for best effort."""
+"""For the clock; reliable also matches subscribers that request best effort."""

@@ -8,7 +8,7 @@ from conveyor_sim.scene.schema import Outputs
 
 
 def tables() -> dict[str, str]:
-    """By the name of the part that holds it."""
+    """Return the tables by the name of the part of the page that holds them."""
     ours = sorted((topic for topic in TOPICS.values() if not topic.subscribed), key=lambda topic: topic.rate is None)
     theirs = [topic for topic in TOPICS.values() if topic.subscribed]
     return {
@@ -39,7 +39,7 @@ def _type(topic: Topic) -> str:
 
 
 def _rate(topic: Topic) -> str:
-    """The scene's default, where the scene has a rate for it."""
+    """Return the default of a scene, if the scene has a rate for the topic."""
     hertz = Outputs.model_fields[str(topic.rate)].default
     return f"{hertz:g} Hz ¹" if hertz else "never ¹"
 

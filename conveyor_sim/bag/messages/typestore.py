@@ -19,7 +19,7 @@ SEPARATOR = "=" * 80 + "\n"
 
 
 def default_distro() -> str:
-    """The ROS 2 distribution that is sourced, or installed as wheels, if it is one of DISTROS; else "jazzy"."""
+    """Return the ROS 2 distribution that is sourced, or installed as wheels, if it is one of DISTROS; else "jazzy"."""
     sourced = os.environ.get("ROS_DISTRO", "")
     if sourced in DISTROS:
         return sourced
@@ -29,7 +29,7 @@ def default_distro() -> str:
 
 @lru_cache(maxsize=len(DISTROS))
 def typestore(distro: str = DEFAULT) -> Typestore:
-    """The types of a distribution plus conveyor_msgs. Raises ConveyorError for a distribution not in DISTROS."""
+    """Return the types of a distribution plus conveyor_msgs. Raise ConveyorError for a distribution not in DISTROS."""
     if distro not in DISTROS:
         raise ConveyorError(f"ROS distribution {distro!r} given, expected one of {', '.join(DISTROS)}")
     store = get_typestore(DISTROS[distro])
@@ -42,15 +42,15 @@ def typestore(distro: str = DEFAULT) -> Typestore:
 
 @lru_cache(maxsize=64)
 def type_hash(name: str, distro: str = DEFAULT) -> str:
-    """RIHS01 hash of a message type such as "conveyor_msgs/msg/Bottles"; equals the one ROS itself computes."""
+    """Return the RIHS01 hash of a message type such as "conveyor_msgs/msg/Bottles". It equals the hash of ROS."""
     return typestore(distro).hash_rihs01(name)
 
 
 @lru_cache(maxsize=64)
 def definition(name: str, distro: str = DEFAULT) -> str:
-    """The `ros2msg` definition of a type, followed by those of the types it is made of.
+    """Return the `ros2msg` definition of a type, followed by those of its parts.
 
-    The text of a conveyor_msgs type is its file's own, so that its comments (units!) reach every reader of a bag.
+    The text of a conveyor_msgs type is that of its file, so that comments (units!) reach every reader of a bag.
     """
     text, _ = typestore(distro).generate_msgdef(name, ros_version=2)
     package, _, short_name = name.split("/")

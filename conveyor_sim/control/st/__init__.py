@@ -1,11 +1,12 @@
 """PLC programs in Structured Text (IEC 61131-3:2013), as controllers of a line.
 
-A text goes one way: `pragmas.py` leaves one branch of its conditional pragmas; `parse.py` (with `grammar.lark`) makes
-the tree of `tree.py`; `declarations.py` its types (`types.py`), names (`scope.py`), qualifiers (`sections.py`) and
-addresses (`located.py`); `expressions.py`, `integers.py`, `calls.py` and `statements.py` check what is done and write
-it as Python, and `compile.py` puts that together. `functions.py`, `conversions.py` and `blocks.py` are the standard
-library, `operations.py` the functions of code at run time. `program.py` runs it. `library.py` runs a shared library
-that another compiler has made of a program. docs/structured_text.md lists the decisions that the standard leaves open.
+A text passes through the files in this order. `pragmas.py` selects one branch of its conditional pragmas, and
+`parse.py` (with `grammar.lark`) builds the tree of `tree.py`. `declarations.py` resolves its types (`types.py`), names
+(`scope.py`), qualifiers (`sections.py`) and addresses (`located.py`). `expressions.py`, `integers.py`, `calls.py` and
+`statements.py` check the body and write it as Python, which `compile.py` puts together. `functions.py`,
+`conversions.py` and `blocks.py` are the standard library, `operations.py` the run-time functions of the code.
+`program.py` runs it. `library.py` runs a shared library that another compiler built from a program.
+docs/structured_text.md lists the decisions that the standard leaves open.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ __all__ = ["CompiledProgram", "StructuredText"]
 
 
 def __getattr__(name: str) -> Any:
-    """Imports what is first asked for: `load.py` and `CompiledProgram` are there without lark."""
+    """Import on first use, so that `load.py` and `CompiledProgram` work without lark."""
     if name == "StructuredText":
         from conveyor_sim.control.st.controller import StructuredText
 

@@ -1,4 +1,4 @@
-"""The standard function blocks (IEC 61131-3:2013, tables 43 to 46); times are whole ns of simulated time.
+"""The standard function blocks (IEC 61131-3:2013, tables 43 to 46). Times are whole ns of simulated time.
 
 Each is a class with a slot for every variable, and `run(now)`, one call.
 """
@@ -17,16 +17,16 @@ class _Timer:
         self.v_in = self.v_q = False
         self.v_pt = self.v_et = 0
         self.since = -1
-        """ns, from when it counts; -1: it does not."""
+        """Start of the count, ns; -1 while it does not count."""
 
 
 class TON(_Timer):
-    """On-delay: Q once IN has been on for PT; ET goes up to PT, and is 0 as soon as IN is off."""
+    """On-delay: Q turns on once IN has been on for PT; ET rises to PT, and is 0 while IN is off."""
 
     __slots__ = ()
 
     def run(self, now: int) -> None:
-        """One call."""
+        """Execute one call."""
         if not self.v_in:
             self.v_q, self.v_et, self.since = False, 0, -1
             return
@@ -38,12 +38,12 @@ class TON(_Timer):
 
 
 class TOF(_Timer):
-    """Off-delay: Q as soon as IN is on, and until IN has been off for PT; then ET stays at PT until IN is on."""
+    """Off-delay: Q turns on with IN, and off once IN has been off for PT; ET then stays at PT until IN is on."""
 
     __slots__ = ()
 
     def run(self, now: int) -> None:
-        """One call."""
+        """Execute one call."""
         if self.v_in:
             self.v_q, self.v_et, self.since = True, 0, -1
         elif self.v_q:
@@ -55,7 +55,7 @@ class TOF(_Timer):
 
 
 class TP(_Timer):
-    """Pulse: Q for PT from where IN goes on, whatever IN does meanwhile; ET stays at PT until IN is off."""
+    """Pulse: Q is on for PT from a rising edge of IN, regardless of later edges; ET stays at PT until IN is off."""
 
     __slots__ = ("before",)
 
@@ -64,7 +64,7 @@ class TP(_Timer):
         self.before = False
 
     def run(self, now: int) -> None:
-        """One call."""
+        """Execute one call."""
         rose = self.v_in and not self.before
         self.before = self.v_in
         if self.since >= 0 and now - self.since >= self.v_pt and (rose or not self.v_in):
@@ -77,7 +77,7 @@ class TP(_Timer):
 
 
 class R_TRIG:
-    """Rising edge: Q for the one call in which CLK goes on; it was off before the first."""
+    """Rising edge: Q is on for one call when CLK turns on. CLK counts as off before the first call."""
 
     __slots__ = ("before", "v_clk", "v_q")
 
@@ -85,16 +85,16 @@ class R_TRIG:
         self.v_clk = self.v_q = self.before = False
 
     def run(self, now: int) -> None:
-        """One call."""
+        """Execute one call."""
         self.v_q = self.v_clk and not self.before
         self.before = self.v_clk
 
 
 class F_TRIG:
-    """Falling edge: Q for the one call in which CLK goes off.
+    """Falling edge: Q is on for one call when CLK turns off.
 
-    The standard's body, Q := NOT CLK AND NOT M; M := NOT CLK, gives an edge in the first call if CLK is off then; as
-    its text speaks of a transition, and compilers have it so, there is none here.
+    The standard's body, Q := NOT CLK AND NOT M; M := NOT CLK, makes an edge in the first call if CLK is off then. Its
+    text speaks of a transition, and compilers follow the text, so there is no edge here.
     """
 
     __slots__ = ("before", "v_clk", "v_q")
@@ -103,7 +103,7 @@ class F_TRIG:
         self.v_clk = self.v_q = self.before = False
 
     def run(self, now: int) -> None:
-        """One call."""
+        """Execute one call."""
         self.v_q = self.before and not self.v_clk
         self.before = self.v_clk
 
@@ -117,7 +117,7 @@ class SR:
         self.v_s1 = self.v_r = self.v_q1 = False
 
     def run(self, now: int) -> None:
-        """One call."""
+        """Execute one call."""
         self.v_q1 = self.v_s1 or (self.v_q1 and not self.v_r)
 
 
@@ -130,7 +130,7 @@ class RS:
         self.v_s = self.v_r1 = self.v_q1 = False
 
     def run(self, now: int) -> None:
-        """One call."""
+        """Execute one call."""
         self.v_q1 = not self.v_r1 and (self.v_s or self.v_q1)
 
 
@@ -144,7 +144,7 @@ class _Counter:
         """PVmin and PVmax: at these it counts no further."""
 
     def _count(self, up: bool, down: bool) -> None:
-        """Edges up and down; both in one call cancel each other."""
+        """Count edges up and down. Both in one call cancel each other."""
         rose, fell = up and not self.up, down and not self.down
         self.up, self.down = up, down
         if rose and not fell and self.v_cv < self.high:
@@ -154,7 +154,7 @@ class _Counter:
 
 
 class CTU(_Counter):
-    """Up-counter: Q from PV rising edges of CU on; R resets, and wins."""
+    """Up-counter: Q is on from PV rising edges of CU on; R resets, and wins."""
 
     __slots__ = ("v_cu", "v_q", "v_r")
 
@@ -163,7 +163,7 @@ class CTU(_Counter):
         self.v_cu = self.v_r = self.v_q = False
 
     def run(self, now: int) -> None:
-        """One call."""
+        """Execute one call."""
         self._count(self.v_cu, False)
         if self.v_r:
             self.v_cv = 0
@@ -171,7 +171,7 @@ class CTU(_Counter):
 
 
 class CTD(_Counter):
-    """Down-counter: LD loads PV, and wins; Q at 0 and below."""
+    """Down-counter: LD loads PV, and wins; Q is on at 0 and below."""
 
     __slots__ = ("v_cd", "v_ld", "v_q")
 
@@ -180,7 +180,7 @@ class CTD(_Counter):
         self.v_cd = self.v_ld = self.v_q = False
 
     def run(self, now: int) -> None:
-        """One call."""
+        """Execute one call."""
         self._count(False, self.v_cd)
         if self.v_ld:
             self.v_cv = self.v_pv
@@ -188,7 +188,7 @@ class CTD(_Counter):
 
 
 class CTUD(_Counter):
-    """Up-down-counter: R resets, else LD loads, else edges count; both edges at once cancel each other."""
+    """Up-down-counter: R resets, else LD loads, else edges count; both edges in one call cancel each other."""
 
     __slots__ = ("v_cd", "v_cu", "v_ld", "v_qd", "v_qu", "v_r")
 
@@ -197,7 +197,7 @@ class CTUD(_Counter):
         self.v_cu = self.v_cd = self.v_r = self.v_ld = self.v_qu = self.v_qd = False
 
     def run(self, now: int) -> None:
-        """One call."""
+        """Execute one call."""
         self._count(self.v_cu, self.v_cd)
         if self.v_r:
             self.v_cv = 0
@@ -220,14 +220,14 @@ STANDARD: dict[str, BlockType] = {
     "SR": _block("SR", "_SR", {"S1": BOOL, "R": BOOL}, {"Q1": BOOL}),
     "RS": _block("RS", "_RS", {"S": BOOL, "R1": BOOL}, {"Q1": BOOL}),
 }
-"""By name."""
+"""Block types by name."""
 
 CLASSES: dict[str, Any] = {f"_{one.__name__}": one for one in (TON, TOF, TP, R_TRIG, F_TRIG, SR, RS)}
-"""By the name that code uses."""
+"""Classes by their names in the code."""
 
 
 class _Typed:
-    """Makes a counter of a type of CV."""
+    """Constructor of a counter for one type of CV."""
 
     def __init__(self, counter: Any, low: int, high: int) -> None:
         self._counter, self._low, self._high = counter, low, high

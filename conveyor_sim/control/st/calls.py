@@ -1,4 +1,4 @@
-"""Calls of functions and of blocks: arguments by position, by name, and what comes back by =>."""
+"""Calls of functions and blocks: arguments by position or by name, and outputs by =>."""
 
 from __future__ import annotations
 
@@ -12,25 +12,28 @@ from conveyor_sim.control.st.values import Place, Value, assignment, converted, 
 from conveyor_sim.control.st.work import CALL
 
 PASSED = ("VAR_INPUT", "VAR_IN_OUT", "VAR_OUTPUT")
-"""Sections of what a call passes."""
+"""Sections of the variables that a call passes."""
 
 MOST_CALLS = 100
-"""Calls one within the other: far from the limit of Python, which depends on who calls the program."""
+"""Largest depth of nested calls. It is far below Python's limit, which depends on the caller of the program."""
 
 
 class CallCompiler:
-    """Of one file: notes who calls whom, for recursion is not allowed (IEC 61131-3:2003, 2.5)."""
+    """Compiler of the calls in one file. Records callers, because recursion is not allowed (IEC 61131-3:2003, 2.5)."""
 
     def __init__(self, trace: bool) -> None:
-        """trace: whether what a call writes is noted."""
+        """Start without calls.
+
+        trace: True to record the writes of calls.
+        """
         self.trace = trace
         self.declarations: Declarations
         """Set before the first call."""
         self.edges: dict[str, dict[str, tree.Call]] = {}
-        """By the Python name of who calls: whom, and where first."""
+        """Called functions and blocks with the first call, by the caller's Python name."""
 
     def __call__(self, expressions: Expressions, node: tree.Call, hint: Type | None) -> Value:
-        """A call of a function. Raises SourceError."""
+        """Compile a call of a function. Raise SourceError."""
         target = node.target
         if not isinstance(target, tree.Name):
             block = expressions.place(target)
@@ -49,9 +52,9 @@ class CallCompiler:
         self._note(expressions, function, node)
         expressions.work += CALL
         codes = []
-        given = self._bound(expressions, node, function)
+        arguments = self._bound(expressions, node, function)
         for member in function.of(*PASSED):
-            argument = given.get(member.slot)
+            argument = arguments.get(member.slot)
             if argument is None:
                 codes.append(self._missing(node, function, member))
             elif member.section == "VAR_INPUT":
@@ -63,7 +66,7 @@ class CallCompiler:
         return Value(node.at, function.result or VOID, code)
 
     def block(self, expressions: Expressions, node: tree.Call) -> tuple[Place, list[str]]:
-        """The block of a call statement, and the lines of the call."""
+        """Return the block of a call statement, and the lines of the call."""
         place = expressions.place(node.target)
         kind = place.type
         if not isinstance(kind, BlockType):
@@ -71,9 +74,9 @@ class CallCompiler:
         self._note(expressions, kind, node)
         lines, after = [f"_o = {place.code}"], []
         written = [one.slot for one in kind.of("VAR_OUTPUT") if kind.standard]
-        given = self._bound(expressions, node, kind)
+        arguments = self._bound(expressions, node, kind)
         for member in kind.of(*PASSED):
-            argument = given.get(member.slot)
+            argument = arguments.get(member.slot)
             if argument is None:
                 if member.section == "VAR_IN_OUT":
                     raise SourceError(node.at, f"found no {member.name}, expected {member.name} := and a variable")
@@ -89,9 +92,9 @@ class CallCompiler:
         return place, [*lines, "_o.run(_rt.now)", *noted, *after]
 
     def noted(self, expressions: Expressions, root: str, at: Position) -> list[str]:
-        """The line that notes who was the last to write a variable, if that is traced.
+        """Return the line that records the last write of a variable, if that is traced.
 
-        What is of a function's own lives as long as the call: nobody asks for it.
+        Variables of a function exist during the call only, so their writes are not recorded.
         """
         unit = expressions.scope.unit
         passing = unit is not None and unit.function and root.startswith("(self,")
@@ -124,14 +127,14 @@ class CallCompiler:
         named = [one.name is not None for one in node.arguments]
         if any(one.output for one in node.arguments) or (any(named) and not all(named)):
             raise SourceError(node.at, f"found arguments of {name} of two kinds, expected all by position or by :=")
-        given = [(one.name, expressions.value(one.value, hint)) for one in node.arguments]
-        return apply(node.at, name, given, expressions, hint)
+        arguments = [(one.name, expressions.value(one.value, hint)) for one in node.arguments]
+        return apply(node.at, name, arguments, expressions, hint)
 
     def _bound(self, expressions: Expressions, node: tree.Call, kind: BlockType) -> dict[str, tree.Argument]:
-        """Arguments by the slot of what they are for."""
+        """Return arguments by the slot of their variable."""
         members = kind.of(*PASSED)
         listed = ", ".join(one.name for one in members) or "none"
-        found: dict[str, tree.Argument] = {}
+        bound: dict[str, tree.Argument] = {}
         positional = [one for one in node.arguments if one.name is None]
         if positional and len(positional) != len(node.arguments):
             raise SourceError(
@@ -140,7 +143,7 @@ class CallCompiler:
         if len(positional) > len(members):
             raise SourceError(node.at, f"found {len(positional)} arguments of {kind.name}, expected {listed}")
         for member, argument in zip(members, positional, strict=False):
-            found[member.slot] = argument
+            bound[member.slot] = argument
         for argument in node.arguments:
             if argument.name is None:
                 continue
@@ -148,16 +151,16 @@ class CallCompiler:
             if not wanted:
                 raise SourceError(argument.at, f"found {argument.name} of {kind.name}, expected one of {listed}")
             member = wanted[0]
-            if member.slot in found:
+            if member.slot in bound:
                 raise SourceError(argument.at, f"found {argument.name} twice, expected it once")
             if argument.output != (member.section == "VAR_OUTPUT"):
                 sign = "=>" if member.section == "VAR_OUTPUT" else ":="
                 raise SourceError(argument.at, f"found {argument.name} of {kind.name}, expected it with {sign}")
-            found[member.slot] = argument
-        return found
+            bound[member.slot] = argument
+        return bound
 
     def _missing(self, node: tree.Call, function: BlockType, member: Member) -> str:
-        """Code of an argument that is left out."""
+        """Return the code of an argument that is left out."""
         if member.section == "VAR_IN_OUT" or (
             member.section == "VAR_INPUT" and any(a.name is None for a in node.arguments)
         ):
@@ -165,7 +168,10 @@ class CallCompiler:
         return member.initial if member.section == "VAR_INPUT" else "None"
 
     def reference(self, expressions: Expressions, argument: tree.Argument, member: Member, at: Position) -> str:
-        """Code that passes a variable itself. at: of the call."""
+        """Return the code that passes a variable by reference.
+
+        at: of the call.
+        """
         place = expressions.target(argument.value)
         if place.type != member.type or not place.reference or argument.negated:
             expected = f"a variable of type {member.type.name}"

@@ -1,4 +1,4 @@
-"""A program's text to Python: checked as a whole, compiled once, and run as often as there are instances."""
+"""Compiler from a program's text to Python. The code is compiled once and used by all instances."""
 
 from __future__ import annotations
 
@@ -23,52 +23,52 @@ from conveyor_sim.support.files import MB, FileError, read_file
 from conveyor_sim.support.printable import SENTENCE, printable
 
 LOWEST = 2**31
-"""The priority of a program without a task: it comes after all others."""
+"""Priority of a program without a task: after all others."""
 
 MOST_BYTES = 2 * MB
-"""Of a file."""
+"""Largest size of a file, bytes."""
 
 MOST_UNITS = 5000
-"""Programs, functions and blocks of a file."""
+"""Largest number of programs, functions and blocks in a file."""
 
 
 @dataclass(frozen=True)
 class Scheduled:
-    """An instance of a program, and when it runs."""
+    """Instance of a program, with its task."""
 
     name: str
     type: BlockType
     task: str = ""
-    """"" in every scan."""
+    """Task; "": the program runs in every scan."""
     interval: int = 0
-    """ns; 0: every scan."""
+    """Interval, ns; 0: every scan."""
     priority: int = LOWEST
-    """0 comes first."""
+    """Priority; 0 comes first."""
 
 
 @dataclass(frozen=True)
 class Compiled:
-    """A whole file."""
+    """Compiled file."""
 
     file: str
     code: CodeType
     source: str
-    """In Python."""
+    """Python code."""
     positions: tuple[Position | None, ...]
-    """Where line n + 1 of it comes from."""
+    """Position in the program of line n + 1 of the Python code."""
     programs: tuple[Scheduled, ...]
-    """In the order in which they run."""
+    """Programs in the order in which they run."""
     globals: BlockType
     digest: str
-    """Of the text: a snapshot fits the same program only."""
+    """SHA-256 of the text. A snapshot fits the same program only."""
     trace: bool
-    """Whether assignments note that they were the last to write."""
+    """True if assignments record the last write of a variable."""
     shared: Mapping[tuple[str, str], int]
     """Number of the memory that a located variable shares with others, by Python class and slot."""
 
 
 def compile_file(path: Path, trace: bool = False) -> Compiled:
-    """The program of a file. Raises StructuredTextError for one that can't be read, or can't be."""
+    """Compile the program in a file. Raise StructuredTextError if the file can't be read or the program is wrong."""
     try:
         text = read_file(path, MOST_BYTES).decode("utf-8-sig")
     except FileError as error:
@@ -79,13 +79,16 @@ def compile_file(path: Path, trace: bool = False) -> Compiled:
 
 
 def compile_text(text: str, file: str = "program.st", trace: bool = False) -> Compiled:
-    """The same of a text. trace: whether assignments note that they were the last to write. Raises as that does."""
+    """Compile a text. Raise StructuredTextError if it is wrong.
+
+    trace: True to record the last write of each variable.
+    """
     try:
         return _compile(text, file, trace)
     except SourceError as error:
         place = f"{file}:{error.at.line}:{error.at.column}"
         raise StructuredTextError(f"{place}: {printable(error, SENTENCE)}") from None
-    except (RecursionError, MemoryError, SyntaxError):  # Python's compiler has limits of its own
+    except (RecursionError, MemoryError, SyntaxError):  # limits of Python's compiler
         raise StructuredTextError(f"{file}: found a program nested too deeply, expected a flatter one") from None
 
 
@@ -118,8 +121,8 @@ def _compile(text: str, file: str, trace: bool) -> Compiled:
     for key in (program.name.lower() for program in scheduled):
         shared = declared.names.globals.members.get(key)
         if shared is not None and isinstance(shared.type, Structure):
-            said = f"found {shared.name}, which has the name of a program"
-            raise SourceError(Position(*shared.at), f"{said}, expected another: {key}/x would be two variables")
+            conflict = f"found {shared.name}, which has the name of a program"
+            raise SourceError(Position(*shared.at), f"{conflict}, expected another: {key}/x would be two variables")
     return Compiled(
         file,
         compile(python, f"<{file}>", "exec"),
@@ -162,7 +165,7 @@ def _unit(
     calls: CallCompiler,
     layout: Layout,
 ) -> None:
-    """The class of a unit, whose `run` is its body."""
+    """Write the class of a unit. Its method `run` is the body."""
     members = [one for one in kind.members.values() if one.section != "VAR_EXTERNAL"]
     _class(lines, kind.python, "", members, layout)
     with lines.inner():
@@ -177,7 +180,7 @@ def _unit(
 
 
 def _function(kind: BlockType, lines: CodeLines) -> None:
-    """What a call calls: a new frame, its arguments in, its body, its result out."""
+    """Write the Python function of a call: a new frame, arguments in, the body, the result out."""
     passed = kind.of(*PASSED)
     lines.add(f"def _f_{kind.name.lower()}({', '.join(one.slot for one in passed)}):")
     with lines.inner():
@@ -229,7 +232,7 @@ def _schedule(
         if (key := (task.resource, task.name.lower())) in tasks:
             raise SourceError(task.at, f"found {task.name} again, expected another name")
         tasks[key] = _task(task, known)
-    found: dict[str, Scheduled] = {}
+    scheduled: dict[str, Scheduled] = {}
     elements = characters = 0
     for one in configuration.instances:
         if one.type.lower() not in programs:
@@ -238,20 +241,20 @@ def _schedule(
         if one.task and own is None:
             names = ", ".join(name for resource, name in tasks if resource in (one.resource, ""))
             raise SourceError(one.at, f"found {one.task}, expected a TASK: {names or 'there is none'}")
-        if one.name.lower() in found:
+        if one.name.lower() in scheduled:
             raise SourceError(one.at, f"found {one.name} again, expected each program once")
         interval, priority = own or (0, LOWEST)
         kind = programs[one.type.lower()]
         elements, characters = elements + kind.size, characters + kind.characters
         require_small(elements, characters, one.at, " in programs")
-        found[one.name.lower()] = Scheduled(one.name, kind, one.task, interval, priority)
-    if not found:
+        scheduled[one.name.lower()] = Scheduled(one.name, kind, one.task, interval, priority)
+    if not scheduled:
         raise SourceError(configuration.at, "found no program in the CONFIGURATION, expected PROGRAM name : type")
-    return list(found.values())
+    return list(scheduled.values())
 
 
 def _task(task: tree.Task, known: Expressions) -> tuple[int, int]:
-    """Interval (ns) and priority."""
+    """Return interval (ns) and priority."""
     interval, priority = 0, LOWEST - 1
     for at, name, node in task.fields:
         word = name.upper()

@@ -1,4 +1,4 @@
-"""`StructuredText`: a program as a controller of a line, in place of one in Python."""
+"""`StructuredText`: a program in Structured Text as a controller of a line."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _NS = 1e9
 
 
 class StructuredText:
-    """Scans as a PLC does: signals into variables, the tasks that are due, variables out as commands and alarms."""
+    """Controller that scans as a PLC does: signals into variables, due tasks, variables out as commands and alarms."""
 
     def __init__(
         self,
@@ -35,20 +35,22 @@ class StructuredText:
         trace: bool = False,
         record: str | Iterable[str] = (),
     ) -> None:
-        """path: of the program. tags: by variable ("main/speed"), over what the program says itself. modbus_map: the
-        file that located variables (AT %IX0.0) are looked up in. budget: statements of all programs in one scan,
-        beyond which the watchdog stops them. trace: `last_written` knows who wrote; a scan takes longer. record:
-        patterns of variables that are recorded ("main/*", `control/recorded.py`).
+        """Compile a program.
 
-        Raises StructuredTextError, a ControlError, for a program that can't be, and MapError for such a map.
+        path: of the program. tags: by variable ("main/speed"); they override those in the program. modbus_map: file
+        with the addresses of located variables (AT %IX0.0). budget: largest number of statements of all programs in one
+        scan; the watchdog stops a program that exceeds it. trace: True to make `last_written` available; scans take
+        longer. record: patterns of variables to record ("main/*", `control/recorded.py`).
+
+        Raise StructuredTextError, a ControlError, for a wrong program, and MapError for a wrong map.
         """
         self._tags = dict(tags or {})
         self._addresses: Addresses = {} if modbus_map is None else read_addresses(Path(modbus_map))
         self.program = Program(compile_file(Path(path), trace), budget)
         self.record = patterns(record)
-        """Of variables that are recorded."""
+        """Patterns of the variables to record."""
         self.mapping: TagMapping | None = None
-        """Set by `bind`, before the first scan."""
+        """Variables and tags; set by `bind`, before the first scan."""
         self._ins: list[tuple[Variable, str]] = []
         self._outs: list[tuple[Variable, str]] = []
         self._limits: Mapping[str, tuple[float, float]] = {}
@@ -56,13 +58,13 @@ class StructuredText:
         self._checked = False
 
     def bind(self, tags: LineTags) -> None:
-        """Find the tag of each variable. Raises StructuredTextError for a mapping that can't be."""
+        """Assign tags to variables. Raise StructuredTextError if that is impossible."""
         self.mapping = mapped(self.program.compiled, tags, self._tags, self._addresses)
         self._limits = tags.limits
         self._take()
 
     def _take(self) -> None:
-        """The variables of the mapping, of the program as it is now."""
+        """Find the variables of the mapping in the present instances."""
         assert self.mapping is not None
         variables = self.program.variables
         pairs = [(one.is_input, variables[one.variable], one.tag) for one in self.mapping.bound]
@@ -71,12 +73,12 @@ class StructuredText:
 
     @property
     def left_over(self) -> tuple[str, ...]:
-        """Sentences: variables without a tag, and commands that are not given, once it is bound to a line."""
+        """Sentences about variables without a tag and commands without a variable, after `bind`."""
         file = self.program.compiled.file
         return () if self.mapping is None else tuple(f"{file}: {words}" for words in self.mapping.left_over())
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
-        """Commands and alarms, as the program has them after this scan. Raises StructuredTextError as it stops."""
+        """Return commands and alarms after this scan. Raise StructuredTextError if the program stops."""
         if self.mapping is None:
             raise ControlError(
                 f"{self.program.compiled.file}: found a scan, expected `bind` with the line's tags before"
@@ -92,22 +94,25 @@ class StructuredText:
         self._force()
         self.program.run(round(inputs.time * _NS))
         self._force()
-        return {tag: self._given(variable, tag) for variable, tag in self._outs}
+        return {tag: self._output(variable, tag) for variable, tag in self._outs}
 
-    def _given(self, variable: Variable, tag: str) -> float:
-        """Return the value of an output; one that is a limit in the variable's type is that limit."""
+    def _output(self, variable: Variable, tag: str) -> float:
+        """Return the value of an output. A limit rounded to the variable's type counts as the limit itself."""
         value = variable.number()
         if tag not in self._limits or (rounded := _rounding(variable.type)) is None:
             return value
         return at_limit(value, *self._limits[tag], rounded)
 
     def _check(self, length: int) -> None:
-        """Tasks take whole scans. length: ns."""
+        """Require that intervals of tasks are whole numbers of scans.
+
+        length: of a scan, ns.
+        """
         for one in self.program.compiled.programs:
             if one.interval % length:
-                found = f"the TASK {one.task} with INTERVAL {one.interval / 1e6:g} ms"
+                task = f"the TASK {one.task} with INTERVAL {one.interval / 1e6:g} ms"
                 raise StructuredTextError(
-                    f"{self.program.compiled.file}: found {found}, expected a multiple of a scan, {length / 1e6:g} ms"
+                    f"{self.program.compiled.file}: found {task}, expected a multiple of a scan, {length / 1e6:g} ms"
                 )
         self._checked = True
 
@@ -117,7 +122,7 @@ class StructuredText:
         return _Shown(self.program)
 
     def force(self, name: str, value: float) -> None:
-        """Hold a variable (plc/main/speed) at a value, before and after each scan. Raises StructuredTextError."""
+        """Force a variable (plc/main/speed) to a value, before and after each scan. Raise StructuredTextError."""
         kind = self._variable(name).type
         try:
             if kind.base.kind == "string":
@@ -127,28 +132,28 @@ class StructuredText:
             raise StructuredTextError(f"{self.program.compiled.file}: {name}: {error}") from None
 
     def unforce(self, name: str) -> None:
-        """Let go of it."""
+        """Stop forcing a variable."""
         self._forced.pop(_plain(name), None)
 
     def last_written(self, name: str) -> str:
-        """File, line and column of the statement that wrote a variable last; "" if none did.
+        """Return file, line and column of the last statement that wrote a variable; "" if none did.
 
-        Raises StructuredTextError without `trace`, or for a variable that there is not.
+        Raise StructuredTextError without `trace`, or for an unknown variable.
         """
         return self.program.last_written(self._variable(name))
 
     def restart(self, *, warm: bool = False) -> None:
-        """Start anew: cold with all variables as they are declared; warm with those of RETAIN as they were."""
+        """Restart: cold with all variables as declared, warm with RETAIN variables as they were."""
         self.program.restart(warm)
         if self.mapping is not None:
             self._take()
 
     def snapshot(self) -> dict[str, Any]:
-        """All that changes, and what is forced, as plain data."""
+        """Return all state and forced values as plain data."""
         return {**self.program.snapshot(), "forced": dict(self._forced)}
 
     def restore(self, data: Mapping[str, Any]) -> None:
-        """Go on from a snapshot. Raises StructuredTextError for one of another program."""
+        """Restore a snapshot. Raise StructuredTextError for one of another program."""
         self.program.restore(data)
         forced = data.get("forced", {})
         self._forced = {str(name): load(self._variable(name).read(), value) for name, value in forced.items()}
@@ -160,26 +165,26 @@ class StructuredText:
             self._variable(name).write(value)
 
     def _variable(self, name: str) -> Variable:
-        found = self.program.variables.get(_plain(name))
-        if found is None:
+        variable = self.program.variables.get(_plain(name))
+        if variable is None:
             raise StructuredTextError(f"{name}: no such variable in {self.program.compiled.file}")
-        return found
+        return variable
 
 
 def _rounding(kind: Type) -> Callable[[float], float] | None:
-    """Return how a type rounds numbers; None: it has all that a limit can be."""
+    """Return how a type rounds numbers; None if it represents every limit exactly."""
     if kind.base == TIME:
         return lambda limit: round(limit * _NS) * 1e-9 if abs(limit) < kind.base.high * 1e-9 else math.inf
     return single if kind.base.name == "REAL" else None
 
 
 def _plain(name: str) -> str:
-    """A variable's name as the program has it."""
+    """Return a variable's name as the program has it."""
     return name.lower().removeprefix(PREFIX)
 
 
 class _Shown(Mapping[str, float]):
-    """Variables as signals have them, read when they are asked for."""
+    """Variables as numbers, read on access."""
 
     def __init__(self, program: Program) -> None:
         self._program = program

@@ -33,14 +33,14 @@ from conveyor_sim.control.st.types import (
 from conveyor_sim.control.st.values import NAMESPACE, Value, converted, described, folded
 
 _UNITS = {TIME: 1_000_000, LTIME: 1}
-"""Nanoseconds that the number 1 stands for."""
+"""Nanoseconds per unit of a number."""
 _BASES = {"2": 2, "8": 8, "16": 16}
 _DURATION = re.compile("L?T(IME)?#", re.IGNORECASE)
 _NAME = re.compile(r"(?:(\w+?)_)?(TO|TRUNC)_(\w+)")
 
 
 def conversion(name: str, hint: Type | None) -> tuple[Type | None, Type, bool] | None:
-    """What a function converts from (None: anything) and to, and whether it cuts decimals; None if it is none."""
+    """Return the source type (None: any) and target type of a conversion, and whether it truncates; None if unknown."""
     if name.upper() == "TRUNC":
         return None, hint.base if hint is not None and hint.base.kind == "int" else DINT, True
     if not (match := _NAME.fullmatch(name.upper())):
@@ -52,22 +52,24 @@ def conversion(name: str, hint: Type | None) -> tuple[Type | None, Type, bool] |
 
 
 def convert(at: Position, name: str, value: Value, hint: Type | None) -> Value:
-    """A conversion function, called."""
-    found = conversion(name, hint)
-    assert found is not None
-    source, target, cut = found
+    """Compile a call of a conversion function."""
+    types = conversion(name, hint)
+    assert types is not None
+    source, target, cut = types
     if source is not None:
         into = replace(source, high=value.type.high) if isinstance(source, String) else source
-        given = converted(value, into, name)
+        argument = converted(value, into, name)
         known = value.constant
         if source.kind == "int" and known is not None:
             known = source.wrap(known)
-        value = Value(at, value.type if isinstance(source, String) else source, given, known)
+        value = Value(at, value.type if isinstance(source, String) else source, argument, known)
     elif value.literal:
         value = Value(at, value.type, value.code, value.constant)
     code = _cut(value, target) if cut else _code(value, target)
     if code is None:
-        raise SourceError(at, f"found {name} of {described(value)}, which is no conversion, expected one that is")
+        raise SourceError(
+            at, f"found {name} of {described(value)}, which is no conversion, expected one of the standard"
+        )
     if isinstance(target, String) and isinstance(value.type, String):
         target = replace(target, high=value.type.high)  # nothing is lost between STRING and WSTRING
     return folded(Value(at, target, code), value)
@@ -133,28 +135,28 @@ def _bool_text(value: bool) -> str:
 
 
 def _single_text(value: float) -> str:
-    """The shortest that reads as the same REAL."""
+    """Return the shortest text that reads as the same REAL."""
     texts = (f"{value:.{digits}g}" for digits in range(1, 10))
     return repr(float(next((text for text in texts if single(float(text)) == value), repr(value))))
 
 
 def _parsed(text: str, name: str) -> Any:
-    """A text as a number. Raises Fault."""
-    target, given = ELEMENTARY[name], text.strip().replace("_", "")
+    """Return a text as a number. Raise Fault."""
+    target, plain = ELEMENTARY[name], text.strip().replace("_", "")
     try:
         if target.kind == "bool":
-            return {"TRUE": True, "FALSE": False, "1": True, "0": False}[given.upper()]
+            return {"TRUE": True, "FALSE": False, "1": True, "0": False}[plain.upper()]
         if target.kind == "real":
-            number = single(float(given)) if target == REAL else float(given)
+            number = single(float(plain)) if target == REAL else float(plain)
             if math.isfinite(number):
                 return number
         if target.kind in ("int", "bits"):
-            base, hash_, digits = given.partition("#")
-            whole = int(digits, _BASES[base]) if hash_ else int(given)
+            base, hash_, digits = plain.partition("#")
+            whole = int(digits, _BASES[base]) if hash_ else int(plain)
             if target.low <= whole <= target.high:
                 return whole
-        if target.kind == "time" and _DURATION.match(given):
-            return duration(Position(1, 1), given)
+        if target.kind == "time" and _DURATION.match(plain):
+            return duration(Position(1, 1), plain)
     except (ValueError, KeyError, SourceError):
         pass
     raise Fault(f"STRING_TO_{name}: found {text[:40]!r}, expected {name}")

@@ -31,26 +31,29 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
 MOST_ELEMENTS = 1_000_000
-"""Of an array, a structure or a block, with all that is in it."""
+"""Largest number of elementary variables in an array, a structure or a block."""
 
 MOST_TEXT = 16_000_000
 """Sum of the declared lengths of all texts in a file, in characters: at most 64 MB of memory."""
 
 MOST_LEVELS = 100
-"""Structures and blocks one within the other."""
+"""Largest depth of nested structures and blocks."""
 
 MOST_CONSTANTS = 50
-"""Global variables whose initial values use each other, as a chain."""
+"""Largest chain of global variables whose initial values use each other."""
 
 
 class Declarations:
-    """Of one file: what is named is resolved when it is first needed, so the order in the file is free."""
+    """Declarations of one file. Names are resolved at their first use, so the order in the file is free."""
 
     def __init__(self, source: tree.SourceFile, calls: Any) -> None:
-        """calls: as `Expressions` takes it."""
+        """Register all names of a file.
+
+        calls: as `Expressions` takes it.
+        """
         self.names = Names(types={name.lower(): block for name, block in STANDARD.items()})
         self.structures: list[Structure] = []
-        """Those declared, each after what it contains."""
+        """Declared structures, each after those it contains."""
         self.located: list[Located] = []
         """Variables with addresses."""
         self._calls = calls
@@ -86,33 +89,33 @@ class Declarations:
             members[key] = members.pop(key)
 
     def _by_name(self, sections: Iterable[tree.VariableSection]) -> dict[str, tree.VariableSection]:
-        """Global variables by name, each as a section of its own."""
-        found: dict[str, tree.VariableSection] = {}
+        """Return global variables by name, each in a separate section."""
+        single: dict[str, tree.VariableSection] = {}
         for section in sections:
             for declared in section.declarations:
-                if declared.name.lower() in found:
+                if declared.name.lower() in single:
                     raise SourceError(declared.at, f"found {declared.name} again, expected another name")
-                found[declared.name.lower()] = replace(section, declarations=(declared,))
-        return found
+                single[declared.name.lower()] = replace(section, declarations=(declared,))
+        return single
 
     def _read(self, key: str) -> None:
-        """Take up a global variable, if there is one of that name and it is not known yet."""
+        """Declare a global variable, if there is one of that name and it is not declared yet."""
         if (section := self._globals.pop(key, None)) is not None:
             if len(self.names.reading) == MOST_CONSTANTS:
-                at, found = section.declarations[0].at, f"found {MOST_CONSTANTS} initial values that use each other"
-                raise SourceError(at, f"{found}, expected a shorter chain")
+                at, chain = section.declarations[0].at, f"found {MOST_CONSTANTS} initial values that use each other"
+                raise SourceError(at, f"{chain}, expected a shorter chain")
             self.names.reading.add(key)
             self._members(self.names.globals, (section,), OUTSIDE)
             self.names.reading.remove(key)
 
     def scope(self, unit: BlockType | None) -> Scope:
-        """The names of a unit."""
+        """Return the names of a unit."""
         return Scope(self.names, unit)
 
     def named(self, at: Position, name: str) -> Type:
-        """The type of a name. Raises SourceError."""
-        if found := ELEMENTARY.get(name.upper()) or self.names.types.get(name.lower()):
-            return found
+        """Return the type of a name. Raise SourceError."""
+        if known := ELEMENTARY.get(name.upper()) or self.names.types.get(name.lower()):
+            return known
         declared = self._pending.get(name.lower())
         if declared is None:
             raise SourceError(at, f"found {name}, expected a type")
@@ -128,7 +131,7 @@ class Declarations:
         return kind
 
     def function(self, name: str) -> BlockType | None:
-        """A function of the file; None if it has none of that name."""
+        """Return a function of the file; None if it has none of that name."""
         key = name.lower()
         if key in self._functions and key not in self.names.functions:
             if key in self._open:
@@ -139,7 +142,10 @@ class Declarations:
         return self.names.functions.get(key)
 
     def type(self, spec: tree.TypeSpec, name: str = "") -> Type:
-        """The type that is written. name: under which it is declared, if it is."""
+        """Return the type of a specification.
+
+        name: of the declared type, if there is one.
+        """
         outside = Expressions(self.scope(None), self._calls)
         return self._type(spec, outside, name)
 
@@ -150,8 +156,8 @@ class Declarations:
                 return kind
             length = known.known(spec.length, "the length of a text")
             if not isinstance(kind, String) or not 1 <= length <= MOST_CHARACTERS:
-                found = f"found {spec.name}[{length}]"
-                raise SourceError(spec.at, f"{found}, expected STRING or WSTRING of 1 to {MOST_CHARACTERS}")
+                wrong = f"found {spec.name}[{length}]"
+                raise SourceError(spec.at, f"{wrong}, expected STRING or WSTRING of 1 to {MOST_CHARACTERS}")
             start = repr(eval(kind.start)[:length]) if kind.start else ""
             return replace(kind, name=f"{kind.name}[{length}]", high=length, start=start)
         if isinstance(spec, tree.SubrangeType):
@@ -193,15 +199,15 @@ class Declarations:
         return Array(f"ARRAY [{shown}] OF {element.name}", "array", ranges=tuple(ranges), element=element)
 
     def _bound(self, kind: Structure, at: Position) -> None:
-        """Keep how many levels it has, once its members are known."""
+        """Check the size of a type, and store its number of levels, once its members are known."""
         own = [one.type for one in kind.members.values() if one.section not in ("VAR_IN_OUT", "VAR_EXTERNAL")]
         require_small(kind.size, kind.characters, at)
         self._levels[kind.python] = levels = 1 + max(map(self._levels_of, own), default=0)
         if levels > MOST_LEVELS:
-            raise SourceError(at, f"found {levels} types one within the other, expected at most {MOST_LEVELS}")
+            raise SourceError(at, f"found {levels} types nested in each other, expected at most {MOST_LEVELS}")
 
     def _levels_of(self, kind: Type) -> int:
-        """Structures and blocks one within the other."""
+        """Return the depth of nested structures and blocks."""
         while isinstance(kind, Array):
             kind = kind.element
         return self._levels.get(kind.python, 1) if isinstance(kind, Structure) else 0
@@ -253,7 +259,10 @@ class Declarations:
         return kind
 
     def _members(self, kind: BlockType, sections: Iterable[tree.VariableSection], unit: str) -> None:
-        """Add the variables of a unit; unit: its kind, as `sections.py` has it."""
+        """Add the variables of a unit.
+
+        unit: its kind, as in `sections.py`.
+        """
         known = Expressions(self.scope(None if kind is self.names.globals else kind), self._calls)
         for section in sections:
             qualifiers = meaning(section, unit)
@@ -276,27 +285,27 @@ class Declarations:
             written = declared.address or f"{{tag: {declared.tag}}}"
             where = f"{', '.join(LOCATED[unit])} of a PROGRAM" if unit else "a PROGRAM or VAR_GLOBAL only"
             raise SourceError(declared.at, f"found {written}, expected it in {where}")
-        found = self._type(declared.type, known)
-        if isinstance(found, BlockType) and (found.function or found.python.startswith("_P_")):
-            raise SourceError(declared.at, f"found {found.name}, expected a type or a function block")
+        type_ = self._type(declared.type, known)
+        if isinstance(type_, BlockType) and (type_.function or type_.python.startswith("_P_")):
+            raise SourceError(declared.at, f"found {type_.name}, expected a type or a function block")
         constant = "CONSTANT" in qualifiers
-        code, value = found.initial, None
+        code, value = type_.initial, None
         if declared.initial is not None:
             if section in ("VAR_IN_OUT", "VAR_EXTERNAL"):
                 raise SourceError(declared.initial.at, f"found an initial value in {section}, expected none")
-            code = self._initial(declared.initial, found, known)
-            if constant and found.kind not in ("array", "structure", "block"):
+            code = self._initial(declared.initial, type_, known)
+            if constant and type_.kind not in ("array", "structure", "block"):
                 value = eval(code)
         elif constant and section != "VAR_EXTERNAL":
             raise SourceError(declared.at, f"found CONSTANT {declared.name} without a value, expected := and one")
         if section == "VAR_EXTERNAL":
             shared = self.names.globals.members.get(key)
-            if shared is None or shared.type != found:
+            if shared is None or shared.type != type_:
                 there = "none of that name" if shared is None else shared.type.name
-                raise SourceError(declared.at, f"found {declared.name} : {found.name}, {there} in VAR_GLOBAL")
+                raise SourceError(declared.at, f"found {declared.name} : {type_.name}, {there} in VAR_GLOBAL")
         kind.members[key] = member = Member(
             declared.name,
-            found,
+            type_,
             code,
             section,
             constant,
@@ -309,8 +318,8 @@ class Declarations:
         )
         if declared.address:
             address = address_of(declared.at, declared.address)
-            require_fit(declared.at, declared.name, found, address, constant)
-            initial = declared.initial is not None or bool(found.start)
+            require_fit(declared.at, declared.name, type_, address, constant)
+            initial = declared.initial is not None or bool(type_.start)
             self.located.append(Located(kind.python, member, address, initial))
 
     def _initial(self, node: tree.Expression, kind: Type, known: Expressions) -> str:
@@ -353,15 +362,15 @@ class Declarations:
     def _initial_structure(self, node: tree.InitialStructure, kind: Type, known: Expressions) -> str:
         if not isinstance(kind, Structure):
             raise SourceError(node.at, f"found a list of fields, expected {kind.name}")
-        given = []
+        fields = []
         for at, name, value in node.fields:
             member = kind.members.get(name.lower())
             if member is None:
                 raise SourceError(
                     at, f"found {name}, expected one of {', '.join(m.name for m in kind.members.values())}"
                 )
-            given.append(f"{member.slot}={self._initial(value, member.type, known)}")
-        return f"_with({kind.python}(), {', '.join(given)})"
+            fields.append(f"{member.slot}={self._initial(value, member.type, known)}")
+        return f"_with({kind.python}(), {', '.join(fields)})"
 
 
 def require_small(elements: int, characters: int, at: Position, of: str = "") -> None:

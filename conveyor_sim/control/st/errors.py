@@ -1,4 +1,4 @@
-"""What can be wrong with a program, or go wrong in it: always with file, line and column."""
+"""Errors of programs, at compile time and at run time, always with file, line and column."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from conveyor_sim.control.scan import ControlError
 
 
 class Position(NamedTuple):
-    """Where something stands in a program's text, both from 1."""
+    """Position in a program's text, from line 1 and column 1."""
 
     line: int
     column: int
 
 
 class StructuredTextError(ControlError):
-    """A program that can't be, or can't go on; the text is a sentence meant for the user."""
+    """Wrong program, or stop of a running program. The text is a sentence for the user."""
 
 
 class SourceError(Exception):
-    """A mistake at a position: what was found, and what was expected. The file is added where the text was read."""
+    """Mistake at a position: text found, and text expected. The file is added where the text is read."""
 
     def __init__(self, at: Position, text: str) -> None:
         super().__init__(text)
@@ -27,4 +27,4 @@ class SourceError(Exception):
 
 
 class Fault(Exception):
-    """What stops a program that runs: a division by zero, an index out of range, ..., with the value."""
+    """Run-time error that stops a program: a division by zero, an index out of range, ..., with the value."""

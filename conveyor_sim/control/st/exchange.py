@@ -18,14 +18,14 @@ class LateError(AnswerError):
 
 
 class EndedError(AnswerError):
-    """The child has closed its end, before or within the answer."""
+    """The child has closed its pipe, before or within the answer."""
 
 
 def exchange(socket: int, request: bytes, patience: float, most: int) -> bytes:
-    """Send a line to a child and return its next line.
+    """Send a line to a child, and return its next line.
 
-    socket: descriptor. patience: s of wall time for request and answer together. most: bytes of the answer.
-    Raises LateError, EndedError, and AnswerError for a wrong answer.
+    socket: descriptor. patience: wall time for request and answer together, s. most: largest number of bytes in the
+    answer. Raise LateError, EndedError, or AnswerError for a wrong answer.
     """
     os.set_blocking(socket, False)
     end, left, received = time.monotonic() + patience, memoryview(request), bytearray()
@@ -54,7 +54,7 @@ def exchange(socket: int, request: bytes, patience: float, most: int) -> bytes:
 
 
 def _written(socket: int, data: memoryview) -> int:
-    """Return the number of bytes that the socket took. Raises EndedError."""
+    """Return the number of bytes that the socket took. Raise EndedError."""
     try:
         return os.write(socket, data[:_CHUNK])
     except BlockingIOError:
@@ -64,7 +64,7 @@ def _written(socket: int, data: memoryview) -> int:
 
 
 def _read(socket: int) -> bytes:
-    """Return what has arrived, at least one byte. Raises EndedError."""
+    """Return the bytes that have arrived, at least one. Raise EndedError."""
     try:
         chunk = os.read(socket, _CHUNK)
     except OSError:

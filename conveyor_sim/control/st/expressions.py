@@ -1,4 +1,4 @@
-"""Expressions: each is checked, and becomes a `Value`. Errors name what was found and what was expected."""
+"""Expressions: each is checked, and becomes a `Value`. Errors state the text found and the text expected."""
 
 from __future__ import annotations
 
@@ -49,21 +49,27 @@ Calls = Callable[["Expressions", tree.Call, "Type | None"], Value]
 
 
 class Expressions:
-    """Of one unit. `calls` does what is called: `calls.py`, which needs this in turn."""
+    """Expressions of one unit.
+
+    `calls` compiles calls. It is an argument because `calls.py` imports this module.
+    """
 
     def __init__(self, scope: Scope, calls: Calls) -> None:
         self.scope = scope
         self.controls: list[str] = []
-        """Code of the control variables of each FOR around what is checked."""
+        """Code of the control variables of all enclosing FOR loops."""
         self.work = 0
         """Work of the expressions checked so far (`work.py`)."""
         self._calls = calls
 
     def value(self, node: tree.Expression, hint: Type | None = None) -> Value:
-        """What an expression comes to. hint: the type of where it goes; literals of its operands take it."""
-        found = self._value(node, hint)
-        self.work += 1 + of_text(found.type)
-        return found
+        """Return the value of an expression.
+
+        hint: the type of its target, which untyped literals of the operands take.
+        """
+        result = self._value(node, hint)
+        self.work += 1 + of_text(result.type)
+        return result
 
     def take_work(self) -> int:
         """Return the work of the expressions checked since the last call."""
@@ -78,10 +84,10 @@ class Expressions:
         if isinstance(node, tree.Unary):
             return self._unary(node, hint)
         if isinstance(node, tree.Call):
-            found = self._calls(self, node, hint)
-            if found.type.kind == "void":
+            result = self._calls(self, node, hint)
+            if result.type.kind == "void":
                 raise SourceError(node.at, "found a call without a result, expected a value")
-            return found
+            return result
         if isinstance(node, (tree.Name, tree.MemberAccess, tree.EnumValue)):
             return self._named(node)
         if isinstance(node, (tree.Item, tree.Bit)):
@@ -89,27 +95,27 @@ class Expressions:
         raise SourceError(node.at, "found a list of initial values, expected a value")
 
     def known(self, node: tree.Expression, what: str, kind: str = "int") -> Any:
-        """A constant: a bound, a label, ... Raises SourceError for what is none."""
+        """Return a constant: a bound, a label, ... Raise SourceError if it is none."""
         value = self.value(node)
         if value.constant is None or value.type.base.kind != kind:
             raise SourceError(node.at, f"found {described(value)}, expected a constant {kind} for {what}")
         return value.constant
 
     def condition(self, node: tree.Expression) -> str:
-        """Code of a BOOL."""
+        """Return the code of a BOOL."""
         value = self.value(node, BOOL)
         if value.literal or value.type != BOOL:
             raise SourceError(node.at, f"found {described(value)}, expected a BOOL")
         return value.raw or value.code
 
     def place(self, node: tree.Expression) -> Place:
-        """A variable or a part of one."""
+        """Return a variable or a part of one."""
         self.work += 1
         if isinstance(node, tree.Name):
-            found = self.scope.find(node.at, node.name)
-            if isinstance(found, Place):
-                return replace(found, at=node.at)
-            raise SourceError(node.at, f"found {node.name}, {found.what}, expected a variable")
+            named = self.scope.find(node.at, node.name)
+            if isinstance(named, Place):
+                return replace(named, at=node.at)
+            raise SourceError(node.at, f"found {node.name}, {named.what}, expected a variable")
         if isinstance(node, tree.MemberAccess):
             return self._member(node)
         if isinstance(node, tree.Item):
@@ -119,7 +125,7 @@ class Expressions:
         raise SourceError(node.at, "found an expression, expected a variable")
 
     def target(self, node: tree.Expression) -> Place:
-        """A place that may be written."""
+        """Return a variable that may be written, or a part of one."""
         place = self.place(node)
         if place.code in self.controls:
             raise SourceError(
@@ -149,7 +155,7 @@ class Expressions:
         return constant(node.at, target, eval(converted(plain, target)))
 
     def _named(self, node: tree.Name | tree.MemberAccess | tree.EnumValue) -> Value:
-        """A variable, a constant, or a value of an enumeration in any of the ways in which it is written."""
+        """Return a variable, a constant, or a value of an enumeration in any of its notations."""
         if isinstance(node, tree.Name):
             return replace(self.scope.value(node.at, node.name), at=node.at)
         if isinstance(node, tree.EnumValue):
@@ -226,7 +232,7 @@ class Expressions:
         least, most = value.bounds
         if low <= least and most <= high:
             return f"{value.code} - {low}" if low else value.code
-        # The condition comes first, and nothing between it and what it guards gives _i another value.
+        # The condition comes first, and _i does not change between it and the guarded index.
         shifted = f"_i - {low}" if low > 0 else f"_i + {-low}" if low else "_i"
         return f"{shifted} if {low} <= (_i := {value.code}) <= {high} else _outside(_i, {low}, {high})"
 
@@ -245,7 +251,7 @@ class Expressions:
             BOOL,
             f"({base.code} & {bit} != 0)",
             write=lambda new: (
-                f"_set_bit({base.reference}, {bit}, {new})"  # what is called in it is called once
+                f"_set_bit({base.reference}, {bit}, {new})"  # calls in it are made once
                 if "(" in base.code
                 else base.write(f"{base.code} | {bit} if {new} else {base.code} & {rest}")
             ),
@@ -273,7 +279,7 @@ class Expressions:
         return folded(Value(node.at, kind, code), value)
 
     def _binaries(self, node: tree.Binary, hint: Type | None) -> Value:
-        """a + b + c + ... without going a level deeper for each."""
+        """Compile a + b + c + ... without recursion per operator."""
         nodes = [node]
         while isinstance(nodes[-1].left, tree.Binary):
             nodes.append(nodes[-1].left)
@@ -285,7 +291,7 @@ class Expressions:
         return value
 
     def binary(self, node: tree.Binary, left: Value, right: Value, hint: Type | None = None) -> Value:
-        """left operator right."""
+        """Compile an operator between two values."""
         self.work += 1
         word = node.operator
         if word in _COMPARED:

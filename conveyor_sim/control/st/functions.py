@@ -35,17 +35,17 @@ Build = Callable[["Application"], Value]
 
 @dataclass(frozen=True)
 class Application:
-    """A standard function, called."""
+    """Call of a standard function."""
 
     at: Position
     name: str
-    """In capitals."""
+    """Name in capitals."""
     values: Sequence[Value]
     expressions: Expressions
     hint: Type | None
 
     def joined(self, values: Sequence[Value]) -> Type:
-        """The type that values share."""
+        """Return the common type of values."""
         first, *others = values
         for other in others:
             kind = unified(first, other, self.hint)
@@ -59,24 +59,27 @@ class Application:
             return self.hint.base if first.literal == "int" or self.hint.base.kind == "real" else LREAL
         return first.type.base
 
-    def given(self, code: str, kind: Type, values: Sequence[Value] = ()) -> Value:
-        """Return the result. values: candidates of a result that is one of them, which is as wide as they are."""
+    def result(self, code: str, kind: Type, values: Sequence[Value] = ()) -> Value:
+        """Return the result.
+
+        values: candidates of a result that is one of them. The result is as wide as they are.
+        """
         reached = [reach(one, kind) for one in values] if kind.kind == "int" else []
         span = (min(low for low, _ in reached), max(high for _, high in reached)) if reached else None
         return folded(Value(self.at, kind, code, span=span), *self.values)
 
     def refuse(self, value: Value, expected: str) -> SourceError:
-        """What is said where an argument can't be."""
+        """Return the error of a wrong argument."""
         return SourceError(value.at, f"found {described(value)} in {self.name}, expected {expected}")
 
     def whole(self, value: Value) -> str:
-        """Code of a whole number."""
+        """Return the code of a whole number."""
         if value.type.base.kind != "int" or value.literal == "real":
             raise self.refuse(value, "a whole number")
         return value.code
 
     def text(self, value: Value) -> str:
-        """Code of a text."""
+        """Return the code of a text."""
         if value.type.kind != "string":
             raise self.refuse(value, "a STRING")
         return value.code
@@ -90,7 +93,7 @@ def _real(call: Application) -> Value:
         if not (one.literal or fits(one.type, kind)):
             raise call.refuse(one, "a REAL or LREAL")
     code = f"_{call.name.lower()}({', '.join(converted(one, kind) for one in call.values)})"
-    return call.given(f"_single({code})" if kind == REAL else code, kind)
+    return call.result(f"_single({code})" if kind == REAL else code, kind)
 
 
 def _abs(call: Application) -> Value:
@@ -100,7 +103,7 @@ def _abs(call: Application) -> Value:
         raise call.refuse(value, "a number")
     code = f"abs({operand(value, kind)})"
     if kind.kind == "real":
-        return call.given(code, kind)
+        return call.result(code, kind)
     return folded(intermediate(call.at, kind, code, 0, max(map(abs, reach(value, kind)))), value)
 
 
@@ -121,11 +124,14 @@ def _compare(call: Application) -> Value:
         raise call.refuse(call.values[0], "an elementary type")
     codes = [one.code if kind.kind == "string" else operand(one, kind) for one in call.values]
     call.expressions.work += len(codes)
-    return call.given(f"_chain(_{call.name.lower()}, {', '.join(codes)})", BOOL)
+    return call.result(f"_chain(_{call.name.lower()}, {', '.join(codes)})", BOOL)
 
 
 def _pick(python: str, ordered: bool, before: int = 0) -> Build:
-    """SEL, MUX: the values behind so many others, of one type; MAX, MIN, LIMIT: of one that has an order."""
+    """Return the compiler of SEL and MUX (`before` arguments, then values of one type), or MAX, MIN and LIMIT.
+
+    ordered: the values need an order.
+    """
 
     def build(call: Application) -> Value:
         choice, values = call.values[:before], call.values[before:]
@@ -139,7 +145,7 @@ def _pick(python: str, ordered: bool, before: int = 0) -> Build:
             code = f"_sel({converted(choice[0], BOOL, 'G of SEL')}, {', '.join(codes)})"
         else:
             code = f"{python}({', '.join([*(call.whole(one) for one in choice), *codes])})"
-        return call.given(code, kind, values)
+        return call.result(code, kind, values)
 
     return build
 
@@ -152,11 +158,14 @@ def _shift(call: Application) -> Value:
     if kind.kind != "bits":
         raise call.refuse(value, "BYTE, WORD, DWORD or LWORD")
     code = converted(value, kind)
-    return call.given(f"_shift({code}, {call.whole(by)}, {kind.width}, {call.name!r})", kind)
+    return call.result(f"_shift({code}, {call.whole(by)}, {kind.width}, {call.name!r})", kind)
 
 
 def _texts(parameters: str, result: str) -> Build:
-    """s for a text, n for a whole number; the result is a text of the first one's length, or a number."""
+    """Return the compiler of a text function.
+
+    parameters: s for a text, n for a whole number. result: s for a text of the first one's length, n for a number.
+    """
 
     def build(call: Application) -> Value:
         letters = parameters if len(parameters) >= len(call.values) else parameters[0] * len(call.values)
@@ -172,7 +181,7 @@ def _texts(parameters: str, result: str) -> Build:
         most = sum(one.high for one in texts) if grows else texts[0].high
         longest = min(MOST_CHARACTERS, most)
         kind = INT if result == "n" else String(texts[0].name.partition("[")[0], "string", 0, longest)
-        return call.given(f"{python}({', '.join(codes)})", kind)
+        return call.result(f"{python}({', '.join(codes)})", kind)
 
     return build
 
@@ -194,7 +203,7 @@ def _now(call: Application) -> Value:
 
 @dataclass(frozen=True)
 class Standard:
-    """Names of its parameters; the last ends in "..." where there may be any number more."""
+    """Standard function. The last parameter ends in "..." if it may be repeated."""
 
     parameters: tuple[str, ...]
     build: Build
@@ -240,21 +249,21 @@ FUNCTIONS: dict[str, Standard] = {
     "FIND": _standard("IN1 IN2", _texts("ss", "n")),
     "TIME": _standard("", _now),
 }
-"""By name."""
+"""Standard functions by name."""
 
 
 def is_standard(name: str) -> bool:
-    """Whether there is a standard function of a name."""
+    """Return True if there is a standard function of a name."""
     return name.upper() in FUNCTIONS or conversion(name, None) is not None
 
 
 def apply(
     at: Position, name: str, given: Sequence[tuple[str | None, Value]], expressions: Expressions, hint: Type | None
 ) -> Value:
-    """A standard function, called with values by position or by name. Raises SourceError."""
-    found = FUNCTIONS.get(name.upper()) or _standard("IN", lambda call: _convert(call, name))
-    plain = tuple(one.removesuffix("...") for one in found.parameters)
-    more = plain != found.parameters
+    """Compile a call of a standard function, with values by position or by name. Raise SourceError."""
+    standard = FUNCTIONS.get(name.upper()) or _standard("IN", lambda call: _convert(call, name))
+    plain = tuple(one.removesuffix("...") for one in standard.parameters)
+    more = plain != standard.parameters
     if given and given[0][0] is not None:
         values = _by_name(at, name, given, plain, more)
     else:
@@ -266,7 +275,7 @@ def apply(
     for one in values:
         if one.type.kind in ("block", "void"):
             raise SourceError(one.at, f"found {described(one)} in {name}, expected a value")
-    return found.build(Application(at, name.upper(), values, expressions, hint))
+    return standard.build(Application(at, name.upper(), values, expressions, hint))
 
 
 def _by_name(

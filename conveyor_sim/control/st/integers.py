@@ -1,6 +1,6 @@
-"""Arithmetic of integers: intermediate results with the width of `register`, and the range that each can have.
+"""Arithmetic of integers: intermediate results with the width of `register`, and their ranges.
 
-The range says where no code for two's complement is needed.
+Where the range fits, no code for two's complement is needed.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ def reach(value: Value, kind: Type) -> tuple[int, int]:
 
 
 def intermediate(at: Position, kind: Type, code: str, low: int, high: int) -> Value:
-    """Return a result of integers from low to high: wrapped in two's complement where `register` can't hold it.
+    """Return a result of integers from low to high, wrapped in two's complement if it exceeds `register`.
 
-    code stands by itself.
+    code: a name, a call or in parentheses.
     """
     wide = register(kind)
     if wide.low <= low and high <= wide.high:
@@ -40,7 +40,10 @@ def negated(at: Position, kind: Type, value: Value) -> Value:
 
 
 def computed(node: tree.Binary, kind: Type, left: Value, right: Value) -> Value:
-    """Return left operator right of two integers. kind: the type that they share. Raise SourceError."""
+    """Return left operator right of two integers. Raise SourceError.
+
+    kind: their common type.
+    """
     word, wide = node.operator, register(kind)
     a, b = operand(left, kind), operand(right, kind)
     (least, most), (low, high) = reach(left, kind), reach(right, kind)
@@ -51,15 +54,15 @@ def computed(node: tree.Binary, kind: Type, left: Value, right: Value) -> Value:
     if word == "*":
         ends = [one * other for one in (least, most) for other in (low, high)]
         return intermediate(node.at, kind, f"({a} * {b})", min(ends), max(ends))
-    # A sum of sums wraps once: two's complement is a ring.
+    # A sum of sums wraps once, because two's complement is a ring.
     chained = left.kind == "sum" and left.type.base.kind == "int" and register(left.type.base).width == wide.width
     raw = f"{left.raw if chained else a} {word} {b}"
     if chained and left.code != f"({left.raw})":  # wrapped already
-        found = Value(node.at, kind, wide.wrapped(raw), span=(wide.low, wide.high))
+        result = Value(node.at, kind, wide.wrapped(raw), span=(wide.low, wide.high))
     else:
         ends = [least + low, most + high] if word == "+" else [least - high, most - low]
-        found = intermediate(node.at, kind, f"({raw})", *ends)
-    return replace(found, raw=raw, kind="sum")
+        result = intermediate(node.at, kind, f"({raw})", *ends)
+    return replace(result, raw=raw, kind="sum")
 
 
 def _divided(node: tree.Binary, kind: Type, left: Value, right: Value) -> Value:

@@ -1,4 +1,4 @@
-"""`CompiledProgram`: a shared library that any compiler has made of a PLC program, as a controller."""
+"""`CompiledProgram`: a shared library, built from a PLC program by any compiler, as a controller."""
 
 from __future__ import annotations
 
@@ -22,26 +22,26 @@ from conveyor_sim.support.child_process import start_python
 from conveyor_sim.support.rounded_limit import at_limit
 
 PATIENCE = 60.0
-"""Wall time of a call from its request to the end of its answer, s; beyond it the watchdog ends the program."""
+"""Wall time of a call from its request to the end of its answer, s. The watchdog ends a program that exceeds it."""
 
 MOST_BYTES = 65_536
-"""Length of an answer; each output value may add _VALUE_BYTES, a snapshot MOST_STATE_BYTES."""
+"""Largest length of an answer, bytes. Each output value may add _VALUE_BYTES, a snapshot MOST_STATE_BYTES."""
 
 MOST_STATE_BYTES = 86_000_000
-"""Length of a snapshot's answer: 64 MB of state in base 64."""
+"""Largest length of a snapshot's answer, bytes: 64 MB of state in base 64."""
 
 _VALUE_BYTES = 32
 
 _MOMENT = 1.0
-"""s of wall time that the end of a program may take."""
+"""Wall time in which a program may end by itself, s."""
 
 _NS = 1e9
 
 
 class CompiledProgram:
-    """A library with the functions of include/conveyor_sim_plc.h, in a process of its own: a crash is an error here.
+    """Library with the functions of include/conveyor_sim_plc.h, in a separate process: a crash is an error here.
 
-    Two share nothing, whatever variables the library keeps outside of its instances.
+    Two programs share nothing, even if the library has variables outside its instances.
     """
 
     def __init__(
@@ -52,18 +52,19 @@ class CompiledProgram:
         patience: float = PATIENCE,
         record: str | Iterable[str] = (),
     ) -> None:
-        """path: of the library. tags: by variable, as the library names it. patience: s of wall time for a scan.
-        record: patterns of variables that are recorded, of those with tags ("*", `control/recorded.py`).
+        """Start the process.
 
-        Raises ControlError for a library that can't be loaded.
+        path: of the library. tags: by variable, as the library names it. patience: wall time for a scan, s. record:
+        patterns of variables to record, among those with tags ("*", `control/recorded.py`). Raise ControlError if the
+        library can't be loaded.
         """
         self._path, self._tags, self._patience = Path(path), dict(tags), patience
         self.record = patterns(record)
-        """Of variables that are recorded."""
+        """Patterns of the variables to record."""
         if not self._path.is_file():
             raise ControlError(f"{path}: no such file, expected a shared library")
         if not self._tags:
-            raise ControlError(f"{path}: found no tags, expected a tag for each variable that is to have one")
+            raise ControlError(f"{path}: found no tags, expected a tag for each connected variable")
         self._ins: list[str] = []
         self._outs: list[str] = []
         self._limits: Mapping[str, tuple[float, float]] = {}
@@ -74,11 +75,11 @@ class CompiledProgram:
                 "conveyor_sim.control.st.library_host", its_pipe, name=str(self._path.resolve())
             )
         self.close = weakref.finalize(self, _end, self._process, self._pipe)
-        """Ends the process; so does the end of this object."""
+        """Ends the process. Deleting this object ends it too."""
         self._call("bind", [])
 
     def bind(self, tags: LineTags) -> None:
-        """Tie variables to their tags: signals in, commands and alarms out. Raises ControlError."""
+        """Connect variables to their tags: signals in, commands and alarms out. Raise ControlError."""
         if self._ins or self._outs:
             raise ControlError(f"{self._path}: found a second line, expected a new CompiledProgram for each")
         variables = []
@@ -94,13 +95,13 @@ class CompiledProgram:
         self._shown = dict.fromkeys(self._names.values(), 0.0)
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
-        """Commands and alarms. Raises ControlError if the program stops, crashes, or does not end its scan."""
+        """Return commands and alarms. Raise ControlError if the program stops, crashes, or does not end its scan."""
         values = [inputs[tag] for tag in self._ins]
-        found = self._call("scan", round(inputs.time * _NS), values)
-        # A REAL comes as a double, but has no more digits for that.
+        outputs = self._call("scan", round(inputs.time * _NS), values)
+        # A REAL is sent as a double, but has only the digits of a REAL.
         answer = {
             tag: at_limit(value, *self._limits[tag]) if tag in self._limits else value
-            for tag, value in zip(self._outs, found, strict=True)
+            for tag, value in zip(self._outs, outputs, strict=True)
         }
         self._shown = {
             self._names[tag]: value for tag, value in (*zip(self._ins, values, strict=True), *answer.items())
@@ -109,19 +110,19 @@ class CompiledProgram:
 
     @property
     def variables(self) -> Mapping[str, float]:
-        """Those that have tags, as plc/<name>, of the last scan; before the first 0."""
+        """Variables with tags, as plc/<name>, after the last scan; 0 before the first one."""
         return self._shown
 
     def snapshot(self) -> dict[str, Any]:
-        """The program's state, as plain data."""
+        """Return the program's state as plain data."""
         return {"state": self._call("snapshot")}
 
     def restore(self, data: Mapping[str, Any]) -> None:
-        """Go on from there. Raises ControlError for what the program does not take."""
+        """Restore a state. Raise ControlError if the program does not accept it."""
         self._call("restore", data["state"])
 
-    def _call(self, do: str, *given: Any) -> Any:
-        request = json.dumps({"do": do, "with": given}).encode() + b"\n"
+    def _call(self, do: str, *arguments: Any) -> Any:
+        request = json.dumps({"do": do, "with": arguments}).encode() + b"\n"
         most = MOST_BYTES + (MOST_STATE_BYTES if do == "snapshot" else _VALUE_BYTES * len(self._outs))
         try:
             answer = _answer(exchange(self._pipe.fileno(), request, self._patience, most))
@@ -143,7 +144,7 @@ class CompiledProgram:
 
 
 def _answer(line: bytes) -> dict[str, Any]:
-    """Return an answer of `library_host`. Raises AnswerError."""
+    """Return an answer of `library_host`. Raise AnswerError."""
     try:
         answer = json.loads(line)
     except (ValueError, RecursionError):
@@ -160,7 +161,7 @@ def _require_numbers(values: Any, count: int) -> None:
 
 
 def _end(process: subprocess.Popen[bytes], pipe: Connection) -> None:
-    """End the process, which has a moment to destroy its instance."""
+    """Let the process destroy its instance, then end it."""
     pipe.close()
     with suppress(subprocess.TimeoutExpired):
         process.wait(_MOMENT)

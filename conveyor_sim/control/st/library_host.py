@@ -20,7 +20,7 @@ _MOST_BYTES = 64_000_000
 
 
 class _Library:
-    """The functions of include/conveyor_sim_plc.h. Raises OSError or AttributeError for what has them not."""
+    """Functions of include/conveyor_sim_plc.h. Raises OSError or AttributeError for a library without them."""
 
     def __init__(self, path: str) -> None:
         library = ctypes.CDLL(path)
@@ -38,12 +38,12 @@ class _Library:
             setattr(self, name, function)
 
     def __getattr__(self, name: str) -> Any:
-        """Only for what is not there: the functions are set above."""
+        """Raise AttributeError. Existing functions are set above."""
         raise AttributeError(name)
 
 
 class _Host:
-    """One instance, and the places of its variables."""
+    """One instance, and the memory of its variables."""
 
     def __init__(self, path: str) -> None:
         self._library = _Library(path)
@@ -56,7 +56,7 @@ class _Host:
         self._outs: list[ctypes.c_double] = []
 
     def bind(self, variables: list[tuple[str, int]]) -> None:
-        """Names and directions, in the order of the values of each scan."""
+        """Bind variables by name and direction, in the order of the values of each scan."""
         for name, direction in variables:
             place = ctypes.c_double(0.0)
             if self._library.bind(self._plc, name.encode(), direction, ctypes.byref(place)):
@@ -64,7 +64,7 @@ class _Host:
             (self._outs if direction else self._ins).append(place)
 
     def scan(self, time_ns: int, values: list[float]) -> list[float]:
-        """Inputs in, outputs out."""
+        """Execute a scan: inputs in, outputs out."""
         for place, value in zip(self._ins, values, strict=True):
             place.value = value
         if code := self._library.scan(self._plc, time_ns):
@@ -72,7 +72,7 @@ class _Host:
         return [place.value for place in self._outs]
 
     def snapshot(self) -> str:
-        """The state, in base 64."""
+        """Return the state, in base 64."""
         size = self._library.snapshot(self._plc, None, 0)
         if not 0 <= size <= _MOST_BYTES:
             raise ValueError(f"found a state of {size} bytes, expected 0 to {_MOST_BYTES}")
@@ -81,13 +81,13 @@ class _Host:
         return base64.b64encode(state.raw[:size]).decode()
 
     def restore(self, state: str) -> None:
-        """Go on from a state."""
+        """Restore a state."""
         content = base64.b64decode(state)
         if self._library.restore(self._plc, content, len(content)):
-            raise ValueError("found a state that the program does not take, expected one of its own")
+            raise ValueError("found a state that the program does not accept, expected one of this program")
 
     def destroy(self) -> None:
-        """The end of the instance."""
+        """Destroy the instance."""
         self._library.destroy(self._plc)
 
 

@@ -1,4 +1,4 @@
-"""What literals stand for: numbers in bases, durations as whole nanoseconds, characters by $."""
+"""Values of literals: numbers in bases, durations as whole nanoseconds, characters escaped by $."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ _UNITS |= {"ms": 1_000_000, "us": 1_000, "ns": 1}
 _ORDER = tuple(_UNITS)
 _PART = re.compile(r"(\d+(?:\.\d+)?)(ms|us|ns|d|h|m|s)")
 _LONGEST = 1000
-"""Characters of a number: more than any type holds, and fewer than Python takes."""
+"""Largest number of characters in a number: more than any type needs, and fewer than Python's limit."""
 _ESCAPES = {"$": "$", "'": "'", '"': '"', "l": "\n", "n": "\n", "p": "\f", "r": "\r", "t": "\t"}
 
 
 def integer(at: Position, text: str) -> int:
-    """1_000"""
+    """Return the value of 1_000."""
     _require_short(at, text)
     return int(text.replace("_", ""))
 
 
 def based(at: Position, text: str) -> int:
-    """16#FF, 8#17 or 2#1010_0001."""
+    """Return the value of 16#FF, 8#17 or 2#1010_0001."""
     _require_short(at, text)
     base, _, digits = text.partition("#")
     try:
@@ -33,12 +33,15 @@ def based(at: Position, text: str) -> int:
 
 
 def real(text: str) -> float:
-    """1.5, 2E3 or 1_000.25e-6."""
+    """Return the value of 1.5, 2E3 or 1_000.25e-6."""
     return float(text.replace("_", ""))
 
 
 def duration(at: Position, text: str) -> int:
-    """T#1h30m, TIME#-2.5s or T#1d_4h in ns. Each unit once, from the largest down; only the last has decimals."""
+    """Return T#1h30m, TIME#-2.5s or T#1d_4h in ns.
+
+    Each unit may occur once, from the largest down; only the last may have decimals.
+    """
     _require_short(at, text)
     written = text.partition("#")[2].lower().replace("_", "")
     sign, digits = (-1, written[1:]) if written.startswith("-") else (1, written.removeprefix("+"))
@@ -63,7 +66,7 @@ def long_time_text(value: int) -> str:
 
 
 def time_text(value: int) -> str:
-    """A duration as it is written: T#1m30s."""
+    """Return a duration as a literal of TIME: T#1m30s."""
     rest, parts = abs(value), ""
     for unit, size in _UNITS.items():
         count, rest = divmod(rest, size)
@@ -77,18 +80,21 @@ def _require_short(at: Position, text: str) -> None:
 
 
 def characters(at: Position, text: str, wide: bool) -> str:
-    """What stands between the quotes: $$, $', $N, $0A (two digits; four in a wide text) stand for one character."""
+    """Return the text between quotes.
+
+    $$, $', $N, $0A (two digits; four in a wide text) stand for one character.
+    """
     digits = 4 if wide else 2
-    body, found, index = text[1:-1], [], 0
+    body, read, index = text[1:-1], [], 0
     while index < len(body):
         char = body[index]
         if char != "$":
             if not wide and ord(char) > 255:
                 raise SourceError(at, f"found {char!r} in a STRING, expected characters up to $FF; a WSTRING has all")
-            found.append(char)
+            read.append(char)
             index += 1
         elif (escape := _ESCAPES.get(body[index + 1].lower())) is not None:
-            found.append(escape)
+            read.append(escape)
             index += 2
         else:
             code = body[index + 1 : index + 1 + digits]
@@ -96,8 +102,8 @@ def characters(at: Position, text: str, wide: bool) -> str:
                 raise SourceError(
                     at, f"found ${code} in a text, expected $$, $', $L, $N, $P, $R, $T or ${'F' * digits}"
                 )
-            found.append(chr(int(code, 16)))
+            read.append(chr(int(code, 16)))
             index += 1 + digits
-    if len(found) > MOST_CHARACTERS:
-        raise SourceError(at, f"found a text of {len(found)} characters, expected at most {MOST_CHARACTERS}")
-    return "".join(found)
+    if len(read) > MOST_CHARACTERS:
+        raise SourceError(at, f"found a text of {len(read)} characters, expected at most {MOST_CHARACTERS}")
+    return "".join(read)

@@ -16,8 +16,10 @@ _RECORD, _BUDGET, _PATIENCE = "record (patterns of variables)", "budget (stateme
 
 
 def load(reference: str, parameters: Mapping[str, object] | None = None) -> Controller:
-    """`program.st`, `library.so`, or as `conveyor_sim.control.load` has it. parameters: of the factory; of a program
-    those of `StructuredText` and `CompiledProgram` by their names. Raises ControlError, and MapError for such a file.
+    """Return the controller of `program.st`, `library.so`, or of another reference of `conveyor_sim.control.load`.
+
+    parameters: of the factory; for a program, those of `StructuredText` and `CompiledProgram` by name. Raise
+    ControlError, and MapError for a wrong map.
     """
     given = dict(parameters or {})
     if reference.lower().endswith(LIBRARY):
@@ -40,7 +42,7 @@ def _compiled(reference: str, given: dict[str, object]) -> Controller:
 
 
 def _require(reference: str, given: Mapping[str, object], known: Mapping[str, str]) -> None:
-    """Raises ControlError for parameters that are not of those names and types."""
+    """Raise ControlError for parameters with wrong names or types."""
     for name, value in given.items():
         if name not in known or not _IS[name](value):
             shown = f"{name}: {value!r:.200}"
@@ -64,4 +66,4 @@ _IS: Mapping[str, Callable[[object], bool]] = {
     "budget": lambda value: _is_number(value) and isinstance(value, int),
     "patience": _is_number,
 }
-"""What a parameter has to be."""
+"""Checks of the parameters, by name."""

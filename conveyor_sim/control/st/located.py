@@ -1,10 +1,4 @@
-"""Located variables (AT %MW0): which of them share memory, and where each lies in it.
-
-%M is bytes, little-endian, in the order of CODESYS: %MWn begins at byte 2n, %MDn at byte 4n, %MLn at byte 8n.
-%MXn.b is bit b of byte n. A variable covers the bytes of its type, and variables that overlap share their memory.
-%I and %Q are places of a Modbus map (docs/scada.md). Bits and registers are two memories, and a place has one type.
-A variable that overlaps no other one has its own slot.
-"""
+"""Located variables (AT %MW0): shared memory, and the place of each variable in it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which variable is which tag of a line: by a pragma, by the caller's word, by its address in a map, by its name."""
+"""Assignment of tags to variables: by a pragma, by the caller, by an address in a Modbus map, or by name."""
 
 from __future__ import annotations
 
@@ -23,44 +23,44 @@ _TABLES = {
 }
 
 _LISTED = 20
-"""Names in a sentence."""
+"""Largest number of names in a sentence."""
 
 Addresses = Mapping[tuple[str, int], tuple[str, object]]
-"""Tag and type in Modbus by table and address."""
+"""Tag and type in a Modbus map, by table and address."""
 
 
 @dataclass(frozen=True)
 class TagBinding:
-    """A variable that is a tag."""
+    """Variable with a tag."""
 
     variable: str
-    """Its whole name: main/speed."""
+    """Full name: main/speed."""
     tag: str
     type: Type
     is_input: bool
     how: str
-    """tag, address or name."""
+    """Source of the assignment: tag, address or name."""
 
 
 @dataclass(frozen=True)
 class TagMapping:
-    """All of a program's; and what is left over on either side."""
+    """All bindings of a program, with the unused variables and commands."""
 
     bound: tuple[TagBinding, ...]
     variables: tuple[str, ...]
     """Inputs, outputs and located variables without a tag."""
     commands: tuple[str, ...]
-    """Commands of the line that the program does not give."""
+    """Commands of the line without a variable."""
 
     def left_over(self) -> tuple[str, ...]:
-        """What is left on either side, in words."""
-        said = (("no tag for", self.variables), ("these commands are not given:", self.commands))
-        return tuple(f"{words} {_listed(names)}" for words, names in said if names)
+        """Return the unused variables and commands, in words."""
+        unused = (("no tag for", self.variables), ("commands not set by the program:", self.commands))
+        return tuple(f"{words} {_listed(names)}" for words, names in unused if names)
 
     def __str__(self) -> str:
         lines = [f"{one.variable} {'<-' if one.is_input else '->'} {one.tag} (by {one.how})" for one in self.bound]
         lines += [f"{name}: no tag" for name in self.variables]
-        lines += [f"{name}: a command that the program does not give" for name in self.commands]
+        lines += [f"{name}: command not set by the program" for name in self.commands]
         return "\n".join(lines)
 
 
@@ -78,22 +78,22 @@ def read_addresses(path: Path) -> Addresses:
     }
 
 
-def mapped(compiled: Compiled, tags: LineTags, given: Mapping[str, str], addresses: Addresses) -> TagMapping:
-    """The mapping of a program on a line.
+def mapped(compiled: Compiled, tags: LineTags, chosen: Mapping[str, str], addresses: Addresses) -> TagMapping:
+    """Return the mapping of a program on a line.
 
-    given: tags by variable. Raises StructuredTextError for a variable or tag that there is not, for a type that does
-    not fit, for a direction that can't be, and for a command that two variables give.
+    chosen: tags by variable; they override those in the program. Raise StructuredTextError for an unknown variable or
+    tag, an unsuitable type, a wrong direction, or a command with two variables.
     """
     file = compiled.file
     candidates = list(_candidates(compiled))
     known = {one.name for one in candidates}
     groups = {one.name: one.group for one in candidates if one.group is not None}
-    for name in given:
+    for name in chosen:
         if name.lower() not in known:
             raise StructuredTextError(
                 f"{file}: found {name} among the tags, expected one of {', '.join(known) or 'none'}"
             )
-    wanted = {name.lower(): tag for name, tag in given.items()}
+    wanted = {name.lower(): tag for name, tag in chosen.items()}
     by_identifier = _by_identifier(tags)
     bound: list[TagBinding] = []
     left: list[str] = []
@@ -108,20 +108,20 @@ def mapped(compiled: Compiled, tags: LineTags, given: Mapping[str, str], address
             bound.append(_checked(where, name, member, tag, how, tags))
         elif member.address or member.section in ("VAR_INPUT", "VAR_OUTPUT"):
             left.append(name)
-    given_by: dict[str, str] = {}
+    sender: dict[str, str] = {}
     for one in bound:
-        other = given_by.get(one.tag, one.variable)
+        other = sender.get(one.tag, one.variable)
         if not one.is_input and groups.get(other, other) != groups.get(one.variable, one.variable):
             both = f"{other} and {one.variable}"
             raise StructuredTextError(f"{file}: {one.tag}: found {both} for it, expected one variable")
         if not one.is_input:
-            given_by[one.tag] = one.variable
+            sender[one.tag] = one.variable
     _require_one_tag(file, bound, groups)
     if not addresses:
         _require_apart(file, candidates, bound)
     tagged = {groups[one.variable] for one in bound if one.variable in groups}
     left = [name for name in left if groups.get(name) not in tagged]
-    return TagMapping(tuple(bound), tuple(left), tuple(name for name in tags.commands if name not in given_by))
+    return TagMapping(tuple(bound), tuple(left), tuple(name for name in tags.commands if name not in sender))
 
 
 @dataclass(frozen=True)
@@ -146,12 +146,12 @@ def _candidates(compiled: Compiled) -> Iterator[Candidate]:
 
 
 def _by_identifier(tags: LineTags) -> dict[str, str]:
-    """Tags by what they are called as a variable: belts_zone1_cmd_speed. Those that two would have are left out."""
-    found: dict[str, str] = {}
+    """Return tags by their names as variables: belts_zone1_cmd_speed. Ambiguous names have ""."""
+    names: dict[str, str] = {}
     for tag in (*tags.signals, *tags.commands):
         name = re.sub(r"\W", "_", tag).lower()
-        found[name] = "" if name in found else tag
-    return found
+        names[name] = "" if name in names else tag
+    return names
 
 
 def _located(where: str, member: Member, addresses: Addresses) -> str:
@@ -159,9 +159,9 @@ def _located(where: str, member: Member, addresses: Addresses) -> str:
     if address.area == "M":
         return ""
     table = _TABLES[address.area, address.size == "X"]
-    if (found := addresses.get((table, address.number))) is None:
+    if (row := addresses.get((table, address.number))) is None:
         return ""
-    tag, there = found
+    tag, there = row
     if there != ("bool" if address.size == "X" else address.bits):
         expected = "one bit" if there == "bool" else f"{there} bits"
         raise StructuredTextError(
@@ -175,8 +175,8 @@ def _require_one_tag(file: str, bound: list[TagBinding], groups: Mapping[str, in
     tags: dict[int, TagBinding] = {}
     for one in bound:
         if one.variable in groups and (other := tags.setdefault(groups[one.variable], one)).tag != one.tag:
-            found = f"{one.tag} for {one.variable}, and {other.tag} for {other.variable}"
-            raise StructuredTextError(f"{file}: found {found}, expected one tag, because they share memory")
+            both = f"{one.tag} for {one.variable}, and {other.tag} for {other.variable}"
+            raise StructuredTextError(f"{file}: found {both}, expected one tag, because they share memory")
 
 
 def _require_apart(file: str, candidates: Iterable[Candidate], bound: list[TagBinding]) -> None:
@@ -193,9 +193,9 @@ def _require_apart(file: str, candidates: Iterable[Candidate], bound: list[TagBi
         free = [one for one in group if one.name not in tagged]
         if len(own) > 1 and free:
             other = next(one for one in group if one is not free[0])
-            found = f"{free[0].name} at {free[0].member.address}, {other.name} at {other.member.address}"
+            both = f"{free[0].name} at {free[0].member.address}, {other.name} at {other.member.address}"
             expected = "a tag for each or other addresses: bits and registers are two memories"
-            raise StructuredTextError(f"{file}: found {found}, expected {expected}")
+            raise StructuredTextError(f"{file}: found {both}, expected {expected}")
 
 
 def _checked(where: str, name: str, member: Member, tag: str, how: str, tags: LineTags) -> TagBinding:
@@ -225,7 +225,10 @@ def _checked(where: str, name: str, member: Member, tag: str, how: str, tags: Li
 
 
 def _suits(kind: Type, tag: str) -> bool:
-    """Whether a variable can hold a tag's values; the kind of a tag is "" where it is not known."""
+    """Return True if a variable can hold a tag's values.
+
+    tag: kind of the tag, "" if not known.
+    """
     base = kind.base
     if base.name not in ELEMENTARY and base.kind != "enum":
         return False

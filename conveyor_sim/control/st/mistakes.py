@@ -1,4 +1,4 @@
-"""What is said where a text can't be parsed: what was found, and what was expected, in the words of the language."""
+"""Messages for texts that can't be parsed: text found, and text expected, in words of the language."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ REFUSED: Mapping[str, str] = {
     **dict.fromkeys(("LDATE", "LTIME_OF_DAY", "LTOD", "LDATE_AND_TIME", "LDT"), _DATES),
     **dict.fromkeys(("LD#", "LDATE#", "LTIME_OF_DAY#", "LTOD#", "LDATE_AND_TIME#", "LDT#"), _DATES),
 }
-"""Words of the standard, and of dialects, that are not for this interpreter, and what they belong to."""
+"""Words of the standard and of dialects that this interpreter does not support, with the feature they belong to."""
 
 SUSPECT: Mapping[str, str] = {
     **dict.fromkeys(("REFERENCE", "REF", "ADR"), "pointers and references"),
@@ -34,7 +34,7 @@ SUSPECT: Mapping[str, str] = {
     **dict.fromkeys(("UNION",), "unions"),
     **dict.fromkeys(("R_EDGE", "F_EDGE"), "R_EDGE and F_EDGE, which R_TRIG and F_TRIG do"),
 }
-"""The same of words that may be names: so they are where the text makes sense with them as names."""
+"""Such words that may also be names. They are refused only where the text makes no sense otherwise."""
 
 _WORDS = {
     "NAME": "a name",
@@ -69,24 +69,24 @@ _VALUES = {
 
 
 def at_of(token: Token) -> Position:
-    """Where a token begins."""
+    """Return the position of a token."""
     return Position(token.line or 1, token.column or 1)
 
 
 def place_of(text: str, index: int) -> Position:
-    """Line and column of a character."""
+    """Return line and column of a character."""
     return Position(text.count("\n", 0, index) + 1, index - text.rfind("\n", 0, index))
 
 
 def not_refused(token: Token) -> Token:
-    """A name, or what stands before #. Raises SourceError for a word of what is not supported."""
+    """Return a name or a prefix of #. Raise SourceError for a word of an unsupported feature."""
     if what := REFUSED.get(token.value.upper()):
         raise SourceError(at_of(token), f"found {token.value}, expected a program without {what}")
     return token
 
 
 def _ends(text: str, place: int) -> bool:
-    """Whether a comment ends, and those within it."""
+    """Return True if a comment ends, with all comments in it."""
     depth = 0
     for match in _COMMENT.finditer(text, place):
         depth += 1 if match.group() == "(*" else -1
@@ -96,7 +96,7 @@ def _ends(text: str, place: int) -> bool:
 
 
 def unexpected(error: Any, text: str) -> SourceError:
-    """What is said of lark's UnexpectedToken in a text."""
+    """Return the error for lark's UnexpectedToken."""
     token = error.token
     place = len(text) if token.type == "$END" else error.pos_in_stream
     for match in (*list(_WORD.finditer(text, 0, place))[-1:], *_WORD.finditer(text, place, place + len(token.value))):
@@ -106,7 +106,7 @@ def unexpected(error: Any, text: str) -> SourceError:
             )
     if text.startswith("(*", place):
         if _ends(text, place):
-            return SourceError(at_of(token), "found comments three deep, expected at most one within another")
+            return SourceError(at_of(token), "found comments nested three deep, expected at most two levels")
         return SourceError(at_of(token), "found a comment that does not end, expected *)")
     if token.type == "ADDRESS":
         return SourceError(at_of(token), f"found {token}, expected a variable that is declared AT {token}")

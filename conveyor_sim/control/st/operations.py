@@ -1,4 +1,4 @@
-"""What the code that programs become calls at run time, where Python's operators are not enough."""
+"""Run-time functions of compiled programs, where Python's operators do not suffice."""
 
 from __future__ import annotations
 
@@ -12,11 +12,14 @@ from conveyor_sim.control.st.errors import Fault
 from conveyor_sim.control.st.types import MOST_CHARACTERS, single
 
 Root = tuple[Any, str]
-"""A variable of a unit: the instance, and its slot."""
+"""Variable of a unit: the instance, and its slot."""
 
 
 class Attribute:
-    """A variable passed as VAR_IN_OUT; root: the one that it is part of, if it is one of a structure's."""
+    """Reference to a variable, passed as VAR_IN_OUT.
+
+    root: the variable of which it is a part, if it is a field of a structure.
+    """
 
     __slots__ = ("_name", "_owner", "root")
 
@@ -24,16 +27,16 @@ class Attribute:
         self._owner, self._name, self.root = owner, name, root or (owner, name)
 
     def get(self) -> Any:
-        """Its value."""
+        """Return the value."""
         return getattr(self._owner, self._name)
 
     def set(self, value: Any) -> None:
-        """Write it."""
+        """Write the value."""
         setattr(self._owner, self._name, value)
 
 
 class Element:
-    """An element of an array, passed likewise."""
+    """Reference to an element of an array, passed as VAR_IN_OUT."""
 
     __slots__ = ("_index", "_list", "root")
 
@@ -41,31 +44,34 @@ class Element:
         self._list, self._index, self.root = values, index, root
 
     def get(self) -> Any:
-        """Its value."""
+        """Return the value."""
         return self._list[self._index]
 
     def set(self, value: Any) -> None:
-        """Write it."""
+        """Write the value."""
         self._list[self._index] = value
 
 
 class Traced:
-    """A variable that a function's output goes to: that this call wrote it is noted."""
+    """Reference to a variable that receives a function's output. The write is recorded."""
 
     __slots__ = ("_note", "_place", "_reference")
 
     def __init__(self, reference: Attribute | Element, note: Callable[[Root, int, int], None], *place: int) -> None:
-        """place: line and column of the call."""
+        """Store the reference.
+
+        place: line and column of the call.
+        """
         self._reference, self._note, self._place = reference, note, place
 
     def set(self, value: Any) -> None:
-        """Write it."""
+        """Write the value."""
         self._reference.set(value)
         self._note(self._reference.root, *self._place)
 
 
 def divide(a: int, b: int) -> int:
-    """Towards zero."""
+    """Return a / b, rounded towards zero."""
     if b == 0:
         raise Fault(f"division by zero: found {a} / 0, expected another divisor")
     quotient = abs(a) // abs(b)
@@ -73,19 +79,19 @@ def divide(a: int, b: int) -> int:
 
 
 def modulo(a: int, b: int) -> int:
-    """IN1 - IN1 / IN2 * IN2, and 0 for a divisor of 0 (IEC 61131-3, table of arithmetic functions, MOD)."""
+    """Return IN1 - IN1 / IN2 * IN2, 0 for a divisor of 0 (IEC 61131-3, table of arithmetic functions, MOD)."""
     return 0 if b == 0 else int(math.copysign(1, a)) * (abs(a) % abs(b))
 
 
 def quotient(a: float, b: float) -> float:
-    """Of reals."""
+    """Return a / b of reals."""
     if b == 0.0:
         raise Fault(f"division by zero: found {a:g} / 0, expected another divisor")
     return a / b
 
 
 def power(a: float, b: float) -> float:
-    """a to the b."""
+    """Return a to the power of b."""
     try:
         result: float | complex = a**b
     except ZeroDivisionError:
@@ -98,17 +104,17 @@ def power(a: float, b: float) -> float:
 
 
 def set_bit(word: Attribute | Element, bit: int, on: bool) -> None:
-    """One bit of a bit string."""
+    """Set one bit of a bit string."""
     word.set(word.get() | bit if on else word.get() & ~bit)
 
 
 def outside(index: int, low: int, high: int) -> int:
-    """Never returns: an index that is not in an array."""
+    """Raise Fault for an index that is not in an array."""
     raise Fault(f"index out of range: found {index}, expected {low} to {high}")
 
 
 def in_range(value: int, low: int, high: int) -> int:
-    """A value that is assigned to a subrange."""
+    """Return a value for a subrange. Raise Fault if it is outside."""
     if not low <= value <= high:
         raise Fault(f"value out of range: found {value}, expected {low} to {high}")
     return value
@@ -125,42 +131,42 @@ def rounds(first: int, last: int, step: int, low: int, high: int) -> range:
 
 
 def after(values: range, low: int, high: int) -> int:
-    """The control variable once its FOR has ended: the first value beyond the last, if its type has it."""
+    """Return the control variable after its FOR: the first value beyond the last, if its type has it."""
     beyond = values[-1] + values.step if values else values.start
     return beyond if low <= beyond <= high else values[-1]
 
 
 def nearest(value: float, low: int, high: int) -> int:
-    """A real as a whole number: the nearest, of two the even one (IEC 61131-3:2013, conversion functions)."""
+    """Return a real as the nearest whole number, ties to even (IEC 61131-3:2013, conversion functions)."""
     if not math.isfinite(value) or not low <= (whole := round(value)) <= high:
         raise Fault(f"value out of range: found {value:g}, expected {low} to {high}")
     return whole
 
 
 def truncated(value: float, low: int, high: int) -> int:
-    """A real as a whole number, towards zero."""
+    """Return a real as a whole number, truncated towards zero."""
     if not math.isfinite(value) or not low <= (whole := int(value)) <= high:
         raise Fault(f"value out of range: found {value:g}, expected {low} to {high}")
     return whole
 
 
 def guarded(name: str, function: Callable[..., float]) -> Callable[..., float]:
-    """A function of reals that stops where it has no value, and is infinite where that is beyond all numbers."""
+    """Wrap a function of reals: raise Fault where it is undefined, and return infinity on overflow."""
 
-    def call(*given: float) -> float:
+    def call(*arguments: float) -> float:
         try:
-            return function(*given)
+            return function(*arguments)
         except OverflowError:
             return math.inf
         except ValueError:
-            shown = ", ".join(f"{value:g}" for value in given)
+            shown = ", ".join(f"{value:g}" for value in arguments)
             raise Fault(f"found {name}({shown}), expected an argument for which it is defined") from None
 
     return call
 
 
 def copied(value: Any) -> Any:
-    """An array or a structure, as a value of its own."""
+    """Return a copy of an array or a structure."""
     if isinstance(value, list):
         return [copied(one) for one in value] if value and isinstance(value[0], (list, StructureValue)) else value[:]
     if isinstance(value, StructureValue):
@@ -169,12 +175,12 @@ def copied(value: Any) -> Any:
 
 
 def rows(values: list[Any], length: int) -> list[list[Any]]:
-    """Values that follow each other, as rows of so many."""
+    """Return consecutive values as rows of a length."""
     return [values[at : at + length] for at in range(0, len(values), length)]
 
 
 def overwrite(target: Any, value: Any) -> None:
-    """Give an array or a structure what another holds."""
+    """Copy the elements of an array or a structure into another one."""
     if isinstance(target, list):
         if target and isinstance(target[0], (list, StructureValue)):
             for one, other in zip(target, value, strict=True):
@@ -191,12 +197,12 @@ def overwrite(target: Any, value: Any) -> None:
 
 
 class StructureValue:
-    """A structure's value; those of a program derive from it."""
+    """Value of a structure. Structures of a program derive from it."""
 
     __slots__: tuple[str, ...] = ()
 
     def copy(self) -> StructureValue:
-        """Another one with the same values."""
+        """Return a copy."""
         new = type(self)()
         for slot in type(self).__slots__:
             setattr(new, slot, copied(getattr(self, slot)))
@@ -204,41 +210,41 @@ class StructureValue:
 
 
 def with_values(record: Any, **values: Any) -> Any:
-    """A structure or a block with initial values of its own."""
+    """Set initial values of a structure or a block, and return it."""
     for slot, value in values.items():
         setattr(record, slot, value)
     return record
 
 
 def left(text: str, count: int) -> str:
-    """LEFT"""
+    """Return the first characters (LEFT)."""
     return text[: _count("LEFT", count)]
 
 
 def right(text: str, count: int) -> str:
-    """RIGHT"""
+    """Return the last characters (RIGHT)."""
     return text[-count:] if _count("RIGHT", count) else ""
 
 
 def mid(text: str, count: int, place: int) -> str:
-    """MID: so many characters from a place on, the first is 1."""
+    """Return `count` characters from a place on; the first is 1 (MID)."""
     return text[_place("MID", place) - 1 :][: _count("MID", count)]
 
 
 def insert(text: str, other: str, place: int) -> str:
-    """INSERT: another text behind a place, cut at the longest length of a text."""
+    """Insert another text after a place (INSERT). The result is cut at the longest length of a text."""
     _count("INSERT", place)
     return (text[:place] + other + text[place:])[:MOST_CHARACTERS]
 
 
 def delete(text: str, count: int, place: int) -> str:
-    """DELETE"""
+    """Delete characters from a place on (DELETE)."""
     begin = _place("DELETE", place) - 1
     return text[:begin] + text[begin + _count("DELETE", count) :]
 
 
 def replace(text: str, other: str, count: int, place: int) -> str:
-    """REPLACE, cut at the longest length of a text."""
+    """Replace characters from a place on (REPLACE). The result is cut at the longest length of a text."""
     begin = _place("REPLACE", place) - 1
     return (text[:begin] + other + text[begin + _count("REPLACE", count) :])[:MOST_CHARACTERS]
 
@@ -256,34 +262,34 @@ def _place(name: str, value: int) -> int:
 
 
 def concat(*texts: str) -> str:
-    """CONCAT"""
+    """Return the joined texts (CONCAT)."""
     return "".join(texts)[:MOST_CHARACTERS]
 
 
 def find(text: str, other: str) -> int:
-    """FIND: where another text begins, 0 if it is not there."""
+    """Return the place of another text, 0 if there is none (FIND)."""
     return text.find(other) + 1 if other else 0
 
 
 def limit(low: Any, value: Any, high: Any) -> Any:
-    """LIMIT: MIN(MAX(value, low), high)."""
+    """Return MIN(MAX(value, low), high) (LIMIT)."""
     return min(max(value, low), high)
 
 
 def sel(second: bool, in0: Any, in1: Any) -> Any:
-    """SEL: both are computed, as arguments of any function."""
+    """Return one of two values (SEL). Both are computed, as arguments of any function."""
     return in1 if second else in0
 
 
 def mux(index: int, *values: Any) -> Any:
-    """MUX"""
+    """Return the value of an index (MUX)."""
     if not 0 <= index < len(values):
         raise Fault(f"MUX: found {index}, expected 0 to {len(values) - 1}")
     return values[index]
 
 
 def shift(value: int, by: int, width: int, name: str) -> int:
-    """SHL, SHR, ROL and ROR of so many bits."""
+    """Shift or rotate by a number of bits (SHL, SHR, ROL, ROR)."""
     if by < 0:
         raise Fault(f"{name}: found {by} bits, expected 0 or more")
     mask = (1 << width) - 1
@@ -298,7 +304,7 @@ def shift(value: int, by: int, width: int, name: str) -> int:
 
 
 def chain(compare: Callable[[Any, Any], bool], *values: Any) -> bool:
-    """GT, GE, EQ, LE and LT of several values: each with the next."""
+    """Compare several values, each with the next (GT, GE, EQ, LE, LT)."""
     return all(compare(a, b) for a, b in pairwise(values))
 
 
@@ -354,4 +360,4 @@ NAMES: dict[str, Any] = {
     "_atan": guarded("ATAN", math.atan),
     "_atan2": guarded("ATAN2", math.atan2),
 }
-"""By the name that code uses."""
+"""Functions by their names in the code."""

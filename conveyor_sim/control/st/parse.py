@@ -36,18 +36,19 @@ _CHAINS = ({"+", "-"}, {"OR"}, {"AND"}, {"XOR"})
 _N = TypeVar("_N", bound=tree.Node)
 
 DEEPEST = 60
-"""How deep expressions and statements nest: more than anybody writes, and less than Python's compiler takes."""
+"""Largest depth of nested expressions and statements, below the limit of Python's compiler."""
 
 MOST_TOKENS = 300_000
-"""Words, numbers and signs of a file: some 30 000 statements, which take about 6 s to compile and 500 MB."""
+"""Largest number of words, numbers and signs in a file: about 30 000 statements, which take 6 s to compile and 500
+MB."""
 MOST_OPERANDS = 1000
-"""Of an expression without parentheses."""
+"""Largest number of operands in an expression without parentheses."""
 
 _ONE_AT_A_TIME = threading.Lock()
 
 
 def parse(text: str) -> tree.SourceFile:
-    """The syntax tree of a file. Raises SourceError."""
+    """Return the syntax tree of a file. Raise SourceError."""
     text = selected(text)
     try:
         with _ONE_AT_A_TIME:
@@ -68,12 +69,12 @@ def parse(text: str) -> tree.SourceFile:
 
 @cache
 def _parser() -> tuple[Lark, _Tree]:
-    """The parser, and what makes the tree as it goes."""
+    """Return the parser, and the transformer that builds the tree during parsing."""
     grammar, made = files(__package__).joinpath("grammar.lark").read_text(encoding="utf-8"), _Tree()
     parser = Lark(
         grammar,
         parser="lalr",
-        lexer="basic",  # type: ignore[arg-type]  # lark takes the word, its types do not
+        lexer="basic",  # type: ignore[arg-type]  # lark accepts it, its type hints do not
         maybe_placeholders=True,
         transformer=made,
         postlex=_Checked(),
@@ -82,12 +83,12 @@ def _parser() -> tuple[Lark, _Tree]:
 
 
 class _Checked(PostLex):
-    """Counts tokens as they come, and looks at names."""
+    """Filter that counts tokens and checks names."""
 
     always_accept = ()
 
     def process(self, stream: Iterator[Token]) -> Iterator[Token]:
-        """The tokens. Raises SourceError for more than MOST_TOKENS, and for words of what is not supported."""
+        """Yield the tokens. Raise SourceError for more than MOST_TOKENS, and for words of unsupported features."""
         for number, token in enumerate(stream):
             if number == MOST_TOKENS:
                 raise SourceError(at_of(token), f"found more than {MOST_TOKENS} words and signs, expected fewer")
@@ -95,7 +96,7 @@ class _Checked(PostLex):
 
 
 def _of(first: Token | tree.Node) -> Position:
-    """Where what begins with this stands."""
+    """Return the position of a token or node."""
     return first.at if isinstance(first, tree.Node) else at_of(first)
 
 
@@ -104,12 +105,15 @@ def _tuple(items: Iterable[Any]) -> tuple[Any, ...]:
 
 
 class _Tree(Transformer[Any]):
-    """One method a rule of the grammar. Depths are watched where they grow: nothing later recurses without end."""
+    """Transformer with one method per rule of the grammar.
+
+    It limits depths as the tree grows, so that later recursion is bounded.
+    """
 
     def __init__(self) -> None:
         super().__init__()
         self.depths: dict[int, tuple[object, int]] = {}
-        """Of nodes, by the id of each, which is kept."""
+        """Depths of nodes by id, with the nodes, which keeps the ids valid."""
 
     def start(self, items: list[Any]) -> tree.SourceFile:
         source = tree.SourceFile()
@@ -127,7 +131,7 @@ class _Tree(Transformer[Any]):
     def _deep(self, node: _N, *parts: object) -> _N:
         depth = 1 + max((self.depths[id(part)][1] for part in parts if id(part) in self.depths), default=0)
         if depth > DEEPEST:
-            raise SourceError(node.at, f"found {depth} levels one within the other, expected at most {DEEPEST}")
+            raise SourceError(node.at, f"found {depth} levels of nesting, expected at most {DEEPEST}")
         self.depths[id(node)] = node, depth
         return node
 
@@ -255,8 +259,8 @@ class _Tree(Transformer[Any]):
         return self._guarding(tree.If(at_of(word), branches, otherwise), *(b for _, b in branches), otherwise)
 
     def label(self, items: list[Any]) -> tree.Expression:
-        found: tree.Expression = _literal(items[0]) if isinstance(items[0], Token) else items[0]
-        return found
+        label: tree.Expression = _literal(items[0]) if isinstance(items[0], Token) else items[0]
+        return label
 
     def negative_label(self, items: list[Any]) -> tree.Expression:
         at = at_of(items[0])

@@ -1,9 +1,9 @@
-"""Conditional pragmas: selects one branch of each {IF ...} before anything else reads the text.
+"""Conditional pragmas: selects one branch of each {IF ...} before the text is parsed.
 
 Supported pragmas of CODESYS ("Conditional Pragmas") and TwinCAT: {define name}, {define name 'text'}, {undefine name},
 {IF}, {ELSIF}, {ELSE}, {END_IF}. Supported in conditions: defined (name), hasvalue (name, 'text'), NOT, AND, OR and
 parentheses. {error 'text'} in a selected branch is an error. Conditional pragmas may stand anywhere between words, in
-declarations too, and within each other.
+declarations too, and may be nested.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from conveyor_sim.control.st.errors import SourceError
 from conveyor_sim.control.st.mistakes import place_of
 
 LONGEST = 1000
-"""Characters of a condition."""
+"""Largest number of characters in a condition."""
 
 DEEPEST = 60
-"""{IF ...} one within the other, and parentheses in a condition."""
+"""Largest depth of nested {IF ...}, and of parentheses in a condition."""
 
 _ANY = re.compile(r"\{\s*#?\s*(if|els|end_?if|define|undef|error)", re.IGNORECASE)
 _PART = re.compile(
@@ -49,7 +49,7 @@ class _If:
 
 
 def selected(text: str) -> str:
-    """Return a text with blanks in place of conditional pragmas and of the branches that they leave out.
+    """Return a text with blanks in place of conditional pragmas and of unselected branches.
 
     Every other character keeps its line and column. Raise SourceError.
     """
@@ -60,9 +60,9 @@ class _Reader:
     def __init__(self, text: str) -> None:
         self._text = text
         self.defined: dict[str, str] = {}
-        """Text by name, "" without one; names as they are written."""
+        """Text by defined name, "" without one. Case matters."""
         self._before: dict[str, str] | None = None
-        """Within a unit: definitions outside of it, which hold again at its end."""
+        """Inside a unit: definitions outside it, which apply again after its end."""
         self._configured = False
         self._open: list[_If] = []
         self._left_out: list[tuple[int, int]] = []
@@ -107,7 +107,7 @@ class _Reader:
         return "".join([*pieces, self._text[place:]])
 
     def _word(self, start: int, name: str) -> None:
-        """Take a word of a selected part in: each unit has its own definitions, and texts do not replace names."""
+        """Process a word of a selected part. Each unit has separate definitions, and texts do not replace names."""
         upper = name.upper()
         if upper in ("CONFIGURATION", "END_CONFIGURATION"):
             self._configured = upper == "CONFIGURATION"
@@ -165,9 +165,9 @@ class _Reader:
         """Return the name, unless it differs from a defined one in capitals only."""
         other = next((one for one in self.defined if one.lower() == name.lower() and one != name), None)
         if other is not None:
-            self.refuse(at, f"found {name}, expected {other}, as {{define}} has it")
+            self.refuse(at, f"found {name}, expected {other}, as in {{define}}")
         if name.lower() in _OF_THE_TARGET:
-            self.refuse(at, f"found {name}, expected a name of a {{define}}: no target is known here")
+            self.refuse(at, f"found {name}, expected a name of a {{define}}, because there is no target")
         return name
 
     def refuse(self, at: int, words: str) -> NoReturn:
@@ -176,7 +176,7 @@ class _Reader:
 
 
 class _Condition:
-    """A condition, by the precedence of NOT, AND, OR."""
+    """Condition with the precedence of NOT, AND, OR."""
 
     def __init__(self, reader: _Reader, at: int, text: str) -> None:
         self._reader, self._at, self._text = reader, at, text
@@ -244,9 +244,9 @@ class _Condition:
         return self._reader.known(self._at, name)
 
     def _next(self, word: str) -> bool:
-        found = self._place < len(self._tokens) and self._tokens[self._place].upper() == word
-        self._place += found
-        return found
+        matches = self._place < len(self._tokens) and self._tokens[self._place].upper() == word
+        self._place += matches
+        return matches
 
     def _need(self, word: str) -> None:
         if not self._next(word):
@@ -254,5 +254,5 @@ class _Condition:
 
     def _unexpected(self) -> NoReturn:
         words = "expected defined (name) and hasvalue (name, 'text'), with NOT, AND, OR and parentheses"
-        found = self._tokens[self._place] if self._place < len(self._tokens) else "its end"
-        self._reader.refuse(self._at, f"found {found} in the condition {self._text[:60]!r}, {words}")
+        token = self._tokens[self._place] if self._place < len(self._tokens) else "its end"
+        self._reader.refuse(self._at, f"found {token} in the condition {self._text[:60]!r}, {words}")

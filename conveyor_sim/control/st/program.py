@@ -1,4 +1,4 @@
-"""A program that runs: its instances, its tasks, the budget of a scan, restarts and snapshots."""
+"""Running program: instances, tasks, the budget of a scan, restarts and snapshots."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from conveyor_sim.control.st.variables import Variable, dump, leaves, load, reta
 from conveyor_sim.control.st.work import handling, searching
 
 BUDGET = 1_000_000
-"""Statements that all programs of a file may execute in one scan (`work.py`): more than a PLC has time for, and at most
-about a second here."""
+"""Largest number of statements of all programs of a file in one scan (`work.py`): more than a PLC has time for, and
+at most about a second here."""
 
 MOST_VARIABLES = 100_000
-"""That can be read by name."""
+"""Largest number of variables that can be read by name."""
 
 
 class _Clock:
-    """What the code sees of the world: the time, and what is left of the budget."""
+    """Time and remaining budget, as the code sees them."""
 
     __slots__ = ("left", "now")
 
@@ -35,10 +35,13 @@ class _Clock:
 
 
 class Program:
-    """All instances of a file. Two of them share nothing but the code."""
+    """All instances of a file. Two programs share only the code."""
 
     def __init__(self, compiled: Compiled, budget: int = BUDGET) -> None:
-        """budget: statements in one scan, beyond which the watchdog stops it."""
+        """Build the instances.
+
+        budget: largest number of statements in one scan; the watchdog stops a program that exceeds it.
+        """
         self.compiled = compiled
         self.budget = budget
         self._clock = _Clock()
@@ -56,9 +59,9 @@ class Program:
         self._variables: dict[str, Variable] = {}
 
     def run(self, now: int) -> bool:
-        """Run the programs that are due at a time (ns), in the order of their priority; whether there was any.
+        """Run the programs that are due at a time (ns), by priority. Return True if there was any.
 
-        Raises StructuredTextError, with file, line and column, for what stops the program.
+        Raise StructuredTextError, with file, line and column, if a program stops.
         """
         self._clock.now, self._clock.left = now, self.budget
         ran = False
@@ -67,15 +70,15 @@ class Program:
             due = self._due.get(name, now)
             if now < due:
                 continue
-            # What should have run in between is not made up for.
+            # Missed runs are not made up.
             self._due[name] = now + one.interval - (now - due) % one.interval if one.interval else now + 1
             ran = True
             try:
                 self.instances[name].run(now)
             except (Fault, ArithmeticError, RecursionError, MemoryError, ValueError) as error:
-                text = str(error) if isinstance(error, Fault) else f"found a value that can't be ({error})"
+                text = str(error) if isinstance(error, Fault) else f"found an impossible value ({error})"
                 if isinstance(error, RecursionError):
-                    text = "found calls too deep within each other, expected fewer levels"
+                    text = "found calls nested too deeply, expected fewer levels"
                 raise StructuredTextError(f"{self._place(error.__traceback__)}: {text}") from None
         return ran
 
@@ -83,7 +86,10 @@ class Program:
         raise Fault(f"watchdog: found more than {self.budget} statements in one scan, expected fewer")
 
     def _copied_large(self, value: Any, count: int) -> Any:
-        """Return a copy of an array or a structure. count: statements that the copy counts as."""
+        """Return a copy of an array or a structure.
+
+        count: statements that the copy counts as.
+        """
         self._spend(count)
         return copied(value)
 
@@ -92,12 +98,12 @@ class Program:
         overwrite(target, value)
 
     def _counted(self, function: Callable[..., Any]) -> Callable[..., Any]:
-        """Return a function of texts that counts by their present lengths."""
+        """Return a text function whose work counts by the present lengths."""
         work = searching if function is find else handling
 
-        def call(*given: Any) -> Any:
-            self._spend(work(*given))
-            return function(*given)
+        def call(*arguments: Any) -> Any:
+            self._spend(work(*arguments))
+            return function(*arguments)
 
         return call
 
@@ -110,16 +116,15 @@ class Program:
         self._written[identity(*variable)] = line, column
 
     def _place(self, traceback: TracebackType | None) -> str:
-        """File, line and column of the innermost statement that was being carried out."""
-        found, file = "", self.compiled.file
+        """Return file, line and column of the innermost statement that was being executed."""
+        place, file = "", self.compiled.file
         while traceback is not None:
             if traceback.tb_frame.f_code.co_filename == f"<{file}>":
                 at = self.compiled.positions[traceback.tb_lineno - 1]
-                found = f":{at.line}:{at.column}" if at is not None else found
+                place = f":{at.line}:{at.column}" if at is not None else place
             traceback = traceback.tb_next
-        return f"{file}{found}"
+        return f"{file}{place}"
 
-    # Variables by name
     @property
     def variables(self) -> Mapping[str, Variable]:
         """Elementary values by name: main/speed, main/timer/et, main/a[3]; global ones without a program's name."""
@@ -131,22 +136,21 @@ class Program:
         owners: list[tuple[str, Any, Type]] = [("", self.globals, self.compiled.globals)]
         owners += [(one.name.lower(), self.instances[one.name.lower()], one.type) for one in self.compiled.programs]
         for prefix, owner, kind in owners:
-            for name, way, leaf in leaves(kind, prefix):
-                yield name, Variable(owner, way, leaf)
+            for name, path, leaf in leaves(kind, prefix):
+                yield name, Variable(owner, path, leaf)
 
     def last_written(self, variable: Variable) -> str:
-        """File, line and column of the statement that wrote a variable last, "" if none did.
+        """Return file, line and column of the last statement that wrote a variable, "" if none did.
 
-        Raises StructuredTextError if the program was not compiled to trace.
+        Raise StructuredTextError if the program was compiled without `trace`.
         """
         if not self.compiled.trace:
             raise StructuredTextError(f"{self.compiled.file}: found a program without a trace, expected trace=True")
         at = self._written.get(variable.root())
         return f"{self.compiled.file}:{at[0]}:{at[1]}" if at else ""
 
-    # State
     def snapshot(self) -> dict[str, Any]:
-        """All that changes, as plain data (json)."""
+        """Return all state as plain data (JSON)."""
         return {
             "program": self.compiled.digest,
             "due": dict(self._due),
@@ -155,7 +159,7 @@ class Program:
         }
 
     def restore(self, data: Mapping[str, Any]) -> None:
-        """Go on from a snapshot. Raises StructuredTextError for one of another program."""
+        """Restore a snapshot. Raise StructuredTextError for one of another program."""
         if data.get("program") != self.compiled.digest:
             raise StructuredTextError(
                 f"{self.compiled.file}: found a snapshot of another program, expected one of this"
@@ -173,7 +177,7 @@ class Program:
         self._due = dict(data["due"])
 
     def restart(self, warm: bool) -> None:
-        """Start anew: cold with all variables as they are declared, warm with those of RETAIN as they were."""
+        """Restart: cold with all variables as declared, warm with RETAIN variables as they were."""
         before = [(self.compiled.globals, self.globals)]
         before += [(one.type, self.instances[one.name.lower()]) for one in self.compiled.programs]
         self._begin()
@@ -185,7 +189,7 @@ class Program:
 
 
 def python_value(kind: Type, number: float) -> Any:
-    """A signal's value as a variable has it. Raises StructuredTextError where the type can't hold it."""
+    """Return a signal's value for a variable. Raise StructuredTextError if the type can't hold it."""
     base = kind.base
     if base.kind == "bool":
         return number >= 0.5

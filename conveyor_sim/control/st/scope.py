@@ -1,4 +1,4 @@
-"""What names mean inside a unit: its own variables, global ones, constants, values of enumerations."""
+"""Meaning of names in a unit: local variables, global ones, constants, values of enumerations."""
 
 from __future__ import annotations
 
@@ -13,42 +13,42 @@ from conveyor_sim.control.st.values import Place, Value, constant
 
 @dataclass(frozen=True)
 class Thing:
-    """A name that is no variable, in words."""
+    """Meaning of a name that is no variable, in words."""
 
     what: str
 
 
 @dataclass
 class Names:
-    """What is known in all units of a file, by name in small letters; it grows as the file is read."""
+    """Names known in all units of a file, in small letters. They grow as the file is read."""
 
     types: dict[str, Type] = field(default_factory=dict)
     """Derived types, blocks and programs."""
     functions: dict[str, BlockType] = field(default_factory=dict)
     globals: BlockType = field(default_factory=lambda: BlockType("VAR_GLOBAL", "block", python="_Globals"))
     values: dict[str, list[Enumeration]] = field(default_factory=dict)
-    """Which enumerations have a value of a name."""
+    """Enumerations that have a value of a name."""
     reading: set[str] = field(default_factory=set)
-    """Global variables that are being taken up."""
+    """Global variables that are being declared."""
     read: Callable[[str], None] = lambda key: None
-    """Takes up the global variable of a name, if it stands further down in the file."""
+    """Declares the global variable of a name, if it follows later in the file."""
 
     def global_(self, key: str) -> Member | None:
-        """A global variable; None if there is none of that name."""
+        """Return a global variable; None if there is none of that name."""
         if key not in self.globals.members:
             self.read(key)
         return self.globals.members.get(key)
 
 
 class Scope:
-    """The names of one unit; with `unit` None those outside of all units."""
+    """Names of one unit, or those outside all units if `unit` is None."""
 
     def __init__(self, names: Names, unit: BlockType | None) -> None:
         self.names = names
         self.unit = unit
 
     def find(self, at: Position, name: str) -> Place | Thing:
-        """A variable, or what else the name is. Raises SourceError for a name that nothing has."""
+        """Return the variable or other meaning of a name. Raise SourceError for an unknown name."""
         key = name.lower()
         if self.unit is not None and (member := self.unit.members.get(key)):
             if member.section == "VAR_EXTERNAL":
@@ -67,7 +67,7 @@ class Scope:
         raise SourceError(at, f"found {name}, which is not declared, expected a variable{hint}")
 
     def value(self, at: Position, name: str) -> Value:
-        """What a name comes to where a value is expected. Raises SourceError."""
+        """Return the value of a name. Raise SourceError."""
         key = name.lower()
         own = self.unit is not None and key in self.unit.members
         if not own and (kinds := self.names.values.get(key)) and self.names.global_(key) is None:
@@ -75,13 +75,13 @@ class Scope:
                 listed = " or ".join(f"{kind.name}#{name}" for kind in kinds)
                 raise SourceError(at, f"found {name}, which several types have, expected {listed}")
             return constant(at, kinds[0], kinds[0].value(name))
-        found = self.find(at, name)
-        if isinstance(found, Thing):
-            raise SourceError(at, f"found {name}, {found.what}, expected a value")
-        return found
+        named = self.find(at, name)
+        if isinstance(named, Thing):
+            raise SourceError(at, f"found {name}, {named.what}, expected a value")
+        return named
 
     def enumeration(self, name: str) -> Enumeration | None:
-        """The enumeration of a name, unless a variable hides it."""
+        """Return the enumeration of a name, unless a variable hides it."""
         kind = self.names.types.get(name.lower())
         hidden = self.unit is not None and name.lower() in self.unit.members
         return kind if isinstance(kind, Enumeration) and not hidden else None
@@ -109,7 +109,10 @@ class Scope:
 
 
 def place_of(at: Position, owner: str, member: Member, inside: bool) -> Place:
-    """A variable of an object; inside: of the unit that it belongs to."""
+    """Return a variable of an object.
+
+    inside: True in the unit that the variable belongs to.
+    """
     slot = member.slot
     if member.section == "VAR_IN_OUT":
         reference = f"{owner}.{slot}"

@@ -1,6 +1,6 @@
-"""Sections of variables: which qualifiers each takes in each kind of unit, and what a qualifier means there.
+"""Sections of variables: allowed qualifiers by kind of unit, and their meaning.
 
-IEC 61131-3:2013, table 13 and 6.5.6; CODESYS and TwinCAT for PERSISTENT and VAR_INPUT CONSTANT.
+Sources: IEC 61131-3:2013, table 13 and 6.5.6; CODESYS and TwinCAT for PERSISTENT and VAR_INPUT CONSTANT.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ OUTSIDE = "outside of all units"
 """The place of VAR_GLOBAL: a file, a CONFIGURATION or a RESOURCE."""
 
 _VAR = ("CONSTANT", "RETAIN", "NON_RETAIN", "PERSISTENT")
-_KEPT = ("RETAIN", "NON_RETAIN", "PERSISTENT")
+_RETENTION = ("RETAIN", "NON_RETAIN", "PERSISTENT")
 _IN_A_UNIT_WITH_MEMORY: Mapping[str, tuple[str, ...]] = {
     "VAR": _VAR,
-    "VAR_INPUT": ("CONSTANT", *_KEPT),
-    "VAR_OUTPUT": _KEPT,
+    "VAR_INPUT": ("CONSTANT", *_RETENTION),
+    "VAR_OUTPUT": _RETENTION,
     "VAR_EXTERNAL": ("CONSTANT",),
     "VAR_TEMP": (),
 }
@@ -52,21 +52,21 @@ def meaning(section: tree.VariableSection, unit: str) -> tuple[str, ...]:
     counts. Raise SourceError for a section or qualifier that the unit does not take.
     """
     allowed = TAKES[unit]
-    name, given = section.section, section.qualifiers
+    name, qualifiers = section.section, section.qualifiers
     if name not in allowed:
         where = "" if unit == OUTSIDE else f" in a {unit}"
         expected = f"one of {', '.join(allowed)}" if len(allowed) > 1 else next(iter(allowed))
         raise SourceError(section.at, f"found {name}, expected {expected}{where}")
-    for one in given:
+    for one in qualifiers:
         if one not in allowed[name]:
             takes = f"with {' or '.join(allowed[name])}" if allowed[name] else "without a qualifier"
             where = "" if unit == OUTSIDE else f" in a {unit}"
             raise SourceError(section.at, f"found {name} {one}{where}, expected {name} {takes}")
-    if len(given) > 1 and (len(set(given)) != len(given) or set(given) not in _PAIRS):
-        raise SourceError(section.at, f"found {' '.join(given)}, expected one of them")
-    found = set(given)
-    if "PERSISTENT" in found:
-        found.add("RETAIN")
+    if len(qualifiers) > 1 and (len(set(qualifiers)) != len(qualifiers) or set(qualifiers) not in _PAIRS):
+        raise SourceError(section.at, f"found {' '.join(qualifiers)}, expected one of them")
+    applied = set(qualifiers)
+    if "PERSISTENT" in applied:
+        applied.add("RETAIN")
     if name == "VAR_INPUT":
-        found.discard("CONSTANT")
-    return tuple(sorted(found))
+        applied.discard("CONSTANT")
+    return tuple(sorted(applied))

@@ -1,4 +1,4 @@
-"""Statements: each is checked, and becomes lines of Python that know where they come from."""
+"""Statements: each is checked, and becomes lines of Python with positions in the program."""
 
 from __future__ import annotations
 
@@ -19,17 +19,21 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 MOST_LOOPS = 15
-"""One within the other; Python has 20."""
+"""Largest depth of nested loops; Python allows 20."""
 
 MOST_BRANCHES = 1000
-"""Of one IF or CASE; Python's compiler takes each for one level more, and has some 2900."""
+"""Largest number of branches of one IF or CASE. Python's compiler counts one level per branch, and allows about
+2900."""
 
 MOST_CODE = 32_000_000
-"""Characters of Python that a file may become: long constants stand where they are used."""
+"""Largest number of characters of Python for a file. Long constants are copied to every use."""
 
 
 class CodeLines:
-    """Python source as it grows; `positions[n]` is where line n + 1 comes from, None for what is not of the program."""
+    """Python source as it grows.
+
+    `positions[n]` is the position of line n + 1 in the program, None for lines without one.
+    """
 
     def __init__(self) -> None:
         self.lines: list[str] = []
@@ -53,14 +57,14 @@ class CodeLines:
 
     @contextmanager
     def inner(self) -> Iterator[None]:
-        """What follows is a level deeper."""
+        """Indent the lines added in this context."""
         self._depth += 1
         yield
         self._depth -= 1
 
 
 class Statements:
-    """Of one unit."""
+    """Statements of one unit."""
 
     def __init__(self, lines: CodeLines, expressions: Expressions, calls: CallCompiler) -> None:
         self._lines = lines
@@ -74,7 +78,10 @@ class Statements:
         self._jumps = 0
 
     def block(self, body: tree.Block, at: Position, count: int = 0) -> None:
-        """Write a list of statements, a level deeper. count: statements that entering the block counts as."""
+        """Write a list of statements, indented.
+
+        count: statements that entering the block counts as.
+        """
         outer = self._counter, self._counted
         with self._lines.inner():
             self._counter = None
@@ -83,7 +90,7 @@ class Statements:
             for statement in body:
                 jumps = self._jumps
                 self._statement(statement)
-                if self._jumps != jumps:  # the statements after it may not be reached
+                if self._jumps != jumps:  # later statements may not be reached
                     self._counter = None
             if not (body or count):
                 self._lines.add("pass")
@@ -162,7 +169,10 @@ class Statements:
         self._otherwise(node, "else:", statements(work))
 
     def _otherwise(self, node: tree.If | tree.Case, word: str, count: int) -> None:
-        """Write an ELSE. count: statements for the conditions before it, which need a branch even without an ELSE."""
+        """Write an ELSE.
+
+        count: statements for the conditions before it, which need a branch even without an ELSE.
+        """
         if node.otherwise or count:
             self._lines.add(word)
             self.block(node.otherwise, node.at, count)
@@ -229,7 +239,7 @@ class Statements:
             self._lines.add(control.write(f"_after({rounds}, {kind.low}, {kind.high})"), node.at)
 
     def _wide(self, value: Value, kind: Type) -> str:
-        """Return code of the last value or the step of a FOR: not assigned, so as wide as it was computed."""
+        """Return the code of the last value or the step of a FOR, as wide as it was computed."""
         code = converted(value, kind)
         return code if value.literal or value.span is None or isinstance(kind, Subrange) else operand(value, kind)
 
@@ -248,7 +258,7 @@ class Statements:
         self._body(node.body, node.at, work)
 
     def _repeat(self, node: tree.Repeat) -> None:
-        # The condition comes at the top, so that CONTINUE comes to it.
+        # The condition is at the top, so that CONTINUE reaches it.
         first = self._name("q")
         self._lines.add(f"{first} = True", node.at)
         self._lines.add(f"while {first} or not ({self._expressions.condition(node.until)}):", node.until.at)
@@ -257,10 +267,13 @@ class Statements:
         self._body(node.body, node.at, self._expressions.take_work())
 
     def _body(self, body: tree.Block, at: Position, work: int = 0) -> None:
-        """Write the body of a loop, each round of which counts as a statement. work: of its condition."""
+        """Write the body of a loop. Each round counts as a statement.
+
+        work: of its condition.
+        """
         self._loops += 1
         if self._loops > MOST_LOOPS:
-            raise SourceError(at, f"found {self._loops} loops one within the other, expected at most {MOST_LOOPS}")
+            raise SourceError(at, f"found {self._loops} loops nested in each other, expected at most {MOST_LOOPS}")
         self.block(body, at, 1 + statements(work))
         self._loops -= 1
 
@@ -276,6 +289,6 @@ class Statements:
 
 
 def _require_few(at: Position, what: str, count: int) -> None:
-    """Raises SourceError for more than MOST_BRANCHES."""
+    """Raise SourceError for more than MOST_BRANCHES."""
     if count > MOST_BRANCHES:
         raise SourceError(at, f"found {count} {what}, expected at most {MOST_BRANCHES}")

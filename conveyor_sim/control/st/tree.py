@@ -1,4 +1,4 @@
-"""The syntax tree of a program: what was written, with its positions, and nothing that follows from it."""
+"""Syntax tree of a program: the text with its positions, without derived properties."""
 
 from __future__ import annotations
 
@@ -10,37 +10,40 @@ from conveyor_sim.control.st.errors import Position
 
 @dataclass(frozen=True)
 class Node:
-    """Anything that stands in the text."""
+    """Part of the text."""
 
     at: Position
 
 
 @dataclass(frozen=True)
 class Expression(Node):
-    """What has a value."""
+    """Expression with a value."""
 
 
 @dataclass(frozen=True)
 class Literal(Expression):
-    """A value as it is written; `kind` int or real where no type stands before it, "" where one does."""
+    """Literal value.
+
+    `kind` is int or real for a number without a type.
+    """
 
     text: str
     kind: OneOf["int", "real", "bool", "time", "string", "wide"]
     value: int | float | bool | str
     type: str = ""
-    """The type that stands before it: "UINT" of UINT#5."""
+    """Type before the value: "UINT" in UINT#5."""
 
 
 @dataclass(frozen=True)
 class Name(Expression):
-    """A variable, a constant or a value of an enumeration."""
+    """Variable, constant or value of an enumeration."""
 
     name: str
 
 
 @dataclass(frozen=True)
 class EnumValue(Expression):
-    """Color#Red"""
+    """Value of an enumeration with its type: Color#Red."""
 
     type: str
     name: str
@@ -48,7 +51,7 @@ class EnumValue(Expression):
 
 @dataclass(frozen=True)
 class MemberAccess(Expression):
-    """A field of a structure, a variable of a block, or Color.Red."""
+    """Field of a structure, variable of a block, or Color.Red."""
 
     base: Expression
     name: str
@@ -56,7 +59,7 @@ class MemberAccess(Expression):
 
 @dataclass(frozen=True)
 class Item(Expression):
-    """An element of an array."""
+    """Element of an array."""
 
     base: Expression
     indices: tuple[Expression, ...]
@@ -64,7 +67,7 @@ class Item(Expression):
 
 @dataclass(frozen=True)
 class Bit(Expression):
-    """A bit of a bit string: w.3 or w.%X3."""
+    """Bit of a bit string: w.3 or w.%X3."""
 
     base: Expression
     number: int
@@ -72,7 +75,7 @@ class Bit(Expression):
 
 @dataclass(frozen=True)
 class Unary(Expression):
-    """-x, +x or NOT x."""
+    """Operation with one operand: -x, +x or NOT x."""
 
     operator: str
     operand: Expression
@@ -80,7 +83,7 @@ class Unary(Expression):
 
 @dataclass(frozen=True)
 class Binary(Expression):
-    """left operator right; the operator in capitals."""
+    """Operation with two operands. The operator is in capitals."""
 
     operator: str
     left: Expression
@@ -89,7 +92,10 @@ class Binary(Expression):
 
 @dataclass(frozen=True)
 class Argument(Node):
-    """One argument of a call. name: None by position. output: given by =>; negated: NOT Q => x."""
+    """Argument of a call.
+
+    name: None for an argument by position. output: passed by =>. negated: NOT Q => x.
+    """
 
     name: str | None
     value: Expression
@@ -99,7 +105,7 @@ class Argument(Node):
 
 @dataclass(frozen=True)
 class Call(Expression):
-    """A function or a block, called."""
+    """Call of a function or a block."""
 
     target: Expression
     arguments: tuple[Argument, ...]
@@ -107,26 +113,26 @@ class Call(Expression):
 
 @dataclass(frozen=True)
 class InitialArray(Expression):
-    """[1, 2, 3(0)] with the repetitions still in it."""
+    """Initial values of an array: [1, 2, 3(0)], with repetitions not expanded."""
 
     elements: tuple[tuple[int, Expression | None], ...]
 
 
 @dataclass(frozen=True)
 class InitialStructure(Expression):
-    """(x := 1, y := 2), of a structure or of a block."""
+    """Initial values of a structure or a block: (x := 1, y := 2)."""
 
     fields: tuple[tuple[Position, str, Expression], ...]
 
 
 @dataclass(frozen=True)
 class Statement(Node):
-    """What is carried out."""
+    """Statement of a body."""
 
 
 @dataclass(frozen=True)
 class Assignment(Statement):
-    """target := value"""
+    """Assignment: target := value."""
 
     target: Expression
     value: Expression
@@ -134,14 +140,14 @@ class Assignment(Statement):
 
 @dataclass(frozen=True)
 class CallStatement(Statement):
-    """A block or a function, called for what it does."""
+    """Call of a block or a function as a statement."""
 
     call: Call
 
 
 @dataclass(frozen=True)
 class If(Statement):
-    """Conditions with what they guard, and what is done without any of them."""
+    """IF with its branches and ELSE."""
 
     branches: tuple[tuple[Expression, Block], ...]
     otherwise: Block
@@ -149,7 +155,7 @@ class If(Statement):
 
 @dataclass(frozen=True)
 class Case(Statement):
-    """Labels are single values, or ranges of two."""
+    """CASE. Labels are single values, or ranges of two."""
 
     selector: Expression
     choices: tuple[tuple[tuple[tuple[Expression, Expression | None], ...], Block], ...]
@@ -158,7 +164,7 @@ class Case(Statement):
 
 @dataclass(frozen=True)
 class For(Statement):
-    """step: None is 1."""
+    """FOR. A missing step is None and means 1."""
 
     control: Expression
     first: Expression
@@ -169,7 +175,7 @@ class For(Statement):
 
 @dataclass(frozen=True)
 class While(Statement):
-    """The condition is looked at before each round."""
+    """WHILE. The condition is evaluated before each round."""
 
     condition: Expression
     body: Block
@@ -177,7 +183,7 @@ class While(Statement):
 
 @dataclass(frozen=True)
 class Repeat(Statement):
-    """The condition that ends it is looked at after each round."""
+    """REPEAT. The end condition is evaluated after each round."""
 
     body: Block
     until: Expression
@@ -195,12 +201,15 @@ Block = tuple[Statement, ...]
 
 @dataclass(frozen=True)
 class TypeSpec(Node):
-    """How a type is written where it is used."""
+    """Type as written at its use."""
 
 
 @dataclass(frozen=True)
 class NamedType(TypeSpec):
-    """An elementary type, a derived one or a block. length: of STRING[20]."""
+    """Elementary type, derived type or block.
+
+    length: of STRING[20].
+    """
 
     name: str
     length: Expression | None = None
@@ -208,7 +217,7 @@ class NamedType(TypeSpec):
 
 @dataclass(frozen=True)
 class SubrangeType(TypeSpec):
-    """INT (0..100)"""
+    """Subrange of an integer type: INT (0..100)."""
 
     name: str
     low: Expression
@@ -217,7 +226,7 @@ class SubrangeType(TypeSpec):
 
 @dataclass(frozen=True)
 class ArrayType(TypeSpec):
-    """ARRAY [1..3, 0..7] OF INT"""
+    """Array type: ARRAY [1..3, 0..7] OF INT."""
 
     ranges: tuple[tuple[Expression, Expression], ...]
     element: TypeSpec
@@ -225,7 +234,7 @@ class ArrayType(TypeSpec):
 
 @dataclass(frozen=True)
 class EnumType(TypeSpec):
-    """(Red, Green := 5) with the type of its values, "" where none is given."""
+    """Enumeration: (Red, Green := 5), with the type of its values, "" if not stated."""
 
     values: tuple[tuple[Position, str, Expression | None], ...]
     base: str
@@ -233,14 +242,14 @@ class EnumType(TypeSpec):
 
 @dataclass(frozen=True)
 class StructureType(TypeSpec):
-    """STRUCT ... END_STRUCT"""
+    """Structure type: STRUCT ... END_STRUCT."""
 
     fields: tuple[VariableDeclaration, ...]
 
 
 @dataclass(frozen=True)
 class VariableDeclaration(Node):
-    """One variable of a section."""
+    """Declaration of one variable."""
 
     name: str
     type: TypeSpec
@@ -251,7 +260,10 @@ class VariableDeclaration(Node):
 
 @dataclass(frozen=True)
 class VariableSection(Node):
-    """A section of variables. section: VAR, VAR_INPUT, ...; qualifiers: CONSTANT, RETAIN, ..."""
+    """Section of variables.
+
+    section: VAR, VAR_INPUT, ...; qualifiers: CONSTANT, RETAIN, ...
+    """
 
     section: str
     qualifiers: tuple[str, ...]
@@ -260,7 +272,7 @@ class VariableSection(Node):
 
 @dataclass(frozen=True)
 class TypeDeclaration(Node):
-    """name : type := initial, in TYPE ... END_TYPE."""
+    """Declaration in TYPE ... END_TYPE: name : type := initial."""
 
     name: str
     type: TypeSpec
@@ -269,7 +281,7 @@ class TypeDeclaration(Node):
 
 @dataclass(frozen=True)
 class ProgramUnit(Node):
-    """A program organisation unit."""
+    """Program organisation unit."""
 
     kind: OneOf["FUNCTION", "FUNCTION_BLOCK", "PROGRAM"]
     name: str
@@ -280,17 +292,20 @@ class ProgramUnit(Node):
 
 @dataclass(frozen=True)
 class Task(Node):
-    """A task, with INTERVAL and PRIORITY as they are written."""
+    """Task, with INTERVAL and PRIORITY as written."""
 
     name: str
     fields: tuple[tuple[Position, str, Expression], ...]
     resource: str = ""
-    """In which it stands, in small letters; "" outside of all."""
+    """Resource that contains it, in small letters; "" outside of all."""
 
 
 @dataclass(frozen=True)
 class Instance(Node):
-    """PROGRAM name WITH task : type; task "" where none is given. resource: as of a task."""
+    """Program instance: PROGRAM name WITH task : type.
+
+    task: "" if not stated. resource: as in Task.
+    """
 
     name: str
     task: str
@@ -300,7 +315,7 @@ class Instance(Node):
 
 @dataclass(frozen=True)
 class Configuration(Node):
-    """What runs, with the resources' tasks and programs taken together."""
+    """CONFIGURATION. Tasks and programs of all resources are combined."""
 
     name: str
     globals: tuple[VariableSection, ...]
@@ -310,7 +325,7 @@ class Configuration(Node):
 
 @dataclass(frozen=True)
 class SourceFile:
-    """A whole file."""
+    """Whole file."""
 
     types: list[TypeDeclaration] = field(default_factory=list)
     globals: list[VariableSection] = field(default_factory=list)

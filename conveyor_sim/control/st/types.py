@@ -1,4 +1,4 @@
-"""The types of the standard: ranges, what converts to what by itself, and how code keeps a value in its type.
+"""Types of the standard: ranges, implicit conversions, and code that keeps values in range.
 
 Values are Python's: BOOL a bool; integers, bit strings and enumerations an int; REAL and LREAL a float, a REAL rounded
 to 32 bits; TIME and LTIME an int, ns; STRING a str; an array a list, nested by dimension; a structure or a block an
@@ -19,84 +19,88 @@ MOST_CHARACTERS = 32767
 Kind = Literal["bool", "int", "bits", "real", "time", "string", "enum", "array", "structure", "block", "void"]
 
 _LIST, _OBJECT, _MEMBER, _ELEMENTS = 4, 6, 2, 16
-"""Work of making one list, one object and one of its members; elements of a list that count 1 together (`work.py`)."""
+"""Work of building one list, one object and one of its members; number of list elements that count as 1 together
+(`work.py`)."""
 
 _SINGLE = array("f", [0.0])
 
 
 def single(value: float) -> float:
-    """The nearest number of 32 bits; beyond the largest it is infinite (IEEE 754)."""
+    """Return the nearest 32-bit number; infinite beyond the largest one (IEEE 754)."""
     _SINGLE[0] = value
     return _SINGLE[0]
 
 
 @dataclass(frozen=True)
 class Type:
-    """A type, by the name that it has in messages. low, high: bounds of what is a whole number."""
+    """Type, by its name in messages.
+
+    low, high: bounds of a whole number.
+    """
 
     name: str
     kind: Kind
     low: int = 0
     high: int = 0
     start: str = field(default="", compare=False)
-    """Code of the initial value that the type is declared with; "" where it is declared without."""
+    """Code of the initial value in the type's declaration, "" if there is none."""
 
     @property
     def base(self) -> Type:
-        """What operators see of it."""
+        """Type as operators see it."""
         return self
 
     @property
     def initial(self) -> str:
-        """Code of the value that a variable has where none is given."""
+        """Code of the default initial value."""
         return self.start or {"bool": "False", "real": "0.0", "string": "''"}.get(self.kind, "0")
 
     @property
     def size(self) -> int:
-        """Elementary variables within one of it."""
+        """Number of elementary variables in one value."""
         return 1
 
     @property
     def characters(self) -> int:
-        """Sum of the declared lengths of all texts within one value."""
+        """Sum of the declared lengths of all texts in one value."""
         return self.high if self.kind == "string" else 0
 
     @property
     def work(self) -> int:
-        """Work of making or copying a value, beyond the statement itself."""
+        """Work of building or copying a value, beyond the statement itself."""
         return 0
 
     @property
     def width(self) -> int:
-        """Bits of a whole number."""
+        """Number of bits of a whole number."""
         return (self.high - self.low).bit_length()
 
     def wrapped(self, code: str) -> str:
-        """Code of a whole number, in two's complement of this width."""
+        """Return the code of a whole number, in two's complement of this width."""
         mask = (1 << self.width) - 1
         if self.low == 0:
             return f"({code} & {mask})"
         return f"(({code} + {-self.low} & {mask}) - {-self.low})"
 
     def wrap(self, value: int) -> int:
-        """The same of a value."""
+        """Return a value in two's complement of this width."""
         return (value - self.low & (1 << self.width) - 1) + self.low
 
 
 @dataclass(frozen=True)
 class Subrange(Type):
-    """Some of an integer type; a value outside of it stops the program."""
+    """Subrange of an integer type. A value outside of it stops the program."""
 
     of: Type = field(default_factory=lambda: Type("INT", "int"))
 
     @property
     def base(self) -> Type:
-        """The integer type."""
+        """Integer type of the subrange."""
         return self.of
 
     @property
     def initial(self) -> str:
-        """0, or the lowest value where that is not in the range."""
+        """Code of 0, or of the lowest value if 0 is not in the range."""
         return self.start or str(0 if self.low <= 0 <= self.high else self.low)
 
 
@@ -108,29 +112,29 @@ class Enumeration(Type):
 
     @property
     def initial(self) -> str:
-        """The first value."""
+        """Code of the first value."""
         return self.start or str(self.values[0][1])
 
     def value(self, name: str) -> int | None:
-        """That of a name, in any case."""
+        """Return the value of a name, regardless of case."""
         return next((value for other, value in self.values if other.lower() == name.lower()), None)
 
 
 @dataclass(frozen=True)
 class String(Type):
-    """Characters, at most `high` of them; what is longer is cut."""
+    """Text of at most `high` characters. Longer texts are cut."""
 
 
 @dataclass(frozen=True)
 class Array(Type):
-    """Indices of each dimension from the first to the last, and what lies there."""
+    """Array with an index range per dimension, and its element type."""
 
     ranges: tuple[tuple[int, int], ...] = ()
     element: Type = field(default_factory=lambda: Type("INT", "int"))
 
     @property
     def initial(self) -> str:
-        """A list of lists of the element's initial value, each its own."""
+        """Code of nested lists, with a separate initial value per element."""
         kind: Type = self.element
         code = kind.initial
         for low, high in reversed(self.ranges):
@@ -141,7 +145,7 @@ class Array(Type):
 
     @property
     def size(self) -> int:
-        """Of all its elements."""
+        """Number of elementary variables in all elements."""
         return math.prod(high - low + 1 for low, high in self.ranges) * self.element.size
 
     @property
@@ -159,59 +163,62 @@ class Array(Type):
 
 
 def repeated(kind: Type, code: str, count: int) -> str:
-    """Return code of `count` elements of a list, each with a separate value. code: one value of the type."""
+    """Return the code of `count` elements of a list, each with a separate value.
+
+    code: one value of the type.
+    """
     if count < 2:
         return code if count else ""
     return f"*[{code}] * {count}" if _fixed(kind) else f"*({code} for _ in range({count}))"
 
 
 def _fixed(kind: Type) -> bool:
-    """Return True if values of a type can't change, so that a list may hold one object many times."""
+    """Return True if values of a type can't change, so that a list may hold one object several times."""
     return not isinstance(kind, (Array, Structure))
 
 
 @dataclass(frozen=True)
 class Member:
-    """A field of a structure, or a variable of a block or program."""
+    """Field of a structure, or variable of a block or program."""
 
     name: str
     type: Type
     initial: str
-    """Code."""
+    """Code of the initial value."""
     section: str = "VAR"
     constant: bool = False
     retain: bool = False
     volatile: bool = False
-    """NON_RETAIN: a warm restart initialises it, also within an instance of RETAIN."""
+    """NON_RETAIN: a warm restart initialises the variable, also in an instance of RETAIN."""
     value: Any = None
-    """Of a constant."""
+    """Value of a constant."""
     address: str = ""
     tag: str = ""
     at: tuple[int, int] = (1, 1)
 
     @property
     def slot(self) -> str:
-        """Its name in Python."""
+        """Name in Python."""
         return f"v_{self.name.lower()}"
 
 
 @dataclass(frozen=True, eq=False)
 class Structure(Type):
-    """Named fields: an object of a class of its own in Python, as is a block."""
+    """Structure with named fields. In Python it is an object of a separate class, as is a block."""
 
     members: dict[str, Member] = field(default_factory=dict)
-    """By name in small letters."""
+    """Members by name in small letters."""
     python: str = ""
-    """The class."""
+    """Name of the class."""
 
     @property
     def initial(self) -> str:
-        """A new object."""
+        """Code of a new object."""
         return self.start or f"{self.python}()"
 
     @cached_property
     def size(self) -> int:  # once all members are known
-        """Of all its members but those that are elsewhere."""
+        """Number of elementary variables stored in the object."""
         return max(1, sum(one.type.size for one in self._own()))
 
     @cached_property
@@ -237,14 +244,17 @@ class Structure(Type):
 
 @dataclass(frozen=True, eq=False)
 class BlockType(Structure):
-    """A function block, a program or a function's frame. standard: one of the library, run with the time."""
+    """Function block, program, or frame of a function.
+
+    standard: a block of the standard library, run with the time.
+    """
 
     standard: bool = False
     function: bool = False
     result: Type | None = None
 
     def of(self, *sections: str) -> list[Member]:
-        """Variables of some sections, in their order."""
+        """Return the variables of some sections, in their order."""
         return [member for member in self.members.values() if member.section in sections]
 
 
@@ -272,9 +282,9 @@ ELEMENTARY = {t.name: t for t in (BOOL, *NUMBERS, *BITS, TIME, LTIME, STRING, WS
 
 
 def register(kind: Type) -> Type:
-    """Type of intermediate results of an integer type: 32 bits at least, as in CODESYS and TwinCAT.
+    """Return the type of intermediate results of an integer type: at least 32 bits, as in CODESYS and TwinCAT.
 
-    USINT and UINT have 64: neither DINT nor UDINT holds both their differences and their products.
+    USINT and UINT have 64 bits, because neither DINT nor UDINT holds both their differences and their products.
     """
     if kind.width >= DINT.width:
         return kind
@@ -282,12 +292,12 @@ def register(kind: Type) -> Type:
 
 
 def is_wide(kind: Type) -> bool:
-    """Whether a text is a WSTRING."""
+    """Return True for a WSTRING."""
     return kind.name.startswith("WSTRING")
 
 
 def fits(source: Type, target: Type) -> bool:
-    """Whether a value of one type is one of the other by itself (IEC 61131-3:2013, figure 12): nothing is ever lost."""
+    """Return True if a type converts implicitly to another one, without loss (IEC 61131-3:2013, figure 12)."""
     source, into = source.base, target.base
     if source == into or source.kind == into.kind == "time":
         return True
@@ -305,7 +315,7 @@ def fits(source: Type, target: Type) -> bool:
 
 
 def common(left: Type, right: Type) -> Type | None:
-    """The smallest type that both fit, in which they are compared and computed."""
+    """Return the smallest type that both types fit, for comparison and arithmetic; None if there is none."""
     if left.base.kind == right.base.kind == "time":
         return LTIME if LTIME in (left.base, right.base) else TIME
     if fits(left, right):

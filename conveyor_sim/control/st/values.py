@@ -1,4 +1,4 @@
-"""What an expression comes to: a type and Python code; and how it is made fit for where it goes."""
+"""Values of expressions: a type and Python code, and their conversion to a target type."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from conveyor_sim.control.st.types import (
 from conveyor_sim.control.st.work import copies
 
 NAMESPACE: dict[str, Any] = {**NAMES, **CLASSES, "_Memory": Memory, "_Cell": Cell}
-"""What code may call."""
+"""Names that the code may use."""
 
 _MOST = {REAL: "3.4028235E38", LREAL: "1.7976931348623157E308"}
 
@@ -45,19 +45,22 @@ _EXACT_IN_REAL = 1 << 24
 
 @dataclass(frozen=True)
 class Value:
-    """The code stands by itself: it is a name, a call or in brackets."""
+    """Value of an expression.
+
+    The code is a name, a call or in parentheses.
+    """
 
     at: Position
     type: Type
     code: str
     constant: Any = None
-    """What it is, where that is known."""
+    """Constant value, if it is known."""
     literal: str = ""
-    """int or real: a literal without a type, or computed of such; its type is that of its surroundings."""
+    """int or real for a literal without a type, or a result of such literals. Its type depends on the context."""
     raw: str = ""
-    """The code before it was brought into its type; for the next operator of the same kind."""
+    """Code before conversion to its type, for the next operator of the same kind."""
     kind: str = ""
-    """Of operators that raw may be followed by."""
+    """Kind of operators that may follow `raw`."""
     span: tuple[int, int] | None = None
     """Least and greatest value of an intermediate result, which may be wider than its integer type (`register`)."""
 
@@ -71,20 +74,20 @@ class Value:
 
 @dataclass(frozen=True)
 class Place(Value):
-    """A variable, or a part of one."""
+    """Variable, or a part of one."""
 
     write: Callable[[str], str] = str
-    """Code that gives it what some code is."""
+    """Returns the code that assigns the value of some code."""
     reference: str = ""
-    """Code that passes it as VAR_IN_OUT; "" where it can't be."""
+    """Code that passes the variable as VAR_IN_OUT; "" if that is impossible."""
     fixed: str = ""
-    """Why it can't be written; "" where it can."""
+    """Reason why it can't be written; "" if it can."""
     root: str = ""
-    """Code of the variable that it is part of: the object that it belongs to, and its slot."""
+    """Code of the variable that contains it: the object that it belongs to, and its slot."""
 
 
 def text_of(value: Any) -> str:
-    """Code of a constant."""
+    """Return the code of a constant."""
     if isinstance(value, float) and (value != value or value in (float("inf"), float("-inf"))):
         return f"float('{value}')"
     return (
@@ -93,12 +96,12 @@ def text_of(value: Any) -> str:
 
 
 def constant(at: Position, kind: Type, value: Any) -> Value:
-    """A value that is known."""
+    """Return a constant value."""
     return Value(at, kind, text_of(value), value)
 
 
 def untyped(at: Position, value: int | float) -> Value:
-    """A literal without a type."""
+    """Return a literal without a type."""
     if isinstance(value, float):
         return Value(at, LREAL, text_of(value), value, "real")
     kind = next((one for one in (INT, DINT, LINT, ULINT) if one.low <= value <= one.high), None)
@@ -108,7 +111,7 @@ def untyped(at: Position, value: int | float) -> Value:
 
 
 def folded(value: Value, *operands: Value) -> Value:
-    """The value, computed now if its operands are known."""
+    """Return the value, computed now if its operands are constants."""
     if any(one.constant is None for one in operands):
         return value
     try:
@@ -121,7 +124,7 @@ def folded(value: Value, *operands: Value) -> Value:
 
 
 def described(value: Value) -> str:
-    """What it is, in words."""
+    """Return a description of a value in words."""
     if value.literal:
         return f"the number {value.constant}"
     if value.constant is None:
@@ -132,7 +135,7 @@ def described(value: Value) -> str:
 
 
 def converts(value: Value, target: Type) -> bool:
-    """Whether it may stand where the type is expected."""
+    """Return True if a value converts implicitly to a type."""
     if value.literal:
         return target.base.kind == "real" or (value.literal == "int" and target.base.kind in ("int", "bits", "bool"))
     return fits(value.type, target)
@@ -155,7 +158,10 @@ def operand(value: Value, kind: Type) -> str:
 
 
 def converted(value: Value, target: Type, what: str = "") -> str:
-    """Code of the value in a type. what: it is expected for. Raises SourceError."""
+    """Return the code of a value in a type. Raise SourceError.
+
+    what: purpose of the value, for the message.
+    """
     expected = f"{target.name}{f' for {what}' if what else ''}"
     if not converts(value, target):
         raise SourceError(value.at, f"found {described(value)}, expected {expected}{_advice(value, target)}")
@@ -195,7 +201,10 @@ def converted(value: Value, target: Type, what: str = "") -> str:
 
 
 def assignment(place: Place, value: Value) -> str:
-    """Code that gives a variable a value. An array or a structure stays where it is: its parts may be passed on."""
+    """Return the code that assigns a value.
+
+    Arrays and structures are overwritten in place, because references to their parts may exist.
+    """
     code = converted(value, place.type)
     if not isinstance(place.type, (Array, Structure)):
         return place.write(code)
@@ -221,7 +230,7 @@ def _advice(value: Value, target: Type) -> str:
 
 
 def unified(left: Value, right: Value, hint: Type | None) -> Type | None:
-    """The type in which two values are computed or compared; None if there is none."""
+    """Return the type in which two values are computed or compared; None if there is none."""
     if left.literal and right.literal:
         return LREAL if "real" in (left.literal, right.literal) else common(left.type, right.type)
     for literal, other in ((left, right), (right, left)):

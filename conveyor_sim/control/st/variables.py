@@ -1,4 +1,4 @@
-"""The values of a program that runs: found by name, written out and read back as plain data."""
+"""Variables of a running program: access by name, and conversion to and from plain data."""
 
 from __future__ import annotations
 
@@ -12,77 +12,80 @@ from conveyor_sim.control.st.operations import Attribute, Element, StructureValu
 from conveyor_sim.control.st.types import Array, BlockType, Structure, Type
 
 Step = str | int
-"""A slot, or an index from 0."""
+"""Slot, or index from 0."""
 
 
 class Variable:
-    """One elementary value, at the end of a way that starts at a program's instance."""
+    """Elementary value, at the end of a path that starts at a program's instance."""
 
-    __slots__ = ("_last", "_owner", "_way", "type")
+    __slots__ = ("_last", "_owner", "_path", "type")
 
-    def __init__(self, owner: Any, way: tuple[Step, ...], kind: Type) -> None:
-        self._owner, self._way, self._last, self.type = owner, way[:-1], way[-1], kind
+    def __init__(self, owner: Any, path: tuple[Step, ...], kind: Type) -> None:
+        self._owner, self._path, self._last, self.type = owner, path[:-1], path[-1], kind
 
     def read(self) -> Any:
-        """Its value."""
-        holder = _at(self._owner, self._way)
+        """Return the value."""
+        holder = _at(self._owner, self._path)
         return holder[self._last] if isinstance(self._last, int) else getattr(holder, self._last)
 
     def write(self, value: Any) -> None:
-        """Give it one."""
-        holder = _at(self._owner, self._way)
+        """Write the value."""
+        holder = _at(self._owner, self._path)
         if isinstance(self._last, int):
             holder[self._last] = value
         else:
             setattr(holder, self._last, value)
 
     def root(self) -> tuple[int, str]:
-        """The innermost instance of a unit on the way, and the variable of it that this is part of."""
-        owner, found = self._owner, (0, "")
-        for step in (*self._way, self._last):
+        """Return the innermost instance of a unit on the path, and its variable that contains this value."""
+        owner, root = self._owner, (0, "")
+        for step in (*self._path, self._last):
             if isinstance(step, str) and not isinstance(owner, StructureValue):
-                found = identity(owner, step)
+                root = identity(owner, step)
             owner = owner[step] if isinstance(step, int) else getattr(owner, step)
-        return found
+        return root
 
     def number(self) -> float:
-        """Its value as a signal has it: a bool is 0 or 1, a TIME is in s, a text is its length."""
+        """Return the value as a number: a bool is 0 or 1, a TIME is in s, a text is its length."""
         value = self.read()
         if self.type.base.kind == "time":
             return float(value) * 1e-9
         return float(len(value)) if isinstance(value, str) else float(value)
 
 
-def _at(owner: Any, way: tuple[Step, ...]) -> Any:
-    for step in way:
+def _at(owner: Any, path: tuple[Step, ...]) -> Any:
+    for step in path:
         owner = owner[step] if isinstance(step, int) else getattr(owner, step)
     return owner
 
 
-def leaves(kind: Type, name: str, way: tuple[Step, ...] = ()) -> Iterator[tuple[str, tuple[Step, ...], Type]]:
-    """All elementary values within a type: name, way and type. Names are as in a program, with / before a member."""
+def leaves(kind: Type, name: str, path: tuple[Step, ...] = ()) -> Iterator[tuple[str, tuple[Step, ...], Type]]:
+    """Yield all elementary values in a type: name, path and type.
+
+    Names are as in a program, with / before a member.
+    """
     if isinstance(kind, Structure):
         for member in kind.members.values():
             if member.section not in ("VAR_IN_OUT", "VAR_EXTERNAL", "VAR_TEMP", "RESULT"):
                 yield from leaves(
-                    member.type, f"{name}/{member.name.lower()}" if name else member.name.lower(), (*way, member.slot)
+                    member.type, f"{name}/{member.name.lower()}" if name else member.name.lower(), (*path, member.slot)
                 )
     elif isinstance(kind, Array):
-        yield from _elements(kind, 0, name, way, "")
+        yield from _elements(kind, 0, name, path, "")
     else:
-        yield name, way, kind
+        yield name, path, kind
 
 
 def _elements(
-    kind: Array, dimension: int, name: str, way: tuple[Step, ...], indices: str
+    kind: Array, dimension: int, name: str, path: tuple[Step, ...], indices: str
 ) -> Iterator[tuple[str, tuple[Step, ...], Type]]:
     if dimension == len(kind.ranges):
-        yield from leaves(kind.element, f"{name}[{indices}]", way)
+        yield from leaves(kind.element, f"{name}[{indices}]", path)
         return
     low, high = kind.ranges[dimension]
     for index in range(low, high + 1):
         shown = f"{indices},{index}" if indices else str(index)
-        yield from _elements(kind, dimension + 1, name, (*way, index - low), shown)
+        yield from _elements(kind, dimension + 1, name, (*path, index - low), shown)
 
 
 def _slots(thing: Any) -> list[str]:
@@ -90,17 +93,17 @@ def _slots(thing: Any) -> list[str]:
 
 
 def dump(value: Any) -> Any:
-    """A value, or an object with all within it, as lists, mappings and plain values."""
+    """Return a value, or an object with all its content, as lists, mappings and plain values."""
     if isinstance(value, list):
         return [dump(one) for one in value]
     if isinstance(value, (bool, int, float, str)):
         return value
-    found = {slot: getattr(value, slot) for slot in _slots(value)}
-    return {slot: dump(one) for slot, one in found.items() if not isinstance(one, (Attribute, Element, type(None)))}
+    values = {slot: getattr(value, slot) for slot in _slots(value)}
+    return {slot: dump(one) for slot, one in values.items() if not isinstance(one, (Attribute, Element, type(None)))}
 
 
 def load(value: Any, data: Any) -> Any:
-    """What `dump` gave, put into an object like it; returns it. Raises StructuredTextError for what does not fit."""
+    """Restore an object from dumped data, and return it. Raise StructuredTextError for data that do not fit."""
     if isinstance(value, (bool, int, float, str)):
         if type(value) is not type(data):
             raise StructuredTextError(f"found {data!r:.50} in a snapshot, expected a {type(value).__name__}")
@@ -116,9 +119,10 @@ def load(value: Any, data: Any) -> Any:
 
 
 def retain(kind: Type, old: Any, new: Any, inherited: bool = False) -> None:
-    """Copy RETAIN variables from one value of a type to another, including blocks within it.
+    """Copy RETAIN variables from one value of a type to another, including blocks in it.
 
-    inherited: the instance itself is RETAIN, so all its variables are, except NON_RETAIN (IEC 61131-3:2013, 6.5.6.2).
+    inherited: True if the instance itself is RETAIN, so all its variables are, except NON_RETAIN (IEC 61131-3:2013,
+    6.5.6.2).
     """
     if isinstance(kind, Array):
         if isinstance(_innermost(kind), Structure):
@@ -136,10 +140,10 @@ def retain(kind: Type, old: Any, new: Any, inherited: bool = False) -> None:
         if member.section in ("VAR_IN_OUT", "VAR_EXTERNAL", "VAR_TEMP"):
             continue
         before, now = getattr(old, member.slot), getattr(new, member.slot)
-        kept = member.retain or (inherited and not member.volatile)
+        retained = member.retain or (inherited and not member.volatile)
         if isinstance(_innermost(member.type), Structure):
-            retain(member.type, before, now, kept)
-        elif kept:
+            retain(member.type, before, now, retained)
+        elif retained:
             setattr(new, member.slot, load(now, dump(before)))
 
 

@@ -9,24 +9,24 @@ from conveyor_sim.scene.parts.alarm import AlarmFields
 
 
 class AlarmState(IntEnum):
-    """The states of ISA-18.2, in its order (A to I there)."""
+    """States of ISA-18.2, in its order (A to I there)."""
 
     NORMAL = 0
     UNACKNOWLEDGED = 1
     ACKNOWLEDGED = 2
     RETURNED = 3
-    """To normal, not acknowledged."""
+    """Returned to normal, not acknowledged."""
     LATCHED_UNACKNOWLEDGED = 4
-    """Its condition is gone; it waits to be acknowledged, then reset."""
+    """The condition has ended; the alarm waits to be acknowledged, then reset."""
     LATCHED_ACKNOWLEDGED = 5
     SHELVED = 6
     SUPPRESSED = 7
-    """By design: an alarm that it follows from stands."""
+    """Suppressed by design: an alarm that causes this one is standing."""
     OUT_OF_SERVICE = 8
 
 
 Shelving = Literal["", "timed", "one_shot"]
-"""one_shot: until its condition ends."""
+"""Kind of shelving. one_shot: until the condition ends."""
 
 _S = AlarmState
 
@@ -36,74 +36,76 @@ RAISED = {
     _S.LATCHED_UNACKNOWLEDGED: _S.UNACKNOWLEDGED,
     _S.LATCHED_ACKNOWLEDGED: _S.UNACKNOWLEDGED,
 }
-"""Where it goes as its condition comes."""
+"""Next state when the condition begins."""
 
 CLEARED = {_S.UNACKNOWLEDGED: _S.RETURNED, _S.ACKNOWLEDGED: _S.NORMAL}
-"""Where one that does not latch goes as its condition ends."""
+"""Next state when the condition ends, without latching."""
 
 LATCHED = {_S.UNACKNOWLEDGED: _S.LATCHED_UNACKNOWLEDGED, _S.ACKNOWLEDGED: _S.LATCHED_ACKNOWLEDGED}
-"""Where one that latches goes then."""
+"""Next state when the condition ends, with latching."""
 
 ACKNOWLEDGED = {
     _S.UNACKNOWLEDGED: _S.ACKNOWLEDGED,
     _S.RETURNED: _S.NORMAL,
     _S.LATCHED_UNACKNOWLEDGED: _S.LATCHED_ACKNOWLEDGED,
 }
-"""Where it goes as somebody acknowledges it; others can't be acknowledged."""
+"""Next state on acknowledgement. Alarms in other states can't be acknowledged."""
 
 RESET = {_S.LATCHED_ACKNOWLEDGED: _S.NORMAL}
-"""Where it goes as somebody resets it; others can't be reset."""
+"""Next state on reset. Alarms in other states can't be reset."""
 
 STANDING = frozenset({_S.UNACKNOWLEDGED, _S.ACKNOWLEDGED, _S.LATCHED_UNACKNOWLEDGED, _S.LATCHED_ACKNOWLEDGED})
 WAITING = frozenset(ACKNOWLEDGED)
 
 NEVER = -1
-"""A tick that does not come."""
+"""Tick of an event that is not scheduled."""
 
 
 class LineAlarm:
     """One alarm. `settle` after any change of `active`, `suppressed`, `shelved` and `out_of_service`."""
 
     def __init__(self, id: str, number: int, fields: AlarmFields, declared_by: str, own: bool, tick: float) -> None:
-        """number: from 1, in the order in which alarms became known. declared_by: "" if nobody did. own: whether that
-        is the line or the scene. tick: its length, s.
+        """Start as a normal alarm.
+
+        number: from 1, in the order of declaration. declared_by: "" if not declared. own: True for alarms of the line
+        or the scene. tick: its length, s.
         """
         self.id, self.number, self.own = id, number, own
         self.condition = False
-        """What was said last."""
+        """Condition as last reported."""
         self.active = False
-        """The same after its delays."""
+        """Condition after the delays."""
         self.due = NEVER
         """Tick at which `active` follows `condition`."""
         self.main = AlarmState.NORMAL
-        """Its state but for what hides it."""
+        """State without shelving, suppression and removal from service."""
         self.shelved: Shelving = ""
         self.shelved_until = NEVER
         self.suppressed = False
         self.out_of_service = False
         self.shown = AlarmState.NORMAL
-        """Its state when it settled last."""
+        """State after the last call of `settle`."""
         self.since = 0
-        """Tick of the last change of its state."""
+        """Tick of the last change of state."""
         self.changed_by = ""
-        """Who acknowledged, shelved, reset it, ... last."""
+        """Writer of the last acknowledgement, shelving, reset, ..."""
         self.rank = 0
-        """How many follow one from another up to it, where some are suppressed by others."""
+        """Length of the longest chain of suppressing alarms that leads to this one."""
         self.suppressing = False
-        """Whether it suppressed others when it settled last."""
+        """True if the alarm suppressed others after the last call of `settle`."""
         self._heard = self._was_hidden = False
         self.declare(fields, declared_by, tick)
 
     def declare(self, fields: AlarmFields, declared_by: str, tick: float) -> None:
-        """Be as declared from now on; its state stays."""
+        """Take over a declaration. The state stays."""
         self.fields, self.declared_by = fields, declared_by
         self.text = fields.text or self.id
         self.delays = (ticks(fields.off_delay, tick), ticks(fields.on_delay, tick))
-        """Ticks, until the end and until the beginning of its condition count."""
+        """Off-delay and on-delay in ticks."""
 
     @property
     def state(self) -> AlarmState:
-        """As others see it."""
+        """State as displayed."""
         if self.out_of_service:
             return AlarmState.OUT_OF_SERVICE
         if self.shelved:
@@ -112,26 +114,26 @@ class LineAlarm:
 
     @property
     def hidden(self) -> bool:
-        """Whether it is not shown."""
+        """Return True if the alarm is shelved, suppressed or out of service."""
         return bool(self.shelved) or self.suppressed or self.out_of_service
 
     @property
-    def is_said(self) -> bool:
-        """Whether a controller has said, last, that its condition holds."""
+    def is_reported(self) -> bool:
+        """Return True if a controller last reported that the condition holds."""
         return self.condition and not self.own and not self.fields.measured
 
     @property
     def stands(self) -> bool:
-        """Whether it is shown, and active or latched."""
+        """Return True if the alarm is displayed, and active or latched."""
         return self.main in STANDING
 
     @property
     def suppresses(self) -> bool:
-        """Whether what follows from it is suppressed: whatever is shown of it, unless it is out of service."""
+        """Return True if alarms caused by this one are suppressed. Shelving does not change that."""
         return (self.active or self.stands) and not self.out_of_service
 
     def settle(self) -> list[Kind]:
-        """Go to the state that follows; what happened to it, as kinds of events."""
+        """Enter the next state, and return the kinds of the resulting events."""
         rose, fell = self.active and not self._heard, self._heard and not self.active
         self._heard = self.active
         happened: list[Kind] = []
@@ -139,7 +141,7 @@ class LineAlarm:
             self.shelved, happened = "", ["alarm_unshelved"]
         was_hidden, self._was_hidden = self._was_hidden, self.hidden
         if self.hidden:
-            # Nothing is said of an alarm that is normal and stays so.
+            # An alarm that is normal and stays normal causes no event.
             if self.state is AlarmState.SUPPRESSED and (rose or (not was_hidden and self._to_be_seen)):
                 happened.append("alarm_suppressed")
             self.main = AlarmState.NORMAL
@@ -152,12 +154,12 @@ class LineAlarm:
         return happened
 
     def delay(self, due: int) -> None:
-        """Count as not active until a tick, without having ended."""
+        """Treat the condition as inactive until a tick, although it has not ended."""
         self.active = self._heard = False
         self.due = due
 
     def recall(self) -> None:
-        """Its attributes were restored: it has settled."""
+        """Derive the remaining attributes after a restore."""
         self._heard, self._was_hidden = self.active, self.hidden
         self.suppressing, self.shown = self.suppresses, self.state
 
@@ -167,5 +169,5 @@ class LineAlarm:
 
 
 def ticks(seconds: float, tick: float) -> int:
-    """The fewest ticks in which so much time passes."""
+    """Return the fewest ticks that last at least `seconds`."""
     return math.ceil(seconds / tick - 1e-9)

@@ -1,4 +1,4 @@
-"""`Alarms`: all alarms of a line; what is said of them, what follows from it, and who was first."""
+"""`Alarms`: all alarms of a line, with their conditions, suppression and first-out."""
 
 import json
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
@@ -17,64 +17,68 @@ from conveyor_sim.scene.parts.alarm import CLASSES, PREFIX, AlarmFields
 from conveyor_sim.support.printable import printable
 
 Note = Callable[[int, Kind, str, float, str], None]
-"""Takes an event: tick, kind, name, value (1 while the alarm stands), text."""
+"""Records an event: tick, kind, name, value (1 while the alarm stands), text."""
 
 
 class DeclarationProblem(NamedTuple):
-    """Why an alarm can't be declared."""
+    """Reason why an alarm can't be declared."""
 
     id: str
     field: str
     text: str
-    """What was given, and what was expected."""
+    """Value that was received, and the expected one."""
 
     def __str__(self) -> str:
         return ": ".join(part for part in (f"alarm {self.id}", self.field, self.text) if part)
 
 
 class Alarms:
-    """Whoever knows a condition says it; deadlines are kept, so an alarm to which nothing happens costs nothing."""
+    """All alarms of a line.
+
+    Conditions are reported as they change; delays are stored as deadlines. An alarm without changes costs no time.
+    """
 
     def __init__(self, tick: float, note: Note, signals: Collection[str]) -> None:
-        """tick: its length, s. signals: names of those that can be measured."""
+        """Start without alarms.
+
+        tick: its length, s. signals: names of signals that alarms can measure.
+        """
         self.tick, self._note, self._signals = tick, note, signals
         self._all: dict[str, LineAlarm] = {}
         self._groups: dict[str, list[LineAlarm]] = {}
-        self._follow: dict[str, list[LineAlarm]] = {}  # of each id, whom it suppresses
-        self._next: float = np.inf  # no deadline is before this tick
+        self._follow: dict[str, list[LineAlarm]] = {}  # alarms that an id suppresses
+        self._next: float = np.inf  # tick of the earliest deadline
         self._tags: tuple[float, ...] | None = None
         self.numbered = 0
-        """Alarms so far, those that were forgotten too."""
+        """Count of all alarms so far, including those removed since."""
         self.first: dict[str, str] = {}
-        """Of each group in which not all is normal, the id of the alarm that came first; in the order of coming."""
+        """Id of the first-out alarm, by group in which an alarm is not normal; in the order of their start."""
         self.measured: tuple[LineAlarm, ...] = ()
-        """Those whose conditions the line is to find out."""
+        """Alarms whose conditions the line measures."""
         self.changed = True
-        """Whether anything to be seen of them has changed since the tick before."""
+        """True if any displayed value has changed since the last tick."""
 
     def __getitem__(self, id: str) -> LineAlarm:
-        """Raises KeyError."""
+        """Return the alarm of an id. Raise KeyError if there is none."""
         return self._all[id]
 
     def __contains__(self, id: object) -> bool:
         return id in self._all
 
     def __iter__(self) -> Iterator[LineAlarm]:
-        """In the order of their numbers."""
+        """Iterate in the order of the numbers."""
         return iter(self._all.values())
 
     def __len__(self) -> int:
         return len(self._all)
 
-    # Declarations
-
     def declaration_problem(self, declared: Sequence[Declared]) -> DeclarationProblem | None:
-        """Why alarms can't be declared; None if they can."""
+        """Return why alarms can't be declared, None if they can."""
         new = dict(declared)
         for id, fields in declared:
             present = self._all.get(id)
             if present is not None and present.own:
-                return DeclarationProblem(id, "id", f"is declared by the {present.declared_by}, expected another one")
+                return DeclarationProblem(id, "id", f"is declared by the {present.declared_by}, expected another id")
             if fields.tag is not None and fields.tag not in self._signals:
                 expected = f"expected a signal of a device{_hint(fields.tag, self._signals)}"
                 return DeclarationProblem(id, "tag", f"{printable(fields.tag)} given, {expected}")
@@ -90,15 +94,17 @@ class Alarms:
             expected = "expected no alarm that suppresses itself in a circle"
             first = next(id for id in new if id in error.args[1])
             return DeclarationProblem(first, "suppressed_by", f"{text} given, {expected}")
-        kept = self._kept() | {id for causes in _causes(new).values() for id in causes if not self._own(id)}
-        if len(kept | new.keys()) > MOST_ALARMS:
-            text = f"{len(new)} alarms declared beside {len(kept - new.keys())}, expected {MOST_ALARMS} at most"
+        required = self._required() | {id for causes in _causes(new).values() for id in causes if not self._own(id)}
+        if len(required | new.keys()) > MOST_ALARMS:
+            text = f"{len(new)} alarms declared beside {len(required - new.keys())}, expected {MOST_ALARMS} at most"
             return DeclarationProblem(declared[0].id, "", text)
         return None
 
     def declare(self, tick: int, declared: Sequence[Declared], by: str, own: bool = False) -> None:
-        """Know alarms as declared; `declaration_problem` has nothing against it. by: who declares them, never "".
-        own: whether they are those of the line or the scene, which controllers can't say or declare.
+        """Declare alarms that `declaration_problem` accepts.
+
+        by: writer of the declaration, never "". own: True for alarms of the line or the scene, which controllers can
+        neither set nor declare.
         """
         changed, named = [], {id for one in declared for id in (one.id, *one.fields.suppressed_by)}
         if not own:
@@ -115,7 +121,7 @@ class Alarms:
             self.settle(tick, changed)
 
     def restored(self, alarms: Iterable[LineAlarm], numbered: int, first: dict[str, str]) -> None:
-        """Have these in place of all that there were."""
+        """Replace all alarms by these."""
         self._all = {alarm.id: alarm for alarm in alarms}
         self.numbered, self.first = numbered, first
         self._arrange()
@@ -124,10 +130,8 @@ class Alarms:
             alarm.recall()
         self._next, self._tags, self.changed = 0, None, True
 
-    # Conditions
-
     def value_problem(self, id: str) -> str:
-        """Why a controller can't say an alarm, "" if it can."""
+        """Return why a controller can't set or clear an alarm, "" if it can."""
         alarm = self._all.get(id)
         if alarm is not None and alarm.own:
             return f"{PREFIX}{id}: is an alarm of the {alarm.declared_by}, expected one of a controller"
@@ -135,38 +139,41 @@ class Alarms:
             return f"{PREFIX}{id}: is measured by the line, expected an alarm without `high` and `low`"
         return ""
 
-    def room_problem(self, said: Mapping[str, bool]) -> str:
-        """Why there are too many alarms to be said at once, "" if there are not."""
-        if all(id in self._all for id in said):
+    def room_problem(self, reported: Mapping[str, bool]) -> str:
+        """Return why the line can't hold all the reported alarms, "" if it can."""
+        if all(id in self._all for id in reported):
             return ""
-        kept = self._kept()
-        after = (kept | {id for id, on in said.items() if on}) - {
-            id for id in kept if not said.get(id, True) and self._spare(self._all[id], said=False)
+        required = self._required()
+        after = (required | {id for id, on in reported.items() if on}) - {
+            id for id in required if not reported.get(id, True) and self._spare(self._all[id], reported=False)
         }
         if len(after) <= MOST_ALARMS:
             return ""
-        raised = sum(said.values())
-        return f"{raised} alarms given beside {len(kept)} that stand or are declared, expected {MOST_ALARMS} at most"
+        raised = sum(reported.values())
+        return (
+            f"{raised} alarms given beside {len(required)} that stand or are declared, expected {MOST_ALARMS} at most"
+        )
 
-    def say(self, tick: int, said: Mapping[str, bool]) -> None:
-        """Whether the conditions of some alarms hold as of a tick; all of them at once.
+    def report(self, tick: int, reported: Mapping[str, bool]) -> None:
+        """Set the conditions of several alarms at a tick, all of them at once.
 
-        One that nobody has declared is as by default; if there is no room for all, those that hold come first.
+        An undeclared alarm gets default fields. If there is no room for all new ones, those whose condition holds come
+        first.
         """
-        new = [id for id in said if id not in self._all]
-        turned = [self._all[id] for id, on in said.items() if id in self._all and self._say(id, on, tick)]
+        new = [id for id in reported if id not in self._all]
+        turned = [self._all[id] for id, on in reported.items() if id in self._all and self._report(id, on, tick)]
         if turned:
             self.settle(tick, turned)
-        # Only then, for it may be forgotten what has just ended.
+        # Only now, because alarms that have just ended may be removed.
         if room := self._make_room(len(new)) if new else 0:
-            first = new if room == len(new) else sorted(new, key=lambda id: not said[id])[:room]
+            first = new if room == len(new) else sorted(new, key=lambda id: not reported[id])[:room]
             made = [self._add(id, UNDECLARED, "", False) for id in first]
             for id in first:
-                self._say(id, said[id], tick)
+                self._report(id, reported[id], tick)
             self.settle(tick, made)
 
     def end(self, tick: int) -> None:
-        """What falls due as a tick ends."""
+        """Apply the deadlines of a tick that ends."""
         if tick < self._next:
             return
         due, self._next = [], np.inf
@@ -183,17 +190,13 @@ class Alarms:
             self.settle(tick, due)
 
     def watch(self, alarm: LineAlarm) -> None:
-        """Have its deadlines kept."""
+        """Schedule the deadlines of an alarm."""
         for deadline in (alarm.due, alarm.shelved_until):
             if NEVER < deadline < self._next:
                 self._next = deadline
 
-    # What follows
-
     def settle(self, tick: int, touched: Iterable[LineAlarm]) -> None:
-        """Bring alarms that were changed, and those that follow from them, to their states: causes first, then by
-        priority.
-        """
+        """Update the states of changed alarms and of those they suppress: causes first, then by priority."""
         waiting: list[tuple[int, int, int, str]] = []
         queued: set[str] = set()
 
@@ -208,7 +211,7 @@ class Alarms:
             alarm = self._all[heappop(waiting)[-1]]
             caused = self._caused(alarm)
             if alarm.suppressed and not caused and alarm.active and alarm.delays[True]:
-                # What followed from a cause has its delay to end after it.
+                # After its cause, a suppressed alarm has its on-delay to end in.
                 alarm.delay(tick + alarm.delays[True])
                 self.watch(alarm)
             alarm.suppressed = caused
@@ -229,14 +232,13 @@ class Alarms:
         self.changed = True
 
     def note(self, tick: int, kind: Kind, alarm: LineAlarm, text: str) -> None:
-        """Something has happened to an alarm."""
+        """Record an event of an alarm."""
         self._note(tick, kind, PREFIX + alarm.id, float(alarm.stands), text)
 
-    # What is shown
-
     def counts(self) -> tuple[float, ...]:
-        """How many stand of each class, how many wait to be acknowledged, and the number of the first-out alarm that
-        came first; 0: there is none.
+        """Return the numbers of standing alarms by class, of unacknowledged ones, and of the first-out alarm.
+
+        The last is the alarm's number, 0 without one.
         """
         standing = [alarm.fields.alarm_class for alarm in self if alarm.stands]
         waiting = sum(alarm.main in ACKNOWLEDGED for alarm in self)
@@ -244,21 +246,21 @@ class Alarms:
         return (*(float(standing.count(kind)) for kind in CLASSES), float(waiting), float(first))
 
     def tag_values(self) -> tuple[float, ...]:
-        """The counts, then 1 for each alarm of line and scene that stands and 0 for the others, in their order."""
+        """Return `counts`, then 1 for each standing alarm of line and scene, 0 for the others, in their order."""
         if self._tags is None:
             self._tags = (*self.counts(), *(float(alarm.stands) for alarm in self if alarm.own))
         return self._tags
 
-    def said(self) -> dict[str, float]:
-        """1 or 0 for each alarm of controllers, by its name in the process image."""
+    def controller_alarms(self) -> dict[str, float]:
+        """Return 1 or 0 for each alarm of a controller, by its name in the process image."""
         return {PREFIX + alarm.id: float(alarm.stands) for alarm in self if not alarm.own}
 
     def changes(self) -> AlarmColumns | None:
-        """All of them, if anything of them has changed in this tick; at the start if there are any."""
+        """Return all alarms if any changed in this tick, or at the start; None otherwise."""
         return self.columns() if self.changed and self._all else None
 
     def columns(self) -> AlarmColumns:
-        """All of them."""
+        """Return all alarms."""
         alarms = list(self)
         first = set(self.first.values())
         return AlarmColumns(
@@ -286,11 +288,11 @@ class Alarms:
         return self._all[id]
 
     def _arrange(self) -> None:
-        """Who is in which group, and who follows from whom, has changed."""
-        found = ranks({alarm.id: alarm.fields.suppressed_by for alarm in self})
+        """Derive groups, ranks and followers from the declarations."""
+        rank_of = ranks({alarm.id: alarm.fields.suppressed_by for alarm in self})
         self._groups, self._follow = {}, {}
         for alarm in self:
-            alarm.rank = found[alarm.id]
+            alarm.rank = rank_of[alarm.id]
             if alarm.fields.group:
                 self._groups.setdefault(alarm.fields.group, []).append(alarm)
             for cause in alarm.fields.suppressed_by:
@@ -298,8 +300,8 @@ class Alarms:
         self.first = {group: id for group, id in self.first.items() if self._all[id].fields.group == group}
         self.measured = tuple(alarm for alarm in self if alarm.fields.measured)
 
-    def _say(self, id: str, on: bool, tick: int) -> bool:
-        """Whether a condition holds now; whether that is news, and counts at once."""
+    def _report(self, id: str, on: bool, tick: int) -> bool:
+        """Set one condition. Return True if it changed and has no delay."""
         alarm = self._all[id]
         if alarm.condition is on:
             return False
@@ -326,22 +328,23 @@ class Alarms:
             return printable(f"follows from {', '.join(causes)}")
         return "its condition has ended" if kind == "alarm_unshelved" else ""
 
-    def _spare(self, alarm: LineAlarm, said: bool | None = None) -> bool:
-        """Whether it can be forgotten: nobody declared it, it does not stand, and nobody has hidden it.
-        said: its condition, if another one than now is meant.
+    def _spare(self, alarm: LineAlarm, reported: bool | None = None) -> bool:
+        """Return True if an alarm can be removed: undeclared, not standing, neither shelved nor out of service.
+
+        reported: its condition, if not the present one.
         """
-        condition = alarm.condition if said is None else said
+        condition = alarm.condition if reported is None else reported
         return not (alarm.declared_by or condition or alarm.shelved or alarm.out_of_service or alarm.id in self._follow)
 
     def _own(self, id: str) -> bool:
         return id in self._all and self._all[id].own
 
-    def _kept(self) -> set[str]:
-        """Ids of the controllers' alarms that can't be forgotten."""
+    def _required(self) -> set[str]:
+        """Return ids of the controllers' alarms that can't be removed."""
         return {alarm.id for alarm in self if not alarm.own and not self._spare(alarm)}
 
     def _make_room(self, wanted: int, keep: Collection[str] = ()) -> int:
-        """Forget as many alarms as it takes, the oldest first; for how many of those wanted there is room then."""
+        """Remove the oldest spare alarms, and return how many of the `wanted` ones then have room."""
         full = sum(not alarm.own for alarm in self) + wanted - MOST_ALARMS
         if full > 0:
             spare = [alarm.id for alarm in self if self._spare(alarm) and alarm.id not in keep][:full]
@@ -351,8 +354,8 @@ class Alarms:
         return wanted - max(full, 0)
 
 
-def _hint(given: str, known: Iterable[str]) -> str:
-    close = get_close_matches(given[:200], known, n=1)
+def _hint(name: str, known: Iterable[str]) -> str:
+    close = get_close_matches(name[:200], known, n=1)
     return f", such as {close[0]}" if close else ""
 
 
@@ -361,4 +364,4 @@ def _causes(declared: Mapping[str, AlarmFields]) -> dict[str, tuple[str, ...]]:
 
 
 UNDECLARED = AlarmFields()
-"""Of an alarm that nobody has declared."""
+"""Fields of an undeclared alarm."""

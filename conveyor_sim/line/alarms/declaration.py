@@ -1,4 +1,4 @@
-"""Declarations of alarms as they travel: an id, and a JSON object with the fields that a scene has for one."""
+"""Declarations of alarms in inputs: an id, and a JSON object with the fields of an alarm in a scene."""
 
 import json
 from collections import Counter
@@ -11,14 +11,14 @@ from conveyor_sim.scene.parts.alarm import AlarmFields, id_problem
 from conveyor_sim.support.printable import SENTENCE, printable
 
 MOST_ALARMS = 1000
-"""That controllers have at once, beside those of the line and the scene: declared, or raised without a declaration."""
+"""Largest number of controllers' alarms at one time, declared or raised undeclared, beside those of line and scene."""
 
 LONGEST_TEXT = 20_000
-"""Characters of one declaration."""
+"""Largest number of characters in one declaration."""
 
 
 class Declared(NamedTuple):
-    """An alarm that is declared."""
+    """Declared alarm."""
 
     id: str
     fields: AlarmFields
@@ -29,12 +29,15 @@ LINE_GROUP = "line"
 
 
 def error(id: str, text: str, tag: str) -> Declared:
-    """An alarm of the line that a device has stopped doing its work. tag: the signal that shows it."""
+    """Return the line's alarm for a device that has stopped working.
+
+    tag: the signal that shows it.
+    """
     return Declared(id, AlarmFields(text=text, alarm_class="error", tag=tag, group=LINE_GROUP))
 
 
 def as_sent(text: str) -> str:
-    """A declaration fit to be kept and recorded: as it came, but for what does not print, and for what is too long."""
+    """Return a declaration for recording: unprintable characters escaped, too long texts shortened."""
     return printable(text.translate(_SPACES), LONGEST_TEXT + 1)
 
 
@@ -42,26 +45,26 @@ _SPACES = str.maketrans("\n\r\t", "   ")
 
 
 def parse(ids: Sequence[str], texts: Sequence[str]) -> list[Declared] | str:
-    """What an input declares, or why it can't be read: field, value, what was expected."""
+    """Return the declarations in an input, or why they can't be read: field, value, expectation."""
     if not ids or len(ids) != len(texts):
-        return f"{len(ids)} ids and {len(texts)} declarations of alarms given, expected as many of both, one at least"
+        return f"{len(ids)} ids and {len(texts)} declarations of alarms given, expected equal numbers from 1 on"
     if len(ids) > MOST_ALARMS:
         return f"{len(ids)} alarms declared in one input, expected {MOST_ALARMS} at most"
-    found = []
+    declared = []
     for id, text in zip(ids, texts, strict=True):
         if problem := id_problem(id):
             return f"alarm {printable(id)}: {problem}"
         fields = fields_of(text)
         if isinstance(fields, str):
             return f"alarm {id}: {fields}"
-        found.append(Declared(id, fields))
+        declared.append(Declared(id, fields))
     if twice := [id for id, times in Counter(ids).items() if times > 1]:
         return f"alarm {twice[0]}: declared twice in one input"
-    return found
+    return declared
 
 
 def fields_of(text: str) -> AlarmFields | str:
-    """What a JSON object declares, or why it can't be read."""
+    """Return the fields in a JSON object, or why it can't be read."""
     if len(text) > LONGEST_TEXT:
         return f"{len(text)} characters given, expected {LONGEST_TEXT} at most"
     try:
@@ -77,17 +80,17 @@ def fields_of(text: str) -> AlarmFields | str:
 
 
 def as_text(fields: AlarmFields) -> str:
-    """The JSON object of some fields, those that are as by default left out."""
+    """Return fields as a JSON object, without those at their defaults."""
     return json.dumps(fields.model_dump(mode="json", exclude_defaults=True), ensure_ascii=False)
 
 
 def ranks(suppressed_by: Mapping[str, Sequence[str]]) -> dict[str, int]:
-    """Of each id, how many follow one from another up to it; causes come before what they suppress.
+    """Return the length of the longest chain of suppressing alarms that leads to each id. Causes come first.
 
-    suppressed_by: of each id, ids that are all among the keys. Raises graphlib.CycleError, whose second argument is the
-    ids of a circle, from one to the same.
+    suppressed_by: causes by id; all of them are keys. Raise graphlib.CycleError for a circle; its second argument lists
+    the ids, with the first one repeated at the end.
     """
-    found: dict[str, int] = {}
+    rank: dict[str, int] = {}
     for id in TopologicalSorter(suppressed_by).static_order():
-        found[id] = max((found[cause] + 1 for cause in suppressed_by[id]), default=0)
-    return found
+        rank[id] = max((rank[cause] + 1 for cause in suppressed_by[id]), default=0)
+    return rank

@@ -1,4 +1,4 @@
-"""What a checkpoint keeps of alarms, and whether what a file says of them can be."""
+"""Alarms in checkpoints, and checks of what a checkpoint file states about them."""
 
 from graphlib import CycleError
 from typing import Any, NamedTuple
@@ -11,13 +11,13 @@ from conveyor_sim.scene.parts.alarm import LONGEST_DELAY
 from conveyor_sim.support.printable import printable
 
 
-class _Kept(NamedTuple):
+class _StoredAlarm(NamedTuple):
     id: str
     number: int
     own: bool
     declared_by: str
     declared: str
-    """JSON, as `declaration.py` reads it; "" of the line's and the scene's, made anew, and where nobody did."""
+    """JSON, as `declaration.py` reads it; "" for alarms of line and scene, and for undeclared ones."""
     condition: bool
     active: bool
     due: int
@@ -30,12 +30,12 @@ class _Kept(NamedTuple):
 
 
 def snapshot(alarms: Alarms) -> dict[str, Any]:
-    """All that is remembered from tick to tick, as plain data."""
+    """Return all state that lasts from tick to tick, as plain data."""
     return {
         "numbered": alarms.numbered,
         "first": alarms.first,
         "alarms": [
-            _Kept(
+            _StoredAlarm(
                 alarm.id,
                 alarm.number,
                 alarm.own,
@@ -57,62 +57,62 @@ def snapshot(alarms: Alarms) -> dict[str, Any]:
 
 
 def restore(alarms: Alarms, tick: int, memory: Any) -> None:
-    """Stand as the alarms of the same line did at a tick. Raises ValueError, in words, for what can't be."""
+    """Restore the alarms of the same line at a tick. Raise ValueError for data that do not fit."""
     name = "line.alarms"
     entries(memory, snapshot(alarms), name)
     numbered = typed(int, memory["numbered"], f"{name}.numbered")
-    kept = typed(list[_Kept], memory["alarms"], f"{name}.alarms")
+    stored = typed(list[_StoredAlarm], memory["alarms"], f"{name}.alarms")
     first = typed(dict[str, str], memory["first"], f"{name}.first")
     own = [(alarm.id, alarm.number, alarm.declared_by) for alarm in alarms if alarm.own]
-    _require([(one.id, one.number, one.declared_by) for one in kept if one.own] == own, "are of another line")
-    _require(len(kept) - len(own) <= MOST_ALARMS, f"are more than {MOST_ALARMS}")
-    numbers = [one.number for one in kept]
-    _require(numbers == sorted(set(numbers)), "have numbers in no order")
-    _require(not kept or (numbers[0] > 0 and numbers[-1] <= numbered), "have a number that was not given")
-    _require(len({one.id for one in kept}) == len(kept), "have one twice")
-    made = [_made(one, tick, alarms) for one in kept]
+    _require([(one.id, one.number, one.declared_by) for one in stored if one.own] == own, "belong to another line")
+    _require(len(stored) - len(own) <= MOST_ALARMS, f"are more than {MOST_ALARMS}")
+    numbers = [one.number for one in stored]
+    _require(numbers == sorted(set(numbers)), "have numbers out of order")
+    _require(not stored or (numbers[0] > 0 and numbers[-1] <= numbered), "have a number that was never assigned")
+    _require(len({one.id for one in stored}) == len(stored), "have one alarm twice")
+    made = [_made(one, tick, alarms) for one in stored]
     known = {alarm.id: alarm for alarm in made}
     for alarm in made:
         _require(all(cause in known for cause in alarm.fields.suppressed_by), f"lack what suppresses {alarm.id}")
     for group, id in first.items():
-        _require(id in known and known[id].fields.group == group, "have a first-out that is not in its group")
+        _require(id in known and known[id].fields.group == group, "have a first-out alarm that is not in its group")
     try:
         alarms.restored(made, numbered, first)
     except CycleError:
-        raise ValueError(f"{name} have one that suppresses itself") from None
+        raise ValueError(f"{name} have an alarm that suppresses itself") from None
     for alarm in made:
         shown = AlarmState.NORMAL if alarm.hidden else alarm.main
         fits = alarm.active == (shown in (AlarmState.UNACKNOWLEDGED, AlarmState.ACKNOWLEDGED)) or alarm.hidden
-        _require(fits and shown is alarm.main, f"have one, {printable(alarm.id, 50)}, in a state that can't be")
+        _require(fits and shown is alarm.main, f"have one, {printable(alarm.id, 50)}, in an impossible state")
     for group in first:
         here = [alarm.main for alarm in made if alarm.fields.group == group]
-        _require(any(main is not AlarmState.NORMAL for main in here), "have a first-out of nothing")
+        _require(any(main is not AlarmState.NORMAL for main in here), "have a first-out without an alarm")
 
 
-def _made(one: _Kept, tick: int, alarms: Alarms) -> LineAlarm:
-    """An alarm of a file."""
+def _made(one: _StoredAlarm, tick: int, alarms: Alarms) -> LineAlarm:
+    """Return an alarm from a file."""
     what = f"have one, {printable(one.id, 50)}, that"
     texts = (one.id, one.declared_by, one.changed_by)
-    _require(all(text == printable(text) for text in texts) and one.id != "", f"{what} has texts that can't be")
+    _require(all(text == printable(text) for text in texts) and one.id != "", f"{what} has invalid texts")
     if one.own:
         fields = alarms[one.id].fields
     else:
         read = fields_of(one.declared) if one.declared_by else UNDECLARED
         if isinstance(read, str) or bool(one.declared_by) != bool(one.declared):
-            raise ValueError(f"line.alarms {what} is declared wrong")
+            raise ValueError(f"line.alarms {what} has an invalid declaration")
         fields = read
     alarm = LineAlarm(one.id, one.number, fields, one.declared_by, one.own, alarms.tick)
     alarm.condition, alarm.active, alarm.due = one.condition, one.active, one.due
     alarm.shelved, alarm.shelved_until, alarm.out_of_service = one.shelved, one.shelved_until, one.out_of_service
     alarm.since, alarm.changed_by = one.since, one.changed_by
-    _require(0 <= one.main <= AlarmState.LATCHED_ACKNOWLEDGED, f"{what} is in a state that can't be")
+    _require(0 <= one.main <= AlarmState.LATCHED_ACKNOWLEDGED, f"{what} is in an impossible state")
     alarm.main = AlarmState(one.main)
     longest = ticks(LONGEST_DELAY, alarms.tick)
     _require((one.due == NEVER) == (one.condition == one.active), f"{what} has a delay without a reason")
-    _require(one.due == NEVER or tick < one.due <= tick + longest, f"{what} has a delay that can't be")
-    _require((one.shelved == "timed") == (one.shelved_until != NEVER), f"{what} is shelved and is not")
-    _require(one.shelved_until == NEVER or tick < one.shelved_until <= tick + longest, f"{what} is shelved for ever")
-    _require(0 <= one.since <= tick, f"{what} has changed later")
+    _require(one.due == NEVER or tick < one.due <= tick + longest, f"{what} has an impossible delay")
+    _require((one.shelved == "timed") == (one.shelved_until != NEVER), f"{what} is shelved without a time")
+    _require(one.shelved_until == NEVER or tick < one.shelved_until <= tick + longest, f"{what} is shelved too long")
+    _require(0 <= one.since <= tick, f"{what} changed after the checkpoint")
     return alarm
 
 

@@ -1,4 +1,4 @@
-"""What operators do with alarms: acknowledge, reset, shelve, unshelve, take out of service and back."""
+"""Operator actions on alarms: acknowledge, reset, shelve, unshelve, remove from service and return to it."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -10,21 +10,21 @@ from conveyor_sim.scene.parts.alarm import LONGEST_DELAY, PREFIX
 from conveyor_sim.support.printable import printable
 
 LISTED = 20
-"""Ids that a refusal lists, of those there are."""
+"""Largest number of ids that a refusal lists."""
 
 
 @dataclass(frozen=True)
 class AlarmOperation:
-    """One of them."""
+    """Operator action on alarms."""
 
     kind: Kind
-    """Of the event."""
+    """Kind of the resulting event."""
     can: Callable[[LineAlarm], bool]
     expected: str
-    """What it can be done to."""
+    """Alarms that the action applies to, in words."""
     do: Callable[[LineAlarm], None]
     all_of_them: bool = False
-    """Whether no name at all means all alarms that it can be done to."""
+    """True if the action without names applies to all alarms that it can be applied to."""
 
 
 def _acknowledge(alarm: LineAlarm) -> None:
@@ -77,7 +77,7 @@ OPERATIONS = {
         "alarm_in_service", lambda alarm: alarm.out_of_service, "one that is out of service", _return
     ),
 }
-"""By name."""
+"""Actions by name."""
 
 
 def argument_problem(name: str, ids: Sequence[str], values: Sequence[float]) -> str:
@@ -86,19 +86,20 @@ def argument_problem(name: str, ids: Sequence[str], values: Sequence[float]) -> 
     `problem` documents the arguments.
     """
     if values and (name != "shelve" or len(values) != len(ids)):
-        expected = f"as many as names ({len(ids)}), or none" if name == "shelve" else "none"
+        expected = f"one per name ({len(ids)}), or none" if name == "shelve" else "none"
         return f"{len(values)} values given, expected {expected}"
     for value in values:
         if not 0.0 <= value <= LONGEST_DELAY:
-            return f"{value:g} given, expected 0 to {LONGEST_DELAY} s, for how long it is shelved"
+            return f"{value:g} given, expected a shelving time of 0 to {LONGEST_DELAY} s"
     if not ids and not OPERATIONS[name].all_of_them:
         return "no name given, expected the id of an alarm"
     return ""
 
 
 def problem(alarms: Alarms, name: str, ids: Sequence[str], values: Sequence[float]) -> str:
-    """Why it can't be done, "" if it can. ids: with or without `alarms/`; values: of `shelve`, s for each, 0 or none at
-    all: until the condition ends next.
+    """Return why an operation can't be done now, "" if it can.
+
+    ids: with or without `alarms/`. values: shelving time of each id, s; 0 or no values: until the condition next ends.
     """
     if reason := argument_problem(name, ids, values):
         return reason
@@ -115,7 +116,10 @@ def problem(alarms: Alarms, name: str, ids: Sequence[str], values: Sequence[floa
 
 
 def perform(alarms: Alarms, name: str, ids: Sequence[str], values: Sequence[float], by: str, tick: int) -> None:
-    """Do what `problem` has nothing against. by: who does it."""
+    """Do an operation that `problem` accepts.
+
+    by: the writer.
+    """
     operation = OPERATIONS[name]
     chosen = [alarms[id] for id in _bare(ids)] if ids else [alarm for alarm in alarms if operation.can(alarm)]
     for index, alarm in enumerate(chosen):

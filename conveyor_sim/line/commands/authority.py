@@ -1,4 +1,4 @@
-"""Who may do what to a line: one table by operation, and one by mode for commands."""
+"""Rights to act on a line: one table of operations by kind of writer, and one of control modes for commands."""
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from fnmatch import fnmatchcase
@@ -19,50 +19,50 @@ from conveyor_sim.line.commands.inputs import (
 from conveyor_sim.support.printable import printable
 
 PEOPLE: tuple[WriterKind, ...] = ("operator", "engineer")
-"""Those who act through the service `operate`."""
+"""Kinds of writer that act through the service `operate`."""
 
 
 class Right(NamedTuple):
-    """Who may use one operation."""
+    """Right to use one operation."""
 
     writers: tuple[WriterKind, ...]
     what: str
-    """What it does, in a sentence for docs/line.md."""
+    """Description of the operation, one sentence for docs/line.md."""
 
 
 MAY: Mapping[str, Right] = {
-    SET: Right(("controller", *PEOPLE, "test"), "Sets commands, in the modes above; says alarms."),
-    INJECT: Right(("test",), "Has faults begin or end."),
+    SET: Right(("controller", *PEOPLE, "test"), "Sets commands, in the modes above; sets and clears alarms."),
+    INJECT: Right(("test",), "Starts or ends faults."),
     MODE: Right((*PEOPLE, "test"), "Puts devices (names) into modes (values)."),
-    OWN: Right(("controller",), "Takes the line, but for the devices that texts name by patterns."),
-    DISOWN: Right(("controller",), "Gives it up."),
+    OWN: Right(("controller",), "Takes the line, except devices that match the patterns in texts."),
+    DISOWN: Right(("controller",), "Releases ownership."),
     FORCE: Right((*PEOPLE, "test"), "Forces signals to values."),
-    UNFORCE: Right((*PEOPLE, "test"), "Ends that, without names for all."),
-    "acknowledge": Right((*PEOPLE, "test"), "Acknowledges alarms, without names all."),
-    "reset": Right((*PEOPLE, "test"), "Clears latched alarms, without names all."),
-    "shelve": Right((*PEOPLE, "test"), "Shelves alarms for so many seconds (values), or once."),
-    "unshelve": Right((*PEOPLE, "test"), "Ends that, without names for all."),
+    UNFORCE: Right((*PEOPLE, "test"), "Ends forcing of signals, without names of all."),
+    "acknowledge": Right((*PEOPLE, "test"), "Acknowledges alarms, without names all of them."),
+    "reset": Right((*PEOPLE, "test"), "Clears latched alarms, without names all of them."),
+    "shelve": Right((*PEOPLE, "test"), "Shelves alarms for a time in seconds (values), or once."),
+    "unshelve": Right((*PEOPLE, "test"), "Ends shelving of alarms, without names of all."),
     "remove_from_service": Right(("engineer", "test"), "Takes alarms out of service."),
-    "return_to_service": Right(("engineer", "test"), "Ends that."),
+    "return_to_service": Right(("engineer", "test"), "Returns alarms to service."),
     "declare": Right(("controller", "test"), "Declares a controller's alarms."),
-    "reset_counters": Right(("controller", *PEOPLE, "test"), "Counters and times of devices, or of all, begin anew."),
+    "reset_counters": Right(("controller", *PEOPLE, "test"), "Resets counters and times, without names of all."),
 }
-"""By operation; what is not here, nobody may."""
+"""Rights by operation. An operation that is not listed is forbidden."""
 
 AUTOMATIC, MAINTENANCE, MANUAL = 1, 2, 3
 
 MODES: Mapping[int, str] = {AUTOMATIC: "Automatic", MAINTENANCE: "Maintenance", MANUAL: "Manual"}
-"""By the numbers of PackML's unit modes, where 1 is Production."""
+"""Text by number of PackML's unit modes, where 1 is Production."""
 
 IN_CONTROL: Mapping[int, tuple[WriterKind, ...]] = {
     AUTOMATIC: ("controller", "test"),
     MAINTENANCE: ("engineer", "test"),
     MANUAL: (*PEOPLE, "test"),
 }
-"""Whose commands a device takes, by its mode."""
+"""Kinds of writer whose commands a device accepts, by its mode."""
 
 OPERATORS_MODES = (AUTOMATIC, MANUAL)
-"""Between which an operator may switch; engineers and tests between all."""
+"""Modes between which an operator may switch. Engineers and tests may switch between all modes."""
 
 
 MAY_SET: Mapping[str, tuple[int, ...]] = {
@@ -70,10 +70,10 @@ MAY_SET: Mapping[str, tuple[int, ...]] = {
     "engineer": tuple(MODES),
     "test": tuple(MODES),
 }
-"""Modes by kind of writer: a device must be in one of them, and can be put into one of them."""
+"""Modes by kind of writer. The present mode of a device and the new one must both be listed."""
 
 MOST_PATTERNS = 1000
-"""Patterns of devices in one input."""
+"""Largest number of device patterns in one input."""
 
 
 def reserved_mode(kind: str, modes: Iterable[float]) -> float | None:
@@ -102,27 +102,31 @@ def pattern_problem(patterns: Sequence[str], devices: Collection[str], where: st
     return ""
 
 
-def hand_over_problem(given: Input) -> str:
+def hand_over_problem(request: Input) -> str:
     """Return why such an input can't take or release the line, whichever controller owns it; "" if it can."""
-    if given.names or given.values or (given.texts and given.operation == DISOWN):
-        expected = "texts alone, patterns of devices" if given.operation == OWN else "nothing beside its writer"
-        return f"{len(given.names)} names, {len(given.values)} values, {len(given.texts)} texts, expected {expected}"
-    return "" if given.writer else "no writer given, expected the name of a controller"
+    if request.names or request.values or (request.texts and request.operation == DISOWN):
+        expected = "texts alone, patterns of devices" if request.operation == OWN else "nothing beside its writer"
+        counts = f"{len(request.names)} names, {len(request.values)} values, {len(request.texts)} texts"
+        return f"{counts} given, expected {expected}"
+    return "" if request.writer else "no writer given, expected the name of a controller"
 
 
-def unauthorized(given: Input, operations: Collection[str]) -> str:
-    """Why nobody of this kind may do this, whatever to, "" if it may. operations: those that there are."""
-    if given.writer_kind not in WRITER_KINDS:
-        return f"{printable(given.writer_kind)}: no such kind of writer, expected one of {', '.join(WRITER_KINDS)}"
-    if given.operation not in operations:
-        return f"{printable(given.operation)}: no such operation, expected one of {', '.join(operations)}"
-    kinds = MAY[given.operation].writers if given.operation in MAY else ()
-    if given.writer_kind in kinds:
+def unauthorized(request: Input, operations: Collection[str]) -> str:
+    """Return why this kind of writer may not use the operation at all, "" if it may.
+
+    operations: those of the line.
+    """
+    if request.writer_kind not in WRITER_KINDS:
+        return f"{printable(request.writer_kind)}: no such kind of writer, expected one of {', '.join(WRITER_KINDS)}"
+    if request.operation not in operations:
+        return f"{printable(request.operation)}: no such operation, expected one of {', '.join(operations)}"
+    kinds = MAY[request.operation].writers if request.operation in MAY else ()
+    if request.writer_kind in kinds:
         return ""
-    return f"{given.operation}: given by {who(given)}, expected one of the kind {' or '.join(kinds)}"
+    return f"{request.operation}: given by {who(request)}, expected one of the kind {' or '.join(kinds)}"
 
 
-def who(given: Input) -> str:
-    """Who gave an input, in words: "operator Jo"."""
-    name = printable(given.writer)
-    return given.writer_kind if name in ("", given.writer_kind) else f"{given.writer_kind} {name}"
+def who(request: Input) -> str:
+    """Return the writer of an input in words, such as "operator Jo"."""
+    name = printable(request.writer)
+    return request.writer_kind if name in ("", request.writer_kind) else f"{request.writer_kind} {name}"

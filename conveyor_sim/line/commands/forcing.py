@@ -1,4 +1,4 @@
-"""`Forcing`: signals that controllers read as somebody has set them, whatever the line does (a PLC's watch table)."""
+"""`Forcing`: signals that controllers read with a forced value, as in a PLC's watch table."""
 
 from __future__ import annotations
 
@@ -19,13 +19,16 @@ from conveyor_sim.support.printable import SENTENCE, printable
 
 
 class Forcing:
-    """What is forced. Public attributes are remembered in checkpoints."""
+    """Forced signals. Public attributes are stored in checkpoints."""
 
     forces: list[tuple[str, float, str]]
-    """Signals in their order, each with its value and who forced it."""
+    """Forced signals in the order of the process image, each with its value and writer."""
 
     def __init__(self, signals: Sequence[Tag], note: Callable[..., None]) -> None:
-        """signals: of the line. note: as EventLog.note."""
+        """Start without forced signals.
+
+        signals: of the line. note: as EventLog.note.
+        """
         self._table = {tag.name: tag.without_limits() for tag in signals}
         self._place = {tag.name: place for place, tag in enumerate(signals)}
         self._note = note
@@ -33,16 +36,16 @@ class Forcing:
         self._arrange()
 
     def operations(self) -> dict[str, Operation]:
-        """What forces, by name."""
+        """Return the operations that force and unforce, by name."""
         return {FORCE: Operation(self._problem, self._force), UNFORCE: Operation(self._unforce_problem, self._unforce)}
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the signals that are forced, in their order."""
+        """Names of the forced signals, in their order."""
         return tuple(name for name, _, _ in self.forces)
 
     def image(self, values: F8) -> Image:
-        """What is read of these values of all signals, which the line has."""
+        """Return the values that controllers read, from the measured values of all signals."""
         if not self.forces:
             return Image(values, *NOTHING_FORCED)
         actual = values[self._places]
@@ -50,7 +53,7 @@ class Forcing:
         return Image(values, self._places, actual)
 
     def read(self, name: str, value: float) -> float:
-        """What is read of one signal, which has this value."""
+        """Return the value that controllers read of one signal, from its measured value."""
         return next((forced for other, forced, _ in self.forces if other == name), value)
 
     def restored(self, tick: int) -> None:
@@ -58,39 +61,39 @@ class Forcing:
         names, values = [name for name, _, _ in self.forces], [value for _, value, _ in self.forces]
         places = [self._place.get(name, -1) for name in names]
         if places != sorted(set(places)) or (names and refusal(self._table, "signal", names, values)):
-            raise ValueError("line.forcing has what can't be forced")
+            raise ValueError("line.forcing has signals or values that can't be forced")
         if any(by != printable(by, SENTENCE) for _, _, by in self.forces):
-            raise ValueError("line.forcing has texts that can't be")
+            raise ValueError("line.forcing has invalid texts")
         self._arrange()
 
     def _arrange(self) -> None:
         self._places = np.array([self._place[name] for name in self.names], dtype=np.uint32)
         self._values = np.array([value for _, value, _ in self.forces])
 
-    def _problem(self, given: Input) -> str:
-        if given.texts:
-            return f"{len(given.texts)} texts given, expected none"
-        return refusal(self._table, "signal", given.names, given.values)
+    def _problem(self, request: Input) -> str:
+        if request.texts:
+            return f"{len(request.texts)} texts given, expected none"
+        return refusal(self._table, "signal", request.names, request.values)
 
-    def _unforce_problem(self, given: Input) -> str:
-        if given.values or given.texts:
-            return f"{len(given.values)} values and {len(given.texts)} texts given, expected names of signals alone"
-        values = [self._table[name].initial if name in self._table else 0.0 for name in given.names]
-        return refusal(self._table, "signal", given.names, values) if given.names else ""
+    def _unforce_problem(self, request: Input) -> str:
+        if request.values or request.texts:
+            return f"{len(request.values)} values and {len(request.texts)} texts given, expected names of signals alone"
+        values = [self._table[name].initial if name in self._table else 0.0 for name in request.names]
+        return refusal(self._table, "signal", request.names, values) if request.names else ""
 
-    def _force(self, given: Input, now: ScanContext) -> None:
+    def _force(self, request: Input, now: ScanContext) -> None:
         forces = {name: (name, value, by) for name, value, by in self.forces}
-        for name, value in zip(given.names, given.values, strict=True):
-            forces[name] = (name, value, who(given))
-            self._note(now.tick, "signal_forced", name, value, text=f"by {who(given)}")
+        for name, value in zip(request.names, request.values, strict=True):
+            forces[name] = (name, value, who(request))
+            self._note(now.tick, "signal_forced", name, value, text=f"by {who(request)}")
         self._take(forces)
 
-    def _unforce(self, given: Input, now: ScanContext) -> None:
+    def _unforce(self, request: Input, now: ScanContext) -> None:
         forces = {name: (name, value, by) for name, value, by in self.forces}
-        for name in given.names or self.names:
+        for name in request.names or self.names:
             if name in forces:
                 del forces[name]
-                self._note(now.tick, "signal_unforced", name, math.nan, text=f"by {who(given)}")
+                self._note(now.tick, "signal_unforced", name, math.nan, text=f"by {who(request)}")
         self._take(forces)
 
     def _take(self, forces: Mapping[str, tuple[str, float, str]]) -> None:

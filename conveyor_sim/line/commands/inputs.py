@@ -1,8 +1,8 @@
-"""`Input`: the one record of whatever acts on a line from outside, and what became of it.
+"""`Input`: the record of every external action on a line, and its result.
 
-An input belongs to a tick: the one at whose beginning it is applied, or refused with the reason, as a whole. Those of
-one tick are taken in the order in which they were given, and within one the names in their order: each is judged as the
-line stands after those before it. Watchdogs act after all inputs, devices after the watchdogs.
+An input is applied at the start of one tick, or refused as a whole with a reason. Inputs of one tick are taken in order
+of arrival, and names within an input in their order. Each is checked against the line as it is after those before it.
+Watchdogs act after all inputs, devices after the watchdogs.
 """
 
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from conveyor_sim.scene.types import Unchecked
 from conveyor_sim.support.printable import SENTENCE, printable
 
 WriterKind = Literal["controller", "operator", "engineer", "test", "line"]
-"""Who acts; "line": the line itself, which replay and rerun bring about again without being given it."""
+"""Kind of writer. "line" is the line itself: replay and rerun produce its inputs again without reading them."""
 
 WRITER_KINDS: tuple[WriterKind, ...] = get_args(WriterKind)
 
@@ -26,143 +26,143 @@ INJECT = "inject"
 """Operation: faults by name."""
 
 MODE = "mode"
-"""Operation: devices by name, and the mode that each gets."""
+"""Operation: devices by name, and a mode for each."""
 
 OWN = "own"
-"""Operation: a controller takes the line; texts: patterns of devices that it leaves to others."""
+"""Operation: a controller takes ownership of the line; texts are patterns of devices that it leaves to others."""
 
 DISOWN = "disown"
-"""Operation: it gives the line up."""
+"""Operation: the owner releases the line."""
 
 FORCE = "force"
-"""Operation: signals by name, and what controllers read in place of their values."""
+"""Operation: signals by name, and values that controllers read in place of the measured ones."""
 
 UNFORCE = "unforce"
-"""Operation: signals by name; none: all that are forced."""
+"""Operation: signals by name; without names, all forced signals."""
 
 DECLARE = "declare"
-"""Operation: alarms of a controller, ids as names and a JSON object each as texts."""
+"""Operation: alarms of a controller, with ids as names and one JSON object per alarm as texts."""
 
 FAULT = "fault"
-"""Source of faults."""
+"""Source of injected faults."""
 
 OPERATE = "operate"
-"""Source of what an operator does."""
+"""Source of operator actions."""
 
 WATCHDOG = "watchdog"
-"""Source of what the line does for a controller that has gone silent."""
+"""Source of stops by a watchdog when a controller sends no more commands."""
 
 ARRIVAL = "arrival"
-"""Source of outcomes that report inputs which never reached the line, many in one."""
+"""Source of results that report inputs which never reached the line, several in one."""
 
 
 class Input(NamedTuple):
-    """Something that acts on a line."""
+    """External action on a line."""
 
     source: str
-    """By which way it came: "commands", "lockstep", "fault", "controller", ..."""
+    """Route of the input: "commands", "lockstep", "fault", "controller", ..."""
     writer: str
-    """Who gave it, by name."""
+    """Name of the writer."""
     writer_kind: str
     """One of WriterKind."""
     operation: str
-    """What is done: a row in the line's table of operations."""
+    """Name of a row in the line's table of operations."""
     names: tuple[str, ...]
-    """Of tags, alarms or devices, as the operation has it."""
+    """Names of tags, alarms or devices, depending on the operation."""
     values: tuple[Unchecked, ...]
-    """One for each name where the operation takes numbers."""
+    """One value per name if the operation takes numbers."""
     texts: tuple[str, ...] = ()
-    """Where it takes texts."""
+    """Texts, if the operation takes any."""
 
     @property
     def by_line(self) -> bool:
-        """Whether the line itself brought it about."""
+        """Return True if the line itself produced the input."""
         return self.writer_kind == "line"
 
 
 @dataclass(frozen=True)
 class CommandOutcome:
-    """What became of one input; conveyor_msgs/CommandOutcome."""
+    """Result of one input; conveyor_msgs/CommandOutcome."""
 
     tick: int
-    """Applied at the start of the scan that leads from this tick to the next."""
+    """The input was applied at the start of the scan that leads from this tick to the next."""
     input: Input
-    """With names fit to be repeated, if it was refused."""
+    """The input; if it was refused, its names are escaped and shortened for display."""
     accepted: bool
     reason: str
-    """Empty if accepted."""
+    """Reason for a refusal, "" if accepted."""
     without_control: bool = False
-    """Refused because its writer has no control there: the device is in other hands, or the line has another owner."""
+    """True if the writer has no control authority: another control mode is set, or another controller owns the line."""
     part: bool = False
-    """It is what was taken out of an input for that; the rest has an outcome of its own."""
+    """True if only this part of the input was refused; the rest has a separate result."""
     repeated: bool = False
-    """Such a refusal was reported before, since hands last changed."""
+    """True if such a refusal was reported before, since control authority last changed."""
 
     @property
     def source(self) -> str:
-        """By which way it came."""
+        """Route of the input."""
         return self.input.source
 
     @property
     def operation(self) -> str:
-        """What was to be done."""
+        """Operation of the input."""
         return self.input.operation
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of what it was about."""
+        """Names in the input."""
         return self.input.names
 
     @property
     def values(self) -> tuple[float, ...]:
-        """That were given."""
+        """Values in the input."""
         return self.input.values
 
 
-def as_kept(given: Input) -> Input:
-    """An input as it can be shown, and as a replay will find it: what does not print is escaped, what is too long cut.
+def normalized(request: Input) -> Input:
+    """Return an input as it can be displayed and as a replay reads it: escaped, and shortened where it is too long.
 
-    Commands are not: a name that is none of the line's is refused as it is. Raises CommandError for what is of another
-    type than its field.
+    Names of commands stay as they are, because unknown ones are refused. Raise CommandError for a field of another
+    type.
     """
     try:
-        return _kept(given)
+        return _normalized(request)
     except (AttributeError, OverflowError, TypeError, ValueError):
-        if (wrong := _of_wrong_type(given)) is None:
+        if (wrong := _of_wrong_type(request)) is None:
             raise
         raise CommandError(wrong) from None
 
 
-def _kept(given: Input) -> Input:
-    source, writer, kind, operation, names, values, texts = given
-    # Whoever names an alarm makes it up.
+def _normalized(request: Input) -> Input:
+    source, writer, kind, operation, names, values, texts = request
+    # Names of alarms are chosen by the writer.
     alarms = operation not in (SET, INJECT)
-    kept = tuple([printable(name) if alarms or name.startswith(PREFIX) else name for name in names])
+    normal = tuple([printable(name) if alarms or name.startswith(PREFIX) else name for name in names])
     numbers = tuple([float(value) for value in values])
     if texts:
         texts = tuple(as_sent(text) if operation == DECLARE else printable(text, SENTENCE) for text in texts)
     source = printable(source)
     writer = source if writer == source else printable(writer)
-    return Input(source, writer, printable(kind), printable(operation), kept, numbers, texts)
+    return Input(source, writer, printable(kind), printable(operation), normal, numbers, texts)
 
 
-def _of_wrong_type(given: Input) -> str | None:
-    """What of an input is no text or no number, in words; None: nothing."""
-    for field, texts in (("names", given.names), ("texts", given.texts)):
+def _of_wrong_type(request: Input) -> str | None:
+    """Return which part of an input is neither text nor number, in words; None if all types are correct."""
+    for field, texts in (("names", request.names), ("texts", request.texts)):
         for text in texts:
             if not isinstance(text, str):
                 return f"{field}: {printable(repr(text))} given, expected a text"
-    for index, value in enumerate(given.values):
+    for index, value in enumerate(request.values):
         try:
             float(value)
         except (OverflowError, TypeError, ValueError):
-            name = given.names[index] if index < len(given.names) else given.operation
+            name = request.names[index] if index < len(request.names) else request.operation
             return f"{printable(name)}: {printable(repr(value))} given, expected a number"
     return None
 
 
 def recorded_input(source: str, names: tuple[str, ...], values: tuple[float, ...]) -> Input:
-    """The input of an outcome from before writers and operations were recorded: its source says enough."""
+    """Return the input of a result that was recorded before writers and operations were. Its source determines them."""
     if source == FAULT:
         return Input(source, source, "test", INJECT, names, values)
     kind = "line" if source in (WATCHDOG, ARRIVAL) else "controller"
@@ -170,5 +170,5 @@ def recorded_input(source: str, names: tuple[str, ...], values: tuple[float, ...
 
 
 def arrival(reason: str, tick: int) -> CommandOutcome:
-    """The report of inputs that never reached the line, before a tick."""
+    """Return the report of inputs before a tick that never reached the line."""
     return CommandOutcome(tick, Input(ARRIVAL, ARRIVAL, "line", SET, (), ()), False, reason)

@@ -1,4 +1,4 @@
-"""`Operation`: a row of the line's table of what can be done to it."""
+"""`Operation`: row in the line's table of operations."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -8,9 +8,9 @@ from conveyor_sim.line.device import ScanContext
 
 
 class Operation(NamedTuple):
-    """What can be done to a line."""
+    """Operation on a line."""
 
     refusal: Callable[[Input], str]
-    """Why it can't be applied as the line stands, "" if it can."""
+    """Returns why an input can't be applied now, "" if it can."""
     apply: Callable[[Input, ScanContext], None]
-    """Called only if there is no reason against it."""
+    """Applies an input that was not refused."""

@@ -1,4 +1,4 @@
-"""`Receipt`: the checks of an input that do not depend on the state of the line, made when it is received.
+"""`Receipt`: checks on receipt of an input, independent of the state of the line.
 
 Protocol servers answer clients by these checks at once. The line checks again at the tick, by the same rules.
 """

@@ -1,4 +1,4 @@
-"""Why commands and faults are refused: by name, value and limits."""
+"""Reasons for refusing commands and faults: unknown name, wrong value, outside the limits."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -8,16 +8,19 @@ from conveyor_sim.scene.parts.alarm import PREFIX
 from conveyor_sim.support.printable import printable
 
 ALARMS = PREFIX
-"""What the name of an input begins with that is an alarm of the controller, 0 or 1: it commands nothing."""
+"""Prefix of the name of a controller's alarm in an input, with value 0 or 1. It is not a command."""
 
 LISTED = 20
-"""Names that a refusal lists, of those there are."""
+"""Largest number of known names that a refusal lists."""
 
 
 def refusal(known: Mapping[str, Tag], what: str, names: Sequence[str], values: Sequence[float]) -> str:
-    """Why a set of inputs can't be applied, "" if it can. known: those there are; what: the word for one of them."""
+    """Return why a set of inputs can't be applied, "" if it can.
+
+    known: tags by name. what: the word for one of them.
+    """
     if len(names) != len(values):
-        return f"{len(names)} names and {len(values)} values given, expected as many of both"
+        return f"{len(names)} names and {len(values)} values given, expected the same number of both"
     if not names:
         return f"no name and no value given, expected at least one {what}"
     seen: set[str] = set()
@@ -45,14 +48,14 @@ def refusal(known: Mapping[str, Tag], what: str, names: Sequence[str], values: S
 
 
 def alarm_problem(name: str, value: float) -> str:
-    """Why an alarm can't be said, "" if it can."""
+    """Return why a controller can't set or clear an alarm, "" if it can."""
     if name == ALARMS:
         return f"{name}: given, expected the name of an alarm behind it"
     return "" if value in (0.0, 1.0) else f"{printable(name)}: {value:g} given, expected 0 or 1"
 
 
 def shown(names: Sequence[str]) -> tuple[str, ...]:
-    """Names that somebody gave, fit to be repeated in an outcome."""
+    """Return names from a client, escaped and shortened for display in a command result."""
     return tuple(map(printable, names))
 
 

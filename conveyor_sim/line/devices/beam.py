@@ -1,4 +1,4 @@
-"""`Beams`: from when to when in a tick a bottle's circle crossed each of some segments."""
+"""`Beams`: times within a tick at which bottles cross light beams."""
 
 from collections.abc import Sequence
 
@@ -11,14 +11,17 @@ from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.scene.types import XY
 
 Span = tuple[float, float]
-"""From and to, s."""
+"""Start and end, s."""
 
 
 class Beams(Device):
-    """All beams at once, in one pass over bottles and beams."""
+    """All beams, evaluated in one pass over bottles and beams."""
 
     def __init__(self, ends: Sequence[tuple[XY, XY]]) -> None:
-        """ends: of each beam, m."""
+        """Store the beams.
+
+        ends: of each beam, m.
+        """
         super().__init__("beams")
         start, end = np.array(ends, dtype=np.float64).swapaxes(0, 1)
         length = np.hypot(*(end - start).T)[:, None]
@@ -36,7 +39,7 @@ class Beams(Device):
         self._states: list[int] = [0] * len(ends)
 
     def begin(self, now: ScanContext) -> None:
-        """Keep where bottles start."""
+        """Store the bottle positions."""
         bottles = now.state.world.bottles
         if self._room.shape[1] != bottles.x.size:
             self._room = np.empty((4, bottles.x.size))
@@ -44,7 +47,7 @@ class Beams(Device):
         began[0], began[1], began[2], began[3] = bottles.x, bottles.y, bottles.vx, bottles.vy
 
     def end(self, now: ScanContext) -> None:
-        """Find out when in this tick each was blocked. At the very first there was no way: bottles stand."""
+        """Find the times at which each beam was blocked. At the start, bottles are at rest."""
         bottles = now.state.world.bottles
         vx, vy, start = bottles.vx, bottles.vy, self._began
         if start is None:
@@ -52,7 +55,7 @@ class Beams(Device):
             start = np.stack((bottles.x, bottles.y, vx, vy))
         self._began = None
         ways = BottleMotion(start, bottles.x, bottles.y, vx, vy, bottles.radius, bottles.id)
-        # A group is laid out for kernels once, so the same arrays are given in the same one.
+        # The layout for kernels is made once, so equal arrays are passed in the same tuple.
         if self._ways is None or any(a is not b for a, b in zip(self._ways, ways, strict=True)):
             self._ways = ways
         ways = self._ways
@@ -65,9 +68,9 @@ class Beams(Device):
         self._states = self._beams.state.tolist()
 
     def state(self, beam: int) -> int:
-        """What became of a beam in this tick (engine/sensors/beams.py): FREE, BLOCKED or CHANGES."""
+        """Return the state of a beam in this tick (engine/sensors/beams.py): FREE, BLOCKED or CHANGES."""
         return self._states[beam]
 
     def spans(self, beam: int) -> list[Span]:
-        """When in this tick a beam was blocked, in order, s from its begin on; those that meet are one."""
+        """Return the intervals in which a beam was blocked, s from the start of the tick. Adjoining ones are joined."""
         return [(begin, end) for begin, end in self._beams.spans[beam, : self._beams.used[beam]].tolist()]

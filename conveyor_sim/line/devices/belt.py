@@ -1,4 +1,4 @@
-"""A belt as a device: its speed setpoint, its speed, the bottles on it. One without a drive follows at once."""
+"""Belts: speed setpoint, actual speed, bottles on the belt, watchdog. Without a drive, the speed follows at once."""
 
 import math
 from collections.abc import Sequence
@@ -17,27 +17,27 @@ from conveyor_sim.scene.geometry import belt_shape
 
 @dataclass
 class Watchdog:
-    """Stops one belt when no command for it was accepted for `timeout` s of simulated time."""
+    """Stop of a belt when no command was accepted for its time-out, in simulated time."""
 
     timeout_ticks: int
     last: int = 0
     """Tick of the last accepted command."""
     tripped: bool = False
     rests: bool = False
-    """While no controller is to command the belt."""
+    """True while no controller is in control of the belt."""
 
     def command(self, tick: int) -> None:
-        """A command was accepted."""
+        """Restart the time-out, because a command was accepted."""
         self.last = tick
         self.tripped = False
 
     def rest(self, tick: int, rests: bool) -> None:
-        """The belt has left its controller's hands, or comes back into them, with all of the time before it."""
+        """Rest outside automatic mode, and restart the time-out at each change of mode."""
         self.rests = rests
         self.command(tick)
 
     def trips(self, tick: int) -> bool:
-        """Whether the belt must stop now: once, at the first tick past the time-out."""
+        """Return True once, at the first tick after the time-out: the belt must stop."""
         if self.rests or self.tripped or tick - self.last < self.timeout_ticks:
             return False
         self.tripped = True
@@ -45,7 +45,7 @@ class Watchdog:
 
 
 class BeltDevice(Device):
-    """One belt while it runs."""
+    """Belt of a running line."""
 
     def __init__(
         self,
@@ -55,7 +55,10 @@ class BeltDevice(Device):
         more: Sequence[Tag] = (),
         backward: bool = False,
     ) -> None:
-        """more: tags that a drive adds. backward: whether it can reverse the setpoint."""
+        """Build the tags.
+
+        more: tags that a drive adds. backward: True if the drive can reverse the setpoint.
+        """
         short_name = name.rpartition("/")[2]
         setpoint, (low, high) = speed_command(short_name), belt.speed_limits
         reach = (low, high, -low, -high) if backward else (low, high)
@@ -84,14 +87,14 @@ class BeltDevice(Device):
 
     @property
     def alarms(self) -> Sequence[Declared]:
-        """Its watchdog has stopped it."""
+        """Alarm of the watchdog."""
         if self.watchdog is None:
             return ()
-        text = f"{self.name} stopped: no command came for its watchdog"
+        text = f"{self.name} stopped: its watchdog received no command"
         return (error(f"{self.name}/watchdog", text, f"{self.name}/speed"),)
 
     def command(self, name: str, value: float, now: ScanContext) -> None:
-        """Take a setpoint, m/s."""
+        """Apply a setpoint, m/s."""
         now.setpoints[self._index] = value
         if self.watchdog is not None:
             if self.watchdog.tripped:
@@ -99,12 +102,12 @@ class BeltDevice(Device):
             self.watchdog.command(now.tick)
 
     def take_mode(self, mode: int, now: ScanContext) -> None:
-        """Have its watchdog wait for a controller in automatic only."""
+        """Let the watchdog rest outside automatic mode."""
         if self.watchdog is not None:
             self.watchdog.rest(now.tick, mode != AUTOMATIC)
 
     def watch(self, now: ScanContext) -> str:
-        """The name of its setpoint if its controller has gone silent and it stops at this tick, "" if not."""
+        """Return the name of the setpoint if the watchdog stops the belt at this tick, "" otherwise."""
         if self.watchdog is None or not self.watchdog.trips(now.tick):
             return ""
         now.setpoints[self._index] = 0.0
@@ -112,17 +115,17 @@ class BeltDevice(Device):
         return self._speed_command
 
     def begin(self, now: ScanContext) -> None:
-        """Run as commanded."""
+        """Set the speed to the setpoint."""
         now.speeds[self._index] = now.setpoints[self._index]
 
     def speed(self, now: ScanContext) -> float:
-        """The speed that it has, m/s."""
+        """Return the present speed, m/s."""
         return float(now.speeds[self._index])
 
     def wanted(self, now: ScanContext) -> float:
-        """The speed that it is commanded to run at, m/s."""
+        """Return the commanded speed, m/s."""
         return float(now.setpoints[self._index])
 
     def values(self, now: ScanContext) -> Sequence[float]:
-        """Speed, m/s, and bottles on it."""
+        """Return the speed, m/s, and the number of bottles on the belt."""
         return now.speeds[self._index], now.carried(self._index)

@@ -1,4 +1,4 @@
-"""The velocity field of each belt's surface, as the engine sees it, set from the speeds that the drives have."""
+"""`BeltSurfaces`: surface velocity fields of the belts, set from the speeds of the drives."""
 
 import math
 
@@ -10,7 +10,7 @@ from conveyor_sim.physics.state import State
 
 
 class BeltSurfaces:
-    """The belts of a State: straight ones move along, curved ones and turn-tables turn."""
+    """Surfaces of all belts. Straight belts translate, curved belts and turn-tables rotate."""
 
     def __init__(self, state: State) -> None:
         self._state = state
@@ -26,11 +26,11 @@ class BeltSurfaces:
         """Speed of the fastest point of any belt, m/s."""
 
     def note(self, speeds: F8) -> None:
-        """The belts have these speeds along their centre lines already, (belts,) m/s."""
+        """Take over speeds that the belts already have along their centre lines, (belts,) m/s."""
         self.fastest = float(np.max(np.abs(speeds) * self._outermost)) if self._state.model.belts else 0.0
 
     def move(self, speeds: F8) -> None:
-        """Give each belt its speed along the centre line, (belts,) m/s, and each bottle that of its belt."""
+        """Set each belt's speed along the centre line, (belts,) m/s, and update the bottles on it."""
         self.note(speeds)
         world, surface = self._state.world, self._state.world.surface
         if surface is None or not self._state.model.belts:

@@ -1,4 +1,4 @@
-"""Counters: bottles whose axis passes over a line, by direction."""
+"""Counters of bottles whose axes pass over a line, by direction."""
 
 from collections.abc import Sequence
 
@@ -10,25 +10,25 @@ from conveyor_sim.scene.parts.counter import Counter
 
 
 class CounterDevice(Device):
-    """One counter while it runs."""
+    """Counter of a running line."""
 
     def __init__(self, name: str, counter: Counter, setup: DeviceSetup) -> None:
         super().__init__(
             name,
             [
                 count(f"{name}/forward", "counter", "Bottles that passed from left to right, seen along its line."),
-                count(f"{name}/backward", "counter", "Bottles that passed the other way."),
+                count(f"{name}/backward", "counter", "Bottles that passed in the opposite direction."),
             ],
         )
         self._line = CrossingLine(counter.from_, counter.to)
         self.forward = self.backward = 0
 
     def begin(self, now: ScanContext) -> None:
-        """See where the bottles start."""
+        """Store the bottle positions."""
         self._line.begin(now)
 
     def end(self, now: ScanContext) -> None:
-        """Count the passages of this tick; a bottle that comes to the line and goes back within it makes none."""
+        """Count the passages of this tick. A bottle that returns within the tick is not counted."""
         for passage in self._line.end(now):
             if passage.forward:
                 self.forward += 1
@@ -36,5 +36,5 @@ class CounterDevice(Device):
                 self.backward += 1
 
     def values(self, now: ScanContext) -> Sequence[float]:
-        """As its signals are listed."""
+        """Return the values in the order of the signals."""
         return self.forward, self.backward

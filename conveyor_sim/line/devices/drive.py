@@ -1,4 +1,4 @@
-"""Drives: a belt that ramps to its setpoint, runs, reverses, trips and is reset, and counts its travel."""
+"""Drives of belts: ramps, running, reversing, trips and reset, and travel of an encoder."""
 
 import math
 from collections.abc import Sequence
@@ -14,20 +14,26 @@ from conveyor_sim.scene.belts import CurvedBelt, StraightBelt
 from conveyor_sim.scene.drives import Drive
 
 AT_SPEED = 1e-9
-"""m/s, between setpoint and speed."""
+"""Tolerance between setpoint and speed, m/s."""
 
 
 @dataclass
 class Ramp:
-    """A speed on its way: no overshoot from rest, and what jerk allows where the setpoint changes on the way."""
+    """Speed that follows a setpoint within limits of acceleration and jerk.
+
+    It does not overshoot from rest. If the setpoint changes on the way, the jerk limit may cause an overshoot.
+    """
 
     value: float
-    """m/s"""
+    """Speed, m/s."""
     acceleration: float = 0.0
-    """m/s^2, in the last interval."""
+    """Acceleration in the last interval, m/s^2."""
 
     def approach(self, setpoint: float, limit: float, jerk: float | None, interval: float) -> float:
-        """The speed (m/s) after an interval (s); limit: m/s^2, jerk: m/s^3 or None for no limit."""
+        """Return the speed (m/s) after an interval (s).
+
+        limit: m/s^2. jerk: m/s^3, None for no limit.
+        """
         left = setpoint - self.value
         if left == 0.0 and self.acceleration == 0.0:
             return self.value
@@ -49,20 +55,20 @@ class Ramp:
 
 
 class DriveDevice(BeltDevice):
-    """One belt with a drive while it runs. It runs at the start, at the speed of the scene.
+    """Belt with a drive. It runs at the start, at the speed of the scene.
 
-    A trip stops it, at its ramp, until the fault is gone and `reset` has risen since.
+    A trip stops it along its ramp, until the fault is gone and `reset` has risen since.
     """
 
     def __init__(self, name: str, belt: StraightBelt | CurvedBelt, drive: Drive, setup: DeviceSetup) -> None:
         tags = [
             switch(f"{name}/running", "status", "Commanded to run, and not tripped.", 1.0, "state"),
-            switch(f"{name}/at_speed", "status", "At the end of its ramp, also of one to standstill.", 1.0),
+            switch(f"{name}/at_speed", "status", "At the end of its ramp, also at standstill.", 1.0),
             switch(f"{name}/fault", "status", "It has tripped.", adds_to="state"),
             switch(f"{name}/run", "command", "Runs while on.", 1.0),
             switch(f"{name}/reverse", "command", "Runs backward while on."),
-            switch(f"{name}/reset", "command", "As it rises, a trip is over if its cause is."),
-            switch(f"{name}/trip", "fault", "The drive trips and stops by its ramp."),
+            switch(f"{name}/reset", "command", "Its rising edge resets a trip whose cause is gone."),
+            switch(f"{name}/trip", "fault", "The drive trips and stops along its ramp."),
         ]
         if drive.pulses_per_metre is not None:
             text = "Pulses of the encoder, counted down in reverse."
@@ -77,15 +83,15 @@ class DriveDevice(BeltDevice):
         self.trip = False
         self.tripped = False
         self.travel = 0.0
-        """m, forward less backward."""
+        """Travel forward minus backward, m."""
 
     @property
     def alarms(self) -> Sequence[Declared]:
-        """It has tripped, beside those of a belt."""
+        """Alarm of a trip, and those of a belt."""
         return (error(self._tripped, f"the drive of {self.name} has tripped", f"{self.name}/fault"), *super().alarms)
 
     def command(self, name: str, value: float, now: ScanContext) -> None:
-        """Take a setpoint (m/s), run, reverse, reset, or the fault trip."""
+        """Apply a setpoint (m/s), run, reverse, reset, or the fault `trip`."""
         if name == self._speed_command:
             super().command(name, value, now)
             return
@@ -104,18 +110,18 @@ class DriveDevice(BeltDevice):
             now.alarm(self._tripped, self.tripped)
 
     def begin(self, now: ScanContext) -> None:
-        """Ramp for a tick."""
+        """Ramp for one tick."""
         drive, ramp, wanted = self._drive, self.ramp, self.wanted(now)
         if ramp.value != wanted or ramp.acceleration != 0.0:
             now.speeds[self._index] = ramp.approach(wanted, drive.acceleration, drive.jerk, now.length)
 
     def end(self, now: ScanContext) -> None:
-        """Count what was travelled in the tick."""
+        """Add the travel of this tick."""
         if now.tick > 0:
             self.travel += self.ramp.value * now.length
 
     def values(self, now: ScanContext) -> Sequence[float]:
-        """As a belt, then running, at_speed, fault, and pulses."""
+        """Return the values of a belt, then running, at_speed, fault, and pulses."""
         index, tripped = self._index, self.tripped
         at_speed = abs(self.ramp.value - self.wanted(now)) <= AT_SPEED
         values = [now.speeds[index], now.carried(index), self.run and not tripped, at_speed, tripped]
@@ -124,11 +130,11 @@ class DriveDevice(BeltDevice):
         return values
 
     def states(self, now: ScanContext) -> list[float]:
-        """Running and fault."""
+        """Return running and fault."""
         return [self.run and not self.tripped, self.tripped]
 
     def wanted(self, now: ScanContext) -> float:
-        """The speed that it is commanded to run at, m/s: none while it is stopped or tripped."""
+        """Return the commanded speed, m/s; 0 while stopped or tripped."""
         if not self.run or self.tripped:
             return 0.0
         setpoint = float(now.setpoints[self._index])
@@ -136,5 +142,5 @@ class DriveDevice(BeltDevice):
 
 
 def belt_device(name: str, belt: StraightBelt | CurvedBelt, setup: DeviceSetup) -> BeltDevice:
-    """A belt, with a drive if it has one."""
+    """Build a belt, with a drive if the part has one."""
     return BeltDevice(name, belt, setup) if belt.drive is None else DriveDevice(name, belt, belt.drive, setup)

@@ -1,4 +1,4 @@
-"""Where bottles enter a line: never onto another bottle or a rail that moves, and whether they are bad."""
+"""Entry of bottles: free space for them, and bad bottles among them."""
 
 import math
 from dataclasses import dataclass
@@ -10,34 +10,34 @@ from conveyor_sim.physics.state import State
 from conveyor_sim.scene.parts.bad import BadBottles
 
 CLEAR = 1e-9
-"""m; bottles one gap of 0 apart touch, and rounding must not block them."""
+"""Tolerance against rounding, m: bottles with a gap of 0 touch, and must not block each other."""
 
 
 @dataclass(frozen=True)
 class BottleEntry:
-    """Bottles of one type that enter in one direction, at one speed."""
+    """Entry of bottles of one type, in one direction and at one speed."""
 
     kind: int
     """Index of the bottle type."""
     radius: float
-    """m"""
+    """Bottle radius, m."""
     direction: float
-    """rad"""
+    """Direction of motion, rad."""
     speed: float
-    """m/s"""
+    """Speed, m/s."""
 
     def has_room(self, state: State, x: float, y: float) -> bool:
-        """Whether a bottle at (x, y) m would touch no other, nor a rail that moves and stands there now."""
+        """Return True if a bottle at (x, y) m would touch neither a bottle nor a moving rail in its present place."""
         return has_room(state, x, y, self.radius)
 
     def enter(self, state: State, x: float, y: float) -> int:
-        """Put a bottle at (x, y) m; return its id."""
+        """Add a bottle at (x, y) m, and return its id."""
         vx, vy = self.speed * math.cos(self.direction), self.speed * math.sin(self.direction)
         return state.add(self.kind, x, y, 0.0, vx, vy, 0.0)
 
 
 def has_room(state: State, x: float, y: float, radius: float) -> bool:
-    """Whether a bottle of a radius at (x, y), m, would touch no other, nor a rail that moves and stands there now."""
+    """Return True if a bottle at (x, y) m would touch neither a bottle nor a moving rail in its present place."""
     bottles = state.world.bottles
     near = (bottles.x - x) ** 2 + (bottles.y - y) ** 2 < (bottles.radius + radius - CLEAR) ** 2
     if bool((near & (bottles.id >= 0)).any()):
@@ -47,7 +47,7 @@ def has_room(state: State, x: float, y: float, radius: float) -> bool:
 
 
 class Quality:
-    """Which of the bottles that come from one place are bad."""
+    """Bad bottles among those of one infeed or source."""
 
     def __init__(self, part: BadBottles, random: np.random.Generator) -> None:
         self._share, self._every, self._at = part.bad_share, part.bad_every, frozenset(part.bad_at)
@@ -55,9 +55,9 @@ class Quality:
         self.count = self.bad = 0
 
     def judge(self, bottle: int, now: ScanContext) -> None:
-        """Decide on the next bottle, by its id."""
+        """Decide whether the next bottle is bad, by its id."""
         self.count += 1
-        # Nothing is drawn where it would decide nothing.
+        # Random numbers are drawn only if they decide.
         if self._every is not None:
             bad = self.count % self._every == 0
         elif self._at:

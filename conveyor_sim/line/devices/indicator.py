@@ -1,4 +1,4 @@
-"""Indicators: flow, jam, starved and blocked of an exit, from what its sensors tell."""
+"""Indicators of an exit from its sensors: flow, jam, starved, blocked."""
 
 import math
 from collections.abc import Sequence
@@ -13,14 +13,14 @@ from conveyor_sim.line.tag import number, switch
 from conveyor_sim.scene.parts.indicator import Indicator
 
 STANDS = 1e-3
-"""m/s; a slower belt stands."""
+"""Speed below which a belt stands still, m/s."""
 
 HOUR = 3600.0
-"""s."""
+"""Seconds per hour."""
 
 
 class IndicatorDevice(Device):
-    """One exit while it runs. Its times are counted in ticks."""
+    """Indicator of a running line. Times are counted in ticks."""
 
     recent: list[int]
     """Ticks of the passages within the window."""
@@ -47,21 +47,21 @@ class IndicatorDevice(Device):
         self._jam_ticks, self._starved_ticks = _ticks(indicator.jam_time, tick), _ticks(starved_time, tick)
         self._window, self._window_ticks = indicator.window, _ticks(indicator.window, tick)
         self.passed = 0
-        """Bottles out, less those back in, at most so far: one that shakes on the line passes once."""
+        """Largest number of bottles out minus those back in so far. A bottle that shakes on the line counts once."""
         self.recent = []
         self.stuck = 0
-        """Ticks for which nothing has left that could have."""
+        """Ticks for which no bottle has left although one could."""
         self.empty = 0
-        """Ticks for which nothing was there to leave."""
+        """Ticks for which no bottle has waited."""
         self.jam = self.starved = self.blocked = False
 
     @property
     def alarms(self) -> Sequence[Declared]:
-        """A jam."""
+        """Jam alarm."""
         return (error(f"{self.name}/jam", f"{self.name} shows a jam", f"{self.name}/jam"),)
 
     def end(self, now: ScanContext) -> None:
-        """Judge this tick."""
+        """Evaluate this tick."""
         if now.tick == 0:
             return
         out = self._counter.forward - self._counter.backward
@@ -76,7 +76,7 @@ class IndicatorDevice(Device):
         )
         self.blocked = bool(waits and wants and held)
         self.stuck = 0 if more or not waits or not runs or self.blocked else self.stuck + 1
-        # A jam is not cleared by stopping the belt.
+        # Stopping the belt does not clear a jam.
         jam = bool(self.stuck >= self._jam_ticks or (self.jam and waits and not more))
         if jam is not self.jam:
             self.jam = jam
@@ -85,7 +85,7 @@ class IndicatorDevice(Device):
         self.starved = self.empty >= self._starved_ticks
 
     def values(self, now: ScanContext) -> Sequence[float]:
-        """As its signals are listed."""
+        """Return the values in the order of the signals."""
         flow = len(self.recent) * HOUR / self._window
         return flow, self.jam, self.starved, *((self.blocked,) if self._can_block else ())
 
@@ -95,5 +95,5 @@ def _runs(belt: BeltDevice, now: ScanContext) -> bool:
 
 
 def _ticks(seconds: float, tick: float) -> int:
-    """The first tick at which so much time has passed."""
+    """Return the first tick at which `seconds` have passed."""
     return max(1, math.ceil(seconds / tick - 1e-9))

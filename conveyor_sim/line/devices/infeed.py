@@ -1,4 +1,4 @@
-"""Infeeds: bottles enter from a tightly packed in-line (`gap`) or at a rate; never onto another bottle."""
+"""Infeeds: bottles enter from a tightly packed in-line (`gap`) or at a rate, always into free space."""
 
 import math
 
@@ -14,22 +14,23 @@ from conveyor_sim.physics.state import State
 from conveyor_sim.scene.parts.infeed import Infeed
 
 ROUNDING = 1e-9
-"""s; sums of 1 / rate must not miss the tick they fall on."""
+"""Tolerance against rounding, s: sums of 1 / rate must not miss the tick they fall on."""
 
 LATE = 2.0
-"""Of the time a bottle takes to enter from a moving in-line: after that without one, the infeed is blocked."""
+"""Multiple of the time a bottle takes to enter from a moving in-line. After that time without a bottle, the infeed
+is blocked."""
 
 
 class InfeedDevice(Device):
-    """One infeed while it runs."""
+    """Infeed of a running line."""
 
     def __init__(self, name: str, infeed: Infeed, setup: DeviceSetup) -> None:
         most = MOST_COUNT if infeed.count is None else infeed.count
         super().__init__(
             name,
             [
-                count(f"{name}/fed", "counter", "Bottles let in.", high=most, adds_to="fed").of("fed"),
-                switch(f"{name}/blocked", "status", "A bottle is due, and there is no room for it.").of("blocked"),
+                count(f"{name}/fed", "counter", "Bottles fed.", high=most, adds_to="fed").of("fed"),
+                switch(f"{name}/blocked", "status", "A bottle is due, but has no room.").of("blocked"),
             ],
         )
         self._infeed, self._entry = infeed, setup.entry(infeed.bottle, infeed.direction, infeed.speed)
@@ -41,17 +42,17 @@ class InfeedDevice(Device):
         self.blocked = False
         self.blocked_ticks = 0
         self.last = -1
-        """Id of the bottle fed last."""
+        """Id of the last bottle."""
         self.due = infeed.start
-        """s: when the next bottle is due (rate), or when the last one entered (gap)."""
+        """Time when the next bottle is due (rate), or when the last one entered (gap), s."""
         self.extra = 0.0
-        """m or s, jitter of the next bottle's place in the in-line."""
+        """Jitter of the next bottle along the in-line, m (gap) or s (rate)."""
         self.offset = 0.0
-        """m, lateral jitter of the next bottle."""
+        """Lateral jitter of the next bottle, m."""
         self._draw()
 
     def feed(self, now: ScanContext) -> None:
-        """Let in what is due."""
+        """Feed the bottles that are due."""
         if now.time < self._infeed.start:
             return
         entered = True
@@ -65,7 +66,7 @@ class InfeedDevice(Device):
         return self._infeed.count is not None and self.fed >= self._infeed.count
 
     def _feed_packed(self, now: ScanContext) -> bool:
-        """The in-line moves with its last bottle: the next one enters a pitch behind it."""
+        """Feed from an in-line that moves with its last bottle. The next bottle enters one pitch behind it."""
         state, time = now.state, now.time
         pitch = 2.0 * self._radius + (self._infeed.gap or 0.0)
         advance = self._infeed.speed * now.length
@@ -75,7 +76,7 @@ class InfeedDevice(Device):
             if ahead < 0.0:
                 self.blocked = self._late(time, pitch)
                 return False
-            # Past one tick's travel the last bottle no longer pulls the in-line behind it.
+            # Beyond one tick's travel the last bottle no longer pulls the in-line.
             ahead = self._way_to_rails(state, min(ahead, advance))
         if not self._enter(now, ahead):
             self.blocked = self._late(time, pitch)
@@ -84,7 +85,7 @@ class InfeedDevice(Device):
         return True
 
     def _progress(self, state: State, time: float) -> float:
-        """How far the bottle fed last has come along the in-line, m; one that is gone goes on at its speed."""
+        """Return the distance of the last bottle along the in-line, m. A removed bottle continues at its speed."""
         bottles = state.world.bottles
         slot = int((bottles.id == self.last).argmax())
         if bottles.id[slot] != self.last:
@@ -94,12 +95,12 @@ class InfeedDevice(Device):
         return dx * self._direction[0] + dy * self._direction[1]
 
     def _way_to_rails(self, state: State, most: float) -> float:
-        """How far ahead of its place a bottle can be, up to `most` (m), before it meets a rail that stands there."""
+        """Return the distance ahead, up to `most` m, at which a bottle meets a rail in its present place."""
         ways = np.linspace(0.0, most, 2 + int(2.0 * most / self._radius))
         clear = self._clear_of_rails(state, ways)
         if clear.all():
             return most
-        # Rails that it only slides along do not hold it up.
+        # Rails alongside do not stop the bottle.
         first = int(np.argmin(clear))
         low, high = float(ways[max(0, first - 1)]), float(ways[first])
         while high - low > CLEAR:
@@ -111,7 +112,7 @@ class InfeedDevice(Device):
         return low
 
     def _clear_of_rails(self, state: State, ways: F8) -> NDArray[np.bool_]:
-        """Whether a bottle that far ahead of its place is in no rail; ways: (n,), m."""
+        """Return whether a bottle at distances ahead (n,), m, touches no rail."""
         places = np.array([self._place(float(way)) for way in ways])
         clear = np.ones(ways.size, dtype=bool)
         for rail in state.rails():
@@ -120,7 +121,7 @@ class InfeedDevice(Device):
         return clear
 
     def _place(self, ahead: float) -> tuple[float, float]:
-        """Where the next bottle is, that far along the in-line, m."""
+        """Return the position of the next bottle at a distance along the in-line, m."""
         along, across = self._direction, (-self._direction[1], self._direction[0])
         x = self._infeed.position[0] + ahead * along[0] + self.offset * across[0]
         y = self._infeed.position[1] + ahead * along[1] + self.offset * across[1]
@@ -137,7 +138,7 @@ class InfeedDevice(Device):
             return False
         if not self._enter(now, 0.0):
             self.blocked = True
-            # A bottle that has to wait shifts the ones behind it: a line does not catch up by itself.
+            # A delayed bottle delays all later ones, because a line does not catch up.
             self.due = time - self.extra
             return False
         self.due += 1.0 / rate
@@ -154,7 +155,7 @@ class InfeedDevice(Device):
         return True
 
     def _draw(self) -> None:
-        """Jitter of the next bottle. Packed bottles can only be late; timed ones may be early too."""
+        """Draw the jitter of the next bottle. Packed bottles can only be late; timed ones may also be early."""
         timing, lateral = self._infeed.timing_jitter, self._infeed.lateral_jitter
         if timing:
             self.extra = float(self.random.uniform(0.0 if self._infeed.gap is not None else -timing, timing))
@@ -162,5 +163,5 @@ class InfeedDevice(Device):
             self.offset = float(self.random.uniform(-lateral, lateral))
 
     def counts(self) -> tuple[int, int, int]:
-        """Bottles fed, and bad ones among them."""
+        """Return fed bottles and bad ones among them."""
         return self.fed, self.quality.bad, 0

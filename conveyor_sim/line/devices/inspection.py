@@ -1,4 +1,4 @@
-"""Inspections: machines that see which of the bottles that pass are bad."""
+"""Inspections: machines that detect bad bottles among those that pass."""
 
 from collections.abc import Sequence
 
@@ -10,17 +10,17 @@ from conveyor_sim.scene.parts.inspection import Inspection
 
 
 class InspectionDevice(Device):
-    """One inspection while it runs."""
+    """Inspection of a running line."""
 
     def __init__(self, name: str, inspection: Inspection, setup: DeviceSetup) -> None:
         super().__init__(
             name,
             [
-                switch(f"{name}/running", "status", "It looks at bottles, and nobody has stopped it.", 1.0, "state"),
+                switch(f"{name}/running", "status", "Inspects bottles, and is not stopped.", 1.0, "state"),
                 count(f"{name}/count", "counter", "Bottles that passed from left to right, seen along its line."),
                 count(f"{name}/bad", "counter", "Bad bottles among them."),
-                seconds(f"{name}/time", "actual", "When the last bottle passed, between ticks."),
-                seconds(f"{name}/bad_time", "actual", "When the last bad bottle passed, between ticks."),
+                seconds(f"{name}/time", "actual", "Time of the last passage, between ticks."),
+                seconds(f"{name}/bad_time", "actual", "Time of the last bad bottle's passage, between ticks."),
                 switch(f"{name}/stop", "fault", "Sees no bottles."),
             ],
         )
@@ -28,18 +28,18 @@ class InspectionDevice(Device):
         self.stop = False
         self.count = self.bad = 0
         self.time = self.bad_time = 0.0
-        """s, when the last bottle passed, and the last bad one."""
+        """Times when the last bottle passed, and the last bad one, s."""
 
     def command(self, name: str, value: float, now: ScanContext) -> None:
-        """Take the fault stop."""
+        """Apply the fault `stop`."""
         self.stop = value != 0.0
 
     def begin(self, now: ScanContext) -> None:
-        """Note where the bottles are."""
+        """Store the bottle positions."""
         self._line.begin(now)
 
     def end(self, now: ScanContext) -> None:
-        """Look at those that passed."""
+        """Inspect the bottles that passed."""
         for passage in self._line.end(now):
             if passage.forward and not self.stop:
                 self.count, self.time = self.count + 1, passage.time
@@ -47,13 +47,13 @@ class InspectionDevice(Device):
                     self.bad, self.bad_time = self.bad + 1, passage.time
 
     def states(self, now: ScanContext) -> list[float]:
-        """Running."""
+        """Return running."""
         return [not self.stop]
 
     def counts(self) -> tuple[int, int, int]:
-        """Bottles that passed, and bad ones among them."""
+        """Return bottles that passed, and bad ones among them."""
         return self.count, self.bad, 0
 
     def values(self, now: ScanContext) -> Sequence[float]:
-        """Running, bottles that passed, bad ones among them, and when the last of each did (s)."""
+        """Return running, passed bottles, bad ones among them, and the times of the last ones (s)."""
         return not self.stop, self.count, self.bad, self.time, self.bad_time

@@ -1,4 +1,7 @@
-"""Gates, pushers and diverters: rails that go to and fro on command, with end switches."""
+"""Gates, pushers and diverters: rails that move to and fro on command, with end switches.
+
+A motion profile is an array (PHASES, 4): start time (s), position, speed and acceleration of each phase.
+"""
 
 from collections.abc import Sequence
 from typing import Any
@@ -18,17 +21,18 @@ WORDS = {
     "pushers": ("push", "retracted", "extended", "retracted", "extended"),
     "diverters": ("divert", "at_home", "diverting", "at home", "diverting"),
 }
-"""By kind: the command, the end switches at home and at the end of the stroke, and what it is called there."""
+"""By kind: the command, the end switches at home and at the end of the stroke, and the words for these positions."""
 
 SWITCHED = 1e-3
-"""Of the stroke: within it of an end that end's switch is on, within it of its course it is not blocked."""
+"""Share of the stroke within which an end switch is on, and within which a mover off its motion profile is not
+blocked."""
 
 
 class Mover(Device):
-    """One rail that moves: to the end of its stroke while its command is on, home while it is off.
+    """Moving rail: to the end of its stroke while its command is on, home while it is off.
 
-    While it is jammed it stands where it was; it goes on when it is free again. Where bottles are too much for its
-    drive, it is held up or goes back, and goes on from where it is.
+    A jammed mover stands still, and continues when it is free again. Where bottles are too heavy for its drive, it is
+    held up or pushed back, and continues from there.
     """
 
     def __init__(self, name: str, part: MoverPart, setup: DeviceSetup) -> None:
@@ -50,24 +54,24 @@ class Mover(Device):
                     f"Goes until {at_end}; off: until {at_home}.",
                     round(share),
                 ),
-                switch(f"{name}/jammed", "fault", "Stands where it is, against whatever presses."),
+                switch(f"{name}/jammed", "fault", "Stands still, against any load."),
             ),
         )
         self._number, self._shape = index, shape
         self.target = self.position = shape.first
-        """m or rad."""
+        """Target position, m or rad."""
         self.speed = 0.0
         self.jammed = False
         self.course = resting(shape.first)
         self.since = 0
-        """Tick at which the course began."""
+        """Tick at which the motion profile began."""
         self.limited = False
-        """Whether its drive could not keep it on its course all through the last tick."""
+        """True if the drive could not follow the motion profile throughout the last tick."""
         self.blocked = False
-        """From when its drive can't keep it near its course, until it has kept that for a tick."""
+        """True from when the drive can't stay near the motion profile, until it has followed it for one tick."""
 
     def command(self, name: str, value: float, now: ScanContext) -> None:
-        """Go to the other end, jam or be free again, from where it is on."""
+        """Move to the other end, jam, or become free, from the present position."""
         if name == self.faults[0].name:
             self.jammed = value != 0.0
         else:
@@ -81,7 +85,7 @@ class Mover(Device):
             self.course = course_to(self.position, speed, self.target, shape.max_speed, shape.acceleration)
 
     def begin(self, now: ScanContext) -> None:
-        """Tell the engine where the rail is in the steps of this tick."""
+        """Set the motion profile of this tick in the engine."""
         rails, number = self._rails(now), self._number
         rails.course[number] = later(self.course, (now.tick - self.since) * now.length)
         if (actuators := rails.actuators) is not None:
@@ -92,7 +96,7 @@ class Mover(Device):
                 actuators.mode[number] = ON_PROFILE
 
     def end(self, now: ScanContext) -> None:
-        """See where it is, and where it is going if its drive was held up."""
+        """Take over the position, and a changed motion profile if the drive was held up."""
         rails, number = self._rails(now), self._number
         self.position, self.speed = float(rails.position[number]), float(rails.speed[number])
         if (actuators := rails.actuators) is None:
@@ -105,12 +109,12 @@ class Mover(Device):
         self.blocked = held_up or (self.blocked and self.limited)
 
     def values(self, now: ScanContext) -> Sequence[float]:
-        """Position from 0, at home, to 1, both end switches, and whether it is blocked."""
+        """Return the position from 0, at home, to 1, both end switches, and blocked."""
         share = min(1.0, max(0.0, self.position / self._shape.stroke))
         return share, float(share <= SWITCHED), float(share >= 1.0 - SWITCHED), float(self.blocked)
 
     def states(self, now: ScanContext) -> list[float]:
-        """Blocked."""
+        """Return blocked."""
         return [self.blocked]
 
     def _rails(self, now: ScanContext) -> MovingRails:
@@ -123,16 +127,16 @@ _plan: Any = plan_profile.py_func  # type: ignore[attr-defined]
 
 
 def resting(position: float) -> F8:
-    """At rest at a position for ever."""
+    """Return the motion profile of permanent rest at a position."""
     course = np.zeros((PHASES, 4))
     course[:, 1] = position
     return course
 
 
 def course_to(position: float, speed: float, target: float, max_speed: float, acceleration: float) -> F8:
-    """The fastest way from a position and speed, at most `max_speed`, to rest at the target; it may turn round first.
+    """Return the fastest motion profile from a position and speed to rest at the target; it may turn round first.
 
-    All in m and s, or rad and s; times since now.
+    Units are m and s, or rad and s. Times count from now.
     """
     course = np.zeros((1, PHASES, 4))
     _plan(course, 0, 0.0, position, speed, target, max_speed, acceleration)
@@ -140,14 +144,14 @@ def course_to(position: float, speed: float, target: float, max_speed: float, ac
 
 
 def position_at(course: F8, seconds: float) -> float:
-    """Where a course is so many seconds after it began."""
+    """Return the position on a motion profile `seconds` after its start."""
     k = max(0, int(np.searchsorted(course[:, 0], seconds, side="right")) - 1)
     since = seconds - course[k, 0]
     return float(course[k, 1] + (course[k, 2] + 0.5 * course[k, 3] * since) * since)
 
 
 def later(course: F8, seconds: float) -> F8:
-    """The same course with its times since so many seconds later."""
+    """Return the motion profile with times counted from `seconds` later."""
     shifted = course.copy()
     shifted[:, 0] -= seconds
     return shifted

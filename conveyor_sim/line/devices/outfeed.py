@@ -1,4 +1,4 @@
-"""Outfeeds: regions that remove the bottles whose axis is inside."""
+"""Outfeeds: regions that remove bottles whose axes are inside."""
 
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.devices.region import Region
@@ -8,11 +8,11 @@ from conveyor_sim.scene.parts.outfeed import Outfeed
 
 
 class OutfeedDevice(Device):
-    """One outfeed while it runs."""
+    """Outfeed of a running line."""
 
     def __init__(self, name: str, outfeed: Outfeed, setup: DeviceSetup) -> None:
         super().__init__(
-            name, [count(f"{name}/removed", "counter", "Bottles taken away.", adds_to="removed").of("removed")]
+            name, [count(f"{name}/removed", "counter", "Bottles removed.", adds_to="removed").of("removed")]
         )
         self._region = Region(outfeed.region)
         self.removed = 0
@@ -24,5 +24,5 @@ class OutfeedDevice(Device):
             self.removed += 1
 
     def counts(self) -> tuple[int, int, int]:
-        """Bottles removed; it looks at none of them."""
+        """Return removed bottles. None of them are inspected."""
         return self.removed, 0, 0

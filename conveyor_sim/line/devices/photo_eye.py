@@ -1,4 +1,4 @@
-"""Photo-eyes: a beam, what can go wrong with it, and the delays after which it is believed."""
+"""Photo-eyes: beams, their faults, debounce and delays."""
 
 from collections.abc import Sequence
 
@@ -10,36 +10,36 @@ from conveyor_sim.line.tag import count, number, seconds, switch
 from conveyor_sim.scene.parts.photo_eye import PhotoEye
 
 FASTEST_CHATTER, LONGEST_DELAY = 1000.0, 60.0
-"""Hz and s, that can be injected."""
+"""Largest chatter frequency and delay that can be injected, Hz and s."""
 
 
 Edge = tuple[float, bool]
-"""When (s) a signal changes, and whether it comes on."""
+"""Time of a change (s), and the new value."""
 
 
 class Timer:
-    """Its output comes on once the input has been on for `on` s, and goes off once that has been off for `off` s.
+    """On-delay and off-delay, TON and TOF of IEC 61131-3 in one, with edges at any time between ticks.
 
-    TON and TOF of IEC 61131-3 in one, with edges at any time between ticks.
+    The output turns on once the input has been on for `on` s, and off once it has been off for `off` s.
     """
 
     def __init__(self, on: float, off: float) -> None:
         self._on, self._off = on, off
         self.input = self.output = False
         self.since = 0.0
-        """s: when the input last changed."""
+        """Time of the last change of the input, s."""
 
     def start(self, level: bool) -> None:
-        """Begin as if the input had always been so."""
+        """Start in a steady state."""
         self.input = self.output = level
 
     @property
     def runs(self) -> bool:
-        """Whether its output is still to follow its input."""
+        """True while the output has yet to follow the input."""
         return self.input != self.output
 
     def follow(self, edges: Sequence[Edge], until: float) -> list[Edge]:
-        """The output's edges up to a time (s), after the input's up to then, which are in order."""
+        """Return the output's edges up to a time (s), from the input's edges up to then, in order."""
         made: list[Edge] = []
         for at, level in edges:
             self._ripen(at, made)
@@ -56,10 +56,10 @@ class Timer:
 
 
 class PhotoEyeDevice(Device):
-    """One photo-eye: beam, chatter, stuck, late by a delay, debounced; then on-delay and off-delay, in this order."""
+    """Photo-eye: beam, chatter, stuck output, delay, debounce, then on-delay and off-delay, in this order."""
 
     late: tuple[Edge, ...]
-    """Edges that have not come through yet."""
+    """Edges that are still delayed."""
 
     def __init__(self, name: str, eye: PhotoEye, setup: DeviceSetup) -> None:
         eyes = setup.scene.photo_eyes
@@ -68,48 +68,46 @@ class PhotoEyeDevice(Device):
         super().__init__(
             name,
             [
-                switch(f"{name}/blocked", "status", "Something is in the beam, after debounce and delays."),
-                seconds(f"{name}/rose", "actual", "When the beam was last broken, between ticks; 0: never yet."),
-                seconds(f"{name}/fell", "actual", "When the beam was last freed, between ticks; 0: never yet."),
-                count(f"{name}/edges", "counter", "How often the beam was broken or freed."),
-                switch(f"{name}/stuck_on", "fault", "Sees a bottle always."),
+                switch(f"{name}/blocked", "status", "A bottle is in the beam, after debounce and delays."),
+                seconds(f"{name}/rose", "actual", "Time when the beam was last broken, between ticks; 0: never."),
+                seconds(f"{name}/fell", "actual", "Time when the beam was last freed, between ticks; 0: never."),
+                count(f"{name}/edges", "counter", "Number of times the beam was broken or freed."),
+                switch(f"{name}/stuck_on", "fault", "Always sees a bottle."),
                 switch(f"{name}/stuck_off", "fault", "Never sees a bottle; stuck_on wins."),
-                number(
-                    f"{name}/chatter", "fault", "Shows the opposite so often, at random.", "Hz", 0.0, FASTEST_CHATTER
-                ),
-                number(f"{name}/delay", "fault", "All that it sees comes so much later.", "s", 0.0, LONGEST_DELAY),
+                number(f"{name}/chatter", "fault", "Frequency of random inversions.", "Hz", 0.0, FASTEST_CHATTER),
+                number(f"{name}/delay", "fault", "Delay of all changes.", "s", 0.0, LONGEST_DELAY),
             ],
         )
         self._beams, self._index, self._debounce = beams, index, eye.debounce
-        self._quiet = False  # nothing changes before the beam does
+        self._quiet = False  # True: no change until the beam changes
         self.random = setup.random(name, CHATTER)
         self.stuck_on = self.stuck_off = False
         self.chatter = 0.0
-        """Hz: full cycles a second."""
+        """Full cycles per second, Hz."""
         self.delay = 0.0
-        """s."""
+        """Injected delay, s."""
         self.beam = False
-        """Whether a bottle is in the beam."""
+        """True while a bottle is in the beam."""
         self.flipped = False
-        """Whether chatter shows the opposite."""
+        """True while chatter inverts the output."""
         self.next_flip = 0.0
-        """s: when chatter turns over next."""
+        """Time of the next inversion by chatter, s."""
         self.level = False
-        """What it shows before delays."""
+        """Output before delays."""
         self.late = ()
         self.debounced = Timer(eye.debounce, eye.debounce)
         self.delayed = Timer(eye.on_delay, eye.off_delay)
         self.rose = self.fell = 0.0
-        """s: when the beam was last broken and last freed, by the edges that passed the debounce."""
+        """Times when the beam was last broken and last freed, s, by edges that passed the debounce."""
         self.edges = 0
 
     @property
     def blocked(self) -> bool:
-        """Its output, after all delays."""
+        """Output after all delays."""
         return self.delayed.output
 
     def command(self, name: str, value: float, now: ScanContext) -> None:
-        """Go wrong, or right again, from this tick on."""
+        """Inject or clear a fault from this tick on."""
         self._quiet = False
         fault = name.rpartition("/")[2]
         setattr(self, fault, bool(value) if fault.startswith("stuck") else float(value))
@@ -123,7 +121,7 @@ class PhotoEyeDevice(Device):
         self._quiet = False
 
     def end(self, now: ScanContext) -> None:
-        """See what happened in this tick."""
+        """Evaluate this tick."""
         if self._quiet and self._beams.state(self._index) == self.beam:  # FREE and not in it, or BLOCKED and in it
             return
         spans = self._beams.spans(self._index)
@@ -155,11 +153,14 @@ class PhotoEyeDevice(Device):
         self._quiet = not (self.chatter or self.late or self.debounced.runs or self.delayed.runs)
 
     def values(self, now: ScanContext) -> Sequence[float]:
-        """As its signals are listed."""
+        """Return the values in the order of the signals."""
         return self.blocked, self.rose, self.fell, self.edges
 
     def _beam(self, spans: Sequence[Span], length: float) -> list[Edge]:
-        """Edges of the beam in a tick, s from its begin on; bottles that came or went between ticks did so at once."""
+        """Return the edges of the beam in a tick, s from its start.
+
+        Bottles that appear or vanish between ticks make an edge at the start.
+        """
         edges: list[Edge] = []
         level = self.beam
         if level and (not spans or spans[0][0] > ROUNDING):
@@ -175,7 +176,7 @@ class PhotoEyeDevice(Device):
         return edges
 
     def _flips(self, time: float) -> list[float]:
-        """When up to a time chatter turns over, s."""
+        """Return the times up to `time` at which chatter inverts the output, s."""
         flips = []
         while self.chatter > 0.0 and self.next_flip <= time:
             flips.append(self.next_flip)
@@ -183,12 +184,12 @@ class PhotoEyeDevice(Device):
         return flips
 
     def _draw(self) -> None:
-        """Half a cycle of chatter, half as long or as long again."""
+        """Draw the next half cycle of chatter, between half and one and a half of its mean length."""
         if self.chatter > 0.0:
             self.next_flip += float(self.random.uniform(0.5, 1.5)) * 0.5 / self.chatter
 
     def _show(self, at: float) -> None:
-        """Note what the eye makes of beam and faults from a time on; edges never overtake each other."""
+        """Delay the output that follows from beam and faults. Edges never overtake each other."""
         level = self.stuck_on or (not self.stuck_off and self.beam != self.flipped)
         if level != self.level:
             self.level = level

@@ -1,4 +1,4 @@
-"""Rejects: machines that throw out the bottle that is before them when they are fired."""
+"""Rejects: machines that remove the bottle in front of them when fired."""
 
 from collections.abc import Sequence
 
@@ -11,22 +11,22 @@ from conveyor_sim.scene.parts.reject import Reject
 
 
 class RejectDevice(Device):
-    """One reject while it runs."""
+    """Reject of a running line."""
 
     strokes: tuple[float, ...]
-    """s, when the strokes that are still to hit began or begin."""
+    """Start times of the strokes that have not hit yet, s."""
 
     def __init__(self, name: str, reject: Reject, setup: DeviceSetup) -> None:
         super().__init__(
             name,
             [
-                switch(f"{name}/running", "status", "It answers to fire, and nobody has stopped it.", 1.0, "state"),
-                count(f"{name}/rejected", "counter", "Bottles thrown out.", adds_to="rejected"),
-                count(f"{name}/rejected_bad", "counter", "Bad bottles thrown out."),
-                count(f"{name}/rejected_good", "counter", "Good bottles thrown out."),
-                count(f"{name}/missed", "counter", "Strokes that hit nothing."),
-                switch(f"{name}/fire", "command", "As it rises, a stroke that can hit one bottle."),
-                switch(f"{name}/stop", "fault", "Does not answer to fire."),
+                switch(f"{name}/running", "status", "Responds to fire, and is not stopped.", 1.0, "state"),
+                count(f"{name}/rejected", "counter", "Bottles rejected.", adds_to="rejected"),
+                count(f"{name}/rejected_bad", "counter", "Bad bottles rejected."),
+                count(f"{name}/rejected_good", "counter", "Good bottles rejected."),
+                count(f"{name}/missed", "counter", "Strokes that hit no bottle."),
+                switch(f"{name}/fire", "command", "Its rising edge starts a stroke that can hit one bottle."),
+                switch(f"{name}/stop", "fault", "Does not respond to fire."),
             ],
         )
         self._reject = reject
@@ -39,18 +39,18 @@ class RejectDevice(Device):
         self.missed = 0
 
     def command(self, name: str, value: float, now: ScanContext) -> None:
-        """Take fire, which counts as it rises, or the fault stop."""
+        """Apply `fire` at its rising edge, or the fault `stop`."""
         if name.endswith("/stop"):
             self.stop = value != 0.0
         elif self.fire.rises(value) and not self.stop:
             self.strokes = (*self.strokes, now.time + self._reject.delay)
 
     def rehearse(self, now: ScanContext) -> None:
-        """Look into the region."""
+        """Search the region."""
         self._region.inside(now.state.world.bottles)
 
     def take(self, now: ScanContext) -> None:
-        """Throw out one bottle a stroke, within its window."""
+        """Remove one bottle per stroke, within its window."""
         if not self.strokes:
             return
         bottles = now.state.world.bottles
@@ -69,13 +69,13 @@ class RejectDevice(Device):
         self.strokes = tuple(left)
 
     def states(self, now: ScanContext) -> list[float]:
-        """Running."""
+        """Return running."""
         return [not self.stop]
 
     def counts(self) -> tuple[int, int, int]:
-        """Bottles thrown out, and bad ones among them."""
+        """Return rejected bottles, and bad ones among them."""
         return self.removed, self.removed_bad, self.removed
 
     def values(self, now: ScanContext) -> Sequence[float]:
-        """Running, rejected, bad and good ones among them, and strokes that hit nothing."""
+        """Return running, rejected, bad and good ones among them, and strokes without a bottle."""
         return not self.stop, self.removed, self.removed_bad, self.removed - self.removed_bad, self.missed

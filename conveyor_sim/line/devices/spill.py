@@ -1,4 +1,4 @@
-"""Spills: bottles that a test has dropped onto the line."""
+"""Spills: bottles that a test drops onto the line."""
 
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.devices.edge import RisingEdge
@@ -8,14 +8,14 @@ from conveyor_sim.scene.parts.spill import Spill
 
 
 class SpillDevice(Device):
-    """One place of spills: each rise of its fault drops a bottle, as soon as there is room."""
+    """One spill. Each rising edge of its fault drops a bottle as soon as there is room."""
 
     def __init__(self, name: str, spill: Spill, setup: DeviceSetup) -> None:
         super().__init__(
             name,
             [
                 count(f"{name}/dropped", "counter", "Bottles dropped.", high=spill.count, adds_to="fed").of("fed"),
-                switch(f"{name}/drop", "fault", "As it rises, a bottle is dropped as soon as there is room."),
+                switch(f"{name}/drop", "fault", "Its rising edge drops a bottle as soon as there is room."),
             ],
         )
         self._spill, self._entry = spill, setup.entry(spill.bottle, 0.0, 0.0)
@@ -24,7 +24,7 @@ class SpillDevice(Device):
         self.fed = 0
 
     def command(self, name: str, value: float, now: ScanContext) -> None:
-        """Take the fault drop."""
+        """Apply the fault `drop`."""
         if self.drop.rises(value) and self.fed + self.due < self._spill.count:
             self.due += 1
 

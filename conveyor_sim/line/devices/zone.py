@@ -1,4 +1,4 @@
-"""Zones: how many bottles have their axis in a region, and whether it is full."""
+"""Zones: number of bottles with their axes in a region, and a switch for a full zone."""
 
 import math
 from collections.abc import Sequence
@@ -12,14 +12,14 @@ from conveyor_sim.line.tag import count, number, switch
 from conveyor_sim.scene.parts.zone import Zone
 
 MOST_OFFSET = 1000.0
-"""Bottles, that can be injected."""
+"""Largest count offset that can be injected."""
 
 DENSEST = 1.0 / (2.0 * math.sqrt(3.0))
-"""Bottles of radius 1 on an area of 1, in a hexagonal pattern."""
+"""Bottles of radius 1 per unit area, in a hexagonal pattern."""
 
 
 class ZoneDevice(Device):
-    """One zone while it runs."""
+    """Zone of a running line."""
 
     def __init__(self, name: str, zone: Zone, setup: DeviceSetup) -> None:
         self._region, self._full_at = Region(zone.region), zone.full_at
@@ -35,7 +35,7 @@ class ZoneDevice(Device):
                 high=most_inside(zone.region, radius),
             ),
             number(f"{name}/density", "actual", "Bottles by the area of the region.", "1/m^2", 0.0, densest),
-            count(f"{name}/offset", "fault", "Added to the bottles that it counts.", -MOST_OFFSET, MOST_OFFSET),
+            count(f"{name}/offset", "fault", "Added to the number of bottles.", -MOST_OFFSET, MOST_OFFSET),
         ]
         if zone.full_at is not None:
             tags.append(switch(f"{name}/full", "status", f"Back-up switch: {zone.full_at} bottles or more are there."))
@@ -43,19 +43,19 @@ class ZoneDevice(Device):
         self.offset = 0
 
     def command(self, name: str, value: float, now: ScanContext) -> None:
-        """Count wrongly from this tick on."""
+        """Inject a count offset."""
         self.offset = int(value)
 
     def count(self, now: ScanContext) -> int:
-        """Bottles that it shows now; never less than none."""
+        """Return the displayed number of bottles, at least 0."""
         return max(0, self._region.inside(now.state.world.bottles).size + self.offset)
 
     def full(self, now: ScanContext) -> bool:
-        """Whether its back-up switch is on; False without one."""
+        """Return True if the back-up switch is on; False without one."""
         return self._full_at is not None and self.count(now) >= self._full_at
 
     def values(self, now: ScanContext) -> Sequence[float]:
-        """As its signals are listed."""
+        """Return the values in the order of the signals."""
         count = self.count(now)
         full = () if self._full_at is None else (count >= self._full_at,)
         return count, count / self._area, *full

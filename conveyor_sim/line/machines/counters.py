@@ -1,4 +1,4 @@
-"""What each device and the line have made since the last reset, and where their time went; summed at changes only."""
+"""Production counts and times of devices and of the line since the last reset. Sums are updated at changes only."""
 
 from __future__ import annotations
 
@@ -18,20 +18,23 @@ from conveyor_sim.line.tag import Adds
 from conveyor_sim.support.printable import printable
 
 RESET_COUNTERS = "reset_counters"
-"""Operation: devices that count bottles, or "line", by name; none: all of them."""
+"""Operation: devices that count bottles, or "line", by name; without names, all of them."""
 
 TEXTS = ("name", "category", "stop_reason")
-"""Columns of texts."""
+"""Columns that hold texts."""
 
 
 class DeviceCounter:
-    """Of one device. Public attributes are remembered in checkpoints."""
+    """Counts and times of one device. Public attributes are stored in checkpoints."""
 
     before: tuple[int, int, int, int]
-    """Its counts at the last reset."""
+    """Counts of the device at the last reset."""
 
     def __init__(self, device: Device) -> None:
-        """device: one that counts bottles."""
+        """Start at 0.
+
+        device: one that counts bottles.
+        """
         self._device = device
         self._machine = device if isinstance(device, MachineDevice) else None
         self._reasons = next((tag.texts for tag in device.tags if tag.name == f"{device.name}/stop_reason"), {})
@@ -43,29 +46,32 @@ class DeviceCounter:
             self._machine.watch(self._change)
 
     def reset(self, tick: int) -> None:
-        """Count anew from a tick on."""
+        """Reset at a tick."""
         self.since, self.before = tick, self._counts()
         self.time.reset(tick)
 
     def counted(self) -> tuple[int, int, int, int]:
-        """Bottles processed, defective and rejected, and failures, since the reset."""
+        """Return bottles processed, defective and rejected, and failures, since the reset."""
         processed, defective, rejected, failures = (
             now - then for now, then in zip(self._counts(), self.before, strict=True)
         )
         return processed, defective, rejected, failures
 
     def times(self, tick: int, length: float) -> dict[str, float]:
-        """s by category since the reset; length: s, of a tick."""
+        """Return the time by category since the reset, s.
+
+        length: of a tick, s.
+        """
         ticks = self.time.up_to(tick) if self._machine is not None else dict.fromkeys(CATEGORIES, 0)
         return {category: ticks[category] * length for category in CATEGORIES}
 
     @property
     def rate(self) -> float:
-        """Nominal, 1/s; NaN of what has none."""
+        """Nominal rate, 1/s; NaN without one."""
         return math.nan if self._machine is None else rate_of(self._machine)
 
     def row(self, tick: int, length: float) -> dict[str, Any]:
-        """Its entry of CounterColumns, by field."""
+        """Return the entry of CounterColumns, by field."""
         category = reason = ""
         if self._machine is not None:
             category, reason = self._machine.category, self._reasons[self._machine.reason]
@@ -82,47 +88,48 @@ class DeviceCounter:
 
 
 class LineCounter:
-    """Of the line as a whole. Public attributes are remembered in checkpoints."""
+    """Counts of the whole line. Public attributes are stored in checkpoints."""
 
     def __init__(self) -> None:
         self.reset(0)
 
     def reset(self, tick: int) -> None:
-        """Count anew from a tick on."""
+        """Reset at a tick."""
         self.since = tick
         """Tick of the last reset."""
         self.left = self.left_defective = self.rejected = 0
-        """Bottles since then: those that left by a sink or an outfeed, defective ones among them; those thrown out."""
+        """Bottles since the reset: those that left by a sink or an outfeed, defective ones among them, rejected
+        ones."""
 
 
 class ProductionCounters:
-    """Of all devices of a line that count bottles, and of the line."""
+    """Counts and times of all devices that count bottles, and of the line."""
 
     def __init__(self, devices: Sequence[Device]) -> None:
         self._devices = {device.name: DeviceCounter(device) for device in devices if device.counts() is not None}
         self._line = LineCounter()
         self._rejecting = {device.name for device in devices if _adds(device, "rejected")}
-        # The line may be reset when its bottleneck is not, so it has accounts of its own for that.
+        # The line may be reset without its bottleneck, so it has separate counters of the bottleneck.
         slowest = bottleneck([device for device in devices if isinstance(device, MachineDevice)])
         self._slowest = {machine.name: DeviceCounter(machine) for machine in slowest}
 
     @property
     def memory(self) -> dict[str, DeviceCounter | LineCounter]:
-        """All that changes, by name."""
+        """All counters, by name."""
         own: dict[str, DeviceCounter | LineCounter] = {LINE: self._line, **self._devices}
         return own | {f"{LINE}/{name}": counter for name, counter in self._slowest.items()}
 
-    def refusal(self, given: Input) -> str:
-        """Why what is named can't be reset, "" if it can."""
-        for name in given.names:
+    def refusal(self, request: Input) -> str:
+        """Return why the named counters can't be reset, "" if they can."""
+        for name in request.names:
             if name != LINE and name not in self._devices:
                 return f"{printable(name)}: counts nothing, expected {', '.join((*self._devices, LINE))} or none"
-        extra = len(given.values) + len(given.texts)
+        extra = len(request.values) + len(request.texts)
         return f"{extra} values and texts given with {RESET_COUNTERS}, expected none" if extra else ""
 
-    def reset(self, given: Input, now: ScanContext) -> None:
-        """Have what is named count anew from this tick on; all of it, if nothing is."""
-        for name in given.names or (*self._devices, LINE):
+    def reset(self, request: Input, now: ScanContext) -> None:
+        """Reset the named counters at this tick, or all of them without names."""
+        for name in request.names or (*self._devices, LINE):
             if name == LINE:
                 self._line.reset(now.tick)
                 for counter in self._slowest.values():
@@ -131,7 +138,10 @@ class ProductionCounters:
                 self._devices[name].reset(now.tick)
 
     def note_removed(self, device: Device, bottles: Collection[int], bad: Collection[int]) -> None:
-        """A device has taken bottles off the line, by their ids. bad: all the bad ones."""
+        """Count bottles that a device has taken off the line, by their ids.
+
+        bad: ids of all bad bottles.
+        """
         if device.name in self._rejecting:
             self._line.rejected += len(bottles)
         else:
@@ -139,7 +149,10 @@ class ProductionCounters:
             self._line.left_defective += sum(bottle in bad for bottle in bottles)
 
     def columns(self, tick: int, length: float) -> CounterColumns | None:
-        """All of it at a tick; length: s, of a tick. None for a line on which nothing is counted."""
+        """Return all counts and times at a tick; None if no device counts.
+
+        length: of a tick, s.
+        """
         if not self._devices:
             return None
         rows = [counter.row(tick, length) for counter in self._devices.values()]
@@ -149,7 +162,7 @@ class ProductionCounters:
         return CounterColumns(**columns, bottleneck=tuple(self._slowest))
 
     def _line_row(self, tick: int, length: float) -> dict[str, Any]:
-        """Its bottles; times and failures of its bottleneck, which are means of machines that share its bottles."""
+        """Return the row of the line: its bottles, and means of times and failures over the bottleneck's machines."""
         line, slowest = self._line, list(self._slowest.values())
         times = [counter.times(tick, length) for counter in slowest]
         mean: dict[str, float] = {
@@ -162,10 +175,10 @@ class ProductionCounters:
 
 
 def bottleneck(machines: Sequence[MachineDevice]) -> list[MachineDevice]:
-    """What bounds a line by its nominal rate: all sources together, all sinks together, or one of the others; the first
-    of equals, none on a line without machines.
+    """Return the machines that limit the line by nominal rate: all sources, all sinks, or one other machine.
 
-    Sources, and sinks, share the bottles of a line; stations are taken to stand one after the other.
+    The first of equals; none on a line without machines. Sources, and sinks, share the bottles of a line. Stations are
+    assumed to stand one after the other.
     """
     sharing: list[Adds] = ["fed", "removed"]
     groups = [[machine for machine in machines if _adds(machine, role)] for role in sharing]
@@ -175,7 +188,7 @@ def bottleneck(machines: Sequence[MachineDevice]) -> list[MachineDevice]:
 
 
 def rate_of(machine: MachineDevice) -> float:
-    """Nominal rate, 1/s."""
+    """Return the nominal rate, 1/s."""
     return next(tag.nominal for tag in machine.tags if tag.nominal is not None)
 
 
@@ -193,14 +206,17 @@ def _row(
     stop_reason: str = "",
     sharing: int = 1,
 ) -> dict[str, Any]:
-    """An entry of CounterColumns, by its fields. sharing: machines of which times are the mean."""
+    """Return an entry of CounterColumns, by field.
+
+    sharing: number of machines of which times are the mean.
+    """
     processed, defective, rejected, failures = counted
     made = efficiency(times, processed, defective, failures / sharing, rate)
     bottles = {"processed": processed, "good": processed - defective, "defective": defective, "rejected": rejected}
     return {
         "name": name,
         "since": np.uint64(max(since, 0)),
-        # Below 0 by an edited checkpoint alone.
+        # Only an edited checkpoint makes these negative.
         **{field: np.uint64(max(value, 0)) for field, value in (bottles | {"failures": failures}).items()},
         **times,
         "rate": rate,

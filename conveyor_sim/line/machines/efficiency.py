@@ -1,8 +1,8 @@
 """Efficiency of machines from counted times and bottles: the indicators of ISO 22400-2, and MTBF and MTTR.
 
-The quotients are those of ISO 22400-2 as OPC 40501-1, C.2.4, cites them; the standard's own text was not at hand. Its
-mean times between failures and to repair may divide by one more than the number of failures; here they divide by that
-number, as textbooks on reliability do. A quotient of nothing is NaN.
+The quotients are those of ISO 22400-2 as cited in OPC 40501-1, C.2.4; the text of the standard was not available. Its
+mean times between failures and to repair may divide by the number of failures plus one. Here they divide by the number
+of failures, as textbooks on reliability do. 0 / 0 is NaN.
 """
 
 from __future__ import annotations
@@ -20,20 +20,20 @@ DEFINITIONS: Mapping[str, str] = {
     "mtbf": "time running / failures",
     "mttr": "time down / failures",
 }
-"""What each figure is, for pages and reports."""
+"""Definition of each figure, for pages and reports."""
 
 
 @dataclass(frozen=True)
 class Efficiency:
-    """Of one machine over some time; NaN where nothing is known yet."""
+    """Indicators of one machine over an interval. NaN before there are data."""
 
     availability: float
     effectiveness: float
     quality: float
     mtbf: float
-    """s; infinite if it ran and has not failed."""
+    """Mean time between failures, s; infinite if the machine ran without a failure."""
     mttr: float
-    """s"""
+    """Mean time to repair, s."""
 
     @property
     def oee(self) -> float:
@@ -42,7 +42,10 @@ class Efficiency:
 
 
 def efficiency(times: Mapping[str, float], processed: int, defective: int, failures: float, rate: float) -> Efficiency:
-    """times: s by category, as `time_account` has them; rate: nominal, 1/s; the rest: counted over the same time."""
+    """Return the indicators of one machine over an interval.
+
+    times: s, by category of `time_account`. rate: nominal, 1/s. The other arguments are counts over the same interval.
+    """
     running = times["running"]
     return Efficiency(
         availability=quotient(running, busy(times)),
@@ -54,10 +57,10 @@ def efficiency(times: Mapping[str, float], processed: int, defective: int, failu
 
 
 def busy(times: Mapping[str, float]) -> float:
-    """Planned busy time, s: all but planned stops."""
+    """Return the planned busy time, s: all time except planned stops."""
     return sum(times.values()) - times["planned"]
 
 
 def quotient(part: float, whole: float) -> float:
-    """part / whole; infinite for something of nothing, NaN for nothing of nothing."""
+    """Return part / whole; x / 0 is infinite, 0 / 0 is NaN."""
     return part / whole if whole else math.inf if part else math.nan

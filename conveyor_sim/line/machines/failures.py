@@ -7,21 +7,24 @@ import numpy as np
 from conveyor_sim.scene.failures import Exponential, Failure, FixedTimes, PlannedStop, Times, Weibull
 
 LONGEST = 2**52
-"""Ticks; a checkpoint holds no larger number exactly."""
+"""Longest time in ticks. A checkpoint holds no larger number exactly."""
 
 
 class Draws:
-    """Times from a distribution, one after the other. Public attributes are remembered in checkpoints."""
+    """Successive times from a distribution. Public attributes are stored in checkpoints."""
 
     def __init__(self, times: Times, random: np.random.Generator, tick: float) -> None:
-        """random: a stream of its own. tick: s."""
+        """Start before the first time.
+
+        random: a separate stream. tick: s.
+        """
         self._times, self._tick = times, tick
         self.random = random
         self.count = 0
-        """How many were drawn."""
+        """Number of times drawn."""
 
     def ticks(self) -> int:
-        """The next one in ticks, to the nearest, 1 at least."""
+        """Draw the next time, in ticks: rounded to the nearest, at least 1."""
         times, number = self._times, self.count
         self.count += 1
         if isinstance(times, FixedTimes):
@@ -34,22 +37,25 @@ class Draws:
 
 
 def weibull_scale(times: Weibull) -> float:
-    """Scale parameter (s) of the Weibull distribution of a mean and a shape: mean / Gamma(1 + 1/shape)."""
+    """Return the scale parameter (s) of a Weibull distribution with a mean and a shape: mean / Gamma(1 + 1/shape)."""
     return times.mean / math.gamma(1.0 + 1.0 / times.shape)
 
 
 class FailureClock:
-    """One way in which a machine fails. Public attributes are remembered in checkpoints."""
+    """Failure mode of a machine. Public attributes are stored in checkpoints."""
 
     def __init__(self, failure: Failure, between: Draws, repair: Draws) -> None:
         self._running = failure.counted == "running"
         self.between, self.repair = between, repair
         self.failed = False
         self.left = between.ticks()
-        """Ticks until it fails, or until it is repaired."""
+        """Ticks until the machine fails or is repaired."""
 
     def advance(self, running: bool) -> bool:
-        """A tick has passed, in which the machine ran or not; whether this made it fail or repaired it."""
+        """Advance by one tick. Return True if the machine failed or was repaired.
+
+        running: True if the machine ran in the tick.
+        """
         if not running and self._running and not self.failed:
             return False
         self.left -= 1
@@ -61,15 +67,18 @@ class FailureClock:
 
 
 class PlannedTimes:
-    """When a planned stop is on."""
+    """Times of a planned stop."""
 
     def __init__(self, stop: PlannedStop, tick: float) -> None:
-        """tick: s."""
+        """Convert the times to ticks.
+
+        tick: s.
+        """
         self._start, self._duration = round(stop.start / tick), max(1, round(stop.duration / tick))
         self._every = None if stop.every is None else max(1, round(stop.every / tick))
 
     def on(self, tick: int) -> bool:
-        """Whether it is on at a tick."""
+        """Return True if the stop is due at a tick."""
         since = tick - self._start
         if since >= 0 and self._every is not None:
             since %= self._every

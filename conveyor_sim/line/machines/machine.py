@@ -1,4 +1,4 @@
-"""What machines that give and take bottles have in common: PackML's states, a rate, failures, planned stops."""
+"""`MachineDevice`: PackML states, rate, failures and planned stops of machines that feed or take bottles."""
 
 import math
 from collections.abc import Callable, Collection, Sequence
@@ -40,16 +40,16 @@ from conveyor_sim.scene.failures import Times
 from conveyor_sim.scene.parts.machine import PackmlPart
 
 ROUNDING = 1e-9
-"""Of a cycle: sums of rate x tick must not miss the tick they fall on."""
+"""Tolerance of a cycle against rounding: sums of rate x tick must not miss the tick they fall on."""
 
 EXECUTE, SUSPENDED, HELD = int(PackMLState.EXECUTE), int(PackMLState.SUSPENDED), int(PackMLState.HELD)
 
 Watcher = Callable[[int, Category, int], None]
-"""Told the tick, where the machine's time goes from then on, and its stop reason."""
+"""Receives the tick, the time category from then on, and the stop reason."""
 
 
 class MachineDevice(Device):
-    """A machine that works in cycles, one bottle each, and follows the PackML state model. It runs at the start."""
+    """Machine that works in cycles of one bottle and follows the PackML state model. It runs at the start."""
 
     def __init__(
         self,
@@ -59,7 +59,10 @@ class MachineDevice(Device):
         own: Sequence[Tag],
         conditional: Collection[PackMLState] = (),
     ) -> None:
-        """own: signals of its kind. conditional: acting states that are left only when it is `ready`."""
+        """Build the tags and the state machine.
+
+        own: signals of its kind. conditional: acting states that end only when it is `ready`.
+        """
         rate, most = part.rate, part.rate if part.rate_limit is None else part.rate_limit
         reasons = reason_texts(part)
         first = PackMLState.STARTING if PackMLState.STARTING in conditional else PackMLState.EXECUTE
@@ -67,19 +70,17 @@ class MachineDevice(Device):
         super().__init__(
             name,
             [
-                switch(f"{name}/running", "status", "It runs, and nobody has stopped it.", 1.0, "state"),
+                switch(f"{name}/running", "status", "Running, and not stopped.", 1.0, "state"),
                 *own,
-                choice(f"{name}/state", "status", "State of PackML.", STATE_TEXTS, first, "state"),
-                choice(
-                    f"{name}/category", "status", "Where its time goes.", dict(enumerate(CATEGORIES)), time, "state"
-                ),
-                choice(f"{name}/stop_reason", "status", "Why it stands, or last stood.", reasons, NONE, "state"),
+                choice(f"{name}/state", "status", "PackML state.", STATE_TEXTS, first, "state"),
+                choice(f"{name}/category", "status", "Time category.", dict(enumerate(CATEGORIES)), time, "state"),
+                choice(f"{name}/stop_reason", "status", "Reason for the present or last stop.", reasons, NONE, "state"),
                 switch(f"{name}/fault", "status", "Failed and not repaired, or aborted."),
-                count(f"{name}/failures", "counter", "How often it has failed."),
-                number(f"{name}/cur_rate", "actual", "Rate at which it works.", "1/s", 0.0, most, rate),
+                count(f"{name}/failures", "counter", "Number of failures."),
+                number(f"{name}/cur_rate", "actual", "Present rate.", "1/s", 0.0, most, rate),
                 switch(f"{name}/run", "command", "Runs while on.", 1.0),
-                choice(f"{name}{CNTRL_CMD}", "command", "Command of PackML, as it changes.", COMMAND_TEXTS),
-                number(f"{name}/rate", "setpoint", "Bottles a second.", "1/s", 0.0, most, rate, nominal=rate),
+                choice(f"{name}{CNTRL_CMD}", "command", "PackML command; acts when it changes.", COMMAND_TEXTS),
+                number(f"{name}/rate", "setpoint", "Bottles per second.", "1/s", 0.0, most, rate, nominal=rate),
                 switch(f"{name}/stop", "fault", "Stopped from outside while on."),
             ],
         )
@@ -98,30 +99,30 @@ class MachineDevice(Device):
             conditional,
         )
         self.speed = rate
-        """1/s, at which it works where it ramps up."""
+        """Present rate during a ramp, 1/s."""
         self.cycle = 1.0
-        """How much of the cycle is done; from 1 on it wants a bottle."""
+        """Completed part of the cycle; from 1 on the machine needs a bottle."""
         self.cause = NONE
-        """STARVED or BLOCKED if it waited in the last tick."""
+        """STARVED or BLOCKED if the machine waited in the last tick, else NONE."""
         self.waited = 0
-        """Ticks for which it has done so without a break."""
+        """Ticks for which it has waited without a break."""
         self.reason = NONE
-        """Why it stands, or last stood."""
+        """Reason for the present or last stop."""
         self.restart = False
-        """It is to be reset and started as soon as it can be."""
+        """True if the machine must be reset and started as soon as possible."""
         self.planned = NONE
-        """The planned stop that it stands for."""
+        """Present planned stop."""
         self.failures = 0
         self.clocks = SimpleNamespace(
             **{
-                way: FailureClock(
+                mode: FailureClock(
                     failure,
                     *(
-                        self._draws(setup, times, f"failures/{way}/{what}")
+                        self._draws(setup, times, f"failures/{mode}/{what}")
                         for what, times in (("between", failure.between), ("repair", failure.repair))
                     ),
                 )
-                for way, failure in part.failures.items()
+                for mode, failure in part.failures.items()
             }
         )
         self._clocks: list[FailureClock] = list(vars(self.clocks).values())
@@ -129,21 +130,21 @@ class MachineDevice(Device):
 
     @property
     def alarms(self) -> Sequence[Declared]:
-        """It has failed, or was aborted."""
+        """Alarm that the machine has failed or was aborted."""
         return (error(f"{self.name}/fault", f"{self.name} has failed", f"{self.name}/fault"),)
 
     @property
     def state(self) -> int:
-        """State of PackML."""
+        """PackML state."""
         return self.packml.state
 
     @property
     def category(self) -> Category:
-        """Where its time goes since the last tick."""
+        """Time category since the last tick."""
         return self._category
 
     def watch(self, watcher: Watcher) -> None:
-        """Call something as a tick ends in which the category or the stop reason has changed."""
+        """Call `watcher` at the end of each tick in which the category or the stop reason has changed."""
         self._watchers.append(watcher)
 
     def restored(self, tick: int) -> None:
@@ -154,7 +155,7 @@ class MachineDevice(Device):
         self._show()
 
     def objection(self, name: str, value: float, now: ScanContext) -> str:
-        """Why a command of its own can't be taken now, "" if it can."""
+        """Return why a command can't be taken now, "" if it can."""
         command = int(value)
         if not name.endswith(CNTRL_CMD) or command in (0, self.cntrl_cmd):
             return ""
@@ -163,11 +164,11 @@ class MachineDevice(Device):
         if not self.run and command in (Command.RESET, Command.START):
             return f"{name}: {COMMAND_TEXTS[command]} given while {self.name}/run is 0, expected 1 before"
         if self._failed and command == Command.UNHOLD:
-            return f"{name}: Unhold given while it is not repaired, expected {self.name}/fault to go first"
+            return f"{name}: Unhold given while it is not repaired, expected {self.name}/fault to be off"
         return ""
 
     def mode_objection(self) -> str:
-        """Why its mode can't change in the present state, "" if it can."""
+        """Return why the control mode can't change in the present state, "" if it can."""
         return mode_objection(self.state)
 
     def stops(self, name: str, value: float) -> bool:
@@ -175,12 +176,12 @@ class MachineDevice(Device):
         return stops(name, value)
 
     def stop_by_hand(self, name: str, value: float) -> None:
-        """Take Stop or Abort; cntrl_cmd stays as who has control gave it."""
+        """Take Stop or Abort. `cntrl_cmd` keeps the value of the writer in control."""
         self._take(int(value), by_hand=True)
         self._settle_state()
 
     def command(self, name: str, value: float, now: ScanContext) -> None:
-        """Take run, cntrl_cmd, rate (1/s), or the fault stop."""
+        """Apply run, cntrl_cmd, rate (1/s), or the fault `stop`."""
         what = name.rpartition("/")[2]
         if what == "rate":
             self.rate = value
@@ -197,7 +198,7 @@ class MachineDevice(Device):
         self._settle_state()
 
     def _switch(self, run: bool, by_hand: bool) -> None:
-        """Stop as the switch `run` goes off; be reset and started as it comes on, unless it was aborted."""
+        """Stop when the switch `run` turns off. Reset and start when it turns on, unless aborted."""
         before, self.run = self.run, run
         if before and not run:
             self.restart = False
@@ -206,7 +207,7 @@ class MachineDevice(Device):
             self.restart = self.state not in (PackMLState.ABORTING, PackMLState.ABORTED, PackMLState.CLEARING)
 
     def _take(self, command: int, by_hand: bool) -> None:
-        """Take a command of PackML, unless what was commanded beside it has led elsewhere."""
+        """Take a PackML command, unless an earlier command of the input has changed the state."""
         if command == 0 or not self.packml.takes(command):
             return
         if command in (Command.STOP, Command.ABORT, Command.RESET):
@@ -217,14 +218,17 @@ class MachineDevice(Device):
             self.packml.take(command)
 
     def _stand(self, command: Command, reason: int) -> None:
-        """Stop working by a command of PackML, if the state allows it. No command hides that the machine has failed."""
+        """Stop working by a PackML command, if the state allows it. A failure stays the reason."""
         if self.packml.takes(command):
             hidden = is_failure(self.reason) and self.state not in WORKING and reason < STARVED
             self.reason = self.reason if hidden else reason
             self.packml.take(command)
 
     def advance(self, now: ScanContext) -> None:
-        """A tick has passed: fail or be repaired, leave acting states, ramp up. Once a tick, first, if it is busy."""
+        """Advance by one tick: failures, repairs, planned stops, acting states, ramp.
+
+        Called once per tick, first, if the machine is busy.
+        """
         if now.tick == 0:
             return
         if self._clocks:
@@ -238,7 +242,7 @@ class MachineDevice(Device):
             self.speed = min(self.rate, self.speed + self._ramp)
 
     def ready(self, now: ScanContext) -> bool:
-        """Whether what a conditional state waits for is there."""
+        """Return True if a conditional acting state may end."""
         return True
 
     def _count_failures(self) -> None:
@@ -262,7 +266,7 @@ class MachineDevice(Device):
             self._settle_state()
 
     def _end_plan(self, tick: int) -> None:
-        """A planned stop is over: stand for another one that is on, or be reset and started."""
+        """End a planned stop: enter another one that is due, or reset and start."""
         self.planned = next((FIRST_PLANNED + index for index, plan in enumerate(self._plans) if plan.on(tick)), NONE)
         if not self.planned:
             self.restart = self.run and self.state in (PackMLState.STOPPING, PackMLState.STOPPED)
@@ -270,7 +274,7 @@ class MachineDevice(Device):
             self.reason = self.planned
 
     def _settle_state(self) -> None:
-        """Do what the machine does by itself in the state that it has come to."""
+        """Make the transitions that follow without a command."""
         machine = self.packml
         if machine.state == HELD and not self._failed and is_failure(self.reason):
             machine.take(Command.UNHOLD)
@@ -284,7 +288,7 @@ class MachineDevice(Device):
     def _note_failures(self) -> None:
         first = (FIRST_FAILURE + index for index, clock in enumerate(self._clocks) if clock.failed)
         self._failed = FAULT if self.stop else next(first, NONE)
-        """The first reason for which it can't work, NONE if there is none."""
+        """First reason that prevents work, NONE if there is none."""
 
     def _note_state(self) -> None:
         self._changed = True
@@ -295,32 +299,35 @@ class MachineDevice(Device):
             self.speed = 0.0 if self._ramp else self.speed
 
     _working: Collection[int] = (EXECUTE,)
-    """States in which it works on bottles."""
+    """States in which the machine works on bottles."""
 
     @property
     def works(self) -> bool:
-        """Whether it works on bottles, or would if it did not have to wait."""
+        """True if the machine works on bottles, or would if it did not wait."""
         return self._works
 
     def turn(self, now: ScanContext) -> bool:
-        """Go on with the cycle for the tick that has passed; whether it is done."""
+        """Advance the cycle by one tick, and return True if it is complete."""
         if self._works and now.tick > 0:
             self.cycle += (self.speed if self._ramp else self.rate) * now.length
         return self._works and self.cycle >= 1.0 - ROUNDING
 
     def wait(self) -> None:
-        """Stand at the end of the cycle: what is lost by waiting is not made up for."""
+        """Stay at the end of the cycle. Time lost by waiting is not recovered."""
         self.cycle = 1.0
 
     def goes_on(self) -> bool:
-        """Whether it works on a bottle that it could take or give now: it comes back from Suspended for it."""
+        """Return True if the machine can take or give a bottle now. It leaves Suspended for that."""
         if self._waits:
             self.packml.take(Command.UNSUSPEND)
             self._note_state()
         return self._works
 
     def conclude(self, cause: int, now: ScanContext) -> None:
-        """The tick's work is done. cause: STARVED or BLOCKED if it had to wait, NONE if not. Once a tick, last."""
+        """End the work of a tick.
+
+        cause: STARVED or BLOCKED if the machine had to wait, else NONE. Called once per tick, last.
+        """
         if not (cause or self.waited or self._changed):
             return
         if cause:
@@ -342,7 +349,7 @@ class MachineDevice(Device):
                     watcher(now.tick, self._category, self.reason)
 
     def _show(self) -> None:
-        """Make its status anew."""
+        """Update the status."""
         self._changed = False
         fault = bool(self._failed) or self.state == PackMLState.ABORTED
         self._shown = self.state, CATEGORIES.index(self._category), self.reason, fault
@@ -353,12 +360,12 @@ class MachineDevice(Device):
         return self._shown[:3]
 
     def status(self) -> Sequence[float]:
-        """State, category, stop_reason, fault, failures and cur_rate (1/s)."""
+        """Return state, category, stop_reason, fault, failures and cur_rate (1/s)."""
         rate = (self.speed if self._ramp else self.rate) if self._works and not self._waits else 0.0
         return *self._shown, self.failures, rate
 
     def _ticks(self, seconds: float) -> int:
-        """The first tick at which so much time has passed."""
+        """Return the first tick at which `seconds` have passed."""
         return math.ceil(seconds / self._tick - 1e-9)
 
     def _draws(self, setup: DeviceSetup, times: Times, purpose: str) -> Draws:

@@ -1,7 +1,7 @@
-"""The PackML state model: 17 states, ten commands, and which leads from which to which.
+"""The PackML state model: 17 states, ten commands, and the transitions.
 
 Numbers are those of StateCurrent and CntrlCmd in PackML (OPC 30050, Beckhoff Tc3_PackML_V3). As in OPC 30050, Hold is
-taken not in Execute alone but on the way to and from it and while Suspended too: a machine can break down there.
+allowed not only in Execute but also on the way to and from it and in Suspended, because a machine can fail there.
 """
 
 from collections.abc import Collection, Mapping
@@ -10,7 +10,7 @@ from typing import Literal
 
 
 class PackMLState(IntEnum):
-    """States of a machine, as StateCurrent has them; 0, Undefined, is none."""
+    """States of a machine, numbered as in StateCurrent. 0, Undefined, is not included."""
 
     CLEARING = 1
     STOPPED = 2
@@ -32,7 +32,7 @@ class PackMLState(IntEnum):
 
 
 class Command(IntEnum):
-    """Commands to a machine, as CntrlCmd has them; 0 is none."""
+    """Commands to a machine, numbered as in CntrlCmd. 0 is no command."""
 
     RESET = 1
     START = 2
@@ -47,7 +47,7 @@ class Command(IntEnum):
 
 
 StateNumber = Literal[1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17]
-"""A State as a plain number, as checkpoints keep it."""
+"""PackMLState as a plain number, for checkpoints."""
 
 CNTRL_CMD = "/cntrl_cmd"
 """Ending of the names of commands that take PackML commands."""
@@ -74,7 +74,7 @@ FROM: Mapping[Command, frozenset[PackMLState]] = {
     Command.CLEAR: frozenset({PackMLState.ABORTED}),
     Command.COMPLETE: frozenset({PackMLState.EXECUTE}),
 }
-"""The states in which a command is taken."""
+"""States in which a command is allowed."""
 
 TO: Mapping[Command, PackMLState] = {
     Command.RESET: PackMLState.RESETTING,
@@ -88,7 +88,7 @@ TO: Mapping[Command, PackMLState] = {
     Command.CLEAR: PackMLState.CLEARING,
     Command.COMPLETE: PackMLState.COMPLETING,
 }
-"""The acting state that a command leads to."""
+"""Acting state that a command leads to."""
 
 COMPLETES: Mapping[PackMLState, PackMLState] = {
     PackMLState.CLEARING: PackMLState.STOPPED,
@@ -102,25 +102,24 @@ COMPLETES: Mapping[PackMLState, PackMLState] = {
     PackMLState.RESETTING: PackMLState.IDLE,
     PackMLState.COMPLETING: PackMLState.COMPLETE,
 }
-"""The acting states, each with the state that it leads to once it is complete."""
+"""Final state of each acting state."""
 
 MODE_STATES = (PackMLState.STOPPED, PackMLState.IDLE, PackMLState.ABORTED, PackMLState.COMPLETE)
-"""In which a machine's unit mode may change: it works on nothing, and does not go on by itself. PackML leaves it to the
-machine which these are (PML_UnitModeConfig of Beckhoff Tc3_PackML_V3).
-"""
+"""States in which the control mode of a machine may change: it works on no bottle and does not continue by itself.
+PackML leaves this choice to the machine (PML_UnitModeConfig of Beckhoff Tc3_PackML_V3)."""
 
 STATE_TEXTS: Mapping[int, str] = {0: "Undefined", **{state: state.name.capitalize() for state in PackMLState}}
 COMMAND_TEXTS: Mapping[int, str] = {0: "none", **{command: command.name.capitalize() for command in Command}}
 
 
 def objection(command: int, state: int) -> str:
-    """Why a command is not taken in a state, "" if it is."""
-    given, now = Command(command), PackMLState(state)
-    if now in FROM[given]:
+    """Return why a command is not allowed in a state, "" if it is."""
+    now, states = PackMLState(state), FROM[Command(command)]
+    if now in states:
         return ""
-    allowed, refused = ([s for s in PackMLState if (s in FROM[given]) is taken] for taken in (True, False))
+    allowed, refused = ([s for s in PackMLState if (s in states) is taken] for taken in (True, False))
     expected = f"in {_listed(allowed)}" if len(allowed) <= len(refused) else f"outside {_listed(refused)}"
-    return f"{COMMAND_TEXTS[given]} given in {STATE_TEXTS[now]}, expected {expected}"
+    return f"{COMMAND_TEXTS[command]} given in {STATE_TEXTS[now]}, expected {expected}"
 
 
 def stops(name: str, value: float) -> bool:
@@ -129,7 +128,7 @@ def stops(name: str, value: float) -> bool:
 
 
 def mode_objection(state: int) -> str:
-    """Why a unit mode can't change in a state, "" if it can."""
+    """Return why a control mode can't change in a state, "" if it can."""
     if state in MODE_STATES:
         return ""
     return f"is in {STATE_TEXTS[state]}, expected {_listed(MODE_STATES)} for a change of mode"
@@ -141,39 +140,47 @@ def _listed(states: Collection[PackMLState]) -> str:
 
 
 class StateMachine:
-    """The state of one machine. An acting state lasts for its ticks; one of none is left as soon as it is entered."""
+    """PackML state of one machine.
+
+    An acting state lasts for its number of ticks; with 0 ticks it ends as soon as it is entered.
+    """
 
     state: StateNumber
 
     def __init__(
         self, state: PackMLState, ticks: Mapping[PackMLState, int], conditional: Collection[PackMLState] = ()
     ) -> None:
-        """ticks: that acting states last at least, 0 for those left out. conditional: acting states that are left only
-        when `advance` says that they may be, however long they have lasted.
+        """Enter the first state.
+
+        ticks: shortest time in acting states, 0 if not listed. conditional: acting states that end only when `advance`
+        allows it.
         """
         self._ticks = {acting: ticks.get(acting, 0) for acting in COMPLETES}
         self._conditional = frozenset(conditional)
         self.spent = 0
-        """Ticks in the present state, if it is an acting one."""
+        """Ticks in the present acting state."""
         self._enter(state)
 
     def take(self, command: int) -> None:
-        """Take a command. Raises ValueError, in words, where the state does not allow it."""
+        """Take a command. Raise ValueError if the state does not allow it."""
         if wrong := objection(command, self.state):
             raise ValueError(wrong)
         self._enter(TO[Command(command)])
 
     def takes(self, command: int) -> bool:
-        """Whether the state allows a command."""
+        """Return True if the state allows a command."""
         return self.state in FROM[Command(command)]
 
     @property
     def acts(self) -> bool:
-        """Whether it is in an acting state."""
+        """True in an acting state."""
         return self.state in COMPLETES
 
     def advance(self, may_complete: bool = True) -> None:
-        """A tick has passed. may_complete: whether what a conditional state waits for is there."""
+        """Advance by one tick.
+
+        may_complete: True if the condition of a conditional acting state is met.
+        """
         after = COMPLETES.get(PackMLState(self.state))
         if after is None:
             return

@@ -1,4 +1,4 @@
-"""Sinks: machines downstream that take one bottle after another at a rate, and are starved where none waits."""
+"""Sinks: downstream machines that take bottles at a rate. A sink without a waiting bottle is starved."""
 
 from collections.abc import Sequence
 
@@ -11,14 +11,14 @@ from conveyor_sim.scene.parts.sink import Sink
 
 
 class SinkDevice(TakingDevice):
-    """One sink while it runs. Starved: it would take a bottle, and none is in its region."""
+    """Sink of a running line. Starved: a bottle is due, and none is in its region."""
 
     def __init__(self, name: str, sink: Sink, setup: DeviceSetup) -> None:
         signals = [
             count(f"{name}/taken", "counter", "Bottles taken.", adds_to="removed"),
             count(f"{name}/taken_bad", "counter", "Bad bottles taken."),
-            switch(f"{name}/starved", "status", "It would take a bottle, and none is there.", adds_to="state"),
-            seconds(f"{name}/starved_time", "counter", "For how long in all it was starved."),
+            switch(f"{name}/starved", "status", "A bottle is due, and none is there.", adds_to="state"),
+            seconds(f"{name}/starved_time", "counter", "Total time starved."),
         ]
         super().__init__(name, sink, setup, signals)
         self.removed = 0
@@ -46,14 +46,14 @@ class SinkDevice(TakingDevice):
         self.conclude(cause, now)
 
     def counts(self) -> tuple[int, int, int]:
-        """Bottles taken, and bad ones among them."""
+        """Return taken bottles, and bad ones among them."""
         return self.removed, self.removed_bad, 0
 
     def values(self, now: ScanContext) -> Sequence[float]:
-        """As its signals are listed."""
+        """Return the values in the order of the signals."""
         starved, time = self.cause == STARVED, self.starved_ticks * now.length
         return self.works, self.removed, self.removed_bad, starved, time, *self.status()
 
     def states(self, now: ScanContext) -> list[float]:
-        """Running, starved, state, category and stop reason."""
+        """Return running, starved, state, category and stop reason."""
         return [self.works, self.cause == STARVED, *self.condition]

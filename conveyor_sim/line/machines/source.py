@@ -1,4 +1,4 @@
-"""Sources: machines upstream that give bottles at a rate, and are blocked where there is no room for one."""
+"""Sources: upstream machines that feed bottles at a rate. A source without room for a bottle is blocked."""
 
 from collections.abc import Sequence
 
@@ -12,13 +12,13 @@ from conveyor_sim.scene.parts.source import Source
 
 
 class SourceDevice(MachineDevice):
-    """One source while it runs. Blocked: it would run, has a bottle to give, and there is no room for it."""
+    """Source of a running line. Blocked: a bottle is due, and there is no room for it."""
 
     def __init__(self, name: str, source: Source, setup: DeviceSetup) -> None:
         signals = [
-            count(f"{name}/produced", "counter", "Bottles given.", adds_to="fed"),
-            switch(f"{name}/blocked", "status", "It would give a bottle, and there is no room.", adds_to="state"),
-            seconds(f"{name}/blocked_time", "counter", "For how long in all it was blocked."),
+            count(f"{name}/produced", "counter", "Bottles fed.", adds_to="fed"),
+            switch(f"{name}/blocked", "status", "A bottle is due, and there is no room.", adds_to="state"),
+            seconds(f"{name}/blocked_time", "counter", "Total time blocked."),
         ]
         super().__init__(name, source, setup, signals)
         self._position = source.position
@@ -28,7 +28,7 @@ class SourceDevice(MachineDevice):
         self.blocked_ticks = 0
 
     def feed(self, now: ScanContext) -> None:
-        """Give the bottle that is due, if there is room."""
+        """Feed the bottle that is due, if there is room."""
         if self._busy:
             self.advance(now)
         cause = NONE
@@ -44,15 +44,15 @@ class SourceDevice(MachineDevice):
         self.conclude(cause, now)
 
     def counts(self) -> tuple[int, int, int]:
-        """Bottles given, and bad ones among them."""
+        """Return fed bottles, and bad ones among them."""
         return self.fed, self.quality.bad, 0
 
     def values(self, now: ScanContext) -> Sequence[float]:
-        """As its signals are listed."""
+        """Return the values in the order of the signals."""
         blocked = self.cause == BLOCKED
         return self.works and not blocked, self.fed, blocked, self.blocked_ticks * now.length, *self.status()
 
     def states(self, now: ScanContext) -> list[float]:
-        """Running, blocked, state, category and stop reason."""
+        """Return running, blocked, state, category and stop reason."""
         blocked = self.cause == BLOCKED
         return [self.works and not blocked, blocked, *self.condition]

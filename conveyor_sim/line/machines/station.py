@@ -1,4 +1,4 @@
-"""Stations: machines that take a bottle, work on it for a cycle, and give it back elsewhere, the same one."""
+"""Stations: machines that take a bottle, work on it for one cycle, and give it back at another place."""
 
 import math
 from collections.abc import Sequence
@@ -18,24 +18,30 @@ EMPTY = -1
 
 
 class StationDevice(TakingDevice):
-    """One station while it runs. Starved: it is empty and none waits; blocked: it is done and has no room to give."""
+    """Station of a running line.
+
+    Starved: it is empty, and no bottle waits. Blocked: it is done, and there is no room for the bottle.
+    """
 
     defects: dict[str, int]
-    """By test, how many it has found defective."""
+    """Number of defective bottles, by test."""
 
     def __init__(self, name: str, station: Station, setup: DeviceSetup) -> None:
         signals = [
             count(f"{name}/processed", "counter", "Bottles given back."),
-            count(f"{name}/good", "counter", "Those that no test has found defective."),
-            count(f"{name}/defective", "counter", "Those that a test has."),
-            count(f"{name}/false_accepts", "counter", "Tests passed by what is beyond their limits."),
-            count(f"{name}/false_rejects", "counter", "Tests not passed by what is within their limits."),
-            *(count(f"{name}/defect_{test}", "counter", f"Found defective in {test}.") for test in station.tests),
-            switch(f"{name}/holds", "status", "It has a bottle."),
-            switch(f"{name}/starved", "status", "It would take a bottle, and none is there.", adds_to="state"),
-            switch(f"{name}/blocked", "status", "It would give a bottle, and there is no room.", adds_to="state"),
-            seconds(f"{name}/starved_time", "counter", "For how long in all it was starved."),
-            seconds(f"{name}/blocked_time", "counter", "For how long in all it was blocked."),
+            count(f"{name}/good", "counter", "Bottles that passed all tests."),
+            count(f"{name}/defective", "counter", "Bottles that failed a test."),
+            count(f"{name}/false_accepts", "counter", "Tests passed by values outside their limits."),
+            count(f"{name}/false_rejects", "counter", "Tests failed by values within their limits."),
+            *(
+                count(f"{name}/defect_{test}", "counter", f"Bottles that failed the test of {test}.")
+                for test in station.tests
+            ),
+            switch(f"{name}/holds", "status", "A bottle is in the station."),
+            switch(f"{name}/starved", "status", "A bottle is due, and none is there.", adds_to="state"),
+            switch(f"{name}/blocked", "status", "A bottle is done, and there is no room.", adds_to="state"),
+            seconds(f"{name}/starved_time", "counter", "Total time starved."),
+            seconds(f"{name}/blocked_time", "counter", "Total time blocked."),
         ]
         super().__init__(name, station, setup, signals)
         self._position = station.position
@@ -49,13 +55,13 @@ class StationDevice(TakingDevice):
         self._tests = [
             AttributeTest(what, test, setup.random(name, f"tests/{what}")) for what, test in station.tests.items()
         ]
-        named = {f"sets_{work.attribute}": work.random for work in self._sets}
-        self.streams = SimpleNamespace(**named, **{f"tests_{look.attribute}": look.random for look in self._tests})
-        """What settings and tests draw from."""
+        named = {f"sets_{setting.attribute}": setting.random for setting in self._sets}
+        self.streams = SimpleNamespace(**named, **{f"tests_{test.attribute}": test.random for test in self._tests})
+        """Random streams of settings and tests."""
         self.holding = EMPTY
-        """Id of the bottle that it has."""
+        """Id of the bottle in the station."""
         self.begun = 0
-        """Tick from which on it works on it."""
+        """First tick of the work on it."""
         self.cycle = 0.0
         self.processed = self.good = 0
         self.false_accepts = self.false_rejects = 0
@@ -65,16 +71,16 @@ class StationDevice(TakingDevice):
 
     @property
     def held(self) -> Sequence[int]:
-        """The bottle that it has."""
+        """Bottle in the station."""
         return () if self.holding == EMPTY else (self.holding,)
 
     def take(self, now: ScanContext) -> None:
-        """Take the bottle that has waited longest, if it has none."""
+        """Take the bottle that has waited longest, if the station is empty."""
         if self._busy:
             self.advance(now)
         slot_of = self.queue(now)
         if self.holding == EMPTY and self.works and self.waiting and self.goes_on():
-            # One that it had to wait for begins its cycle now; any other one when the last was given.
+            # The cycle begins now if the station was starved, else when the last bottle left.
             late = self.cause == STARVED
             self.begun, self.cycle = (now.tick, 0.0) if late else (now.tick - 1, self.cycle)
             first, *others = self.waiting
@@ -82,7 +88,7 @@ class StationDevice(TakingDevice):
             self.waiting = tuple(others)
 
     def feed(self, now: ScanContext) -> None:
-        """Work on the bottle that it has, and give it when it is done, if there is room."""
+        """Work on the bottle, and give it back when it is done, if there is room."""
         cause = NONE
         if self.holding == EMPTY:
             if self.works and now.tick > 0:
@@ -101,29 +107,29 @@ class StationDevice(TakingDevice):
         self.conclude(cause, now)
 
     def _finish(self, bottle: int, now: ScanContext) -> None:
-        """Make of a bottle what is to be made of it, and look at it."""
+        """Set the attributes of a bottle, and test it."""
         self.processed += 1
-        for work in self._sets:
-            if (value := work.value(self.processed)) is not None:
-                now.set_attribute(bottle, work.attribute, value)
+        for setting in self._sets:
+            if (value := setting.value(self.processed)) is not None:
+                now.set_attribute(bottle, setting.attribute, value)
         defective = False
-        for look in self._tests:
-            within = look.within(now.attribute(bottle, look.attribute))
-            passed = look.passes(within)
+        for test in self._tests:
+            within = test.within(now.attribute(bottle, test.attribute))
+            passed = test.passes(within)
             self.false_accepts += passed and not within
             self.false_rejects += within and not passed
-            self.defects[look.attribute] += not passed
+            self.defects[test.attribute] += not passed
             defective = defective or not passed
         if defective:
             now.set_attribute(bottle, BAD, 1.0)
         self.good += not defective
 
     def counts(self) -> tuple[int, int, int]:
-        """Bottles given back, and those that a test has found defective."""
+        """Return processed bottles, and defective ones among them."""
         return self.processed, self.processed - self.good, 0
 
     def values(self, now: ScanContext) -> Sequence[float]:
-        """As its signals are listed."""
+        """Return the values in the order of the signals."""
         return (
             self.works,
             self.processed,
@@ -141,21 +147,21 @@ class StationDevice(TakingDevice):
         )
 
     def states(self, now: ScanContext) -> list[float]:
-        """Running, starved, blocked, state, category and stop reason."""
+        """Return running, starved, blocked, state, category and stop reason."""
         return [self.works, self.cause == STARVED, self.cause == BLOCKED, *self.condition]
 
 
 class AttributeSetting:
-    """What a station makes of one attribute."""
+    """Setting of one attribute by a station."""
 
     def __init__(self, attribute: str, setting: Setting, random: np.random.Generator) -> None:
         self.attribute, self.random = attribute, random
         self._setting, self._at = setting, frozenset(setting.at)
 
     def value(self, number: int) -> float | None:
-        """What the attribute of the bottle of a number (from 1) becomes; None: it stays."""
+        """Return the new value for the bottle of a number (from 1), None if it keeps its value."""
         setting = self._setting
-        # Nothing is drawn where it would decide nothing.
+        # Random numbers are drawn only if they decide.
         chosen = setting.every is None or number % setting.every == 0
         chosen = chosen and (not self._at or number in self._at)
         if chosen and setting.share < 1.0:
@@ -165,18 +171,21 @@ class AttributeSetting:
 
 
 class AttributeTest:
-    """What a station takes for good in one attribute."""
+    """Test of one attribute by a station."""
 
     def __init__(self, attribute: str, test: Acceptance, random: np.random.Generator) -> None:
         self.attribute, self.random = attribute, random
         self._test = test
 
     def within(self, value: float) -> bool:
-        """Whether a value is within the limits."""
+        """Return True if a value is within the limits."""
         test = self._test
         return (test.low is None or value >= test.low) and (test.high is None or value <= test.high)
 
     def passes(self, within: bool) -> bool:
-        """Whether what is within the limits, or is not, is taken for good."""
+        """Return True if the test passes.
+
+        within: True for a value within the limits. A false accept or reject inverts the result.
+        """
         wrong = self._test.false_reject if within else self._test.false_accept
         return within != (wrong > 0.0 and float(self.random.uniform()) < wrong)

@@ -1,4 +1,4 @@
-"""Why a machine does not work: the numbers of its stop reason, and where its time goes."""
+"""Stop reasons of machines, and time categories that follow from them."""
 
 from collections.abc import Mapping
 
@@ -13,10 +13,10 @@ FIRST_PLANNED = FIRST_FAILURE + MOST_STOPS
 COMMANDED: Mapping[int, int] = {
     Command.STOP: 2, Command.HOLD: 3, Command.SUSPEND: 4, Command.ABORT: 5, Command.COMPLETE: 6,
 }  # fmt: skip
-"""The reasons that commands are, by command."""
+"""Stop reason by command."""
 
 BY_HAND = 10
-"""Added to the reason that a command is, and to RUN, where a person gave it and not a controller."""
+"""Added to the reason of a command, and to RUN, if a person sent it and not a controller."""
 
 _COMMANDS = {
     RUN: "command run", 2: "command Stop", 3: "command Hold", 4: "command Suspend", 5: "command Abort",
@@ -48,21 +48,22 @@ WORKING = frozenset({PackMLState.EXECUTE, PackMLState.COMPLETING})
 
 
 def reason_texts(part: PackmlPart) -> dict[int, str]:
-    """The texts of a machine's stop reasons, its failures and planned stops among them by name."""
+    """Return the texts of a machine's stop reasons, with its failures and planned stops by name."""
     failures = {FIRST_FAILURE + index: f"failure {name}" for index, name in enumerate(part.failures)}
     planned = {FIRST_PLANNED + index: f"planned stop {name}" for index, name in enumerate(part.planned_stops)}
     return {**_TEXTS, **failures, **planned}
 
 
 def is_failure(reason: int) -> bool:
-    """Whether a reason is the machine's own: the fault `stop`, or a failure."""
+    """Return True if the reason is the fault `stop` or a failure of the machine."""
     return reason == FAULT or FIRST_FAILURE <= reason < FIRST_PLANNED
 
 
 def category_of(state: int, reason: int, cause: int, failed: bool) -> Category:
-    """Where the time of a machine goes. cause: STARVED or BLOCKED if it waits in this tick, NONE if not.
+    """Return the time category of a machine.
 
-    failed: and not repaired yet. Waiting in Execute counts from its first tick on, before the machine is Suspended.
+    cause: STARVED or BLOCKED if it waits in this tick, else NONE. failed: True until it is repaired. Waiting in Execute
+    counts from its first tick on, before the machine is Suspended.
     """
     if state in WORKING:
         return "starved" if cause == STARVED else "blocked" if cause == BLOCKED else "running"

@@ -1,4 +1,4 @@
-"""What machines that take bottles out of a region have in common: the queue there, and how many have to wait in it."""
+"""`TakingDevice`: queue of the machines that take bottles from a region, and the fill level at which they start."""
 
 from collections.abc import Mapping, Sequence
 
@@ -16,10 +16,10 @@ FILLS = frozenset({PackMLState.STARTING, PackMLState.UNSUSPENDING})
 
 
 class TakingDevice(MachineDevice):
-    """A machine that takes the bottle which has waited longest in its region."""
+    """Machine that takes the bottle that has waited longest in its region."""
 
     waiting: tuple[int, ...]
-    """Ids of the bottles in the region, in the order of their arrival."""
+    """Ids of the bottles in the region, in order of arrival."""
 
     _working = (PackMLState.EXECUTE, PackMLState.COMPLETING)
 
@@ -33,7 +33,7 @@ class TakingDevice(MachineDevice):
         self.waiting = ()
 
     def queue(self, now: ScanContext) -> Mapping[int, int]:
-        """See who waits; slots of those who do by their ids."""
+        """Update `waiting`, and return the slots of the waiting bottles by their ids."""
         bottles = now.state.world.bottles
         slots = self._region.inside(bottles)
         slot_of: dict[int, int] = dict(zip(bottles.id[slots].tolist(), slots.tolist(), strict=True))
@@ -43,7 +43,10 @@ class TakingDevice(MachineDevice):
         return slot_of
 
     def ready(self, now: ScanContext) -> bool:
-        """Whether enough wait to start, or to go on after it was starved; or nothing has come to empty out."""
+        """Return True if enough bottles wait to start or resume, or if the machine has run empty.
+
+        The latter applies in Completing: no bottle has arrived for the run-down time.
+        """
         if self.state == PackMLState.COMPLETING:
             return self.cause == STARVED and self.waited >= self._run_down_ticks
         if self.state not in FILLS or (self.state == PackMLState.UNSUSPENDING and self.reason == BLOCKED):
@@ -53,10 +56,10 @@ class TakingDevice(MachineDevice):
     def _filled(self, now: ScanContext) -> int:
         if self._zone_name is None:
             return self._region.inside(now.state.world.bottles).size
-        if self._zone is None:  # zones are made after machines
+        if self._zone is None:  # zones are built after machines
             self._zone = self._setup.device(ZoneDevice, f"zones/{self._zone_name}")
         return self._zone.count(now)
 
     def rehearse(self, now: ScanContext) -> None:
-        """Look into the region."""
+        """Search the region."""
         self._region.inside(now.state.world.bottles)

@@ -1,4 +1,4 @@
-"""`TimeAccount`: how long a machine has been running, starved, blocked, ...; sums grow at changes, not every tick."""
+"""`TimeAccount`: time of a machine by category: running, starved, blocked, ... Sums change only with the category."""
 
 from __future__ import annotations
 
@@ -6,38 +6,38 @@ from collections.abc import Mapping
 from typing import Literal, get_args
 
 Category = Literal["running", "starved", "blocked", "down", "planned", "idle"]
-"""running: works on bottles; starved: could, and none comes; blocked: could, and nothing takes them; down: has failed,
-until it is repaired; planned: stands as planned; idle: was stopped, or has not been started."""
+"""running: works on bottles; starved: no bottle arrives; blocked: no bottle can leave; down: has failed, until it is
+repaired; planned: planned stop; idle: stopped, or not started."""
 
 CATEGORIES: tuple[Category, ...] = get_args(Category)
 
 
 class TimeAccount:
-    """Where the time of one machine went, in ticks. Public attributes are remembered in checkpoints."""
+    """Time of one machine by category, in ticks. Public attributes are stored in checkpoints."""
 
     category: Category
-    """Present one."""
+    """Present category."""
     ticks: dict[str, int]
-    """By category, up to the last change."""
+    """Ticks by category, up to the last change."""
 
     def __init__(self, category: Category, tick: int = 0) -> None:
-        """category: that in which the account opens."""
+        """Start in a category."""
         self.category = category
         self.since = tick
-        """Tick at which it began, or at which all was set to 0."""
+        """Tick of the last change or reset."""
         self.reset(tick)
 
     def reset(self, tick: int) -> None:
-        """Count anew from a tick; what is going on goes on, and counts from here."""
+        """Reset all times to 0 at a tick. The category stays."""
         self.since = tick
         self.ticks = dict.fromkeys(CATEGORIES, 0)
 
     def change(self, tick: int, category: Category) -> None:
-        """From a tick on, the machine is in a category; nothing happens where it is in it already."""
+        """Change the category at a tick. Without effect if it is the present one."""
         if category != self.category:
             self.ticks[self.category] += tick - self.since
             self.category, self.since = category, tick
 
     def up_to(self, tick: int) -> Mapping[str, int]:
-        """Ticks by category since the reset, what is going on included."""
+        """Return the ticks by category since the reset, the present category included."""
         return {**self.ticks, self.category: self.ticks[self.category] + tick - self.since}

@@ -1,8 +1,8 @@
-"""A machine in the words of the Weihenstephan Standards, made from its tags when somebody asks; nothing of it is kept.
+"""A machine's data points of the Weihenstephan Standards, derived from its tags on request.
 
-Values of mode and program are those of OPC 40600, and so are the states: PackML's, with Lack, Tailback and Prepared
-below Suspended, and failures below Held. Numbers of data points and the values of WS_Cur_State are those that published
-programs of machine builders have; the standard's own text was not at hand.
+Values of mode and program are those of OPC 40600. States are those of PackML, with Lack, Tailback and Prepared below
+Suspended, and failures below Held. Numbers of data points and values of WS_Cur_State are taken from published programs
+of machine builders; the text of the standard was not available.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from conveyor_sim.line.tag import Tag
 
 
 class DataPoint(NamedTuple):
-    """One of the standard."""
+    """Data point of the standard."""
 
     number: int
     tags: tuple[str, ...]
-    """Ends of the machine's tags that it is made from: those that there are."""
+    """Last parts of the names of the machine's tags that it is derived from, if they exist."""
     what: str
-    """A sentence for docs/line.md."""
+    """Description, one sentence for docs/line.md."""
 
 
 DATA_POINTS: Mapping[str, DataPoint] = {
@@ -34,14 +34,16 @@ DATA_POINTS: Mapping[str, DataPoint] = {
         "0 none (Complete), 1 production, 2 start up (Starting), 4 run down (Completing), 32 maintenance, 64 break.",
     ),
     "WS_Cur_State": DataPoint(300, ("state", "stop_reason"), "See below."),
-    "WS_Cur_Mach_Spd": DataPoint(401, ("cur_rate",), "Bottles a second."),
-    "WS_Set_Mach_Spd": DataPoint(402, ("rate",), "Bottles a second."),
-    "WS_Mach_Design_Spd": DataPoint(403, ("rate",), "Its nominal value, bottles a second."),
-    "WS_Not_Of_Fail_Code": DataPoint(10000, ("fault", "stop_reason"), "The stop reason while it has failed, else 0."),
+    "WS_Cur_Mach_Spd": DataPoint(401, ("cur_rate",), "Bottles per second."),
+    "WS_Set_Mach_Spd": DataPoint(402, ("rate",), "Bottles per second."),
+    "WS_Mach_Design_Spd": DataPoint(403, ("rate",), "Nominal rate, bottles per second."),
+    "WS_Not_Of_Fail_Code": DataPoint(
+        10000, ("fault", "stop_reason"), "Stop reason while the machine has failed, else 0."
+    ),
     "WS_Tot_Containers": DataPoint(50005, ("produced", "taken", "processed"), "Bottles."),
     "WS_Good_Containers": DataPoint(50006, ("good",), "Bottles, of stations."),
 }
-"""By name."""
+"""Data points by name."""
 
 BY_HAND, BY_ITSELF = 2, 8
 NONE, PRODUCTION, START_UP, RUN_DOWN, MAINTAINED, BREAK = 0, 1, 2, 4, 32, 64
@@ -60,9 +62,8 @@ STATES: Mapping[int, int] = {
     PackMLState.RESETTING: 32768,
     PackMLState.COMPLETE: 32768,
 }
-"""WS_Cur_State by state of PackML, where that alone says it. Acting states without a value of their own count as what
-they lead to.
-"""
+"""WS_Cur_State by PackML state, where that alone determines it. Acting states without a separate value count as the
+state they lead to."""
 
 STATE_TEXTS: Mapping[int, str] = {
     1: "Stopped", 2: "Starting", PREPARED: "Prepared", LACK: "Lack", TAILBACK: "Tailback", 128: "Operating",
@@ -74,14 +75,14 @@ _HOLDING = (PackMLState.HOLDING, PackMLState.HELD, PackMLState.UNHOLDING)
 
 
 def data_points(machine: str, tags: Mapping[str, Tag], values: Mapping[str, float]) -> dict[str, float]:
-    """Those of one machine that follows PackML ("machines/filler"), by name.
+    """Return the data points of one machine that follows PackML ("machines/filler"), by name.
 
-    tags: of its line, by name; values: of signals and commands, by name.
+    tags: of its line, by name. values: of signals and commands, by name.
     """
     own = {end: values[name] for end in _ENDS if (name := f"{machine}/{end}") in values}
     mode, state, reason = (int(own[end]) for end in ("mode", "state", "stop_reason"))
     design = tags[f"{machine}/rate"].nominal
-    found = {
+    points = {
         "WS_Cur_Mode": BY_ITSELF if mode == AUTOMATIC else BY_HAND,
         "WS_Cur_Prog": program(mode, state, reason),
         "WS_Cur_State": state_of(state, reason),
@@ -91,11 +92,11 @@ def data_points(machine: str, tags: Mapping[str, Tag], values: Mapping[str, floa
         "WS_Not_Of_Fail_Code": reason if own["fault"] and is_failure(reason) else 0,
         "WS_Tot_Containers": next(own[end] for end in DATA_POINTS["WS_Tot_Containers"].tags if end in own),
     }
-    return found | ({"WS_Good_Containers": own["good"]} if "good" in own else {})
+    return points | ({"WS_Good_Containers": own["good"]} if "good" in own else {})
 
 
 def program(mode: int, state: int, reason: int) -> int:
-    """WS_Cur_Prog, from mode, state and stop reason."""
+    """Return WS_Cur_Prog, from mode, state and stop reason."""
     if mode == MAINTENANCE:
         return MAINTAINED
     if state in STOPPED and reason >= FIRST_PLANNED:
@@ -106,9 +107,9 @@ def program(mode: int, state: int, reason: int) -> int:
 
 
 def state_of(state: int, reason: int) -> int:
-    """WS_Cur_State, from the state of PackML and the stop reason.
+    """Return WS_Cur_State, from PackML state and stop reason.
 
-    A machine that a command holds has not failed itself: something outside keeps it from working.
+    A machine that a command holds has not failed: an external cause prevents its work.
     """
     if state in STATES:
         return STATES[state]
@@ -118,7 +119,7 @@ def state_of(state: int, reason: int) -> int:
 
 
 def names_of(tag: Tag) -> tuple[str, ...]:
-    """Data points that are made from a tag."""
+    """Return the data points that are derived from a tag."""
     machine, _, end = tag.name.rpartition("/")
     if not machine.startswith("machines/") or tag.device_class not in ("source", "sink", "station"):
         return ()

@@ -1,8 +1,8 @@
-"""`PlcFace`: a PLC that is a server controls a line without waiting for it, as a real one does.
+"""`FreeRunningPlc`: a PLC that is a server controls a line in real time, without lockstep.
 
-Every `period` the signals are written to it, and what it commands is read and given to the line. The lag between both
-is measured and told, for it is part of what is tested; a test that is to have the same bits every time goes in
-lockstep (testing/plc.py).
+Every `period` the signals are written to it, and its commands are read and given to the line. The lag between both is
+measured and reported, because it is part of the test. A test that needs the same bits each time runs in lockstep
+(testing/plc_server.py).
 """
 
 from __future__ import annotations
@@ -13,63 +13,63 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 
-from conveyor_sim.control.scan import ALARMS, AlarmChanges
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.commands.inputs import SET, Input
-from conveyor_sim.line.commands.refusal import refusal
+from conveyor_sim.line.commands.refusal import ALARMS, refusal
 from conveyor_sim.line.tag import COMMANDS
-from conveyor_sim.protocols.attach.link import Link, LinkError
-from conveyor_sim.protocols.attach.links import all_of, link
+from conveyor_sim.protocols.attach.links import plc_link
+from conveyor_sim.protocols.attach.plc_link import PlcLink, PlcLinkError, read_answer
 from conveyor_sim.protocols.attach.tag_map import TagMap, read_tag_map
 from conveyor_sim.protocols.hosting.server_kinds import ServerKind
 from conveyor_sim.protocols.server.interface import ProtocolServer, Status
 from conveyor_sim.protocols.tags.tag_provider import PLC, LineSnapshot, TagProvider
+from conveyor_sim.run.alarm_changes import AlarmChanges
 from conveyor_sim.support.printable import SENTENCE, printable
 
 AGAIN = 1.0
-"""s of wall time between two attempts to reach a PLC that was lost."""
+"""Time between two attempts to connect to a lost PLC, s of wall time."""
 
 
-class PlcFace:
-    """One PLC: a Face."""
+class FreeRunningPlc:
+    """One PLC, as a protocol server (`ProtocolServer`) of a line."""
 
     def __init__(
         self,
         source: TagProvider,
         url: str,
         tags: TagMap,
-        make: Callable[[], Link],
+        make: Callable[[], PlcLink],
         period: float,
         say: Callable[[str], object],
         observe: Callable[[Mapping[str, float]], object],
     ) -> None:
-        """make: the way to it. period: s of wall time from scan to scan. say: takes sentences for the user.
-        observe: takes the PLC's own values (plc/<name>) after each scan, to be recorded.
+        """make: makes a link. period: time from scan to scan, s of wall time. say: takes sentences for the user.
+        observe: takes the values of the PLC (plc/<name>) after each scan, to record them.
         """
         self._source, self._url, self._tags, self._make = source, url, tags, make
         self._period, self._say, self._observe = period, say, observe
         self._writer = f"{PLC} {url}"
-        self._link: Link | None = None
+        self._link: PlcLink | None = None
         self._task: asyncio.Task[None] | None = None
         self._alarms = AlarmChanges()
-        self._commands = {tag.name: tag for tag in source.about.tags if tag.role in COMMANDS}
-        self._bad: set[str] = set()  # commands that are out of range
+        self._commands = {tag.name: tag for tag in source.info.tags if tag.role in COMMANDS}
+        self._bad: set[str] = set()  # names of commands out of range
         self._written: LineSnapshot | None = None
-        self._given = self._refused = 0
+        self._passed_on = self._refused = 0
         self._lag = 0.0
 
     @property
     def address(self) -> str:
-        """Where the PLC is."""
+        """URL of the PLC."""
         return self._url
 
     async def start(self) -> None:
-        """Reach it. Raises LinkError, TagMapError."""
+        """Connect to the PLC. Raise PlcLinkError, TagMapError."""
         self._link = await self._reach()
         self._task = asyncio.create_task(self._run())
 
     async def stop(self) -> None:
-        """Leave it."""
+        """Disconnect from the PLC."""
         task, self._task = self._task, None
         if task is not None:
             task.cancel()
@@ -77,34 +77,33 @@ class PlcFace:
         await self._leave()
 
     def status(self) -> Status:
-        """Scans that gave commands, and what was not taken; the lag from a tick to what the PLC made of it."""
+        """Return the numbers of scans with commands and of refusals, and the lag from a tick to the commands for it."""
         lag, self._lag = self._lag, 0.0
-        return Status(int(self._link is not None), 0, self._given, self._refused, lag)
+        return Status(int(self._link is not None), 0, self._passed_on, self._refused, lag)
 
     async def _run(self) -> None:
-        told = ""
+        reported = ""
         while True:
             began = time.monotonic()
             try:
                 if self._link is None:
                     self._link = await self._reach()
-                    self._say(f"{self._url}: reached again")
-                    told = ""
+                    self._say(f"{self._url}: connected again")
+                    reported = ""
                 await self._scan(self._link)
-            except (
-                Exception
-            ) as error:  # whatever it is: a PLC may be loaded with another program, and with this one again
+            # All errors, because a PLC may be loaded with another program, and with this one again.
+            except Exception as error:
                 text = str(error) if isinstance(error, ConveyorError) else f"{type(error).__name__}: {error}"
-                # Of attempts that fail, those are told whose reason is another one than that there is no PLC.
-                if text != told and (self._link is not None or not isinstance(error, LinkError)):
-                    told = text
-                    self._say(f"{printable(text, SENTENCE)}; it commands nothing until it is reached again")
+                # A failed attempt is reported unless its only reason is that there is no PLC.
+                if text != reported and (self._link is not None or not isinstance(error, PlcLinkError)):
+                    reported = text
+                    self._say(f"{printable(text, SENTENCE)}; it commands nothing until it is connected again")
                 await self._leave()
                 await asyncio.sleep(AGAIN)
             await asyncio.sleep(max(0.0, self._period - (time.monotonic() - began)))
 
-    async def _scan(self, link: Link) -> None:
-        began, shown, before = time.monotonic(), self._source.shown, self._written
+    async def _scan(self, link: PlcLink) -> None:
+        began, shown, before = time.monotonic(), self._source.snapshot, self._written
         if shown.lost or (before is not None and shown.tick == before.tick and shown.run_id == before.run_id):
             return
         last = {} if before is None else before.values
@@ -115,34 +114,36 @@ class PlcFace:
         if changed:
             await link.write(changed)
         self._written = shown
-        if asked := [each.tag.name for each in (*self._tags.read, *self._tags.own)]:
-            found = await link.read(asked)
-            if own := {each.tag.name: found.pop(each.tag.name) for each in self._tags.own}:
-                self._observe(own)
-            self._give(found)
+        answer, own = await read_answer(link, self._tags)
+        if own:
+            self._observe(own)
+        self._give(answer)
         self._lag = max(self._lag, time.monotonic() - began)
 
     def _give(self, answer: dict[str, float]) -> None:
-        """What is out of range is given alone, to be refused on record, and once: the rest acts all the same."""
+        """Give commands and alarm changes to the line.
+
+        A command out of range is given alone and once, so that its refusal is recorded and the others act.
+        """
         commands = {name: value for name, value in answer.items() if not name.startswith(ALARMS)}
         bad = {name for name, value in commands.items() if refusal(self._commands, "command", [name], [value])}
         for name in sorted(bad - self._bad):
             self._pass_on({name: commands[name]})
         self._refused += len(bad - self._bad)
         self._bad = bad
-        given = {name: value for name, value in commands.items() if name not in bad}
-        given |= self._alarms.of({name: value for name, value in answer.items() if name not in commands})
-        if given and self._pass_on(given):
-            self._given += 1
-        elif given:
+        valid = {name: value for name, value in commands.items() if name not in bad}
+        valid |= self._alarms.of({name: value for name, value in answer.items() if name not in commands})
+        if valid and self._pass_on(valid):
+            self._passed_on += 1
+        elif valid:
             self._refused += 1
-            self._alarms = AlarmChanges()  # none of them is known to the line
+            self._alarms = AlarmChanges()  # the line has none of them
 
     def _pass_on(self, values: Mapping[str, float]) -> bool:
-        given = Input(PLC, self._writer, "controller", SET, tuple(values), tuple(values.values()))
-        return not self._source.give(given)
+        request = Input(PLC, self._writer, "controller", SET, tuple(values), tuple(values.values()))
+        return not self._source.give(request)
 
-    async def _reach(self) -> Link:
+    async def _reach(self) -> PlcLink:
         link = self._make()
         try:
             await link.connect()
@@ -155,11 +156,11 @@ class PlcFace:
     async def _leave(self) -> None:
         link, self._link = self._link, None
         if link is not None:
-            with suppress(LinkError):
+            with suppress(PlcLinkError):
                 await link.close()
 
 
-def of_plc(
+def plc_kind(
     url: str,
     tags: Path,
     user: str,
@@ -168,14 +169,17 @@ def of_plc(
     say: Callable[[str], object],
     observe: Callable[[Mapping[str, float]], object],
 ) -> ServerKind:
-    """What serves a source to a PLC, as one of the faces. url, user, password: as `link`. tags: the map. The others: as
-    `PlcFace`.
+    """Return the kind of protocol server that attaches a PLC.
+
+    url, user, password: as for `plc_link`. tags: file of the map. Other parameters: as for `FreeRunningPlc`.
     """
 
     def make(source: TagProvider, *_: object) -> ProtocolServer:
-        mapped = read_tag_map(tags, source.about.tags)
-        return PlcFace(source, url, mapped, lambda: link(url, all_of(mapped), user, password), period, say, observe)
+        mapped = read_tag_map(tags, source.info.tags)
+        return FreeRunningPlc(
+            source, url, mapped, lambda: plc_link(url, mapped.all, user, password), period, say, observe
+        )
 
     library = "pymodbus" if url.startswith("modbus") else "asyncua"
-    # It is alone, and made of functions of this process.
+    # Not isolated in a child process, because it needs functions of this one.
     return ServerKind(PLC, 0, (library,), __name__, make, lambda _: "command it", isolated=False)

@@ -1,24 +1,19 @@
-"""Which way leads to a PLC: its URL says."""
+"""`plc_link`: the link to a PLC by the protocol of its URL."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from urllib.parse import urlsplit
 
-from conveyor_sim.protocols.attach.link import Link, LinkError
-from conveyor_sim.protocols.attach.tag_map import Mapped, TagMap
+from conveyor_sim.protocols.attach.plc_link import PlcLink, PlcLinkError
+from conveyor_sim.protocols.attach.tag_map import MappedTag
 from conveyor_sim.support.printable import printable
 
 
-def all_of(tags: TagMap) -> tuple[Mapped, ...]:
-    """All that a map names."""
-    return (*tags.written, *tags.read, *tags.own, *(each for each in (tags.tick, tags.target) if each is not None))
+def plc_link(url: str, mapped: Sequence[MappedTag], user: str = "", password: str = "") -> PlcLink:
+    """Return a link for mapped tags. url: "opc.tcp://host:port" or "modbus://host:port"; user: "" for anonymous.
 
-
-def link(url: str, mapped: Sequence[Mapped], user: str = "", password: str = "") -> Link:
-    """The way to the tags of a map. url: "opc.tcp://host:port" or "modbus://host:port"; user: "" for anonymous.
-
-    Raises LinkError for another URL, TagMapError for a place in Modbus that can't be, ImportError without the library.
+    Raises PlcLinkError for another URL, TagMapError for an invalid place in Modbus, ImportError without the library.
     """
     try:
         parts = urlsplit(url)
@@ -26,7 +21,7 @@ def link(url: str, mapped: Sequence[Mapped], user: str = "", password: str = "")
     except ValueError:
         host = port = None
     if not host or parts.scheme not in ("opc.tcp", "modbus"):
-        raise LinkError(f"{printable(url)} given, expected opc.tcp://host:port or modbus://host:port")
+        raise PlcLinkError(f"{printable(url)} given, expected opc.tcp://host:port or modbus://host:port")
     if parts.scheme == "modbus":
         from conveyor_sim.protocols.attach.modbus_link import ModbusLink
 

@@ -1,4 +1,4 @@
-"""`ModbusLink`: the way to the registers of a PLC that is a Modbus TCP server."""
+"""`ModbusLink`: access to the registers of a PLC that is a Modbus TCP server."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from pymodbus.client import AsyncModbusTcpClient
 from pymodbus.exceptions import ModbusException
 
 from conveyor_sim.line.tag import SIGNALS
-from conveyor_sim.protocols.attach.link import PATIENCE, LinkError
-from conveyor_sim.protocols.attach.tag_map import OWN, Mapped, TagMapError
+from conveyor_sim.protocols.attach.plc_link import PATIENCE, PlcLinkError
+from conveyor_sim.protocols.attach.tag_map import OWN, MappedTag, TagMapError
 from conveyor_sim.protocols.tags.handshake import TICK
 from conveyor_sim.support.modbus_rows import MOST_ADDRESSES, Row, Table, Type, WordOrder, decode, encode
 from conveyor_sim.support.printable import printable
 
 MOST_WORDS = 100
-"""Of one request; the protocol has 125 to read and 123 to write."""
+"""Largest number of words of one request. The protocol allows 125 to read and 123 to write."""
 
 _BITS: tuple[Table, ...] = ("coil", "discrete input")
 _WRITABLE: tuple[Table, ...] = ("coil", "holding register")
@@ -26,27 +26,27 @@ _WRITABLE_TEXT = " or ".join(f"a {table}" for table in _WRITABLE)
 
 
 class ModbusLink:
-    """Neighbouring addresses are one request."""
+    """Link by Modbus TCP. Neighbouring addresses are read and written in one request."""
 
-    def __init__(self, host: str, port: int, mapped: Sequence[Mapped]) -> None:
-        """Raises TagMapError."""
+    def __init__(self, host: str, port: int, mapped: Sequence[MappedTag]) -> None:
+        """Read the places of the mapped tags. Raise TagMapError for an invalid one."""
         self._url, self._at = f"modbus://{host}:{port}", (host, port)
         self._rows = {each.tag.name: _row(each) for each in mapped}
         self._client: AsyncModbusTcpClient | None = None
 
     async def connect(self) -> None:
-        """Reach it, and read every place of the map once: who does not answer there is not reached."""
-        logging.getLogger("pymodbus.logging").setLevel(logging.CRITICAL)  # it logs what LinkError says
+        """Connect, and read every place of the map once to check that the PLC has it."""
+        logging.getLogger("pymodbus.logging").setLevel(logging.CRITICAL)  # PlcLinkError reports the same
         host, port = self._at
         client = AsyncModbusTcpClient(host, port=port, timeout=PATIENCE, retries=0, reconnect_delay=0)
         self._client = client
         if not await asyncio.wait_for(client.connect(), 2.0 * PATIENCE):
-            raise LinkError(f"{self._url}: can't be reached, expected the Modbus server of a PLC")
+            raise PlcLinkError(f"{self._url}: can't be reached, expected the Modbus server of a PLC")
         await self.read(list(self._rows))
 
     async def write(self, values: Mapping[str, float]) -> None:
         """Set coils and holding registers, in the order of the values."""
-        client = self._there()
+        client = self._connected()
         for rows in _runs(self._rows[name] for name in values):
             words = [word for row in rows for word in encode(row, values[row.name])]
             if rows[0].table == "coil":
@@ -55,8 +55,8 @@ class ModbusLink:
                 await self._ask(rows, client.write_registers, rows[0].address, words)
 
     async def read(self, names: Sequence[str]) -> dict[str, float]:
-        """Values by our names."""
-        client, found = self._there(), {}
+        """Return values, by our names."""
+        client, values = self._connected(), {}
         ask = {
             "coil": client.read_coils,
             "discrete input": client.read_discrete_inputs,
@@ -68,34 +68,34 @@ class ModbusLink:
             answer = await self._ask(rows, ask[rows[0].table], first, count=count)
             words = answer.bits if rows[0].table in _BITS else answer.registers
             for row in rows:
-                found[row.name] = decode(row, words[row.address - first : row.addresses.stop - first])
-        return found
+                values[row.name] = decode(row, words[row.address - first : row.addresses.stop - first])
+        return values
 
     async def close(self) -> None:
-        """Leave it."""
+        """Disconnect."""
         client, self._client = self._client, None
         if client is not None:
             client.close()
 
-    def _there(self) -> AsyncModbusTcpClient:
+    def _connected(self) -> AsyncModbusTcpClient:
         if self._client is None:
-            raise LinkError(f"{self._url}: is not reached")
+            raise PlcLinkError(f"{self._url}: is not connected")
         return self._client
 
     async def _ask(self, rows: Sequence[Row], request: Callable[..., Any], *arguments: Any, **more: Any) -> Any:
         try:
             answer = await asyncio.wait_for(request(*arguments, **more), 2.0 * PATIENCE)
         except (ModbusException, OSError, asyncio.TimeoutError) as error:
-            raise LinkError(f"{self._url}: does not answer ({printable(error) or 'in time'})") from error
+            raise PlcLinkError(f"{self._url}: does not answer ({printable(error) or 'in time'})") from error
         if answer.isError():
             row = rows[0]
             code = getattr(answer, "exception_code", "?")
-            raise LinkError(f"{self._url}: {row.table} {row.address} ({row.name}) is refused with exception {code}")
+            raise PlcLinkError(f"{self._url}: {row.table} {row.address} ({row.name}) is refused with exception {code}")
         return answer
 
 
 def _runs(rows: Iterable[Row]) -> Iterator[list[Row]]:
-    """Rows that follow one another, as far as they go into one request."""
+    """Yield runs of rows at consecutive addresses, each short enough for one request."""
     run: list[Row] = []
     for row in rows:
         last = run[-1] if run else None
@@ -110,7 +110,7 @@ def _runs(rows: Iterable[Row]) -> Iterator[list[Row]]:
         yield run
 
 
-def _row(mapped: Mapped) -> Row:
+def _row(mapped: MappedTag) -> Row:
     expected = 'expected such as "coil 3 bool", "holding register 12 float32 big"'
     words = mapped.theirs.split()
     table = next((table for table in get_args(Table) if mapped.theirs.startswith(f"{table} ")), None)

@@ -1,12 +1,12 @@
-"""Which tag of a PLC stands for which of ours: a CSV file with the columns `tag` and `theirs`.
+"""Map of our tags to those of a PLC: a CSV file with the columns `tag` and `theirs`.
 
     tag,theirs
     photo_eyes/full1/blocked,ns=4;s=GVL.Full1
     belts/zone1/cmd_speed,ns=4;s=GVL.Speed1
     alarms/jam at the outfeed,ns=4;s=GVL.Jam
 
-Signals are written to the PLC; commands, and alarms that the PLC raises, are read from it. So are values of its own,
-such as a state or a counter, under names that begin with `plc/`: conditions of a test may ask for them.
+Signals are written to the PLC. Commands, and alarms that the PLC raises, are read from it. Other values of the PLC,
+such as a state or a counter, have names that begin with `plc/`; conditions of a test may read them.
 
 `theirs` is a NodeId of OPC UA, or a place in Modbus: table, address, type, word order ("holding register 12 float32
 big").
@@ -30,15 +30,15 @@ from conveyor_sim.support.printable import printable
 COLUMNS = ("tag", "theirs")
 
 OWN = "plc/"
-"""What names begin with that stand for values of the PLC's own."""
+"""Prefix of the names of values that only the PLC has."""
 
 
 class TagMapError(ConveyorError):
-    """A map that can't be read, or does not fit the line or the PLC: file, line, what was given and expected."""
+    """A map that can't be read, or does not fit the line or the PLC: file, line, the entry and what was expected."""
 
 
-class Mapped(NamedTuple):
-    """One line of it."""
+class MappedTag(NamedTuple):
+    """One line of a map."""
 
     tag: Tag
     theirs: str
@@ -47,22 +47,28 @@ class Mapped(NamedTuple):
 
 
 class TagMap(NamedTuple):
-    """What goes where."""
+    """MappedTag tags by direction."""
 
-    written: tuple[Mapped, ...]
-    """To the PLC: signals."""
-    read: tuple[Mapped, ...]
-    """From it: commands and alarms."""
-    own: tuple[Mapped, ...]
-    """Values of its own, read too."""
-    tick: Mapped | None
-    """`run/tick`, written behind all signals; None: it is not in the map."""
-    target: Mapped | None
-    """`run/target_tick`, which the PLC sets once it has scanned; None likewise."""
+    written: tuple[MappedTag, ...]
+    """Signals, written to the PLC."""
+    read: tuple[MappedTag, ...]
+    """Commands and alarms, read from the PLC."""
+    own: tuple[MappedTag, ...]
+    """Other values of the PLC, read as well."""
+    tick: MappedTag | None
+    """`run/tick`, written after all signals; None if it is not in the map."""
+    target: MappedTag | None
+    """`run/target_tick`, which the PLC sets after its scan; None if it is not in the map."""
+
+    @property
+    def all(self) -> tuple[MappedTag, ...]:
+        """All mapped tags."""
+        handshake = (each for each in (self.tick, self.target) if each is not None)
+        return (*self.written, *self.read, *self.own, *handshake)
 
 
 def read_tag_map(path: Path, tags: Sequence[Tag]) -> TagMap:
-    """A map for a line with these tags. Raises TagMapError."""
+    """Return the map in a file, for a line with these tags. Raise TagMapError."""
     try:
         text = read_file(path, MB).decode("utf-8-sig")
         rows = list(csv.reader(io.StringIO(text), strict=True))
@@ -71,35 +77,35 @@ def read_tag_map(path: Path, tags: Sequence[Tag]) -> TagMap:
     except UnicodeDecodeError as error:
         raise TagMapError(f"{path}: is not UTF-8, expected a CSV file of tags") from error
     if not rows or tuple(rows[0]) != COLUMNS:
-        given = printable(",".join(rows[0])) if rows else "nothing"
-        raise TagMapError(f"{path}: line 1: {given} given, expected {','.join(COLUMNS)}")
+        header = printable(",".join(rows[0])) if rows else "nothing"
+        raise TagMapError(f"{path}: line 1: {header} given, expected {','.join(COLUMNS)}")
     known = {tag.name: tag for tag in tags if tag.role in (*SIGNALS, *COMMANDS)} | _HANDSHAKE
-    found: dict[str, Mapped] = {}
+    mapped: dict[str, MappedTag] = {}
     for number, cells in enumerate(rows[1:], start=2):
         if not cells:
             continue
         where = f"{path}: line {number}"
         if len(cells) != len(COLUMNS) or not cells[1]:
-            raise TagMapError(f"{where}: {printable(','.join(cells))} given, expected a tag and what it is in the PLC")
+            raise TagMapError(f"{where}: {printable(','.join(cells))} given, expected a tag and its place in the PLC")
         name, theirs = cells
         tag = known.get(name) or _of_the_plc(name)
         if tag is None:
             expected = "expected a signal or command of the line, alarms/<name> or plc/<name>"
             raise TagMapError(f"{where}: {printable(name)} given, {expected} (conveyor-sim tags lists them)")
-        if name in found:
+        if name in mapped:
             raise TagMapError(f"{where}: {printable(name)} given twice")
-        found[name] = Mapped(tag, theirs, where)
-    if not found:
-        raise TagMapError(f"{path}: names no tag, expected one or more")
-    tick, target = found.pop(TICK, None), found.pop(TARGET, None)
-    own = tuple(each for name, each in found.items() if name.startswith(OWN))
-    written = tuple(each for each in found.values() if each.tag.role in SIGNALS and each not in own)
-    read = tuple(each for each in found.values() if each not in (*written, *own))
+        mapped[name] = MappedTag(tag, theirs, where)
+    if not mapped:
+        raise TagMapError(f"{path}: has no tag, expected one or more")
+    tick, target = mapped.pop(TICK, None), mapped.pop(TARGET, None)
+    own = tuple(each for name, each in mapped.items() if name.startswith(OWN))
+    written = tuple(each for each in mapped.values() if each.tag.role in SIGNALS and each not in own)
+    read = tuple(each for each in mapped.values() if each not in (*written, *own))
     return TagMap(written, read, own, tick, target)
 
 
 def _of_the_plc(name: str) -> Tag | None:
-    """What is the PLC's and not the line's: an alarm, or a value of its own."""
+    """Return the tag of an alarm or another value of the PLC; None for other names."""
     if name.startswith(ALARMS) and name != ALARMS:
         return switch(name, "command", "")
     return count(name, "status", "") if name.startswith(OWN) and name != OWN else None

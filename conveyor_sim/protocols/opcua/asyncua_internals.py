@@ -204,7 +204,7 @@ class OpenSubscriptions(SubscriptionService):
 
     @property
     def conditions(self) -> dict[ua.NodeId, Any]:
-        """Latest event of each retained condition, for a refresh; the library fills it only for events that it emits."""
+        """Latest event of each retained condition, for a refresh. The library fills it only for its own events."""
         return self._conditions
 
     def lifetime(self, count: int) -> int:
@@ -229,7 +229,7 @@ class OpenServer(Server):
         await self._setup_server_nodes()
 
     def state_application(self, uri: str) -> None:
-        """Set the application URI before `init`. The library's setter also writes nodes, which do not exist yet."""
+        """Set the application URI before `init`. The library's setter writes nodes as well, before they exist."""
         self._application_uri = uri
 
 

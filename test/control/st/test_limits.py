@@ -1,4 +1,4 @@
-"""A command at a limit, from a program whose type has fewer digits than the limit."""
+"""Commands at a limit, from programs whose type has fewer digits than the limit."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 
 from conveyor_sim.control.st import StructuredText
 from conveyor_sim.errors import CommandError
-from conveyor_sim.run.controlled import Controlled
+from conveyor_sim.run.scan_loop import ScanLoop
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.testing import Scenario
@@ -30,7 +30,7 @@ def program(folder: Path, kind: str, value: str) -> StructuredText:
 
 
 def commanded(folder: Path, kind: str, value: str) -> float:
-    """Return what the line takes from a program with a variable of a type."""
+    """Return the command that the line gets from a variable of a type."""
     with Scenario("scenarios/zoned_line", overrides=LIMITS) as plant:
         plant.attach(program(folder, kind, value))
         plant.run_for(0.02)
@@ -63,7 +63,7 @@ def test_a_value_beyond_a_limit_is_refused_as_before(tmp_path: Path, kind: str, 
 
 def test_a_run_without_a_test_takes_the_limit_too(tmp_path: Path) -> None:
     simulation = Simulation(load_scene("config/scenarios/zoned_line.yaml", LIMITS), threads=1)
-    controlled = Controlled(simulation, program(tmp_path, "REAL", "0.6"))
-    controlled.before_tick(None)
+    scans = ScanLoop(simulation, program(tmp_path, "REAL", "0.6"))
+    scans.before_tick(None)
     simulation.advance()
     assert simulation.line.read_back.values[simulation.process_image.command_names.index(COMMAND)] == 0.6

@@ -1,4 +1,4 @@
-"""A program's variables in recordings: where asked, as they are after each scan, and nothing else changes by it."""
+"""Recorded variables of programs: only the selected ones, after each scan, without any other effect."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from conveyor_sim.control.recorded import RecordedVariables
 from conveyor_sim.control.scan import ControlError, together
 from conveyor_sim.control.st import StructuredText
 from conveyor_sim.page.content import Collector
-from conveyor_sim.page.recording import Detail, Recording
+from conveyor_sim.page.recording import Detail, PageRecording
 from conveyor_sim.page.watch import Watch
 from conveyor_sim.testing import Scenario
 
@@ -28,7 +28,7 @@ NAMES = ["plc/table/held", "plc/table/free/in", "plc/table/free/pt", "plc/table/
 
 
 def play(plant: Scenario, *record: str) -> list[tuple[int, list[float]]]:
-    """Run the table with its program attached a little later; ticks, and what the variables were after their scans."""
+    """Run the table with its program attached a little later, and return ticks and variables after their scans."""
     plant.run_for(0.1)
     plant.attach(StructuredText(PROGRAMS / "table.st", record=record))
     seen = []
@@ -40,7 +40,7 @@ def play(plant: Scenario, *record: str) -> list[tuple[int, list[float]]]:
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[tuple[int, list[float]]], int]:
-    """A folder with a recording and its inputs, what was seen of the variables, the hash of the state at the end."""
+    """Return a folder with a recording and its inputs, the observed variables, and the hash of the final state."""
     folder = tmp_path_factory.mktemp("recorded")
     with Scenario(TABLE, bag=folder / "bag", inputs=folder / "inputs") as plant:
         seen = play(plant, "table/held", "plc/Table/free/*")
@@ -77,7 +77,7 @@ def test_a_recording_made_of_the_inputs_has_them_too(recorded: tuple[Path, list,
 def test_the_page_shows_them_as_signals(recorded: tuple[Path, list, int]) -> None:
     folder, seen, _ = recorded
     with open_bag(folder / "bag") as bag:
-        recording = Recording(bag, Detail())
+        recording = PageRecording(bag, Detail())
         assert recording.head()["signals"] == [*bag.line.signal_names, *NAMES]
         assert recording.block(0)
         collector = Collector(bag, 0, {"signals": 1}, NAMES)

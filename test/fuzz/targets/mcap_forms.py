@@ -23,7 +23,7 @@ from mcap.reader import NonSeekingReader, make_reader
 from mcap.records import Attachment, Channel, Message, Metadata, Schema
 
 from conveyor_sim.bag.mcap.chunk import Chunk, chunk_at, read_content
-from conveyor_sim.bag.mcap_source import McapSource
+from conveyor_sim.bag.mcap_reader import McapFilesReader
 from conveyor_sim.bag.recover import recover
 from conveyor_sim.bag.replay import replay
 from conveyor_sim.errors import BagError
@@ -111,7 +111,7 @@ def _expected(content: bytes, items: Sequence[Item], extended: bool, chunked: bo
 
 
 def _read(file: Path, expected: list[tuple[int, Raw]], foreign: set[int]) -> None:
-    with closing(McapSource(file, [file])) as source:
+    with closing(McapFilesReader(file, [file])) as source:
         read = list(source.messages({one.topic for one in source.topics}, None, None))
     if read != [raw for channel, raw in expected if channel not in foreign]:
         raise Violation("other messages", f"{len(read)} messages are read, the library reads {len(expected)}")

@@ -1,4 +1,4 @@
-"""Alarms together: delays, shelving, what follows from what, who was first, and how many there may be."""
+"""Several alarms: delays, shelving, suppression, first-out, and their largest number."""
 
 import re
 
@@ -197,7 +197,7 @@ def test_one_that_is_declared_after_it_was_said_keeps_its_state() -> None:
             {"a": {"suppressed_by": ["b"]}, "b": {"suppressed_by": ["c"]}, "c": {"suppressed_by": ["a"]}},
             "suppressed_by: . by . by . by . given",
         ),
-        ({"trip": {}}, "alarm trip: id: is declared by the line, expected another one"),
+        ({"trip": {}}, "alarm trip: id: is declared by the line, expected another id"),
         (
             {"a": {"tag": "zone/table/bottles", "high": 3}},
             "alarm a: tag: zone/table/bottles given, expected a signal of a device, such as zones/table/bottles",
@@ -233,7 +233,7 @@ def test_only_so_many() -> None:
 
 
 def test_more_alarms_at_once_than_there_can_be() -> None:
-    """Those that hold are taken first, wherever they are in the message; the others as far as there is room."""
+    """Alarms that hold come first, at any place in the message. Others are taken as long as there is room."""
     board = Board()
     said = {f"a{n}": n >= MOST_ALARMS + 400 for n in range(MOST_ALARMS + 500)}
     assert board.alarms.room_problem(said) == ""
@@ -264,10 +264,10 @@ def test_operations_are_refused_with_what_was_expected() -> None:
     assert board.do("acknowledge", "jam", "alarms/jam") == "jam: given twice"
     assert board.do("acknowledge", "jam", values=(1.0,)) == "1 values given, expected none"
     assert board.do("shelve") == "no name given, expected the id of an alarm"
-    assert board.do("shelve", "jam", values=(1.0, 2.0)) == "2 values given, expected as many as names (1), or none"
+    assert board.do("shelve", "jam", values=(1.0, 2.0)) == "2 values given, expected one per name (1), or none"
     nan = float("nan")
     for value, shown in ((-1.0, "-1"), (1e9, "1e+09"), (nan, "nan")):
-        expected = f"{shown} given, expected 0 to 86400 s, for how long it is shelved"
+        expected = f"{shown} given, expected a shelving time of 0 to 86400 s"
         assert board.do("shelve", "jam", values=(value,)) == expected
     assert board.states() == {"jam": "UNACKNOWLEDGED", "full": "NORMAL"}
 

@@ -1,4 +1,4 @@
-"""Declarations as they travel."""
+"""Declarations of alarms in inputs."""
 
 import json
 import re
@@ -70,8 +70,8 @@ def test_what_can_not_be_is_said_in_one_sentence(text: str, problem: str) -> Non
 @pytest.mark.parametrize(
     ("ids", "texts", "problem"),
     [
-        ([], [], "0 ids and 0 declarations of alarms given, expected as many of both, one at least"),
-        (["a"], [], "1 ids and 0 declarations of alarms given, expected as many of both, one at least"),
+        ([], [], "0 ids and 0 declarations of alarms given, expected equal numbers from 1 on"),
+        (["a"], [], "1 ids and 0 declarations of alarms given, expected equal numbers from 1 on"),
         (["a", "a"], ["{}", "{}"], "alarm a: declared twice in one input"),
         *(
             ([id], ["{}"], "expected an id of 1 to 100 printable characters, without `alarms/` before it")

@@ -1,4 +1,4 @@
-"""What a checkpoint keeps of alarms, and what of a file is refused."""
+"""Alarms in checkpoints, and refused data of checkpoint files."""
 
 import copy
 import json
@@ -20,7 +20,7 @@ def line() -> Board:
 
 
 def busy(seed: int, ticks: int = 60) -> Board:
-    """After much of everything."""
+    """Return alarms after many events of all kinds."""
     board, draw = line(), random.Random(seed)
     board.declare(
         full={"suppressed_by": ["jam", "trip"], "group": "g", "off_delay": 0.7}, hot={"group": "h", "latching": True}
@@ -64,7 +64,7 @@ def alarm(memory: Any, id: str) -> list[Any]:
     return next(one for one in memory["alarms"] if one[0] == id)
 
 
-FIELDS = list(memory._Kept._fields)
+FIELDS = list(memory._StoredAlarm._fields)
 
 
 def set_field(id: str, /, **fields: Any) -> Callable[[Any], None]:
@@ -80,38 +80,38 @@ def set_field(id: str, /, **fields: Any) -> Callable[[Any], None]:
     [
         (lambda m: m.pop("first"), "other entries"),
         (lambda m: m.update(numbered="3"), "line.alarms.numbered is not of its type"),
-        (lambda m: m.update(numbered=2), "number that was not given"),
-        (lambda m: m["alarms"].append(m["alarms"][-1]), "numbers in no order"),
-        (lambda m: m["alarms"].pop(0), "are of another line"),
-        (lambda m: m["alarms"].reverse(), "are of another line"),
-        (lambda m: m.update(first={"g": "said"}), "a first-out that is not in its group"),
-        (lambda m: m.update(first={"g": "nobody"}), "a first-out that is not in its group"),
-        (lambda m: m.update(first={"g": "trip"}), "a first-out of nothing"),
-        (set_field("said", id="hot"), "have one twice"),
-        (set_field("said", id=""), "texts that can't be"),
-        (set_field("said", changed_by="a\nb"), "texts that can't be"),
-        (set_field("said", number=99), "number that was not given"),
-        (set_field("hot", declared="{"), "is declared wrong"),
-        (set_field("hot", declared=""), "is declared wrong"),
-        (set_field("said", declared="{}"), "is declared wrong"),
+        (lambda m: m.update(numbered=2), "number that was never assigned"),
+        (lambda m: m["alarms"].append(m["alarms"][-1]), "numbers out of order"),
+        (lambda m: m["alarms"].pop(0), "belong to another line"),
+        (lambda m: m["alarms"].reverse(), "belong to another line"),
+        (lambda m: m.update(first={"g": "said"}), "a first-out alarm that is not in its group"),
+        (lambda m: m.update(first={"g": "nobody"}), "a first-out alarm that is not in its group"),
+        (lambda m: m.update(first={"g": "trip"}), "a first-out without an alarm"),
+        (set_field("said", id="hot"), "have one alarm twice"),
+        (set_field("said", id=""), "invalid texts"),
+        (set_field("said", changed_by="a\nb"), "invalid texts"),
+        (set_field("said", number=99), "number that was never assigned"),
+        (set_field("hot", declared="{"), "has an invalid declaration"),
+        (set_field("hot", declared=""), "has an invalid declaration"),
+        (set_field("said", declared="{}"), "has an invalid declaration"),
         (set_field("hot", declared='{"suppressed_by": ["nobody"]}'), "lack what suppresses hot"),
-        (set_field("hot", declared='{"suppressed_by": ["hot"]}'), "have one that suppresses itself"),
-        (set_field("said", own=True), "are of another line"),
-        (set_field("said", main=6), "in a state that can't be"),
-        (set_field("said", main=-1), "in a state that can't be"),
-        (set_field("said", main=0), "in a state that can't be"),
-        (set_field("said", main=3), "in a state that can't be"),
-        (set_field("hot", main=1), "in a state that can't be"),
-        (set_field("said", out_of_service=True), "in a state that can't be"),
+        (set_field("hot", declared='{"suppressed_by": ["hot"]}'), "have an alarm that suppresses itself"),
+        (set_field("said", own=True), "belong to another line"),
+        (set_field("said", main=6), "in an impossible state"),
+        (set_field("said", main=-1), "in an impossible state"),
+        (set_field("said", main=0), "in an impossible state"),
+        (set_field("said", main=3), "in an impossible state"),
+        (set_field("hot", main=1), "in an impossible state"),
+        (set_field("said", out_of_service=True), "in an impossible state"),
         (set_field("said", due=9), "a delay without a reason"),
         (set_field("said", active=False), "a delay without a reason"),
-        (set_field("said", active=False, due=5), "a delay that can't be"),
-        (set_field("said", active=False, due=2**52), "a delay that can't be"),
-        (set_field("said", shelved="timed"), "is shelved and is not"),
-        (set_field("hot", shelved="timed", shelved_until=2**52), "is shelved for ever"),
-        (set_field("hot", shelved="timed", shelved_until=3), "is shelved for ever"),
+        (set_field("said", active=False, due=5), "an impossible delay"),
+        (set_field("said", active=False, due=2**52), "an impossible delay"),
+        (set_field("said", shelved="timed"), "is shelved without a time"),
+        (set_field("hot", shelved="timed", shelved_until=2**52), "is shelved too long"),
+        (set_field("hot", shelved="timed", shelved_until=3), "is shelved too long"),
         (set_field("hot", shelved="for fun"), r"line.alarms.alarms\[3\]\[9\] is not of its type"),
-        (set_field("said", since=6), "has changed later"),
+        (set_field("said", since=6), "changed after the checkpoint"),
     ],
 )
 def test_what_can_not_be_is_refused(change: Callable[[Any], None], problem: str) -> None:

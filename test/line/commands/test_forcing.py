@@ -1,4 +1,4 @@
-"""Forced signals: controllers read what somebody has set, and the line goes on as it is."""
+"""Forced signals: controllers read the forced value, and the line itself does not change."""
 
 import math
 from pathlib import Path
@@ -14,7 +14,7 @@ SPEED, BLOCKED, REMOVED = "belts/one/speed", "photo_eyes/e/blocked", "outfeeds/o
 
 
 def passing() -> Simulation:
-    """A bottle that passes a photo-eye and leaves by an outfeed, 0.4 m further on."""
+    """Return a line with a bottle that passes a photo-eye and leaves by an outfeed 0.4 m further on."""
     return simulation(
         accuracy={"per_tick": 10},
         base=base(0.4),
@@ -47,7 +47,7 @@ def read(sim: Simulation, name: str) -> float:
 
 
 def test_it_changes_what_is_read_and_never_what_is() -> None:
-    """Same bits of the state at every tick as on a line on which nothing is forced, and the same counts."""
+    """State and counts have the same bits at every tick as without forced signals."""
     sim, free = passing(), passing()
     given = force((BLOCKED, 1.0), (SPEED, -9.0), (REMOVED, 700.0), ("zones/z/bottles", 5.0), ("belts/one/mode", 3.0))
     assert all(outcome.accepted for outcome in after(sim, given))
@@ -96,7 +96,7 @@ def test_commands_of_a_device_whose_mode_is_forced_are_taken_as_it_is() -> None:
 )  # fmt: skip
 def test_refusals(given: Input, reason: str) -> None:
     sim = passing()
-    assert sim.refusal(given).startswith(reason)
+    assert sim.line.refusal(given).startswith(reason)
     (outcome,) = after(sim, given)
     assert outcome.reason.startswith(reason) and not sim.line.signals().forced.size
 
@@ -106,9 +106,9 @@ def test_each_is_an_event() -> None:
     events = []
     for given in (force((SPEED, 0.1), (BLOCKED, 1.0)), force((SPEED, 0.2)), unforce(SPEED), unforce(), unforce(SPEED)):
         after(sim, given)
-        events += [(event.at, event.kind, event.name, event.text) for event in sim.happened]
+        events += [(event.at, event.kind, event.name, event.text) for event in sim.line.happened]
         if given.operation == FORCE:
-            assert [event.value for event in sim.happened] == list(given.values)
+            assert [event.value for event in sim.line.happened] == list(given.values)
     assert events == [
         (0, "signal_forced", SPEED, "by engineer Jo"),
         (0, "signal_forced", BLOCKED, "by engineer Jo"),

@@ -1,4 +1,4 @@
-"""In whose hands a device is, and which controller owns the line: whose commands are taken."""
+"""Control mode of devices and ownership of the line: which commands are accepted."""
 
 from pathlib import Path
 
@@ -41,7 +41,7 @@ def mode(kind: str, number: float, device: str = "belts/one") -> Input:
 
 
 def after(sim: Simulation, *given: Input) -> list[CommandOutcome]:
-    """What becomes of inputs in the next tick."""
+    """Return the results of inputs in the next tick."""
     for one in given:
         sim.give(one)
     sim.advance()
@@ -76,7 +76,7 @@ def test_only_devices_that_take_commands_have_a_mode() -> None:
 @pytest.mark.parametrize("number", IN_CONTROL)
 @pytest.mark.parametrize("kind", ["controller", "operator", "engineer", "test"])
 def test_commands_are_taken_of_those_in_control(kind: str, number: int) -> None:
-    """Whatever comes back into force, the setpoint stays on a change of hands."""
+    """The setpoint stays when the control mode changes."""
     sim = two_belts()
     outcomes = after(sim, mode("test", number), act(kind, SET, (ONE, 0.7)))
     allowed = kind in IN_CONTROL[number]
@@ -90,7 +90,7 @@ def test_commands_are_taken_of_those_in_control(kind: str, number: int) -> None:
 
 
 def test_what_a_controller_has_no_control_of_is_taken_out_of_its_scan() -> None:
-    """The rest is applied; a record of both gives the same again."""
+    """The rest is applied. A record of both parts gives the same results again."""
     sim = two_belts()
     after(sim, mode("operator", MANUAL))
     outcomes = after(sim, plc((ONE, 0.5), (TWO, 0.6), ("alarms/x", 1.0)))
@@ -113,7 +113,7 @@ def test_of_others_the_whole_is_refused() -> None:
     after(sim, mode("operator", MANUAL))
     given = act("operator", SET, (ONE, 0.5), (TWO, 0.6))
     reason = "belts/two: is in Automatic, expected Manual for an operator's commands"
-    assert sim.refusal(given) == reason
+    assert sim.line.refusal(given) == reason
     (outcome,) = after(sim, given)
     assert (outcome.reason, outcome.names, commanded(sim)) == (reason, (ONE, TWO), [0.2, 0.3])
 
@@ -121,19 +121,20 @@ def test_of_others_the_whole_is_refused() -> None:
 def test_what_waits_counts_when_a_refusal_is_asked_for() -> None:
     sim = two_belts()
     command = act("operator", SET, (ONE, 0.5))
-    assert sim.refusal(command)
+    assert sim.line.refusal(command)
     sim.give(mode("controller", MANUAL))  # which will be refused
-    assert sim.refusal(command)
+    assert sim.line.refusal(command)
     sim.give(mode("operator", MANUAL))
-    assert sim.refusal(command) == ""
-    assert sim.refusal(plc((ONE, 0.5))) and sim.refusal(plc((ONE, 0.5), (TWO, 0.5))) == ""
+    assert sim.line.refusal(command) == ""
+    assert sim.line.refusal(plc((ONE, 0.5))) and sim.line.refusal(plc((ONE, 0.5), (TWO, 0.5))) == ""
     assert (
-        sim.refusal(mode("operator", MAINTENANCE))
+        sim.line.refusal(mode("operator", MAINTENANCE))
         == "belts/one: Maintenance is not for operators, expected an engineer"
     )
     sim.give(mode("engineer", MAINTENANCE))
     assert (
-        sim.refusal(mode("operator", AUTOMATIC)) == "belts/one: Maintenance is not for operators, expected an engineer"
+        sim.line.refusal(mode("operator", AUTOMATIC))
+        == "belts/one: Maintenance is not for operators, expected an engineer"
     )
 
 
@@ -148,13 +149,16 @@ def test_what_waits_counts_when_a_refusal_is_asked_for() -> None:
         (act("controller", DISOWN), "the line has no owner, expected one"),
         (act("controller", OWN, writer=""), "no writer given, expected the name of a controller"),
         (act("controller", OWN, texts=("zones/*",)), "zones/*: fits no device that takes commands, expected such as"),
-        (act("controller", OWN, (ONE, 1.0)), "1 names, 1 values, 0 texts, expected texts alone, patterns of devices"),
+        (
+            act("controller", OWN, (ONE, 1.0)),
+            "1 names, 1 values, 0 texts given, expected texts alone, patterns of devices",
+        ),
         (act("operator", INJECT, ("x", 1.0)), "inject: given by operator Jo, expected one of the kind test"),
     ],
 )  # fmt: skip
 def test_refusals(given: Input, reason: str) -> None:
     sim = two_belts()
-    assert sim.refusal(given).startswith(reason)
+    assert sim.line.refusal(given).startswith(reason)
     (outcome,) = after(sim, given)
     assert not outcome.accepted and outcome.reason.startswith(reason)
     assert shown(sim, "belts/one/mode") == AUTOMATIC and not sim.line.modes.owner
@@ -168,10 +172,10 @@ def test_an_owner_excludes_other_controllers_but_where_it_releases_groups() -> N
     assert other[0].reason == "belts/one: the line is owned by controller plc, expected its release"
     assert all(o.accepted for o in after(sim, plc((ONE, 0.7), (TWO, 0.8))))
     assert (
-        sim.refusal(act("controller", OWN, writer="forgotten"))
+        sim.line.refusal(act("controller", OWN, writer="forgotten"))
         == "the line is owned by controller plc, expected its release"
     )
-    assert sim.refusal(act("controller", DISOWN, writer="forgotten"))
+    assert sim.line.refusal(act("controller", DISOWN, writer="forgotten"))
     after(sim, mode("operator", MANUAL))
     assert all(o.accepted for o in after(sim, act("operator", SET, (ONE, 0.1)), act("test", SET, (TWO, 0.1))))
     after(sim, mode("operator", AUTOMATIC), act("controller", OWN, writer="plc"))
@@ -192,7 +196,9 @@ def test_each_change_is_an_event_and_refusals_are_one_each_time_hands_change() -
         (plc((ONE, 0.6), writer="forgotten"), act("controller", DISOWN, writer="plc")),
     ):
         after(sim, *given)
-        events += [(event.at, event.kind, event.name, event.value, event.text.split(",")[0]) for event in sim.happened]
+        events += [
+            (event.at, event.kind, event.name, event.value, event.text.split(",")[0]) for event in sim.line.happened
+        ]
     assert events == [
         (0, "mode_changed", "belts/one", 3.0, "by operator Jo"),
         (0, "command_refused", ONE, 0.5, "belts/one: is in Manual"),
@@ -206,7 +212,10 @@ def test_each_change_is_an_event_and_refusals_are_one_each_time_hands_change() -
 
 
 def test_a_watchdog_waits_for_a_controller_in_automatic_only() -> None:
-    """0.05 s: in other hands it rests, and has all of its time when the belt comes back."""
+    """Outside automatic mode it rests.
+
+    Its full time, 0.05 s, starts when the belt is back in automatic mode.
+    """
     sim = two_belts(watchdog=0.05)
     after(sim, mode("operator", MANUAL))
     sim.advance(20)

@@ -88,11 +88,9 @@ def test_what_is_left_out_does_not_change_the_future(saved: Path) -> None:
             array[...] = np.nan if array.dtype.kind == "f" else 1
             spoilt.add(name)
     assert len(spoilt) > 5
-    other.take_outcomes()
-    other.take_guard_events()
-    other.take_damage_events()
-    other._integration._memory.deepest = 0.9
-    other._integration._memory.shortened_ticks = 7
+    other.take_events()
+    other.integration._memory.deepest = 0.9
+    other.integration._memory.shortened_ticks = 7
     for _ in range(AHEAD):
         assert other.full_state_hash() == sim.full_state_hash()
         sim.advance()

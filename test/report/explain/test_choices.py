@@ -1,4 +1,4 @@
-"""What `explain` tells: each effect with the line that decides, the bounds and the one that rules, prices."""
+"""Output of `explain`: each effect with the line that decides it, bounds of the time step, prices."""
 
 import math
 import re

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from mcap.reader import NonSeekingReader, make_reader
 
-from conveyor_sim.bag.mcap.file import McapFile, Schema
-from conveyor_sim.bag.mcap.index import sealed
+from conveyor_sim.bag.mcap.index import is_complete
+from conveyor_sim.bag.mcap.writer import McapFileWriter, Schema
 
 TOPICS = ("/bottles", "/signals", "/never")
 SCHEMA = Schema("std_msgs/msg/String", "ros2msg", b"string data")
@@ -28,7 +28,7 @@ def messages(count: int) -> list[tuple[int, int, bytes, int]]:
 
 def written(count: int, flush_every: int) -> bytes:
     stream = BytesIO()
-    file = McapFile(stream, "bag_0.mcap", "jazzy")
+    file = McapFileWriter(stream, "bag_0.mcap", "jazzy")
     assert [file.add_topic(topic, SCHEMA, "cdr", {"hash": topic}) for topic in TOPICS] == [1, 2, 3]
     for number, (channel, time, data, sequence) in enumerate(messages(count)):
         file.add_message(channel, data, time, time + 1, sequence)
@@ -64,14 +64,14 @@ def test_mcap_reads_it_back(count: int, flush_every: int) -> None:
 @pytest.mark.parametrize("count", [0, 300])
 def test_checksums_cover_every_byte(count: int) -> None:
     data = written(count, 7)
-    assert sealed(data)
+    assert is_complete(data)
     stream = BytesIO(data)
     assert sum(1 for _ in NonSeekingReader(stream, validate_crcs=True).iter_messages()) == count
 
 
 def test_a_flushed_file_is_readable_without_its_end() -> None:
     stream = BytesIO()
-    file = McapFile(stream, "bag_0.mcap", "jazzy")
+    file = McapFileWriter(stream, "bag_0.mcap", "jazzy")
     channel = file.add_topic("/a", SCHEMA, "cdr", {})
     for time in range(5):
         file.add_message(channel, b"x", time, time)
@@ -81,7 +81,7 @@ def test_a_flushed_file_is_readable_without_its_end() -> None:
 
 
 def test_times_and_counts_are_those_of_all_ros_messages_so_far() -> None:
-    file = McapFile(BytesIO(), "bag_0.mcap", "jazzy")
+    file = McapFileWriter(BytesIO(), "bag_0.mcap", "jazzy")
     channel, foreign = file.add_topic("/a", SCHEMA, "cdr", {}), file.add_foreign("/b", None, "json", {})
 
     def state() -> tuple[int, int, int, dict[str, int]]:

@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from conveyor_sim.bag.any_source import AnySource
 from conveyor_sim.bag.messages.cdr import tick_of
 from conveyor_sim.bag.messages.encode import Header, commands_message
 from conveyor_sim.bag.messages.topics import OUTPUTS
-from conveyor_sim.bag.own_source import OwnSource, own_source
+from conveyor_sim.bag.own_reader import OwnReader, own_reader
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recorder import Recorder
+from conveyor_sim.bag.rosbags_reader import RosbagsReader
 
 SECOND = 1_000_000_000
 
@@ -29,8 +29,8 @@ def file_of(bag: Path) -> Path:
 
 
 @pytest.fixture
-def sources(bag: Path) -> Iterator[tuple[OwnSource, AnySource]]:
-    own, other = own_source(file_of(bag)), AnySource([file_of(bag)])
+def sources(bag: Path) -> Iterator[tuple[OwnReader, RosbagsReader]]:
+    own, other = own_reader(file_of(bag)), RosbagsReader([file_of(bag)])
     assert own is not None
     with closing(own), closing(other):
         yield own, other
@@ -50,7 +50,7 @@ def same(one: Any, other: Any) -> bool:
     return bool(one == other)
 
 
-def test_topics_span_and_hashes_are_those_of_rosbags(sources: tuple[OwnSource, AnySource]) -> None:
+def test_topics_span_and_hashes_are_those_of_rosbags(sources: tuple[OwnReader, RosbagsReader]) -> None:
     own, other = sources
     assert own.topics == other.topics
     assert own.span_ns == other.span_ns
@@ -60,7 +60,7 @@ def test_topics_span_and_hashes_are_those_of_rosbags(sources: tuple[OwnSource, A
 
 @pytest.mark.parametrize(("start", "stop"), [(None, None), (SECOND // 5, None), (None, SECOND // 2), (1, SECOND // 3)])
 def test_messages_are_those_of_rosbags_in_their_order(
-    sources: tuple[OwnSource, AnySource], start: int | None, stop: int | None
+    sources: tuple[OwnReader, RosbagsReader], start: int | None, stop: int | None
 ) -> None:
     own, other = sources
     topics = [recorded.topic for recorded in own.topics]
@@ -70,7 +70,7 @@ def test_messages_are_those_of_rosbags_in_their_order(
         assert list(own.messages([topic], start, stop)) == list(other.messages([topic], start, stop))
 
 
-def test_decoded_messages_are_those_of_rosbags_to_the_bit(sources: tuple[OwnSource, AnySource]) -> None:
+def test_decoded_messages_are_those_of_rosbags_to_the_bit(sources: tuple[OwnReader, RosbagsReader]) -> None:
     own, other = sources
     types = {recorded.topic: recorded.type for recorded in own.topics}
     with_tick = 0
@@ -87,7 +87,7 @@ def test_what_belongs_to_an_earlier_time_comes_earlier(tmp_path: Path) -> None:
     with Recorder(tmp_path / "bag") as recorder:
         for number, stamp in enumerate((1, 50, 50, 20, 70, 20)):
             recorder.write("line" if number % 2 else "bottles", bytes([number]), stamp)
-    own, other = own_source(file_of(tmp_path / "bag")), AnySource([file_of(tmp_path / "bag")])
+    own, other = own_reader(file_of(tmp_path / "bag")), RosbagsReader([file_of(tmp_path / "bag")])
     assert own is not None
     topics = ["/line", "/bottles"]
     messages = list(own.messages(topics, None, None))
@@ -99,7 +99,7 @@ def test_a_recording_of_several_chunks_is_read_to_its_end(tmp_path: Path) -> Non
     with Recorder(tmp_path / "long") as recorder:
         for number in range(40):
             recorder.write("signals", bytes(100_000) + bytes([number]), 1 + number)
-    own = own_source(file_of(tmp_path / "long"))
+    own = own_reader(file_of(tmp_path / "long"))
     assert own is not None
     for _ in range(2):
         assert [data[-1] for _, _, data in own.messages(["/signals"], None, None)] == list(range(40))
@@ -115,12 +115,12 @@ def test_what_another_recorder_wrote_is_left_to_rosbags(bag: Path, tmp_path: Pat
     content = file.read_bytes()
     assert content.count(b"conveyor_sim ", 0, 64) == 1
     file.write_bytes(content.replace(b"conveyor_sim ", b"conveyor_xyz ", 1))
-    assert own_source(file) is None
+    assert own_reader(file) is None
 
 
 def test_messages_of_another_definition_are_left_to_rosbags(bag: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(OUTPUTS, "bottles", OUTPUTS["contacts"])
-    assert own_source(file_of(bag)) is None
+    assert own_reader(file_of(bag)) is None
 
 
 def test_chosen_ticks_are_read_as_in_a_reading_of_all(bag: Path) -> None:

@@ -16,20 +16,20 @@ from rosbags.rosbag2.metadata import parse_qos
 from rosbags.typesys import Stores, TypesysError, get_types_from_idl, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
-from conveyor_sim.bag.any_source import offered
 from conveyor_sim.bag.mcap.chunk import MESSAGE, messages_of, read_content
-from conveyor_sim.bag.mcap.file import QOS_KEY
 from conveyor_sim.bag.mcap.foreign import IDL
 from conveyor_sim.bag.mcap.records import Data
 from conveyor_sim.bag.mcap.salvage import Salvage
 from conveyor_sim.bag.mcap.walk import ValidChunk
+from conveyor_sim.bag.mcap.writer import QOS_KEY
+from conveyor_sim.bag.message_reader import Raw, RecordedTopic
 from conveyor_sim.bag.messages.qos import Qos
 from conveyor_sim.bag.messages.typestore import SEPARATOR, typestore
-from conveyor_sim.bag.source import Raw, Recorded
+from conveyor_sim.bag.rosbags_reader import offered
 from conveyor_sim.errors import BagError
 
 
-class McapSource:
+class McapFilesReader:
     """The ROS 2 messages of some MCAP files; channels of other programs are left out."""
 
     def __init__(self, path: Path, files: Sequence[Path]) -> None:
@@ -65,10 +65,10 @@ class McapSource:
         return tuple(f"{one.path}: skipped {one.skipped}" for one in self._files if one.skipped)
 
     @cached_property
-    def topics(self) -> Sequence[Recorded]:
+    def topics(self) -> Sequence[RecordedTopic]:
         """The ROS 2 topics."""
         return [
-            Recorded(
+            RecordedTopic(
                 channel.topic,
                 file.schemas[channel.schema_id].name,
                 file.counts[number],

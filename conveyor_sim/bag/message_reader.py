@@ -1,4 +1,4 @@
-"""Where a bag's messages come from: what `reader.Bag` asks of whatever reads its files."""
+"""Interface between `reader.Bag` and the classes that read the files of a bag."""
 
 from __future__ import annotations
 
@@ -13,39 +13,39 @@ Raw = tuple[str, int, bytes]
 
 
 @dataclass(frozen=True)
-class Recorded:
-    """A topic of a bag; it may be there several times, by several publishers."""
+class RecordedTopic:
+    """A topic of a bag. A topic with several publishers may occur several times."""
 
     topic: str
     """Absolute."""
     type: str
     count: int
     qos: Qos
-    """As it was offered."""
+    """Quality of service that the publisher offered."""
 
 
-class Source(Protocol):
-    """An open bag; errors are whatever its library raises."""
+class MessageReader(Protocol):
+    """Reader of an open bag. Errors are those of the library that reads it."""
 
     @property
-    def topics(self) -> Sequence[Recorded]:
-        """What was recorded."""
+    def topics(self) -> Sequence[RecordedTopic]:
+        """The recorded topics."""
 
     @property
     def span_ns(self) -> tuple[int, int]:
         """Log times of the first and the last message."""
 
     def messages(self, topics: Collection[str], start_ns: int | None, stop_ns: int | None) -> Iterator[Raw]:
-        """The messages of some topics (absolute) in time order; if given: from a log time on, before a log time."""
+        """Yield messages of some topics (absolute) in time order; if given: from a log time on, before a log time."""
 
     def deserialize(self, data: bytes, type_name: str) -> Any:
-        """A rosbags message object."""
+        """Return a rosbags message object."""
 
     def tick(self, data: bytes, type_name: str) -> int:
-        """The tick of a message that has one."""
+        """Return the tick of a message that has one."""
 
     def type_hash(self, type_name: str) -> str:
-        """RIHS01 hash of a type by the definition that the bag states."""
+        """Return the RIHS01 hash of a type by the definition that the bag states."""
 
     def close(self) -> None:
         """Close the files."""

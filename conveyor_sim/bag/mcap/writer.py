@@ -1,4 +1,4 @@
-"""One MCAP file of a rosbag2 bag as it is written: topics, messages, then the index and rosbag2's own metadata."""
+"""Writer of one MCAP file of a rosbag2 bag: topics and messages, then the index and rosbag2's metadata record."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ HASH_KEY = "topic_type_hash"
 """Keys of a channel's metadata."""
 PROFILE = "ros2"
 LIBRARY = "conveyor_sim"
-"""As the file's head states them; the library with its version."""
+"""Fields of the file's header; the version of this package follows the library."""
 
 
 @dataclass(frozen=True)
 class Schema:
-    """A message type as the file states it."""
+    """Message type as the file states it."""
 
     name: str
     encoding: str
@@ -37,13 +37,13 @@ class Schema:
 
 
 def topic_info(name: str, type_name: str, channel_metadata: dict[str, str], message_count: int) -> TopicInfo:
-    """A topic from what its channel in the file says."""
+    """Return a topic's entry in metadata.yaml from the metadata of its channel."""
     qos = from_yaml(channel_metadata.get(QOS_KEY, ""))
     profiles: list[dict[str, Any]] = qos if isinstance(qos, list) else []
     return TopicInfo(name, type_name, channel_metadata.get(HASH_KEY, ""), profiles, message_count)
 
 
-class McapFile:
+class McapFileWriter:
     """Writer of one file to a binary stream, which the caller closes. Every method may raise OSError.
 
     Chunks of 1 MiB, each with a checksum, compressed by zstd at its level 3: `mcap.writer` has no setting for it. The

@@ -13,16 +13,16 @@ from mcap.reader import SeekingReader
 from mcap.records import Header
 
 from conveyor_sim.bag.channels import ENCODING, metadata_of, schema_of
-from conveyor_sim.bag.mcap.file import LIBRARY, PROFILE, Schema
 from conveyor_sim.bag.mcap.index import Index, read_index
 from conveyor_sim.bag.mcap.records import LIMIT, MAGIC, RECORD_HEAD, Data, head_at, parse
+from conveyor_sim.bag.mcap.writer import LIBRARY, PROFILE, Schema
+from conveyor_sim.bag.message_reader import Raw, RecordedTopic
 from conveyor_sim.bag.messages.cdr import tick_of
 from conveyor_sim.bag.messages.topics import OUTPUTS
 from conveyor_sim.bag.messages.typestore import DEFAULT, type_hash, typestore
-from conveyor_sim.bag.source import Raw, Recorded
 
 
-class OwnSource:
+class OwnReader:
     """One sealed MCAP file of a Recorder."""
 
     def __init__(self, index: Index, data: mmap.mmap) -> None:
@@ -33,12 +33,12 @@ class OwnSource:
         self._reader = SeekingReader(data, validate_crcs=True, record_size_limit=LIMIT)  # type: ignore[arg-type]
 
     @cached_property
-    def topics(self) -> Sequence[Recorded]:
+    def topics(self) -> Sequence[RecordedTopic]:
         """The recorded topics."""
         counts = self._statistics.channel_message_counts
         outputs = {number: OUTPUTS[channel.topic[1:]] for number, channel in self._channels.items()}
         return [
-            Recorded(self._channels[number].topic, output.type, counts.get(number, 0), output.qos)
+            RecordedTopic(self._channels[number].topic, output.type, counts.get(number, 0), output.qos)
             for number, output in outputs.items()
         ]
 
@@ -69,7 +69,7 @@ class OwnSource:
         self._data.close()
 
 
-def own_source(file: Path) -> OwnSource | None:
+def own_reader(file: Path) -> OwnReader | None:
     """Return a source of a sealed file; None for a file that this package did not record with its present types."""
     with file.open("rb") as stream:
         data = mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)
@@ -77,7 +77,7 @@ def own_source(file: Path) -> OwnSource | None:
     if index is None or not _has_present_types(index):
         data.close()
         return None
-    return OwnSource(index, data)
+    return OwnReader(index, data)
 
 
 def is_of_this_package(data: Data) -> bool:

@@ -1,4 +1,4 @@
-"""Bags whose storage is not plain MCAP and that rosbags can read: sqlite3, compressed by file or by message."""
+"""Bags in other storages that rosbags can read: sqlite3, and MCAP that is compressed by file or by message."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from rosbags.interfaces import Connection, ConnectionExtRosbag2, QosDurability, 
 from rosbags.interfaces import Qos as RosbagsQos
 from rosbags.rosbag2 import Reader
 
+from conveyor_sim.bag.message_reader import Raw, RecordedTopic
 from conveyor_sim.bag.messages.qos import DATA, Qos
 from conveyor_sim.bag.messages.typestore import typestore
-from conveyor_sim.bag.source import Raw, Recorded
 
 
-class AnySource:
+class RosbagsReader:
     """A bag opened by rosbags."""
 
     def __init__(self, paths: Sequence[Path]) -> None:
@@ -26,9 +26,9 @@ class AnySource:
         self._shares_position = _is_scanned(self._reader)
 
     @property
-    def topics(self) -> Sequence[Recorded]:
-        """What was recorded."""
-        return [Recorded(c.topic, c.msgtype, c.msgcount, _offered(c)) for c in self._reader.connections]
+    def topics(self) -> Sequence[RecordedTopic]:
+        """The recorded topics."""
+        return [RecordedTopic(c.topic, c.msgtype, c.msgcount, _offered(c)) for c in self._reader.connections]
 
     @property
     def span_ns(self) -> tuple[int, int]:
@@ -36,7 +36,7 @@ class AnySource:
         return self._reader.start_time, self._reader.end_time - 1
 
     def messages(self, topics: Collection[str], start_ns: int | None, stop_ns: int | None) -> Iterator[Raw]:
-        """The messages of some topics in time order; if given: from a log time on, before a log time."""
+        """Yield the messages of some topics in time order; if given: from a log time on, before a log time."""
         with self._own_reader() as reader:
             chosen = [connection for connection in reader.connections if connection.topic in topics]
             if chosen:  # none would mean all
@@ -44,15 +44,15 @@ class AnySource:
                     yield connection.topic, log_time, data
 
     def deserialize(self, data: bytes, type_name: str) -> Any:
-        """A rosbags message object."""
+        """Return a rosbags message object."""
         return self._reader.deserialize(data, type_name)
 
     def tick(self, data: bytes, type_name: str) -> int:
-        """The tick of a message that has one."""
+        """Return the tick of a message that has one."""
         return int(self.deserialize(data, type_name).tick)
 
     def type_hash(self, type_name: str) -> str:
-        """RIHS01 hash of a type by the definition that the bag states."""
+        """Return the RIHS01 hash of a type by the definition that the bag states."""
         return self._reader.typestore.hash_rihs01(type_name)
 
     def close(self) -> None:
@@ -60,14 +60,14 @@ class AnySource:
         self._reader.close()
 
     def _own_reader(self) -> AbstractContextManager[AnyReader]:
-        """A reader that nobody else moves on: rosbags has one position for all who read a file without an index."""
+        """Return a separate reader where rosbags has one position per file, which is the case without an index."""
         if not self._shares_position:
             return nullcontext(self._reader)
         return AnyReader(self._reader.paths, default_typestore=typestore())
 
 
 def _is_scanned(reader: AnyReader) -> bool:
-    """Whether rosbags finds messages by going through a file, for want of an index of chunks."""
+    """Return True if rosbags scans a file for messages because it has no index of chunks."""
     bags: list[Any] = [bag.storage for bag in reader.readers if isinstance(bag, Reader)]
     storages = [file for bag in bags for file in getattr(bag, "storages", [bag])]
     return any(not getattr(storage, "chunks", True) for storage in storages)
