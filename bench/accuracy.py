@@ -1,4 +1,4 @@
-"""What a person waits for who asks how accurate a scene is: the first answer, a measured one, the end of the study."""
+"""Waiting time for the accuracy of a scene: the first answer, a measured one, the end of the study."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def measure(effort: Effort) -> list[Row]:
 
 
 def _answers(scene: str, folder: str, until: str) -> dict[str, float]:
-    """s of wall time from the start of the command to each answer, as far as one is waited for."""
+    """Return the wall time from the start of the command to each awaited answer, s."""
     command = [sys.executable, "-c", "from conveyor_sim.cli import main; main()", "accuracy", scene, "--out", folder]
     found: dict[str, float] = {}
     start = time.perf_counter()
@@ -56,7 +56,7 @@ def _answers(scene: str, folder: str, until: str) -> dict[str, float]:
 
 
 def tables(rows: Rows) -> str:
-    """A line a scene."""
+    """Return a table with one line per scene."""
     quantities = (PREDICTED, PRELIMINARY, ANSWER)
     body = [[name, *(rows.spread(CASE, 0.0, name, what) for what in quantities)] for name in rows.contestants(CASE)]
     return markdown(["", *quantities], body)

@@ -23,7 +23,7 @@ class AllPairs:
         self._closed = np.empty((n, n), dtype=bool)
 
     def contact_forces(self) -> tuple[F8, F8]:
-        """Of bottles and walls on each bottle, N."""
+        """Return the forces of bottles and walls on each bottle, N."""
         np.subtract.outer(self.x, self.x, out=self._dx)
         np.subtract.outer(self.y, self.y, out=self._dy)
         np.multiply(self._dx, self._dx, out=self._squares)
@@ -66,6 +66,6 @@ class AllPairs:
 
 
 def _wall_force(place: F8, end: float) -> F8:
-    """Of the walls at 0 and `end`, N."""
+    """Return the force of the walls at 0 and `end`, N."""
     found: F8 = WALL_STIFFNESS * (np.maximum(RADIUS - place, 0.0) - np.maximum(place + RADIUS - end, 0.0))
     return found

@@ -1,4 +1,4 @@
-"""What the first run of a kind of scene costs: processor time to the first tick, where no kernel is kept."""
+"""Cost of the first run of a kind of scene: processor time to the first tick, without cached kernels."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from bench.rows import Row, Rows
 
 ROOT = Path(__file__).resolve().parent.parent
 BEFORE = ROOT / "docs" / "performance" / "compile_before.csv"
-"""The same at the commit before the line's sensors were compiled."""
+"""Measurements at the commit before the line's sensors were compiled."""
 
 CASE = "compile"
 SECONDS = "s of a core to the first tick"
@@ -41,7 +41,7 @@ for name in sys.argv[1:]:
 
 
 def measure(effort: Effort) -> list[Row]:
-    """New processes with an empty cache, but for the last."""
+    """Measure new processes with an empty cache, except for the last."""
     rows = []
     for turn in range(1 if effort.quick else ROUNDS):
         for name in FIRST[:1] if effort.quick else FIRST:
@@ -68,7 +68,7 @@ def _measured(
 
 
 def _first_ticks(scenes: Sequence[str], cache: str) -> list[float]:
-    """s of a core, one scene after the other in one process, without numba's import."""
+    """Return the processor time of first ticks, s, for scenes in sequence in one process, without numba's import."""
     environment = {**os.environ, "NUMBA_CACHE_DIR": cache}
     command = [sys.executable, "-c", CODE, *scenes]
     done = subprocess.run(command, env=environment, stdout=subprocess.PIPE, text=True, check=True)
@@ -76,7 +76,7 @@ def _first_ticks(scenes: Sequence[str], cache: str) -> list[float]:
 
 
 def of_before(rows: Rows, name: str) -> float | None:
-    """The share of what the scene's first tick alone took before; None if it wasn't measured."""
+    """Return the ratio of a scene's first tick to that of the earlier commit; None if it wasn't measured."""
     now = rows.spread(CASE, 0.0, name, SECONDS)
     before = Rows.read(BEFORE).spread(CASE, 0.0, OWN.get(name, name), SECONDS)
     return None if now is None or before is None else now.middle / before.middle

@@ -1,4 +1,4 @@
-"""What control tests wait for: ticks of a line outside the step kernels, and a scenario, in CPU time of one core."""
+"""Cost of control tests: ticks of a line without the step kernels, and a scenario, in CPU time of one core."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from conveyor_sim.testing import Scenario
 
 ROOT = Path(__file__).resolve().parent.parent
 BEFORE = ROOT / "docs" / "performance" / "control_before.csv"
-"""The same at the commit before the line's sensors were compiled."""
+"""Measurements at the commit before the line's sensors were compiled."""
 
 CASE = "control"
 FACTOR, OUTSIDE, WHOLE = "times real time", "us a tick outside the step kernels", "us a tick"
@@ -27,7 +27,7 @@ BESIDE = "us a tick of scan, conditions, history and outputs"
 LINES = ("zoned_line", "reject_line", "buffer_lane", "watched_eyes")
 DOWNSTREAM_STOP = "scenario of a stopped packer"
 WITH_EVIDENCE = f"{DOWNSTREAM_STOP}, with evidence"
-"""As the fixture `line` runs it; before, it was recorded to a bag meanwhile."""
+"""Scenario as the fixture `line` runs it; formerly it was recorded to a bag as well."""
 FEW, MANY = 6, 60
 """Photo-eyes behind the outfeed, where no bottle comes."""
 SECONDS, QUICK_SECONDS = 60.0, 2.0
@@ -56,12 +56,12 @@ def measure(effort: Effort) -> list[Row]:
 
 
 def line_name(name: str, riding: bool) -> str:
-    """What a line is called in tables."""
+    """Return the name of a line in tables."""
     return name if riding else f"{name}, riding off"
 
 
 def eyes_name(number: int) -> str:
-    """What a line with so many more photo-eyes is called in tables."""
+    """Return the name, in tables, of a line with `number` more photo-eyes."""
     return f"{number} photo-eyes that see nothing"
 
 
@@ -110,7 +110,7 @@ class _Clock:
         self.seconds = 0.0
 
     def around(self, function: Callable[..., Any]) -> Callable[..., Any]:
-        """The function, timed."""
+        """Return the function with a timer."""
 
         def timed(*arguments: Any) -> Any:
             begin = time.process_time()

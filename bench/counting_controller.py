@@ -27,5 +27,5 @@ class Counting:
 
 
 def make(path: str, first: int, last: int) -> Counting:
-    """As `controller_node` makes it."""
+    """Build the controller, as `controller_node` does."""
     return Counting(path, first, last)

@@ -32,7 +32,7 @@ SAME_BITS = "same bits as on one thread"
 
 
 def name_of(effects: str, threads: int) -> str:
-    """Of our engine as a contestant."""
+    """Return the name of this project's engine as a contestant."""
     return f"{effects}, {threads} thread{'s' * (threads > 1)}"
 
 

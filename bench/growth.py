@@ -1,4 +1,4 @@
-"""How the cost of a bottle-step grows: with bottles, belts, rails, and with the share of bottles that touch."""
+"""Growth of the cost of a bottle-step: with bottles, belts, rails, and the share of bottles in contact."""
 
 from __future__ import annotations
 

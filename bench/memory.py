@@ -51,7 +51,7 @@ def child(n: int, effects: str) -> None:
 
 
 def array_bytes(thing: object) -> int:
-    """Of all NumPy arrays that can be reached from a thing; views count as what they are views of."""
+    """Return the bytes of all NumPy arrays reachable from an object; views count as their bases."""
     buffers: dict[int, int] = {}
     seen: set[int] = set()
     waiting = [thing]

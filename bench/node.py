@@ -42,7 +42,7 @@ KERNEL_CODE = "from bench.node import kernels; kernels({scene!r}, {ticks})"
 
 
 def measure(effort: Effort) -> list[Row]:
-    """As fast as it goes, and at real time where the kernels are fast enough for it."""
+    """Measure at full speed, and in real time where the kernels are fast enough."""
     try:
         import conveyor_msgs  # noqa: F401
         import rclpy  # noqa: F401
@@ -101,7 +101,7 @@ def kernels(scene: str, ticks: int) -> None:
 
 @contextmanager
 def _node(scene: Path, folder: Path, factor: float) -> Iterator[Any]:
-    """A node with a listener, settled; both are ended after it."""
+    """Yield a settled node with a listener; both end afterwards."""
     from bench.node_client import Line
     from conveyor_sim.ros.child import Child
 

@@ -67,7 +67,7 @@ class Line:
         return (time.perf_counter() - wall) / done, (self._processor_time() - cpu) / done
 
     def latencies(self, count: int) -> list[float]:
-        """s from a command for the belt until its outcome has arrived, of so many commands."""
+        """Return the latencies of `count` belt commands, each from sending to its result, s."""
         found = []
         for i in range(count):
             time.sleep(STEP + self._tick_length * i / count)
@@ -90,7 +90,7 @@ class Line:
         return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
     def _until(self, condition: Callable[[], Any], patience: float) -> Any:
-        """The first true value of a condition. Raises RuntimeError if it stays in vain, or the node has ended."""
+        """Wait for a true value of a condition. Raise RuntimeError after `patience`, or if the node has ended."""
         end = time.monotonic() + patience
         while not (value := condition()):
             if self._child.exit_code is not None:

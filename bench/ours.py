@@ -1,4 +1,4 @@
-"""This project's engine, as a contestant and as the maker of packed states."""
+"""This project's engine, as a contestant and as the source of packed states."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ FAINT = 1e-9
 
 @dataclass(frozen=True)
 class PackedState:
-    """Where the bottles of a box are and how they move, (N,), m and m/s: what the other engines start from."""
+    """Positions and velocities of bottles in a box, (N,), m and m/s: the initial state of the other engines."""
 
     box: Box
     x: NDArray[np.float64]
@@ -31,12 +31,12 @@ class PackedState:
 
 
 def simulate(scene: Scene, threads: int) -> Simulation:
-    """A simulation on so many threads."""
+    """Build a simulation on `threads` threads."""
     return Simulation(scene, threads=threads)
 
 
 def packed(scene: Scene, settle: float, threads: int) -> Simulation:
-    """The table of a scene, packed."""
+    """Build the packed table of a scene."""
     simulation = simulate(scene, threads)
     press(simulation, settle)
     return simulation
@@ -62,13 +62,13 @@ def contestant(name: str, simulation: Simulation, n: float) -> Contestant:
 
 
 def state_of(simulation: Simulation, box: Box) -> PackedState:
-    """Of a simulation with nothing but the box."""
+    """Return the state of a simulation that has only the box."""
     bottles = simulation.bottles()
     return PackedState(box, bottles.x, bottles.y, bottles.vx, bottles.vy)
 
 
 def contacts_per_bottle(simulation: Simulation) -> float:
-    """Closed contacts between bottles now, each counted once, over the number of bottles."""
+    """Return the number of closed contacts between bottles, each counted once, per bottle."""
     contacts = simulation.contacts()
     closed = (contacts.kind == 0) & (contacts.normal_force > FAINT)
     return float(closed.sum() / simulation.counts.present)

@@ -51,7 +51,7 @@ class Box:
 
 
 def box_for(count: int) -> Box:
-    """The box for so many bottles."""
+    """Return the box for `count` bottles."""
     row = PITCH * math.sqrt(0.75)
     across = max(2, round(math.sqrt(count * row / (FILL * 2.0 * PITCH))))
     if math.ceil(count / across) * row / FILL > LONGEST:
@@ -61,7 +61,7 @@ def box_for(count: int) -> Box:
 
 
 def table(count: int, effects: str, dt: float = DT, **changes: Any) -> Scene:
-    """The dense table with one of EFFECTS; steps of dt (s). changes: fields of the scene, in place of its own."""
+    """Build the dense table with one of EFFECTS, in steps of dt (s). changes: fields of the scene to override."""
     box = box_for(count)
     fields: dict[str, Any] = {
         "name": f"table_{effects}",
@@ -92,7 +92,7 @@ def _minimal(box: Box) -> dict[str, Any]:
 
 
 def _paper(box: Box) -> dict[str, Any]:
-    """The paper's damping, and friction at contacts, which turns bottles."""
+    """Return the paper's damping, and friction at contacts, which turns bottles."""
     laws = {"damping": {"law": "paper", "coefficient": 0.1}, "friction": 0.1}
     return {"contacts": _contacts(**laws), "bottles": _rows(box, "soft")}
 

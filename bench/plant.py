@@ -39,7 +39,7 @@ ROUNDS = 3
 
 
 def glass_name(stiffness: float, steps: int) -> str:
-    """A contestant."""
+    """Return the name of a contestant."""
     return f"glass {stiffness:.0e} N/m, {steps} steps a contact"
 
 
@@ -61,7 +61,7 @@ def glass_step(stiffness: float, steps: int) -> float:
 
 
 def glass(stiffness: float, steps: int, duration: float) -> Scene:
-    """The plant of glass."""
+    """Build the plant of glass."""
     per_tick = math.ceil(_plant(duration).tick / glass_step(stiffness, steps))
     return _plant(duration, outputs=NO_OUTPUTS, contacts=glass_contacts(stiffness), accuracy={"per_tick": per_tick})
 
@@ -106,7 +106,7 @@ def _crowd_of_glass(effort: Effort) -> list[Row]:
 
 
 def crowd_name(threads: int) -> str:
-    """A contestant."""
+    """Return the name of a contestant."""
     return f"{CROWD} of glass {CROWD_STIFFNESS:.0e} N/m on the dense table, {CROWD_STEPS} steps, {threads} thread(s)"
 
 

@@ -1,4 +1,4 @@
-"""What riding saves: ticks of a line with it and without it, in CPU time of one core, and how many bottles ride."""
+"""Savings by riding: ticks of a line with and without it, in CPU time of one core, and the number of riding bottles."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def _riders(simulation: Simulation) -> int:
 
 
 def tables(rows: Rows) -> str:
-    """A line a scene."""
+    """Return a table with one line per scene."""
     body = []
     for name in rows.contestants(CASE):
         share = rows.spread(CASE, 0.0, name, SHARE)

@@ -1,4 +1,4 @@
-"""What was measured, as rows of one CSV a part, and how a table asks for them."""
+"""Measurements as rows of one CSV file per part, and queries for tables."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class Row:
     """One number."""
 
     case: str
-    """Which table, and what is varied in it."""
+    """Name of the table and of the varied quantity."""
     n: float
     """Bottles, or whatever is varied."""
     contestant: str
@@ -53,12 +53,12 @@ class Rows:
         return spread_of(self.values(case, n, contestant, quantity).values())
 
     def ratio(self, case: str, n: float, one: str, other: str, quantity: str) -> Spread | None:
-        """Of one to the other, taken round by round; None if either wasn't measured."""
+        """Return the ratio of two contestants, taken round by round; None if either wasn't measured."""
         above, below = (self.values(case, n, contestant, quantity) for contestant in (one, other))
         return spread_of(above[i] / below[i] for i in sorted(above.keys() & below.keys()))
 
     def ns(self, case: str) -> list[float]:
-        """What was varied in a case, in rising order."""
+        """Return the values varied in a case, in rising order."""
         return sorted({row.n for row in self.all if row.case == case})
 
     def contestants(self, case: str) -> list[str]:
@@ -75,7 +75,7 @@ class Rows:
 
     @classmethod
     def read(cls, path: Path) -> Rows:
-        """As it was written; nothing if it wasn't."""
+        """Read rows from a file; no rows if it doesn't exist."""
         if not path.is_file():
             return cls()
         with path.open(newline="") as file:

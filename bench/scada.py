@@ -37,7 +37,7 @@ CASE, TICKS = "faces", "ticks"
 TAGS, CHANGING, EVERY, TICK = 500, 50, 10, 0.01
 """EVERY: ticks, from one change to the next."""
 CLIENTS = 5
-"""Of each protocol."""
+"""Clients per protocol."""
 KINDS = [kind for kind in SERVER_KINDS if kind.by_default]
 SCENE = "config/scenarios/zoned_line.yaml"
 LOST, SEEN, LATENCY = "changes lost", "changes seen", "ms at most from a request or a change on"
@@ -60,19 +60,19 @@ class Counting:
         tags = [
             replace(count(f"belts/belt{n}/count", "counter", "Goes up."), device=f"belts/belt{n}") for n in range(TAGS)
         ]
-        self.about = LineInfo(
+        self.info = LineInfo(
             "bench", "", TICK, "2025-01-01T00:00:00Z", [replace(tag, device_class="belt") for tag in tags]
         )
         self._listeners = Listeners()
-        self.shown = self._at(0)
+        self.snapshot = self._at(0)
 
     def show(self, tick: int) -> None:
-        """The line is at a tick."""
-        self.shown = self._at(tick)
+        """Set the tick of the line."""
+        self.snapshot = self._at(tick)
         self._listeners.tell()
 
     def _at(self, tick: int) -> LineSnapshot:
-        values = {tag.name: float(tick // EVERY if n < CHANGING else n) for n, tag in enumerate(self.about.tags)}
+        values = {tag.name: float(tick // EVERY if n < CHANGING else n) for n, tag in enumerate(self.info.tags)}
         return LineSnapshot(tick, values, run=RunState(RUNNING))
 
     def events(self, after: int) -> tuple[int, Sequence[Event]]:
@@ -116,7 +116,7 @@ def _tag(belt: str) -> Tag:
 
 
 def measure(effort: Effort) -> list[Row]:
-    """What clients miss and what that costs; then what it costs the ticks."""
+    """Measure the losses of clients and their cost; then the cost for the ticks."""
     if missing := [kind.libraries[0] for kind in KINDS if not kind.installed]:
         say(f"scada is left out: {', '.join(missing)} not installed")
         return []
@@ -174,11 +174,11 @@ def _cores_served(source: SceneTagProvider, seconds: float) -> float:
 
 @contextmanager
 def _clients(serving: Serving, seconds: float) -> Iterator[Callable[[], dict[str, list[tuple[int, int]]]]]:
-    """Those of each protocol, in a process of their own; what is yielded waits for what they have seen and lost."""
+    """Run the clients of each protocol in a separate process; the yielded function waits for their results."""
     command = [sys.executable, "-m", "bench.scada_clients", str(seconds)]
     with ExitStack() as stack:
         processes = []
-        for face in serving.faces:
+        for face in serving.hosts:
             process = subprocess.Popen([*command, face.address], stdout=subprocess.PIPE, text=True)
             stack.callback(process.wait)
             stack.callback(process.kill)
@@ -194,14 +194,14 @@ def _clients(serving: Serving, seconds: float) -> Iterator[Callable[[], dict[str
 
 
 def _cores_of(pid: int, seconds: float) -> float:
-    """That another process takes."""
+    """Return the cores that another process uses."""
     before, began = _cpu_of(pid), time.monotonic()
     time.sleep(seconds)
     return (_cpu_of(pid) - before) / (time.monotonic() - began)
 
 
 def _cpu_of(pid: int) -> float:
-    """s of all its threads so far."""
+    """Return the processor time of all its threads so far, s."""
     fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 

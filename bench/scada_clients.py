@@ -27,7 +27,7 @@ class Ready:
         self._missing, self._open = count, asyncio.Event()
 
     async def wait(self) -> None:
-        """Until all others wait, too."""
+        """Wait until all others wait as well."""
         self._missing -= 1
         if not self._missing:
             self._open.set()
@@ -35,7 +35,7 @@ class Ready:
 
 
 class Seen:
-    """What one client has seen of tags that go up by one."""
+    """Record of one client of tags that count up."""
 
     def __init__(self) -> None:
         self._last: dict[str, int] = {}
@@ -43,7 +43,7 @@ class Seen:
 
     @property
     def lowest(self) -> int:
-        """What all tags have reached; -1: not all have been seen."""
+        """Return the value that all tags have reached; -1: some have not been received."""
         return min(self._last.values()) if len(self._last) == CHANGING else -1
 
     @property
@@ -52,7 +52,7 @@ class Seen:
         return self.changes, self.lost
 
     def note(self, name: str, value: int) -> None:
-        """A tag has this value."""
+        """Record a tag's value."""
         last = self._last.get(name)
         if last is not None and value != last:
             self.changes += 1
@@ -60,7 +60,7 @@ class Seen:
         self._last[name] = value
 
     def datachange_notification(self, node: Any, value: Any, _: Any) -> None:
-        """As asyncua calls it."""
+        """Record a data change; called by asyncua."""
         if value is not None:
             self.note(str(node), int(value))
 

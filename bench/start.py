@@ -27,7 +27,7 @@ print(simulation.tick, flush=True)
 
 
 def measure(effort: Effort) -> list[Row]:
-    """Some processes with an empty cache, then some that find it filled."""
+    """Measure some processes with an empty cache, then some with a filled one."""
     rows = []
     for turn in range(1 if effort.quick else COLD_REPEATS):
         with tempfile.TemporaryDirectory() as cache:

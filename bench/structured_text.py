@@ -38,7 +38,7 @@ def _lines() -> Iterator[str]:
 
 
 def measure(effort: Effort) -> list[Row]:
-    """Scans of a running program, and compiling; the parser is made before."""
+    """Measure scans of a running program, and compiling, with a parser built beforehand."""
     compile_text(program(5))
     rows = []
     running = Program(compile_text(program(STATEMENTS)))

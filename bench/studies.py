@@ -68,7 +68,7 @@ def _study(duration: float) -> Setup:
 
 @contextmanager
 def _ready(setup: Setup, engine: Engine) -> Iterator[Runs]:
-    """Runs by an engine whose processes have all made some."""
+    """Yield runs by an engine whose processes have each completed some."""
     with tempfile.TemporaryDirectory() as folder, Runs(setup, Path(folder), engine, say) as made:
         made.run([Job(0, POINT, FIRST + number) for number in range(4 * engine.processes)])
         yield made

@@ -1,4 +1,4 @@
-"""What the engine should reach, beside what was measured."""
+"""Performance targets of the engine, beside the measurements."""
 
 from __future__ import annotations
 
@@ -134,7 +134,7 @@ def _middle(spread: Spread | None) -> float | None:
 
 
 def _rise(case: str, least: float, most: float) -> Callable[[Rows], float | None]:
-    """The dearest over the cheapest bottle-step within a range, less one."""
+    """Return the most expensive over the cheapest bottle-step within a range, minus one."""
 
     def figure(rows: Rows) -> float | None:
         found = [growth.nanoseconds(rows, case, n) for n in rows.ns(case) if least <= n <= most]

@@ -14,7 +14,7 @@ from bench.measure import Effort, say
 from bench.rows import Row, Rows
 from conveyor_sim.bag.messages.encode import Header
 from conveyor_sim.bag.messages.topics import TOPICS
-from conveyor_sim.bag.outputs import Outputs
+from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.columns.bottles import BottleColumns, ContactColumns
 from conveyor_sim.page.one_file import write_page
@@ -88,7 +88,7 @@ def _long(folder: Path, effort: Effort) -> list[Row]:
 
 
 def _cpu() -> float:
-    """s of processor time that all processes of the browser have spent."""
+    """Return the processor time of all processes of the browser, s."""
     ticks = 0
     for place in Path("/proc").glob("[0-9]*"):
         try:
@@ -101,14 +101,14 @@ def _cpu() -> float:
 
 
 def _written(folder: Path, seconds: float, bottles: int, rate: float, with_contacts: bool = True) -> Path:
-    """A recording of a square crowd that sways, each bottle touching the next."""
+    """Write a recording of a swaying square crowd in which each bottle touches the next."""
     simulation = Simulation(load_scene(scene_path("accumulation_table"), {"bottles": []}))
     ids, zeros, side = np.arange(bottles, dtype=np.uint64), np.zeros(bottles), int(bottles**0.5)
     kinds, belts, pairs = np.zeros(bottles, np.uint16), np.zeros(bottles, np.int32), np.zeros(bottles - 1)
     places = np.arange(bottles, dtype=np.float64)
     every = round(1.0 / rate / simulation.model.tick_ns * 1e9)
     with Recorder(folder) as recorder:
-        Outputs(simulation, [recorder], run_id="run").start()
+        OutputWriter(simulation, [recorder], run_id="run").start()
         for tick in range(every, round(seconds * 1e9 / simulation.model.tick_ns) + 1, every):
             x = 1.2 / side * (places % side) + 0.05 * np.sin(0.01 * tick)
             y, peak = 0.9 / side * (places // side), 5.0 + 5.0 * np.sin(9.0 * x)

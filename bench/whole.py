@@ -1,4 +1,4 @@
-"""What a person waits for: a command from its start to its end, recording, summary and pictures included."""
+"""Duration of complete commands, with recording, summary and figures."""
 
 from __future__ import annotations
 

@@ -65,7 +65,7 @@ def add_navigation(app: Sphinx, page: str, source: list[str]) -> None:
 
 
 def show_titles(app: Sphinx, page: str, source: list[str]) -> None:
-    """The title of a block of code, a file's path, becomes its caption; Markdown by itself does not show it."""
+    """Turn the title of a code block, a file's path, into its caption; plain Markdown doesn't show it."""
     source[0] = re.sub(r'^```(\w+) title="(.+)"$', r"```{code-block} \1\n:caption: \2\n", source[0], flags=re.MULTILINE)
 
 
@@ -78,13 +78,13 @@ def from_markdown(app: Sphinx, kind: str, name: str, thing: object, options: obj
 
 
 def write_start(app: Sphinx, problem: Exception | None) -> None:
-    """The address of the site itself shows the README."""
+    """Let the address of the site show the README."""
     if problem is None and app.builder.name == "html":
         shutil.copy(app.outdir / "README.html", app.outdir / "index.html")
 
 
 def setup(app: Sphinx) -> None:
-    """Called by Sphinx."""
+    """Register the handlers; called by Sphinx."""
     app.connect("source-read", add_navigation)
     app.connect("source-read", show_titles)
     app.connect("autodoc-process-docstring", from_markdown)

@@ -36,7 +36,7 @@ class Reader(Node):
         print(f"{line.scene_name}: belts {', '.join(line.belts)}; rails {', '.join(line.rails)}", flush=True)
 
     def due(self, topic: str, time: float) -> bool:
-        """Whether it is time for the next line of output."""
+        """Return True if it is time for the next line of output."""
         if self.line is None or time < self.next[topic]:
             return False
         self.next[topic] = time + PERIOD

@@ -31,7 +31,7 @@ class Sender(Node):
         self.timer = self.create_timer(0.1, self.send)
 
     def send(self) -> None:
-        """As soon as the simulation is there; several belts may be commanded in one message."""
+        """Send the command as soon as the simulation is present; one message may command several belts."""
         if not self.sent and self.publisher.get_subscription_count():
             self.publisher.publish(Commands(names=[self.name], values=[self.value]))
             self.sent = True

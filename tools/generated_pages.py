@@ -1,9 +1,9 @@
-"""The pages of docs/ that are made by programs: are they up to date?
+"""Generate the pages of docs/ that programs write, or check that they are current.
 
-    make docs-check                 # names those that are not; fails if there are any
-    make docs                       # writes them anew
+    make docs-check                 # prints the pages that are not current; fails if there are any
+    make docs                       # writes them
 
-What is measured is not measured again: pages are made from the figures kept beside them.
+Measurements are not repeated: pages are generated from the stored figures.
 """
 
 from __future__ import annotations

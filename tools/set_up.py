@@ -1,8 +1,8 @@
-"""Makes the environment of `make run`, `make test` and others: set_up.py DISTRO [test] [bench] [docs]
+"""Build the environment of `make run`, `make test` and others: set_up.py DISTRO [test] [bench] [docs]
 
-A virtual environment with the ROS 2 wheels of that distribution, this package (editable) and conveyor_msgs, built
-from msg_defs/. `set-up.json` in the environment holds a key of what each stage was made from; a stage whose key
-still holds is skipped. The file is away while pip works, so an environment that was interrupted is made afresh.
+The result is a virtual environment with the ROS 2 wheels of that distribution, this package (editable) and
+conveyor_msgs, built from msg_defs/. `set-up.json` in the environment holds a key of each stage's inputs; a stage whose
+key is current is skipped. The file is removed while pip works, so an interrupted environment is rebuilt.
 """
 
 import configparser
@@ -50,7 +50,7 @@ class Environment:
         self.state = self._read_state()
 
     def _read_state(self) -> dict:
-        """What is known to be complete; nothing if the checkout was moved, or the base Python is gone."""
+        """Return the completed stages; none if the checkout was moved, or the base Python is gone."""
         try:
             state = json.loads(self.state_file.read_text())
         except (OSError, ValueError):
@@ -93,7 +93,7 @@ class Environment:
             raise
 
     def build_messages(self) -> None:
-        """Builds and installs conveyor_msgs into the environment's own prefix, which needs no path to be found."""
+        """Build conveyor_msgs and install it into the environment's prefix, so that no path has to be set."""
         installed = self.path / "conveyor_msgs.txt"
         if installed.exists():
             for name in installed.read_text().splitlines():
@@ -157,7 +157,7 @@ def say(text: str) -> None:
 
 
 def command(arguments: list, what: str, log: Path | None = None, env: dict | None = None) -> None:
-    """Runs a command with its output in the log; SetUpError, after the output's end, if it fails."""
+    """Run a command with its output in the log. Raise SetUpError, after the end of the output, if it fails."""
     done = subprocess.run(
         [str(argument) for argument in arguments],
         cwd=ROOT,
@@ -178,7 +178,7 @@ def command(arguments: list, what: str, log: Path | None = None, env: dict | Non
 
 
 def key(*parts: Path | str) -> str:
-    """A digest of files (by content) and strings."""
+    """Return a digest of files (by content) and strings."""
     digest = hashlib.sha256()
     for part in parts:
         digest.update(part.encode() if isinstance(part, str) else part.name.encode() + b"\0" + part.read_bytes())

@@ -26,9 +26,9 @@ from conveyor_sim.errors import ConveyorError
 from conveyor_sim.physics.model.remedies import STEP_COST
 from conveyor_sim.physics.timestep.presets import PRESETS
 from conveyor_sim.scene import Scene
+from conveyor_sim.support.checked_json import read_checked, with_checksum
 from conveyor_sim.support.files import FileError
 from conveyor_sim.support.machine import machine
-from conveyor_sim.support.sealed_json import read_sealed, sealed
 
 MEASURED = "measured.json"
 MEASURED_OF = "measured_of"
@@ -83,7 +83,9 @@ def measured_once(
         left = bars_with_left(bars, lambda: max(0.0, effort.budget / PROCESSORS - meter.cpu))
         measured = _measure(scene, tolerance, effort, left, meter, preliminary)
     measured = replace(measured, cpu=meter.cpu, compiling=meter.compiling)
-    write(file, sealed({MEASURED_OF: fingerprint(scene), **cast("dict[str, object]", plain(measured))}, indent=1))
+    write(
+        file, with_checksum({MEASURED_OF: fingerprint(scene), **cast("dict[str, object]", plain(measured))}, indent=1)
+    )
     return measured
 
 
@@ -185,8 +187,8 @@ def _closed_forms(scene: Scene, bars: Bars) -> tuple[tuple[Order, ...], dict[str
 
 def _read(file: Path, scene: Scene) -> Measured:
     try:
-        kept = read_sealed(file)
-        if not kept.sealed:
+        kept = read_checked(file)
+        if not kept.has_checksum:
             raise FileError("has no checksum")
         if kept.data.pop(MEASURED_OF, None) != fingerprint(scene):
             raise FileError("was measured in another scene or version")

@@ -1,4 +1,4 @@
-"""Which topic is written at which tick: serialized once, handed to every sink that wants it."""
+"""Messages of a simulation: each topic at its ticks, serialized once for all sinks that want it."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ _EVENTS = [(name, topic, topic.events) for name, topic in OUTPUTS.items() if top
 
 
 class MessageSink(Protocol):
-    """Takes serialized messages: the recorder, a node's publishers."""
+    """Receiver of serialized messages: the recorder, a node's publishers."""
 
     def wants(self, topic: str) -> bool:
-        """Whether a message of this topic would be used now; nothing is computed that no sink wants."""
+        """Return True if a message of this topic would be used now. Messages that no sink wants are not computed."""
 
     def write(self, topic: str, data: bytes, stamp_ns: int) -> None:
-        """Takes one message, with its simulated time in ns."""
+        """Take one message, with its simulated time in ns."""
 
 
-class Outputs:
-    """Feeds sinks from a simulation: `start` once, then `after_tick` after every single tick."""
+class OutputWriter:
+    """Writer of a simulation's messages to sinks: call `start` once, then `after_tick` after every single tick."""
 
     def __init__(self, sim: Simulation, sinks: Sequence[MessageSink], *, run_id: str, frame_id: str = "world") -> None:
         self._sim = sim
@@ -44,7 +44,7 @@ class Outputs:
         self._run: RunState | None = None
 
     def start(self) -> None:
-        """Writes what is latched (line, plant) and the state at the present tick."""
+        """Write the latched topics (line, plant) and the state at the present tick."""
         header, now = self._header(self._sim.tick), Snapshot(self._sim, self._run_id)
         for topic in OUTPUTS.values():
             if topic.state is not None and topic.once:
@@ -52,15 +52,13 @@ class Outputs:
         self._write_state()
 
     def after_tick(self) -> list[CommandOutcome]:
-        """Writes the outcomes of the tick's commands, then every topic that is due; returns the outcomes."""
+        """Write the outcomes of the tick's commands, then every topic that is due. Return the outcomes."""
         outcomes = self.after_failure()
         self._write_state()
         return outcomes
 
     def after_failure(self) -> list[CommandOutcome]:
-        """Writes what is known of a tick that failed: what became of its commands, what the guard says, and what went
-        beyond limits.
-        """
+        """Write the events of a tick that failed: outcomes of its commands, reports of the guard, exceeded limits."""
         events = self._sim.take_events()
         for name, topic, view in _EVENTS:
             for event in view(events) if self._sinks else ():
@@ -69,22 +67,22 @@ class Outputs:
         return events.outcomes
 
     def take_noticed(self) -> list[GuardEvent]:
-        """What the guard said since the last call; it has been written."""
+        """Return the reports of the guard since the last call, which have been written."""
         noticed, self._noticed = self._noticed, []
         return noticed
 
     def tell(self, outcome: CommandOutcome) -> None:
-        """Writes one outcome that belongs to no tick to come."""
+        """Write an outcome that belongs to no later tick."""
         self._hand_out("outcomes", OUTPUTS["outcomes"], self._header(outcome.tick), _itself, outcome)
 
     def show_run(self, run: RunState) -> None:
-        """Writes what the run is doing, if that has changed."""
+        """Write the state of the run if it has changed."""
         if run != self._run:
             self._run = run
             self._hand_out("run_state", OUTPUTS["run_state"], self._header(self._sim.tick), _itself, run)
 
     def show_variables(self, names: Sequence[str], values: Sequence[float]) -> None:
-        """Writes what a controller's variables are after its scan at the present tick, if any are to be recorded."""
+        """Write a controller's variables after its scan at the present tick, if any are recorded."""
         if names:
             columns = VariableColumns(names, np.asarray(values, np.float64))
             self._hand_out("variables", OUTPUTS["variables"], self._header(self._sim.tick), _itself, columns)
@@ -107,12 +105,12 @@ class Outputs:
             if topic.rate is None or self._sim.due(topic.rate):
                 self._hand_out(topic.name, topic, header, topic.state, now)
 
-    def _hand_out(self, name: str, topic: Topic, header: Header, observe: Callable[[Any], Any], what: Any) -> None:
-        """Write what is observed, if any sink wants the topic and there is something."""
-        takers = [sink for sink in self._sinks if sink.wants(name)]
-        if takers and (found := observe(what)) is not None:
-            data = topic.pack(found, header)
-            for sink in takers:
+    def _hand_out(self, name: str, topic: Topic, header: Header, observe: Callable[[Any], Any], source: Any) -> None:
+        """Write the observation of a source, if any sink wants the topic and there is an observation."""
+        receivers = [sink for sink in self._sinks if sink.wants(name)]
+        if receivers and (observation := observe(source)) is not None:
+            data = topic.pack(observation, header)
+            for sink in receivers:
                 sink.write(name, data, header.stamp_ns)
 
     def _header(self, tick: int) -> Header:
@@ -120,5 +118,5 @@ class Outputs:
         return Header(tick, max(1, tick * self._sim.model.tick_ns), self._frame_id)
 
 
-def _itself(what: Any) -> Any:
-    return what
+def _itself(source: Any) -> Any:
+    return source

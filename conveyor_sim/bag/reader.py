@@ -15,7 +15,7 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.bag.mcap.index import sealed
+from conveyor_sim.bag.mcap.index import is_complete
 from conveyor_sim.bag.mcap.metadata import FILE_NAME, file_names, is_stated_in, read_metadata
 from conveyor_sim.bag.mcap.records import mapped
 from conveyor_sim.bag.mcap.storage import other_storage, packed_message
@@ -346,4 +346,4 @@ def _source(path: Path, files: list[Path]) -> tuple[MessageReader, bool]:
 
 def _is_sealed(file: Path) -> bool:
     with mapped(file) as data:
-        return sealed(data)
+        return is_complete(data)

@@ -14,7 +14,7 @@ from mcap.records import Schema as SchemaRecord
 
 from conveyor_sim.bag.lock import alone
 from conveyor_sim.bag.mcap.foreign import is_ros
-from conveyor_sim.bag.mcap.index import Index, read_index, sealed
+from conveyor_sim.bag.mcap.index import Index, is_complete, read_index
 from conveyor_sim.bag.mcap.line_copy import NAME as LINE_COPY
 from conveyor_sim.bag.mcap.metadata import (
     FILE_NAME,
@@ -179,7 +179,7 @@ def _missing(folder: Path) -> list[str]:
 def _repair(file: Path) -> _ValidPart:
     """Verify a file. If it is damaged, write a copy of its valid parts beside it."""
     with mapped(file) as data:
-        index = read_index(data) if sealed(data) and is_of_this_package(data) else None
+        index = read_index(data) if is_complete(data) and is_of_this_package(data) else None
         if index is not None and index.statistics is not None and _is_ours(index):
             statistics = index.statistics
             span = (statistics.message_start_time, statistics.message_end_time)
@@ -197,7 +197,7 @@ def _repair(file: Path) -> _ValidPart:
             stream.flush()
             os.fsync(stream.fileno())
     with mapped(_temporary(file)) as data:
-        if not sealed(data):
+        if not is_complete(data):
             raise BagError(f"{file}: the repaired copy can't be read back; the original was left as it was")
     damage = [*salvage.damage, *(str(loss) for loss in salvage.losses)]
     if salvage.unread or salvage.unknown:

@@ -12,7 +12,7 @@ from typing import Any
 
 from conveyor_sim.bag.input_log import FILE_NAME, FORMAT, START_NAME, copier, environment_of
 from conveyor_sim.bag.lock import alone
-from conveyor_sim.bag.outputs import Outputs
+from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.errors import BagError, SimulationError
 from conveyor_sim.line.commands.inputs import Input
@@ -113,7 +113,7 @@ def _simulate(
     watch: Watcher | None,
 ) -> str:
     """Run to the end. Return the first deviation from the logged states in words; "": there is none."""
-    outputs = Outputs(simulation, [recorder], run_id=uuid.uuid4().hex)
+    outputs = OutputWriter(simulation, [recorder], run_id=uuid.uuid4().hex)
     outputs.start()
     outputs.show_run(RunState(RUNNING))
     total = run.last * simulation.model.tick_ns * 1e-9

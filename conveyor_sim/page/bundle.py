@@ -1,4 +1,4 @@
-"""The page as one file: its modules in one script, its styles and its data inside, and a policy against all else."""
+"""The page as one file: modules in one script, styles and data inside, and a policy that forbids other content."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ HEADERS = {
     "X-Content-Type-Options": "nosniff",
     "Cache-Control": "no-store",
 }
-"""Of whatever a server of the page answers."""
+"""HTTP headers of each answer of a server of the page."""
 _TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript"}
 _IMPORT = re.compile(r'^import \{[^}]*\} from "\./([\w.]+)";\n', re.MULTILINE)
 _EXPORT = re.compile(r"^export (?=(?:async )?(?:function|const|class) (\w+))", re.MULTILINE)
@@ -25,17 +25,17 @@ _SCRIPT = re.compile(r'<script( type="module")? src="([\w./]+)"></script>')
 
 
 def one_file(parts: Mapping[str, bytes], title: str) -> str:
-    """The page with its data: bytes by name, deflated. title: shown until the data are read."""
+    """Return the page with its data, deflated bytes by name. title: shown until the data are read."""
     scripts: list[str] = []
     styles: list[str] = []
 
-    def style(found: re.Match[str]) -> str:
-        styles.append(text(found[1]))
+    def style(match: re.Match[str]) -> str:
+        styles.append(text(match[1]))
         return f"<style>{styles[-1]}</style>"
 
-    def script(found: re.Match[str]) -> str:
-        scripts.append(joined(found[2]) if found[1] else text(found[2]))
-        return f"<script{found[1] or ''}>{scripts[-1]}</script>"
+    def script(match: re.Match[str]) -> str:
+        scripts.append(joined(match[2]) if match[1] else text(match[2]))
+        return f"<script{match[1] or ''}>{scripts[-1]}</script>"
 
     page = _SCRIPT.sub(script, _STYLE.sub(style, text("index.html")))
     policy = (
@@ -52,15 +52,15 @@ def one_file(parts: Mapping[str, bytes], title: str) -> str:
 
 
 def page_files() -> dict[str, str]:
-    """The content type of each file of the page, by its path in PAGE."""
-    found = (file for file in PAGE.rglob("*") if file.suffix in _TYPES)
-    return {file.relative_to(PAGE).as_posix(): _TYPES[file.suffix] for file in found}
+    """Return the content type of each file of the page, by its path in PAGE."""
+    files = (file for file in PAGE.rglob("*") if file.suffix in _TYPES)
+    return {file.relative_to(PAGE).as_posix(): _TYPES[file.suffix] for file in files}
 
 
 def joined(module: str) -> str:
-    """A module and all that it imports, in one script: each a function that returns what it exports.
+    """Return a module and all that it imports in one script. Each module is a function that returns its exports.
 
-    What is exported has names that are unique among them.
+    The names of exports are unique among the modules.
     """
     done: dict[str, str] = {}
 
@@ -79,7 +79,7 @@ def joined(module: str) -> str:
 
 
 def text(name: str) -> str:
-    """A file of the page."""
+    """Return the text of a file of the page."""
     return (PAGE / name).read_text(encoding="utf-8")
 
 

@@ -1,4 +1,4 @@
-"""What a block is made of, taken from messages in the order of time, at most so many a second."""
+"""Content of a block, selected from messages in the order of time at limited rates."""
 
 from __future__ import annotations
 
@@ -14,17 +14,19 @@ from conveyor_sim.columns.variables import VariableColumns
 from conveyor_sim.page.block import BlockContent
 
 DRAWN = ("bottles", "contacts", "belts", "signals")
-"""Topics of which blocks are made."""
+"""Topics that blocks contain."""
 VARIABLES = "variables"
-"""The topic of a controller's variables, which are further columns of the signals."""
+"""Topic of a controller's variables, which are further columns of the signals."""
 
 
 class Collector:
-    """Fills a BlockContent."""
+    """Collects the content of a block from messages."""
 
     def __init__(self, bag: Bag, start: int, gaps: Mapping[str, int], variables: Sequence[str] = ()) -> None:
-        """start: the block's first tick. gaps: by topic, ticks from one that is taken to the next, at least. variables:
-        names of the controller's that are shown.
+        """Begin an empty block.
+
+        start: the block's first tick. gaps: least number of ticks between two selected messages, by topic. variables:
+        names of the controller's variables that are shown.
         """
         self.content = BlockContent()
         self._bag = bag
@@ -36,7 +38,7 @@ class Collector:
         self._variables = np.full(len(variables), np.nan)
 
     def add(self, topic: str, tick: int, raw: bytes) -> None:
-        """A message; whether it is taken depends on the ticks since the block's first, which all topics share."""
+        """Add a message if it is due. All topics count the ticks from the block's first one."""
         if topic == VARIABLES:
             self._add_variables(tick, raw)
             return
@@ -54,7 +56,7 @@ class Collector:
             self.content.signals.append((tick, np.concatenate([values, self._variables])))
 
     def _add_variables(self, tick: int, raw: bytes) -> None:
-        """Those of a scan go with the signals of its tick, which it read, and hold until the next."""
+        """Add the variables of a scan to the signals of its tick, which the scan has read, and to those that follow."""
         columns: VariableColumns = TOPICS[VARIABLES].unpack(self._bag.decode(VARIABLES, raw))
         now = dict(zip(columns.name, columns.value.tolist(), strict=True))
         self._variables = np.array([now.get(name, np.nan) for name in self._names])
@@ -63,14 +65,14 @@ class Collector:
             row[len(row) - len(self._variables) :] = self._variables
 
     def _add_bottles(self, tick: int, raw: bytes, is_due: bool) -> None:
-        """Peak forces of those that are not taken go into the next that is."""
+        """Add bottles if they are due. Peak forces of skipped messages go into the next one that is due."""
         bottles: BottleColumns = TOPICS["bottles"].unpack(self._bag.decode("bottles", raw))
         if not is_due:
             self._left_out.append(bottles)
             return
         force = bottles.peak_force.copy()
         for earlier in self._left_out if len(force) else ():
-            # Ids ascend; those that are gone are drawn no more.
+            # Ids ascend; bottles that have left are not drawn.
             place = np.searchsorted(bottles.id, earlier.id).clip(max=len(force) - 1)
             there = bottles.id[place] == earlier.id
             force[place[there]] = np.fmax(force[place[there]], earlier.peak_force[there])

@@ -1,4 +1,4 @@
-"""The first tick at which two recordings differ, in words: which commands, signals and bottles, and by how much."""
+"""First tick at which two recordings differ, in words: which commands, signals and bottles, and by how much."""
 
 from __future__ import annotations
 
@@ -26,24 +26,24 @@ KINDS = {
     ),
     "seen": ("bottles",),
 }
-"""Causes before effects, with their topics in the order in which they are looked at.
+"""Kinds of differences, causes before effects, with their topics in the order of comparison.
 
 `seen` are bottles that are farther apart than SEEN.
 """
 SEEN = 1e-3
-"""m"""
+"""Distance of the positions of a bottle that can be seen, m."""
 MOST = 5
-"""Sentences."""
+"""Sentences per difference, at most."""
 _BATCH = 5.0
-"""s of both recordings that are held at a time."""
+"""Part of both recordings that is in memory at a time, s."""
 
 Messages = Mapping[str, Sequence[bytes]]
-"""Of one tick, by topic."""
+"""Messages of one tick, by topic."""
 
 
 @dataclass(frozen=True)
 class RecordingDifference:
-    """The first one of its kind between two recordings, A and B."""
+    """First difference of its kind between two recordings, A and B."""
 
     kind: str
     """One of KINDS."""
@@ -52,16 +52,16 @@ class RecordingDifference:
     """s"""
     texts: tuple[str, ...]
     signals: tuple[str, ...]
-    """Those that differ."""
+    """Names of the signals that differ."""
     bottle: int | None
-    """The one that is farthest from where it is in the other recording."""
+    """Bottle with the largest distance between its positions in both recordings."""
 
 
 class RecordingComparison:
-    """Finds them in what both hold: bit for bit; in recordings of two versions or machines, within tolerances."""
+    """Comparison of the topics that two recordings share: bit for bit, or within tolerances between two versions."""
 
     def __init__(self, a: Bag, b: Bag, seconds: float) -> None:
-        """seconds: of a stretch, in simulated time. Raises ConveyorError if their ticks are not of the same length."""
+        """seconds: length of a stretch in simulated time. Raise ConveyorError if the lengths of ticks differ."""
         if a.line.tick_ns != b.line.tick_ns:
             raise ConveyorError(
                 f"{b.path}: has ticks of {b.line.tick_ns * 1e-6:g} ms, expected those of {a.path}, "
@@ -70,7 +70,7 @@ class RecordingComparison:
         self._bags = (a, b)
         made_by = [(bag.line.engine_hash, list(bag.line.versions), bag.line.machine) for bag in self._bags]
         self.exact = made_by[0] == made_by[1]
-        """Whether every bit counts."""
+        """True if versions and machine are the same, so that every bit counts."""
         rows = [TOPICS["outcomes"], *COMPARED.values()]
         held = [row for row in rows if all(bag.types.get(row.name) == row.type for bag in self._bags)]
         held = [row for row in held if self.exact or row.compare.within or row.name == "outcomes"]
@@ -84,50 +84,50 @@ class RecordingComparison:
 
     @property
     def stretches(self) -> int:
-        """How many there are: up to the end of the recording that ends first."""
+        """Number of stretches up to the end of the shorter recording."""
         return max(1, -(-(self._last + 1 - self._first) // self._length))
 
     @property
     def end(self) -> float:
-        """s, up to which both go."""
+        """Simulated time at the end of the shorter recording, s."""
         return self._last * self._tick_ns * 1e-9
 
     def head(self) -> dict[str, Any]:
-        """For the page: the recordings' names, how far both go, and how what differs is read."""
+        """Return for the page: names of the recordings, end, kind of comparison, and number of stretches."""
         paths = [str(bag.path) for bag in self._bags]
         return {"names": paths, "end": self.end, "exact": self.exact, "stretches": self.stretches}
 
     def part(self, number: int = 0) -> list[dict[str, Any]]:
-        """For the page: as `find`."""
+        """Return the differences of a stretch for the page, as `find` does."""
         return [vars(one) for one in self.find(number)]
 
     def find(self, number: int = 0) -> list[RecordingDifference]:
-        """The first difference of each kind in a stretch, from 0 on, where there is one. Raises BagError."""
+        """Return the first difference of each kind in a stretch, counted from 0. Raise BagError."""
         start = self._first + number * self._length
         stop = min(start + self._length, self._last + 1)
         batch = max(1, round(_BATCH * 1e9 / self._tick_ns))
-        found: dict[str, RecordingDifference] = {}
+        first: dict[str, RecordingDifference] = {}
         for begin in range(start, stop, batch):
-            wanted = [kind for kind in KINDS if kind not in found]
+            wanted = [kind for kind in KINDS if kind not in first]
             a, b = (self._messages(stamps, wanted, begin, min(begin + batch, stop)) for stamps in self._stamps)
             for tick in sorted(a.keys() | b.keys()):
                 for kind in wanted:
-                    one = None if kind in found else self._at(kind, tick, a.get(tick, {}), b.get(tick, {}))
+                    one = None if kind in first else self._at(kind, tick, a.get(tick, {}), b.get(tick, {}))
                     if one is not None:
-                        found[kind] = one
-        return sorted(found.values(), key=lambda one: one.tick)
+                        first[kind] = one
+        return sorted(first.values(), key=lambda one: one.tick)
 
     def _messages(
         self, stamps: Stamps, kinds: Iterable[str], start: int, stop: int
     ) -> dict[int, dict[str, list[bytes]]]:
-        found: dict[int, dict[str, list[bytes]]] = defaultdict(lambda: defaultdict(list))
+        messages: dict[int, dict[str, list[bytes]]] = defaultdict(lambda: defaultdict(list))
         topics = {row.name for kind in kinds for row in self._rows[kind]}
         for topic, tick, raw in stamps.messages(topics, start, stop) if topics else ():
-            found[tick][topic].append(raw)
-        return found
+            messages[tick][topic].append(raw)
+        return messages
 
     def _at(self, kind: str, tick: int, a: Messages, b: Messages) -> RecordingDifference | None:
-        """By the first topic that differs."""
+        """Return the difference of a kind at a tick by the first topic that differs; None if there is none."""
         for row in self._rows[kind]:
             raw = a.get(row.name, []), b.get(row.name, [])
             if raw[0] == raw[1] and self._same_names(row):
@@ -136,8 +136,8 @@ class RecordingComparison:
             texts: list[str] = []
             bottle = None
             if row.name == "outcomes":  # none or many at a tick
-                texts = [*_alone(*([*map(_said, self._decoded(place, row, raw[place]))] for place in (0, 1)))]
-            elif raw[0] and raw[1]:  # else they were recorded at other rates
+                texts = [*_alone(*([*map(_command_text, self._decoded(place, row, raw[place]))] for place in (0, 1)))]
+            elif raw[0] and raw[1]:  # else the recordings have different rates
                 then, now = (self._decoded(place, row, raw[place])[-1] for place in (0, 1))
                 if row.name == "signals":
                     texts, signals = self._signals(then, now)
@@ -163,7 +163,7 @@ class RecordingComparison:
         return list(getattr(self._bags[place].line, field))
 
     def _signals(self, then: Any, now: Any) -> tuple[list[str], list[str]]:
-        """Of those that both have."""
+        """Return sentences on the signals of both recordings that differ, and their names."""
         names = [self._names(place, "signal_names") for place in (0, 1)]
         units = dict(zip(names[0], self._names(0, "signal_units"), strict=True))
         a, b = (
@@ -195,7 +195,7 @@ class RecordingComparison:
         return texts, None
 
     def _bottle_fields(self, a: BottleColumns, b: BottleColumns, both: Any, i: Any, j: Any) -> list[str]:
-        """Of bottles that are at the same places."""
+        """Return a sentence on the first field that differs, for bottles at the same positions."""
         for field, unit in _BOTTLE_FIELDS.items():
             tolerance = 0.0 if self.exact else COMPARED["bottles"].compare.within.get(field, 0.0)
             then, now = getattr(a, field)[i], getattr(b, field)[j]
@@ -207,11 +207,11 @@ class RecordingComparison:
     def _fields(self, row: Topic, then: Any, now: Any) -> list[str]:
         if not self._same_names(row):
             return []
-        found = first_difference(row.name, self._bags[1].line, then, now, exact=self.exact)
-        if found is None:
+        difference = first_difference(row.name, self._bags[1].line, then, now, exact=self.exact)
+        if difference is None:
             return []
-        part = f" of {found.part}" if found.part else ""
-        return [f"{row.name}: {found.field}{part} is {found.recorded} in A, {found.replayed} in B"]
+        part = f" of {difference.part}" if difference.part else ""
+        return [f"{row.name}: {difference.field}{part} is {difference.recorded} in A, {difference.replayed} in B"]
 
 
 _NAMES = {
@@ -221,25 +221,25 @@ _NAMES = {
     "contacts": "rails",
     "rail_wear": "rails",
 }
-"""By topic, the names that its entries are of."""
+"""Field of Line with the names of a topic's entries, by topic."""
 _BOTTLE_FIELDS = {
     "type": "1", "theta": "rad", "vx": "m/s", "vy": "m/s", "omega": "rad/s", "belt": "1", "peak_force": "N",
     "impulse": "N s",
 }  # fmt: skip
-"""With their units."""
+"""Compared fields of bottles, with their units."""
 
 
-def _said(message: Any) -> str:
-    """A command and what became of it."""
+def _command_text(message: Any) -> str:
+    """Return a command and its result in words."""
     outcome = to_outcome(message)
-    given = [*map(repr, outcome.values), *map(repr, outcome.texts)]
-    values = [f"{name} = {value}" for name, value in zip(outcome.names, given, strict=False)] or [outcome.operation]
+    requests = [*map(repr, outcome.values), *map(repr, outcome.texts)]
+    values = [f"{name} = {value}" for name, value in zip(outcome.names, requests, strict=False)] or [outcome.operation]
     refused = "" if outcome.accepted else f", refused: {outcome.reason}"
     return f"command {', '.join(values)} by {outcome.writer or outcome.source}{refused}"
 
 
 def _alone(a: Sequence[str], b: Sequence[str]) -> Iterator[str]:
-    """What only one of two lists says."""
+    """Yield the texts that only one of two lists has."""
     yield from (f"in A alone: {text}" for text in a if text not in b)
     yield from (f"in B alone: {text}" for text in b if text not in a)
 
@@ -249,7 +249,7 @@ def _near(a: float, b: float, tolerance: float) -> bool:
 
 
 def _two(a: float, b: float, unit: str) -> str:
-    """Values in words, with as many digits as tell them apart."""
+    """Return two values in words, with enough digits to distinguish them."""
     measure = "" if unit == "1" else f" {unit}"
     apart = abs(float(a) - float(b))
     digits = next((digits for digits in range(4, 17) if f"{a:.{digits}g}" != f"{b:.{digits}g}"), 17)

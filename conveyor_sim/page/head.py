@@ -1,4 +1,4 @@
-"""What stands still of a recording, for the page: the plant's shapes, the tags, and what indices mean. As JSON."""
+"""Constant part of a recording for the page, as JSON: shapes of the plant, tags, meaning of indices."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from conveyor_sim.scene.moving import moving_shapes
 
 _ARC_POINTS = 96
 _DIGITS = 5
-"""Of metres."""
+"""Decimal places of lengths in m."""
 
 
 def head(line: Any, scene: Scene) -> dict[str, Any]:
-    """All that the page needs besides what changes, and how to read that, of a decoded message of topic line."""
+    """Return the constant data of the page and the scales of the changing data, from a decoded Line message."""
     signals = list(line.signal_names)
     return {
         "scene": scene.name,
@@ -94,7 +94,7 @@ def _points(points: Any) -> list[list[float]]:
 
 
 def _tags(line: Any) -> list[dict[str, Any]]:
-    """All tags; of a recording older than them, its signals and commands."""
+    """Return all tags; the signals of a recording that is older than tags."""
     if not hasattr(line, "tag_names"):
         signals = zip(line.signal_names, line.signal_units, strict=True)
         return [{"name": name, "unit": unit, "role": "actual"} for name, unit in signals]

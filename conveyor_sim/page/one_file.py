@@ -37,12 +37,12 @@ def write_page(
     trends: Sequence[str] = (),
     other: Path | None = None,
 ) -> Path:
-    """Write a recording as one HTML file, and return it.
+    """Write a recording as one HTML file. Return its path.
 
-    last: only so many seconds at its end are drawn; None: all. What happened is listed from the beginning. watch: what
-    is drawn instead, of the same run. trends: signals that are shown at first; none: what there is most to see of.
+    last: length of the part at the end that is drawn, s; None: all. Events are listed from the beginning. watch: frames
+    of the same run that are drawn instead. trends: signals that are shown at first; none: those that change most.
     other: a recording that is shown beside it, at the same times.
-    Raises BagError, SceneError, and ConveyorError if the file can't be written, or is one of the recording's.
+    Raise BagError, SceneError, and ConveyorError if the file can't be written, or belongs to the recording.
     """
     bags = [bag] if other is None else [bag, other]
     recorded = [part for one in bags for part in (*mcap_files(one), one / "metadata.yaml") if part.exists()]
@@ -76,7 +76,7 @@ def write_page(
 def _parts(
     recording: PageRecording, prefix: str, more: Mapping[str, Any], blocks: Sequence[bytes] | None = None
 ) -> Iterator[tuple[str, bytes]]:
-    """Names and content. blocks: deflated; None: those of the recording."""
+    """Yield names and content of the parts. blocks: deflated; None: those of the recording."""
     yield f"{prefix}head", _deflated(text({**recording.head(), **more}))
     yield f"{prefix}story/0", _deflated(recording.story())
     for number in range(recording.blocks) if blocks is None else ():

@@ -1,4 +1,4 @@
-"""A recording as the page sees it: its head, blocks of some seconds, read by the bag's index, and its story."""
+"""A recording as the page shows it: head, blocks of some seconds, and story, each read by the bag's index."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from conveyor_sim.scene import parse_overrides, parse_scene
 
 @dataclass(frozen=True)
 class Detail:
-    """How much of a recording is shown, at most, in Hz of simulated time."""
+    """Greatest detail in which a recording is shown: rates in Hz of simulated time."""
 
     bottles: float = 25.0
     contacts: float = 12.5
@@ -28,13 +28,13 @@ class Detail:
     signals: float = 25.0
     counters: float = 0.5
     block: float = SECONDS
-    """s, not Hz: how long a block is."""
+    """Length of a block, s."""
     story: float = math.inf
-    """s: how much of what happened is read at a time."""
+    """Length of a stretch of the story, s."""
 
 
 class PageRecording:
-    """What the page is given of an open bag. Raises SceneError if its scene can't be read by this version."""
+    """Data of the page from an open bag. Raise SceneError if its scene can't be read by this version."""
 
     def __init__(self, bag: Bag, detail: Detail) -> None:
         self._bag = bag
@@ -51,26 +51,26 @@ class PageRecording:
         self._block_ticks = block_ticks(self._tick_ns, detail.block)
 
     def begin_before(self, tick: int, seconds: float) -> None:
-        """Draw it only from so many seconds before a tick on. What happened is still listed from the beginning."""
+        """Draw only the part from `seconds` before a tick on. Events are still listed from the beginning."""
         self.first = min(self.last, max(self.first, tick - round(seconds * 1e9 / self._tick_ns)))
 
     @property
     def name(self) -> str:
-        """Of the scene."""
+        """Name of the scene."""
         return self._scene.name
 
     @property
     def blocks(self) -> int:
-        """How many there are; the first one begins at the first tick."""
+        """Number of blocks; the first one begins at the first tick."""
         return 1 + (self.last - self.first) // self._block_ticks
 
     @property
     def stories(self) -> int:
-        """How many stretches what happened is told in."""
+        """Number of stretches of the story."""
         return 1 + math.floor((self.last - self._began) * self._tick_ns * 1e-9 / self._detail.story)
 
     def head(self) -> dict[str, Any]:
-        """As `head.head`, and how much there is."""
+        """Return the data of `head.head`, with the times and the numbers of blocks and stretches."""
         times = {
             "first": self.first,
             "last": self.last,
@@ -84,7 +84,7 @@ class PageRecording:
         return {**shown, "times": times, "forced": forced}
 
     def block(self, number: int) -> bytes:
-        """A block, from 0 on, as `block.pack` writes it."""
+        """Return a block, counted from 0, as `block.pack` writes it."""
         start = self.first + number * self._block_ticks
         gaps = {name: max(1, round(1e9 / getattr(self._detail, name) / self._tick_ns)) for name in DRAWN}
         collector = Collector(self._bag, start, gaps, self._variables)
@@ -94,7 +94,7 @@ class PageRecording:
         return pack(collector.content, start)
 
     def story(self, number: int = 0) -> bytes:
-        """What happened in a stretch of the recording, from 0 on, as JSON (`Story`)."""
+        """Return the story of a stretch of the recording, counted from 0, as JSON (`Story`)."""
         story = Story(self._bag.time, 1.0 / self._detail.counters)
         start = stop = None
         if self.stories > 1:
@@ -107,7 +107,7 @@ class PageRecording:
 
 
 def text(value: Any) -> bytes:
-    """As JSON, which has neither NaN nor infinities."""
+    """Return a value as JSON, with null for NaN and infinities."""
     return json.dumps(_clean(value), separators=(",", ":")).encode()
 
 

@@ -27,23 +27,23 @@ from conveyor_sim.support.printable import SENTENCE, printable
 
 ADDRESS = "127.0.0.1"
 MOST_CONNECTIONS = 64
-"""At once; for one more the oldest makes room."""
+"""Connections at a time; the oldest one is closed for one more."""
 SILENT = 20.0
-"""s of wall time in which a browser has to ask, and to take what it is sent."""
+"""Wall time in which a browser must send a request, and receive the answer, s."""
 SERVED = Detail(bottles=50.0, contacts=25.0, belts=50.0, signals=50.0, block=2.0, story=60.0)
 
 
 class RecordingServer(AbstractContextManager["RecordingServer"]):
-    """Serves a bag's page until it is closed."""
+    """Server of a bag's page; it serves until it is closed."""
 
     def __init__(self, path: Path, port: int = 0, other: Path | None = None) -> None:
-        """port: 0 for any that is free. other: a recording that is shown beside it, at the same times.
+        """port: 0 for any free port. other: a recording that is shown beside it, at the same times.
 
-        Raises BagError, SceneError, and ConveyorError if it can't listen there, or these can't be compared.
+        Raise BagError, SceneError, and ConveyorError if the port is taken, or the recordings can't be compared.
         """
         with ExitStack() as stack:
             bags = [path] if other is None else [path, other]
-            # Whoever reads on through the whole recording does not throw out what somebody looks at.
+            # Blocks on display and the story are read in parallel, each by its own reader.
             looked, read_on = ([stack.enter_context(open_bag(bag, by_index=True)) for bag in bags] for _ in range(2))
             self._shown = [PageRecording(bag, SERVED) for bag in looked]
             self._read_on = [PageRecording(bag, SERVED) for bag in read_on]
@@ -64,13 +64,13 @@ class RecordingServer(AbstractContextManager["RecordingServer"]):
 
     @property
     def url(self) -> str:
-        """Where the page is."""
+        """Address of the page."""
         return f"http://{ADDRESS}:{self._server.server_address[1]}/"
 
     def answer(self, name: str) -> bytes:
-        """The deflated part of a name. Raises KeyError if there is none, and BagError.
+        """Return the deflated part with a name. Raise KeyError if there is none, and BagError.
 
-        head, story/<n>, block/<n>, and the same behind other/; difference/<n>.
+        Names: head, story/<n>, block/<n>, each of them after other/ for the other recording, and difference/<n>.
         """
         place = int(name.startswith("other/"))
         if place >= len(self._shown):
@@ -92,20 +92,20 @@ class RecordingServer(AbstractContextManager["RecordingServer"]):
         return self._deflated(self._reading_on, lambda: read_on.story(int(number)))
 
     def __exit__(self, *_: object) -> None:
-        """Nothing is answered any more."""
+        """Stop the server."""
         self._stack.close()
         self._thread.join()
 
     def _deflated(self, lock: threading.Lock, make: Callable[[], bytes]) -> bytes:
         with lock:
-            made = make()
-        return zlib.compress(made, 1)
+            part = make()
+        return zlib.compress(part, 1)
 
 
 class _Server(ThreadingHTTPServer):
     daemon_threads = True
     request_queue_size = 128
-    """Connections that wait to be accepted: one that finds no room tries again only after a second."""
+    """Connections that may wait to be accepted. A browser repeats one that is dropped only after a second."""
     answer: Callable[[str], bytes]
 
     def __init__(self, *arguments: Any) -> None:
@@ -114,24 +114,24 @@ class _Server(ThreadingHTTPServer):
         super().__init__(*arguments)
 
     def process_request(self, request: Any, client_address: Any) -> None:
-        """Have it answered in a thread of its own."""
+        """Answer the request in a new thread."""
         with self._changing:
             if len(self._connected) >= MOST_CONNECTIONS:
                 oldest = next(iter(self._connected))
                 del self._connected[oldest]
-                with suppress(OSError):  # it has just ended
+                with suppress(OSError):  # the connection has just ended
                     oldest.shutdown(socket.SHUT_RDWR)
             self._connected[request] = None
         super().process_request(request, client_address)
 
     def shutdown_request(self, request: Any) -> None:
-        """It has been answered, or left."""
+        """Forget a connection that has ended."""
         with self._changing:
             self._connected.pop(request, None)
         super().shutdown_request(request)
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """A browser that leaves while it is answered is nothing to tell of."""
+        """Ignore browsers that disconnect during an answer."""
         if not isinstance(sys.exc_info()[1], ConnectionError):
             super().handle_error(request, client_address)
 
@@ -144,7 +144,7 @@ class _Handler(BaseHTTPRequestHandler):
     def do_GET(self) -> None:
         path = urlsplit(self.path).path.removeprefix("/") or "index.html"
         if not is_own(self.headers.get_all("Host", []), "http"):
-            self._send(HTTPStatus.FORBIDDEN, b"expected to be asked for as 127.0.0.1", "text/plain")
+            self._send(HTTPStatus.FORBIDDEN, b"expected a request for the host 127.0.0.1", "text/plain")
         elif path.startswith("data/"):
             self._send_part(path.removeprefix("data/"))
         elif (kind := page_files().get(path)) is not None:
@@ -158,8 +158,8 @@ class _Handler(BaseHTTPRequestHandler):
         except KeyError:
             self._send(HTTPStatus.NOT_FOUND, b"there is no such part of the recording", "text/plain")
         except ConveyorError as error:
-            said = printable(error, SENTENCE).encode()
-            self._send(HTTPStatus.INTERNAL_SERVER_ERROR, said, "text/plain")
+            reason = printable(error, SENTENCE).encode()
+            self._send(HTTPStatus.INTERNAL_SERVER_ERROR, reason, "text/plain")
 
     def _send(self, status: HTTPStatus, content: bytes, kind: str) -> None:
         self.send_response(status)
@@ -171,4 +171,4 @@ class _Handler(BaseHTTPRequestHandler):
         self.wfile.write(content)
 
     def log_message(self, format: str, *args: Any) -> None:
-        """Nothing: what can't be read is shown on the page."""
+        """Log nothing. The page shows parts that can't be read."""

@@ -1,4 +1,4 @@
-"""Which log times the ticks of a recording have: simulated time, or, in stock rosbag2's recordings, the wall's."""
+"""Log times of a recording's ticks: simulated time, or wall time in recordings of stock rosbag2."""
 
 from __future__ import annotations
 
@@ -9,24 +9,24 @@ import numpy as np
 from conveyor_sim.bag.reader import Bag
 
 _SLACK_NS = 2_000_000_000
-"""How far a message may be from the others of its tick."""
+"""Greatest distance of a message's log time from that of others of its tick, ns."""
 
 
 class Stamps:
-    """Finds messages by tick. Where log times are not simulated, the recording is gone through once at the start."""
+    """Finds messages by tick. If log times are not simulated times, the recording is read once at the start."""
 
     def __init__(self, bag: Bag, topics: Collection[str]) -> None:
-        """topics: those that carry ticks, and are asked for later."""
+        """topics: those that carry ticks, and are requested later."""
         self._bag = bag
         self._tick_ns = int(bag.line.tick_ns)
         first = next(((bag.tick(topic, data), stamp) for topic, stamp, data in bag.raw(topics)), None)
         self._simulated = first is None or abs(first[0] * self._tick_ns - first[1]) <= 1
-        found = [] if self._simulated else [(bag.tick(topic, data), stamp) for topic, stamp, data in bag.raw(topics)]
-        ticks = np.array([tick for tick, _ in found], dtype=np.int64)
-        # Ticks that go back are of another run, after a reset.
+        stamped = [] if self._simulated else [(bag.tick(topic, data), stamp) for topic, stamp, data in bag.raw(topics)]
+        ticks = np.array([tick for tick, _ in stamped], dtype=np.int64)
+        # Decreasing ticks belong to another run, after a reset.
         back = np.flatnonzero(np.diff(ticks) < -_SLACK_NS // self._tick_ns)
         self._ticks = np.maximum.accumulate(ticks[: back[0] + 1] if len(back) else ticks)
-        self._stamps = [stamp for _, stamp in found]
+        self._stamps = [stamp for _, stamp in stamped]
 
     @property
     def last(self) -> int:
@@ -36,7 +36,7 @@ class Stamps:
     def messages(
         self, topics: Collection[str], start: int | None = None, stop: int | None = None
     ) -> Iterator[tuple[str, int, bytes]]:
-        """Topic, tick and bytes of the messages of some topics in time order, from a tick on, before a tick."""
+        """Yield topic, tick and bytes of the messages of some topics in time order, from a tick on, before a tick."""
         if self._simulated:
             # The stamp of tick 0 is 1 ns.
             first, last = (None if tick is None else tick * self._tick_ns for tick in (start, stop))

@@ -1,6 +1,6 @@
-"""What happened in a stretch of a recording, for the page: events, alarms, readings back, counters. As JSON.
+"""Story of a stretch of a recording for the page, as JSON: events, alarms, read-back values, counters.
 
-Every list is in the order of time; what says a state says it when it changes.
+Every list is in the order of time. States are listed when they change.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from conveyor_sim.bag.messages.topics import TOPICS
 
 TOPICS_READ = ("events", "alarm_states", "readback", "counters", "rail_wear", "run_state")
-"""Those that it is made of."""
+"""Topics from which a story is collected."""
 
 _DECLARED = ("id", "text", "alarm_class", "priority", "tag", "group", "latching")
 _ALARM = ("state", "active", "first_out", "since", "changed_by")
@@ -26,28 +26,28 @@ _COUNTED = (
 
 _WORN = ("scuffing_work", "impulse")
 WEAR_EVERY = 5.0
-"""s of simulated time from one entry of what rails have borne to the next, at least."""
+"""Least simulated time between two entries of rail wear, s."""
 
 
 class Story:
-    """Collects it from messages in the order of time."""
+    """Story collected from messages in the order of time."""
 
     def __init__(self, time: Callable[[int], float], counters_every: float) -> None:
-        """time: s, of a tick. counters_every: s from one entry of the counters to the next, at least."""
+        """time: returns the time of a tick, s. counters_every: least time between two entries of the counters, s."""
         self._time = time
         self._counters_every = counters_every
         self._last: dict[str, dict[Any, Any]] = {"alarms": {}, "commands": {}}
         self._counted = -math.inf
         self._worn = -math.inf
-        self.data = _nothing()
+        self.data = _empty()
 
     def take(self) -> dict[str, Any]:
-        """What was collected since the last call."""
-        data, self.data = self.data, _nothing()
+        """Return the story since the last call."""
+        data, self.data = self.data, _empty()
         return data
 
     def add(self, topic: str, message: Any, tick: int) -> None:
-        """A decoded message of one of TOPICS_READ, or its columns."""
+        """Add a decoded message of one of TOPICS_READ, or its columns."""
         getattr(self, f"_{topic}")(message, self._time(tick))
 
     def _events(self, message: Any, _: float) -> None:
@@ -103,7 +103,7 @@ class Story:
         self.data["runs"].append([time, message.text, message.reason])
 
 
-def _nothing() -> dict[str, Any]:
+def _empty() -> dict[str, Any]:
     return {
         "events": {name: [] for name in ("at", "kind", "name", "bottle", "value", "text")},
         "alarms": {},
@@ -117,12 +117,12 @@ def _nothing() -> dict[str, Any]:
 
 
 def fields() -> Mapping[str, tuple[str, ...]]:
-    """What rows hold, by list."""
+    """Return the names of the fields of rows, by list."""
     return {"counters": _COUNTED, "alarm_changes": ("at", "number", *_ALARM)}
 
 
 def _short(value: float) -> float:
-    """With as many digits as a colour shows."""
+    """Round a value to the digits that a colour shows."""
     return float(f"{value:.3g}")
 
 

@@ -1,4 +1,4 @@
-"""The last seconds of a simulation, packed for the page while it runs: at the page's rates, whatever is recorded."""
+"""The last seconds of a simulation, packed for the page while it runs, at the page's rates instead of the recorded."""
 
 from __future__ import annotations
 
@@ -20,13 +20,14 @@ FRAMES, CONTACTS = 25.0, 12.5
 
 
 class Watch:
-    """Called with the simulation at its start and after every tick; only looks, and keeps deflated blocks.
+    """Observer that is called with a simulation at its start and after every tick, and keeps deflated blocks.
 
-    The controller's recorded variables are further columns of the signals, those that there were at first.
+    The controller's recorded variables are further columns of the signals; their names are those of the first call
+    that has any.
     """
 
     def __init__(self, last: float) -> None:
-        """last: s that are kept, at least."""
+        """last: simulated time that is kept, at least, s."""
         self._last = last
         self._kept: deque[bytes] = deque()
         self._content = BlockContent()
@@ -35,19 +36,19 @@ class Watch:
         self.variables: tuple[str, ...] = ()
         """Names of the controller's variables."""
         self.end = -1
-        """The last tick that was seen; -1: none."""
+        """The last observed tick; -1: none."""
 
     @property
     def first(self) -> int:
-        """The tick at which the first block begins."""
+        """The first tick of the first block."""
         return self._start - len(self._kept) * self._block
 
     def blocks(self) -> list[bytes]:
-        """The blocks, deflated, the last one up to now."""
+        """Return the blocks, deflated, the last one up to now."""
         return [*self._kept, _deflated(self._content, self._start)]
 
     def __call__(self, simulation: Simulation, variables: Mapping[str, float]) -> None:
-        """Look at the present tick."""
+        """Add the present tick."""
         tick, seconds = simulation.tick, simulation.model.tick_ns * 1e-9
         if self._start < 0:
             self._start, self._block = tick, block_ticks(simulation.model.tick_ns)
@@ -72,7 +73,7 @@ class Watch:
 
 
 def with_forces(bottles: BottleColumns, contacts: ContactColumns) -> BottleColumns:
-    """With the largest force on each at this tick, where peaks since the last output are not known or never restart."""
+    """Return bottles whose peak force is their largest force at this tick. Without outputs, peaks are never reset."""
     force = np.zeros(len(bottles.id))
     if len(force):
         pairs = contacts.kind == 0

@@ -11,7 +11,7 @@ from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
-from conveyor_sim.bag.outputs import Outputs
+from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.control.scan import Controller
 from conveyor_sim.errors import ConveyorError, SimulationError
@@ -74,7 +74,7 @@ def run_scene(
     scans.scan_tick()
     recorder = Recorder(bag) if bag is not None else None
     with recorder or nullcontext(), _stop_request() as stop:
-        outputs = Outputs(simulation, [recorder] if recorder else [], run_id=uuid.uuid4().hex)
+        outputs = OutputWriter(simulation, [recorder] if recorder else [], run_id=uuid.uuid4().hex)
         outputs.start()
         outputs.show_run(RunState(RUNNING))
         peaks = PeakWatch(simulation)

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
-from conveyor_sim.bag.outputs import Outputs
+from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.control.line_tags import LineTags, bind
 from conveyor_sim.control.memory import restore, snapshot
 from conveyor_sim.control.recorded import RecordedVariables
@@ -181,7 +181,7 @@ class ScanLoop:
         except ControlError as error:
             raise ConveyorError(f"at {simulation.time:.2f} s: {error}") from error
 
-    def before_tick(self, outputs: Outputs | None) -> None:
+    def before_tick(self, outputs: OutputWriter | None) -> None:
         """Scan, write the recorded variables to the outputs, and queue the commands. Raise as `scan_tick`."""
         self.scan_tick()
         if outputs is not None:

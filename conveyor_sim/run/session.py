@@ -6,7 +6,7 @@ import time
 import uuid
 from pathlib import Path
 
-from conveyor_sim.bag.outputs import MessageSink, Outputs
+from conveyor_sim.bag.outputs import MessageSink, OutputWriter
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.line.commands.inputs import CommandOutcome, Input
@@ -37,7 +37,7 @@ class RunSession:
         keep_start = simulation.save if simulation.tick > 0 else None
         self._recorder = Recorder(bag, distro=distro, start=keep_start) if bag else None
         sinks = [sink] if self._recorder is None else [self._recorder, sink]
-        self.outputs = Outputs(self.simulation, sinks, frame_id=frame_id, run_id=self.run_id)
+        self.outputs = OutputWriter(self.simulation, sinks, frame_id=frame_id, run_id=self.run_id)
         self.outputs.start()
         self._peaks = PeakWatch(self.simulation)
         self._last_outcomes: list[CommandOutcome] = []
@@ -104,5 +104,5 @@ class RunSession:
         if self._recorder is not None:
             recorder, self._recorder = self._recorder, None
             # Results of commands that come too late are still published.
-            self.outputs = Outputs(self.simulation, [self._sink], frame_id=self._frame_id, run_id=self.run_id)
+            self.outputs = OutputWriter(self.simulation, [self._sink], frame_id=self._frame_id, run_id=self.run_id)
             recorder.close()

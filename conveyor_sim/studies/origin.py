@@ -13,8 +13,8 @@ from typing import Any
 from conveyor_sim.errors import StudyError
 from conveyor_sim.studies.setup import Setup
 from conveyor_sim.studies.study import Study
+from conveyor_sim.support.checked_json import CheckedJson, read_checked, with_checksum
 from conveyor_sim.support.files import MB, FileError
-from conveyor_sim.support.sealed_json import Kept, read_sealed, sealed
 
 ORIGIN = "study.json"
 WARM_UP = "warm_up"
@@ -31,7 +31,7 @@ _FIELDS = ("study", "scene", "code", "engine", VERSION)
 
 
 @dataclass(frozen=True)
-class Origin:
+class StudyOrigin:
     """Content of a `study.json`."""
 
     fields: Mapping[str, str]
@@ -40,13 +40,13 @@ class Origin:
     """s; None: not found yet, or not needed."""
     text: str | None
     """Text of the study's file; None in files of older versions."""
-    sealed: bool
+    has_checksum: bool
     """False in files of older versions, which have no checksum."""
 
     def content(self) -> bytes:
         """Return the content of the file."""
         warm_up = {} if self.warm_up is None else {WARM_UP: self.warm_up}
-        return sealed({**self.fields, **warm_up, TEXT: self.text}, indent=1)
+        return with_checksum({**self.fields, **warm_up, TEXT: self.text}, indent=1)
 
 
 def origin_of(setup: Setup) -> dict[str, str]:
@@ -70,26 +70,26 @@ def fingerprint(setup: Setup) -> str:
     return _hash(*origin_of(setup).values())[:8]
 
 
-def read_origin(folder: Path) -> Origin:
+def read_origin(folder: Path) -> StudyOrigin:
     """Return the content of a folder's `study.json`. Raises FileError; StudyError for a file of another kind."""
     kept = read_study_json(folder / ORIGIN)
     data = dict(kept.data)
     warm_up, text = data.pop(WARM_UP, None), data.pop(TEXT, None)
     sound = tuple(data) == _FIELDS and all(isinstance(value, str) for value in data.values())
     sound = sound and (warm_up is None or (type(warm_up) in (int, float) and math.isfinite(warm_up) and warm_up >= 0.0))
-    if not sound or isinstance(text, str) is not kept.sealed:
-        if kept.sealed or "scene" not in data or "study" not in data:
+    if not sound or isinstance(text, str) is not kept.has_checksum:
+        if kept.has_checksum or "scene" not in data or "study" not in data:
             raise StudyError(
                 f"{folder / ORIGIN}: is not that of conveyor-sim sweep or optimise (conveyor-sim accuracy has one of "
                 "the same name), expected the folder of a study"
             )
         raise FileError("has other fields than conveyor-sim sweep writes")
-    return Origin(data, warm_up, text, kept.sealed)
+    return StudyOrigin(data, warm_up, text, kept.has_checksum)
 
 
-def read_study_json(path: Path, finite: bool = True) -> Kept:
+def read_study_json(path: Path, finite: bool = True) -> CheckedJson:
     """Return the content of a JSON file of a study. Raises FileError."""
-    return read_sealed(path, MOST, finite)
+    return read_checked(path, MOST, finite)
 
 
 def _hash(*parts: str) -> str:

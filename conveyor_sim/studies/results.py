@@ -19,12 +19,12 @@ from conveyor_sim.errors import SceneError, StudyError
 from conveyor_sim.scene import parse_overrides
 from conveyor_sim.studies.journal import SOURCE, read_rows, unusable
 from conveyor_sim.studies.origin import ORIGIN, VERSION, WARM_UP, read_origin
-from conveyor_sim.studies.row import Row
+from conveyor_sim.studies.row import RunRow
 from conveyor_sim.studies.run_file import row_of
 from conveyor_sim.studies.study import HALF_WIDTH, Seeds, Until
 from conveyor_sim.studies.units_file import UNITS, read_units
+from conveyor_sim.support.checked_json import CHECKSUM, parsed
 from conveyor_sim.support.files import MB, FileError, read_file, write_file
-from conveyor_sim.support.sealed_json import SEAL, parsed
 
 PARQUET = "results.parquet"
 METADATA = "conveyor_sim"
@@ -47,7 +47,7 @@ class Results:
     parameters: Mapping[str, str]
     """Their units, "" where it is not known, or there is none."""
     versions: Mapping[str, str]
-    rows: Sequence[Row]
+    rows: Sequence[RunRow]
     warm_up: float | None = None
     """s, where pilot runs have found it; None: as the study says."""
     verified: bool = True
@@ -68,7 +68,7 @@ class Results:
         """Return a metric's unit as written behind a number: "" if dimensionless."""
         return "" if self.units[metric] == "1" else self.units[metric]
 
-    def command(self, row: Row) -> str:
+    def command(self, row: RunRow) -> str:
         """Return the shell command that repeats one run."""
         return run_command(self.path, row, self.warm_up)
 
@@ -78,7 +78,7 @@ class Results:
         return len({row.point for row in self.rows}) == len(self.rows)
 
 
-def run_command(path: str, row: Row, warm_up: float | None = None) -> str:
+def run_command(path: str, row: RunRow, warm_up: float | None = None) -> str:
     """Return the shell command that repeats one run of a study file. warm_up: s, if it comes from pilot runs."""
     given = [f"--set {name}={shlex.quote(text_of(value))}" for name, value in row.parameters.items()]
     found = [] if warm_up is None else [f"--warm-up {warm_up!r}"]
@@ -100,14 +100,16 @@ def read_results(path: Path) -> Results:
         raise unusable(path / ORIGIN, error) from None
     rows = read_rows(path, origin)
     try:
-        about = read_units(path / UNITS, origin.fields, origin.sealed)
+        about = read_units(path / UNITS, origin.fields, origin.has_checksum)
     except FileError as error:
         raise unusable(path / UNITS, error) from None
     versions = {"conveyor_sim": __version__, "engine": origin.fields["engine"], "sources": origin.fields[VERSION]}
     rows = [_as_asked(row, about.asked) for row in rows]
     try:
         study = read_file(path / SOURCE, 8 * MB).decode() if origin.text is None else origin.text
-        found = Results(study, about.path, about.units, about.parameters, versions, rows, origin.warm_up, origin.sealed)
+        found = Results(
+            study, about.path, about.units, about.parameters, versions, rows, origin.warm_up, origin.has_checksum
+        )
         return _fitting(found)
     except (FileError, ValueError, SceneError) as error:
         reason = error if isinstance(error, FileError) else "does not fit the runs beside it"
@@ -124,7 +126,7 @@ def _fitting(results: Results) -> Results:
     return results
 
 
-def _as_asked(row: Row, asked: Mapping[str, str]) -> Row:
+def _as_asked(row: RunRow, asked: Mapping[str, str]) -> RunRow:
     """With the metrics of today; NaN: the run was made before it was asked for this one."""
     if row.status != "finished":
         return row
@@ -190,7 +192,7 @@ def _table(results: Results) -> Any:
         WARM_UP: results.warm_up,
     }
     made = pyarrow.Table.from_arrays([column for column, _ in columns.values()], schema=pyarrow.schema(fields))
-    about[SEAL] = _digest(about, made.to_pylist())
+    about[CHECKSUM] = _digest(about, made.to_pylist())
     return made.replace_schema_metadata({METADATA: json.dumps(about)})
 
 
@@ -204,7 +206,7 @@ def _of_parquet(path: Path) -> Results:
         content = read_file(path, MOST)
         table = parquet.read_table(BufferReader(content))
         about = parsed(table.schema.metadata[METADATA.encode()])
-        digest, rows = about.pop(SEAL, None), table.to_pylist()
+        digest, rows = about.pop(CHECKSUM, None), table.to_pylist()
         if digest is not None and digest != _digest(about, rows):
             raise StudyError(f"{path}: its checksum does not fit, {expected}")
         kept = {name: about[name] for name in ("study", "path", "units", "parameters", "versions")}
@@ -227,7 +229,7 @@ def _digest(about: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def _row(values: Mapping[str, Any], about: Mapping[str, Any]) -> Row:
+def _row(values: Mapping[str, Any], about: Mapping[str, Any]) -> RunRow:
     """Return the run of one table row. Raises ValueError or KeyError for values of other types."""
     kept = ("point", "seed", "status", "error", *FIXED_UNITS, "bag")
     finished = values["status"] == "finished"

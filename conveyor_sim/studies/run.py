@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from conveyor_sim.bag.outputs import Outputs
+from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.errors import BagError, ConveyorError, StudyError
 from conveyor_sim.line.commands.inputs import Input
@@ -23,7 +23,7 @@ from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.studies.gauges import Averaged, Gauge, half_width
 from conveyor_sim.studies.line_of import controller_of, scene_of
-from conveyor_sim.studies.row import BAGS, Job, Row, Status
+from conveyor_sim.studies.row import BAGS, Job, RunRow, Status
 from conveyor_sim.studies.setup import Setup
 from conveyor_sim.support.printable import SENTENCE, printable
 
@@ -43,10 +43,10 @@ class Work:
     """Folder of the study, for recordings; None: no recordings."""
 
 
-def make_row(work: Work) -> Row:
+def make_row(work: Work) -> RunRow:
     """Make a run and return its row; a failure is recorded in the row."""
     job, clock = work.job, _Clock()
-    row = Row(job.point, job.seed, dict(job.parameters), "failed", asked=work.setup.asked)
+    row = RunRow(job.point, job.seed, dict(job.parameters), "failed", asked=work.setup.asked)
     try:
         work.setup.require_same_versions()
     except StudyError as error:  # of this process, not of the run
@@ -102,7 +102,7 @@ def warm_start(work: Work) -> bytes:
         return path.read_bytes()
 
 
-def simulate(work: Work, bag: Path | None, clock: _Clock | None = None) -> Row:
+def simulate(work: Work, bag: Path | None, clock: _Clock | None = None) -> RunRow:
     """Simulate one run, recorded to `bag` unless None. Raise any exception of the run, after closing the recording."""
     study, job = work.setup.study, work.job
     scene = scene_of(work.setup, job.parameters, job.seed)
@@ -113,7 +113,7 @@ def simulate(work: Work, bag: Path | None, clock: _Clock | None = None) -> Row:
     keep_start = None if work.start is None else simulation.save
     recorder = None if bag is None else Recorder(bag, start=keep_start)
     try:
-        outputs = Outputs(simulation, [recorder] if recorder else [], run_id=uuid.uuid4().hex)
+        outputs = OutputWriter(simulation, [recorder] if recorder else [], run_id=uuid.uuid4().hex)
         if work.start is not None:
             simulation.take_events()  # of the warm start
         outputs.start()
@@ -143,7 +143,7 @@ def simulate(work: Work, bag: Path | None, clock: _Clock | None = None) -> Row:
     finally:
         if recorder is not None:
             recorder.close()
-    return Row(
+    return RunRow(
         job.point,
         job.seed,
         dict(job.parameters),
@@ -168,7 +168,7 @@ def begun(scene: Scene, start: Path | bytes | None) -> Simulation:
         return Simulation.load(path, threads=1, scene=scene)
 
 
-def make_tick(simulation: Simulation, scans: ScanLoop, outputs: Outputs | None) -> None:
+def make_tick(simulation: Simulation, scans: ScanLoop, outputs: OutputWriter | None) -> None:
     """Make one tick of a run, with a scan of its controller."""
     scans.before_tick(outputs)
     simulation.advance(1)

@@ -10,10 +10,10 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, Field, FiniteFloat, ValidationError
 
-from conveyor_sim.studies.origin import WARM_UP, Origin, read_study_json
-from conveyor_sim.studies.row import Job, Row, Status
+from conveyor_sim.studies.origin import WARM_UP, StudyOrigin, read_study_json
+from conveyor_sim.studies.row import Job, RunRow, Status
+from conveyor_sim.support.checked_json import CheckedJson, with_checksum
 from conveyor_sim.support.files import FileError
-from conveyor_sim.support.sealed_json import Kept, sealed
 
 RUNS = "runs"
 MADE_WITH = "made_with"
@@ -23,7 +23,7 @@ _Seconds = Annotated[FiniteFloat, Field(ge=0.0)]
 
 
 class _Row(BaseModel, strict=True, extra="forbid"):
-    """The types of a `Row` in a file; metrics may be NaN or infinite."""
+    """The types of a `RunRow` in a file; metrics may be NaN or infinite."""
 
     point: Annotated[int, Field(ge=0, lt=2**63)]
     seed: Annotated[int, Field(ge=0, lt=2**64)]
@@ -40,14 +40,14 @@ class _Row(BaseModel, strict=True, extra="forbid"):
     bag: str
 
 
-def name_of(job: Job | Row) -> str:
+def name_of(job: Job | RunRow) -> str:
     """Return the name of the file of a run, below the folder of the study."""
     return f"{RUNS}/point_{job.point}_seed_{job.seed}.json"
 
 
-def content_of(row: Row, made_with: Mapping[str, Any]) -> bytes:
+def content_of(row: RunRow, made_with: Mapping[str, Any]) -> bytes:
     """Return the content of the file of a run. made_with: as `made_with` returns it."""
-    return sealed({**json.loads(json.dumps(asdict(row), default=str)), MADE_WITH: dict(made_with)})
+    return with_checksum({**json.loads(json.dumps(asdict(row), default=str)), MADE_WITH: dict(made_with)})
 
 
 def made_with(fields: Mapping[str, str], warm_up: float | None) -> dict[str, Any]:
@@ -55,12 +55,12 @@ def made_with(fields: Mapping[str, str], warm_up: float | None) -> dict[str, Any
     return {**fields, **({} if warm_up is None else {WARM_UP: warm_up})}
 
 
-def row_of(data: Mapping[str, Any]) -> Row:
+def row_of(data: Mapping[str, Any]) -> RunRow:
     """Return a row from plain data. Raises ValueError (pydantic's) for data of other types."""
-    return Row(**dict(_Row.model_validate(dict(data))))
+    return RunRow(**dict(_Row.model_validate(dict(data))))
 
 
-def read_row(folder: Path, file: Path) -> tuple[Row, Kept]:
+def read_row(folder: Path, file: Path) -> tuple[RunRow, CheckedJson]:
     """Return a run and the content of its file, with its field MADE_WITH.
 
     Raises FileError for a file that is damaged, or has the name of another run.
@@ -72,7 +72,7 @@ def read_row(folder: Path, file: Path) -> tuple[Row, Kept]:
     except ValidationError as error:
         where = ".".join(map(str, error.errors(include_url=False)[0]["loc"]))
         raise FileError(f"{where}: is not as conveyor_sim writes it") from None
-    if kept.sealed is not isinstance(kept.data.get(MADE_WITH), dict):
+    if kept.has_checksum is not isinstance(kept.data.get(MADE_WITH), dict):
         raise FileError("does not say what it was made with")
     if file.relative_to(folder).as_posix() != name_of(row):
         raise FileError(f"holds the run of point {row.point} with seed {row.seed}")
@@ -81,11 +81,11 @@ def read_row(folder: Path, file: Path) -> tuple[Row, Kept]:
     return row, kept
 
 
-def objection(row: Row, kept: Kept, origin: Origin) -> str:
+def objection(row: RunRow, kept: CheckedJson, origin: StudyOrigin) -> str:
     """Return why a run is not one of a folder, in words that follow its file, "" if it is one."""
-    if kept.sealed is not origin.sealed:
-        return "has no checksum" if origin.sealed else "has a checksum, which study.json has not"
-    if not kept.sealed:
+    if kept.has_checksum is not origin.has_checksum:
+        return "has no checksum" if origin.has_checksum else "has a checksum, which study.json has not"
+    if not kept.has_checksum:
         return ""
     fields = dict(kept.data[MADE_WITH])
     warm_up = fields.pop(WARM_UP, None)

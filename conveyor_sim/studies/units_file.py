@@ -34,7 +34,7 @@ def read_units(file: Path, fields: Mapping[str, str], sealed: bool) -> Units:
     """
     kept = read_study_json(file)
     made = kept.data.pop(MADE_WITH, None)
-    if kept.sealed is not sealed:
+    if kept.has_checksum is not sealed:
         raise FileError("has no checksum" if sealed else f"has a checksum, which {ORIGIN} has not")
     if sealed and not (isinstance(made, dict) and fields.items() <= made.items()):
         raise FileError("was made with another study")

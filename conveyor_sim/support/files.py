@@ -43,18 +43,18 @@ def read_file(path: Path, most: int, folder: Path | None = None) -> bytes:
     Raises FileError.
     """
     try:
-        found = os.open(_in_folder(path, folder), os.O_PATH | os.O_CLOEXEC)
+        descriptor = os.open(_in_folder(path, folder), os.O_PATH | os.O_CLOEXEC)
         try:
-            _require_below(found, folder)
-            entry = os.fstat(found)
+            _require_below(descriptor, folder)
+            entry = os.fstat(descriptor)
             if not stat.S_ISREG(entry.st_mode):
                 raise FileError(_KINDS.get(stat.S_IFMT(entry.st_mode), "is not a regular file"))
             # Some regular files of the kernel wait for news, without O_NONBLOCK.
-            with open(os.open(_of(found), os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as stream:
+            with open(os.open(_of(descriptor), os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as stream:
                 # It may grow while it is read.
                 content = b"" if entry.st_size > most else (stream.read(most + 1) or b"")
         finally:
-            os.close(found)
+            os.close(descriptor)
     except FileNotFoundError:
         raise FileError("no such file") from None
     except (OSError, ValueError) as error:

@@ -14,13 +14,13 @@ VECTORS = ("avx512f", "avx2", "sse4_2")
 
 
 def machine(packages: Sequence[str] = PACKAGES) -> str:
-    """Processor, cores, system and versions, in one line; packages that aren't there are left out."""
+    """Return processor, cores, system and versions of installed packages, in one line."""
     lines = Path("/proc/cpuinfo").read_text().splitlines()
     facts = {key.strip(): value.strip() for key, _, value in (line.partition(":") for line in lines)}
     flags = facts.get("flags", "").split()
     vector = next((name for name in VECTORS if name in flags), "no vector units")
     processor = f"{facts.get('model name', platform.machine())} (family {facts.get('cpu family')}, {vector})"
-    versions = ", ".join(f"{name} {found}" for name in packages if (found := installed(name)))
+    versions = ", ".join(f"{name} {number}" for name in packages if (number := installed(name)))
     return (
         f"{processor}, {len(os.sched_getaffinity(0))} cores, Linux {platform.release().split('-')[0]}, "
         f"CPython {platform.python_version()}, {versions}"
@@ -28,7 +28,7 @@ def machine(packages: Sequence[str] = PACKAGES) -> str:
 
 
 def installed(package: str) -> str:
-    """Its version, "" if it isn't there."""
+    """Return the version of a package, "" if it is not installed."""
     try:
         return version(package)
     except PackageNotFoundError:

@@ -186,28 +186,28 @@ def _rows(path: str, reader: Iterable[list[str]]) -> list[Row]:
 def _parsed(where: str, cells: list[str]) -> Row:
     if len(cells) != len(_COLUMNS):
         raise MapError(f"{where}: {len(cells)} columns given, expected {len(_COLUMNS)}: {', '.join(_COLUMNS)}")
-    given = dict(zip(_COLUMNS, cells, strict=True))
+    values = dict(zip(_COLUMNS, cells, strict=True))
     for column, allowed in _CHOICES.items():
-        if given[column] not in allowed:
-            raise MapError(f"{where}: {column} {printable(given[column])} given, expected one of {', '.join(allowed)}")
+        if values[column] not in allowed:
+            raise MapError(f"{where}: {column} {printable(values[column])} given, expected one of {', '.join(allowed)}")
     numbers: dict[str, float] = {}
     for column in ("low", "high"):
         try:
-            numbers[column] = float(given[column])
+            numbers[column] = float(values[column])
         except ValueError:
-            raise MapError(f"{where}: {column} {printable(given[column])} given, expected a number") from None
-    kind: Type = given["type"]  # type: ignore[assignment]
+            raise MapError(f"{where}: {column} {printable(values[column])} given, expected a number") from None
+    kind: Type = values["type"]  # type: ignore[assignment]
     most = MOST_ADDRESSES - WORDS[kind]
-    address = given["address"]
+    address = values["address"]
     if not (address.isascii() and address.isdigit() and len(address) <= 5 and int(address) <= most):
         raise MapError(f"{where}: address {printable(address)} given, expected a whole number from 0 to {most}")
-    bits = given["table"] in ("coil", "discrete input")
+    bits = values["table"] in ("coil", "discrete input")
     if bits != (kind == "bool"):
         expected = "bool" if bits else f"one of {', '.join(_FORMATS)}"
-        raise MapError(f"{where}: type {kind} given, expected {expected}: a {given['table']}")
-    if not given["name"]:
+        raise MapError(f"{where}: type {kind} given, expected {expected}: a {values['table']}")
+    if not values["name"]:
         raise MapError(f"{where}: name is empty, expected that of a tag")
-    return Row(**{**given, "address": int(address), **numbers})  # type: ignore[arg-type]
+    return Row(**{**values, "address": int(address), **numbers})  # type: ignore[arg-type]
 
 
 _CHOICES: dict[str, tuple[str, ...]] = {

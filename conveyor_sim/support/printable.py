@@ -13,8 +13,8 @@ def printable(text: object, most: int = MOST) -> str:
     Printable text is unchanged, so a second call changes nothing.
     """
     # Cut before it is escaped, too: a text of megabytes is not walked through.
-    given = str(text)[: most + 1]
-    shown = given if given.isprintable() else "".join(map(_escaped, given))
+    head = str(text)[: most + 1]
+    shown = head if head.isprintable() else "".join(map(_escaped, head))
     return shown if len(shown) <= most else f"{shown[: most - 1]}…"
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from conveyor_sim.bag.input_log import InputLog, copier
-from conveyor_sim.bag.outputs import Outputs
+from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.control.scan import ALARMS, ControlError, Controller
 from conveyor_sim.errors import CommandError, SimulationError
@@ -81,7 +81,9 @@ class Scenario(AbstractContextManager["Scenario"]):
         """Sentence about that failure."""
         self._read: dict[str, None] = {}
         self._recorder = None if bag is None else Recorder(bag, start=copier(start))
-        self._outputs = Outputs(self.simulation, [self._recorder] if self._recorder else [], run_id=uuid.uuid4().hex)
+        self._outputs = OutputWriter(
+            self.simulation, [self._recorder] if self._recorder else [], run_id=uuid.uuid4().hex
+        )
         began = self._began = None if start is None else Path(start)
         if began is not None:
             self.simulation.take_events()  # of the run before the checkpoint

@@ -28,7 +28,7 @@ with while_importing():
     from conveyor_sim.accuracy.report.forecast import foretold
     from conveyor_sim.accuracy.report.lines import three_lines
     from conveyor_sim.accuracy.report.tables import markdown
-    from conveyor_sim.accuracy.results import Study
+    from conveyor_sim.accuracy.results import AccuracyStudy
     from conveyor_sim.physics.timestep.presets import table
     from conveyor_sim.scene import load_scene
 
@@ -52,7 +52,7 @@ KEPT = ("*.csv", "study.json", "pareto.png", "stiffness.png", "scene.yaml", TABL
 
 
 def scene_file(name: str) -> Path:
-    """The scene's file; glass of a tenth of the stiffness is made from glass_line."""
+    """Return the scene's file; glass of a tenth of the stiffness is derived from glass_line."""
     if name != "glass_line_1e7":
         return Path("config") / f"{name}.yaml"
     file = Path("docs") / "accuracy" / name / "scene.yaml"
@@ -86,7 +86,7 @@ def keep_only_what_the_page_shows(folder: Path) -> None:
 
 
 def page(text: str) -> str:
-    """The page with its tables made anew from the studies in docs/accuracy/; ValueError without a marker."""
+    """Return the page with its tables renewed from the studies in docs/accuracy/. Raise ValueError without a marker."""
     studies = {name: of_today(name) for name in studied()}
     parts = {"presets": table(), "answers": answers(studies)}
     parts |= {name: section(name) for name in studies}
@@ -94,31 +94,31 @@ def page(text: str) -> str:
 
 
 def section(name: str) -> str:
-    """The picture, and where all tables are."""
+    """Return the figure, and the place of all tables."""
     return f"![What accuracy costs on {name}](accuracy/{name}/pareto.png)\n\n[All tables](accuracy/{name}/{TABLES})"
 
 
 def tables() -> dict[Path, str]:
-    """The page of tables of each study."""
+    """Return the page of tables of each study."""
     pages = {name: markdown(of_today(name)).replace("### ", "## ") for name in studied()}
     return {FOLDER / name / TABLES: f"# The study of {name}\n\n{page}" for name, page in pages.items()}
 
 
 def studied() -> list[str]:
-    """The scenes whose studies are there."""
+    """Return the scenes with a stored study."""
     return [name for name in SCENES if (FOLDER / name / STUDY).exists()]
 
 
-def of_today(name: str) -> Study:
-    """A study with the errors that are predicted now, and the answer that follows: they are computed, not measured."""
+def of_today(name: str) -> AccuracyStudy:
+    """Return a study with present predictions and the resulting answer, which are computed, not measured."""
     study, scene = read_study(FOLDER / name / STUDY, print), load_scene(ROOT / scene_file(name))
     points = tuple(foretold(scene, point) for point in study.points)
     answer = find_answer(points, study.reference, study.comparisons, study.tolerance, study.rest)
     return replace(study, points=points, answer=answer)
 
 
-def answers(studies: dict[str, Study]) -> str:
-    """The first three lines of each scene's answer, and the setting."""
+def answers(studies: dict[str, AccuracyStudy]) -> str:
+    """Return the first three lines of each scene's answer, and the setting."""
     parts = []
     for name, study in studies.items():
         setting = "none" if study.answer is None else f"`{line(study.answer.setting)}`"

@@ -1,10 +1,10 @@
-"""What a point under bottles leaves out beside a ring, on shipped scenes: scuffing and flow.
+"""Effect of a ring under bottles, compared with a point, on shipped scenes: scuffing and flow.
 
     python docs/studies/base_radius.py        (about 10 minutes; writes base_radius.csv beside itself)
 
-Each scene runs with bottles that stand on a point and on rings of some shares of their radius, over seeds of its
+Each scene runs with bottles that stand on a point and on rings of some fractions of their radius, over seeds of its
 infeeds. `rails J` is the sliding work at the rails, `walls J` that at the walls of the bottles (by rails and by other
-bottles), both over the bottles that came; `out` is how many left in the second half of the run. What a ring costs is
+bottles), both per entered bottle; `out` is the number that left in the second half of the run. The cost of a ring is
 measured by `conveyor-sim explain SCENE --price` on the scene with base_radius.
 """
 

@@ -1,8 +1,8 @@
-"""How evenly the exit of the paper's plant flows, over guide angles, table speeds, time steps and integrators.
+"""Regularity of the exit flow of the paper's plant, over guide angles, table speeds, time steps and integrators.
 
     python docs/studies/exit_flow.py        (about 3 minutes; writes exit_flow.csv beside itself)
 
-Counts the bottles that come onto bend_1, the first belt of the single file, in every 5 s of 50 s.
+The study counts the bottles that come onto bend_1, the first belt of the single file, in every 5 s of 50 s.
 """
 
 import csv

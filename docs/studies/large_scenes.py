@@ -1,4 +1,4 @@
-"""What it costs to read a scene of very many bottles (docs/reliability.md): core time and memory, each in a process.
+"""Cost of reading a scene of very many bottles (docs/reliability.md): core time and memory, each in a process.
 
 python docs/studies/large_scenes.py
 """
@@ -27,7 +27,7 @@ CASES = (("listed", 10_000), ("listed", 100_000), ("listed", 300_000), ("in a gr
 
 
 def text_of(how: str, bottles: int) -> str:
-    """A scene of bottles in rows of COLUMNS."""
+    """Return a scene of bottles in rows of COLUMNS."""
     if how == "in a grid":
         rows = bottles // COLUMNS
         grid = (
@@ -40,7 +40,7 @@ def text_of(how: str, bottles: int) -> str:
 
 
 def measure(how: str, bottles: int) -> None:
-    """Reads one scene and prints what it took."""
+    """Read one scene and print the cost."""
     text = text_of(how, bottles)
     began, before = time.process_time(), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     try:

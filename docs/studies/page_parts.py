@@ -7,7 +7,7 @@ from pathlib import Path
 
 
 def with_parts(page: Path, text: str, parts: Mapping[str, str]) -> str:
-    """A page's text with every part in place of what stood between its markers; ValueError without them."""
+    """Return a page's text with each part between its markers replaced. Raise ValueError without them."""
     for name, part in parts.items():
         before, start, rest = text.partition(f"<!-- study: {name} -->\n")
         _, end, after = rest.partition(f"<!-- end: {name} -->")

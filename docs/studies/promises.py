@@ -43,7 +43,7 @@ SCENES = ROOT / "docs" / "accuracy" / "unseen"
 LATER_SCENES = ROOT / "docs" / "accuracy" / "unseen_later"
 
 INTEGRATORS = ("leapfrog", "semi_implicit_euler", "velocity_verlet", "rk4")
-"""Those that may be the default."""
+"""Integrators that may be the default."""
 
 TEXT = """# Promised, predicted and measured
 
@@ -94,7 +94,7 @@ def scene_files() -> Mapping[str, Path]:
 
 
 def measure(name: str) -> list[dict[str, Any]]:
-    """The rows of a scene; one that says why, if it can't be measured."""
+    """Return the rows of a scene; a row that states the reason if it can't be measured."""
     loaded = load_scene(scene_files()[name])
     scene = load_scene(scene_files()[name], {"duration": min(loaded.duration, LONGEST)})
     precision = WorkPrecision(scene)
@@ -124,7 +124,7 @@ def measure(name: str) -> list[dict[str, Any]]:
 
 
 def preset_settings(scene: Scene) -> dict[tuple[str, Preset], Setting]:
-    """The steps of every preset with every integrator that may be the default and can run the scene."""
+    """Return the steps of each preset with each integrator that may be the default and can run the scene."""
     settings = {}
     for integrator in INTEGRATORS:
         if integrator in compared(scene):
@@ -174,7 +174,7 @@ def measure_all(names: Sequence[str], processes: int) -> None:
 
 
 def predict_again(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """The rows as they were measured, with what is predicted of their settings today."""
+    """Return the measured rows with the present predictions of their settings."""
     scenes = {name: load_scene(file) for name, file in scene_files().items()}
     renewed = []
     for row in rows:
@@ -189,7 +189,7 @@ def predict_again(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
 
 
 def read() -> list[dict[str, Any]]:
-    """The rows there are."""
+    """Return the stored rows."""
     if not TABLE.exists():
         return []
     with TABLE.open(newline="", encoding="utf-8") as file:
@@ -206,7 +206,7 @@ def keep(rows: Sequence[Mapping[str, Any]]) -> None:
 
 
 def page() -> str:
-    """The page of both tables, from promises.csv."""
+    """Return the page of both tables, from promises.csv."""
     rows = read()
     later = [row for row in rows if row["scene"] in {file.stem for file in LATER_SCENES.glob("*.yaml")}]
     others = [row for row in rows if row not in later]
@@ -234,7 +234,7 @@ def _promises(rows: Sequence[Mapping[str, str]], names: Sequence[str]) -> str:
 
 
 def _predictions(rows: Sequence[Mapping[str, str]]) -> str:
-    """How many settings of each integrator are predicted well, and those that are not by far; presets may share one."""
+    """Return the number of well-predicted settings by integrator, and the settings with large deviations."""
     settings = {(row["scene"], row["integrator"], row["steps"]): row for row in rows if _touched(row)}
     lines = ["| integrator | settings | as predicted | better | worse |", "| --- | ---: | ---: | ---: | ---: |"]
     off = {key: float(row["impacts"]) / float(row["impacts_predicted"]) for key, row in settings.items()}
@@ -261,7 +261,7 @@ def _verdict(row: Mapping[str, str]) -> str:
 
 
 def _touched(row: Mapping[str, str]) -> bool:
-    """Whether there was a force to err in; bottles on a line in good order do not touch."""
+    """Return True if there was a force with an error; bottles on a regular line do not touch."""
     return bool(row["impacts"]) and float(row["impacts"]) > 0.0
 
 

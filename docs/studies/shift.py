@@ -64,7 +64,7 @@ def main() -> None:
 
 
 def write(name: str, heads: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    """A CSV file beside this one."""
+    """Write a CSV file beside this one."""
     with (HERE / name).open("w", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(heads)

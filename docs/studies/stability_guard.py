@@ -1,6 +1,6 @@
-"""What the guard costs: its share of the time that ticks take, on some scenes.
+"""Cost of the guard: its share of the time of ticks, on some scenes.
 
-The parts are timed within one run, so the share hardly depends on what else the machine does.
+The parts are timed within one run, so the share hardly depends on the load of the machine.
 """
 
 import csv

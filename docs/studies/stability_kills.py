@@ -54,7 +54,7 @@ def measure(path: Path, kills: int = KILLS) -> None:
 
 
 def _kill(folder: Path, pace: str, wall: float) -> tuple[str, ...]:
-    """Starts a recording, kills it after some wall time, repairs and replays it."""
+    """Start a recording, kill it after some wall time, repair and replay it."""
     log, bag = folder / "ticks", folder / "bag"
     process = subprocess.Popen([sys.executable, __file__, "--record", str(bag), str(log), pace])
     try:
@@ -89,7 +89,7 @@ def _kill(folder: Path, pace: str, wall: float) -> tuple[str, ...]:
 
 
 def _record(bag: Path, log: Path, pace: str) -> None:
-    """What is killed: a run as `conveyor-sim run` makes it, which notes every tick."""
+    """Record until killed: a run as in `conveyor-sim run`, which logs every tick."""
     scene = load_scene(scene_path(SCENE), {"duration": 3600.0})
     file = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
     first: float | None = None

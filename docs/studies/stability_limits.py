@@ -1,7 +1,7 @@
-"""How long a step may be: the largest that is stable, over the bound that the time step is chosen by.
+"""Largest stable step over the bound by which the time step is chosen.
 
-Each scene is held by one bound of stability. Where the bound is half of a limit in closed form, a method that is as
-stable as the closed form has a ratio of 2.
+Each scene is limited by one stability bound. If the bound is half of a limit in closed form, a method as stable as the
+closed form has a ratio of 2.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.progress import ProgressBar
 
 STEPS = 4000
-"""That a run must get through."""
+"""Steps that a run must complete."""
 LEAST, MOST, CLOSE = 0.5, 12.0, 1.02
 """Ratios that are looked between, and how close to the largest. Far beyond MOST, steps outrun the lists."""
 SLIPS, LOOKS = 0.1, 16
@@ -36,7 +36,7 @@ SLIPS, LOOKS = 0.1, 16
 
 R, MASS, STIFFNESS = 0.033, 0.35, 1e5
 SQUEEZE = 0.01
-"""Of a radius, by which contacts are closed that must stay closed."""
+"""Initial overlap of contacts that must stay closed, as a fraction of a radius."""
 AWAY = 5.0
 """m, where bottles begin that no scene lets begin where they are put."""
 
@@ -75,7 +75,7 @@ class Held:
         return parse_scene(json.dumps(with_annex(fields)), self.name)
 
     def predicted(self) -> Bound:
-        """The bound of stability that the scene is about."""
+        """Return the stability bound that the scene tests."""
         bounds = build_model(self.scene("semi_implicit_euler")).bounds
         found = [bound for bound in bounds if bound.stability and bound.name.startswith(self.bound)]
         if not found:
@@ -109,7 +109,7 @@ SIDE = 6
 
 
 def packing() -> dict[str, Any]:
-    """A rhombus of rails that is a little too small for its hexagonal packing."""
+    """Return a rhombus of rails that is slightly too small for its hexagonal packing."""
     r, root = R * (1.0 - SQUEEZE), math.sqrt(3.0)
     low, high = -r, (SIDE - 1) * root * r + r
 
@@ -137,7 +137,7 @@ def put_into_packing(simulation: Simulation) -> None:
 
 
 def on_belt() -> dict[str, Any]:
-    """A bottle set down on a belt."""
+    """Return a bottle set down on a belt."""
     belt = {"kind": "straight", "start": [-1, -1], "angle": 0, "length": 50, "width": 2, "speed": 0.3,
             "material": "chain"}  # fmt: skip
     base = [{"between": ["glass", "chain"], "friction": 0.3}]
@@ -145,23 +145,23 @@ def on_belt() -> dict[str, Any]:
 
 
 def spinning() -> dict[str, Any]:
-    """A bottle that spins while a belt presses it against a stop: rolled along it, then held."""
+    """Return a spinning bottle that a belt presses against a stop: it rolls along the stop, then stays."""
     stop = {"kind": "segment", "from": [R, -1], "to": [R, 1], "material": "steel"}
     return {**on_belt(), "bottles": [{"type": "half_litre", "position": [0, 0], "spin": 10}], "rails": {"stop": stop}}
 
 
 def speed(bottles: BottleColumns) -> float:
-    """Of the only bottle, m/s."""
+    """Return the speed of the only bottle, m/s."""
     return float(np.hypot(bottles.vx, bottles.vy)[0])
 
 
 def on_the_belt(bottles: BottleColumns) -> float:
-    """Of the only bottle on the belt of 0.3 m/s, m/s."""
+    """Return the speed of the only bottle relative to the belt of 0.3 m/s, m/s."""
     return float(np.hypot(bottles.vx - 0.3, bottles.vy)[0])
 
 
 def at_the_stop(bottles: BottleColumns) -> float:
-    """Of the rim of the only bottle at the stop on its right, m/s."""
+    """Return the rim speed of the only bottle at the stop on its right, m/s."""
     return float(np.abs(bottles.vy + R * bottles.omega)[0])
 
 
@@ -177,7 +177,7 @@ SCENES = (
 
 
 def why_unstable(held: Held, integrator: str, dt: float) -> str:
-    """What goes wrong in steps of dt (s); empty if nothing does."""
+    """Return the failure in steps of dt (s); empty if the run is stable."""
     tick = max(1, round(dt * 1e9)) * 1e-9
     simulation = Simulation(held.scene(integrator, round(tick, 9)), threads=1, shorten=False)
     if held.put is not None:
@@ -198,7 +198,7 @@ def _next(simulation: Simulation, slip: Callable[[BottleColumns], float]) -> flo
 
 
 def largest(held: Held, integrator: str, bound: float) -> float:
-    """The largest stable step over the bound (s): 0 below LEAST, infinite above MOST."""
+    """Return the largest stable step over the bound (s): 0 below LEAST, infinite above MOST."""
     if why_unstable(held, integrator, LEAST * bound):
         return 0.0
     if not why_unstable(held, integrator, MOST * bound):

@@ -31,15 +31,15 @@ from conveyor_sim.scene.accuracy import INTEGRATOR_NAMES
 from conveyor_sim.support.progress import ProgressBar
 
 WORK = 1.5e7
-"""Of one run, about a second: ticks times TICK, and steps times (bottles + BESIDE) times STEP_COST."""
+"""Work of one run, about a second: ticks times TICK, and steps times (bottles + BESIDE) times STEP_COST."""
 TICK, BESIDE = 3000, 20
 AT_ALL = 20.0
-"""Of WORK: what a single tick would take more than is not run."""
+"""Limit of the work of a single tick, as a multiple of WORK; a run above it is left out."""
 AGAIN = 0.1
-"""Of a run's work that is repeated on two threads."""
+"""Share of a run's work that is repeated on two threads."""
 
 SAFE = ("overlap", "speed", "lost", "tunnelled")
-"""What a run must keep below its greatest value, however early it ended."""
+"""Observables that a run must keep below their limits, however early it ended."""
 
 COLUMNS = (
     "row", "effects", "integrator", "preset", "verdict", "steps_per_tick", "simulated", "of", "overlap", "residual",
@@ -49,7 +49,7 @@ COLUMNS = (
 """`verdict`: kept, kept so far, broken, limit, refused, not run; `said`: why; `two_threads`: same, differs."""
 
 SOURCES = f"{ENGINE_HASH}+{sources_hash()}"
-"""What decides a run beside its row."""
+"""Versions that decide a run, beside its row."""
 
 
 @dataclass(frozen=True)
@@ -63,12 +63,12 @@ class Job:
 
     @property
     def key(self) -> tuple[str, str, str, str]:
-        """What distinguishes it from all others."""
+        """Return the key of this job."""
         return self.row, self.effects, self.integrator, self.preset
 
 
 def jobs(cases: Sequence[Case]) -> Iterator[Job]:
-    """The whole matrix, in the order of the table."""
+    """Yield all jobs in the order of the table."""
     for case in cases:
         for effects in case.variants:
             for integrator in case.integrators or _integrators(case):
@@ -111,7 +111,7 @@ def make(job: Job) -> dict[str, Any]:
 
 
 def again(line: dict[str, Any]) -> str:
-    """The beginning of a run once more, on two threads: `same`, `differs`, or nothing where there is none."""
+    """Repeat the beginning of a run on two threads: `same`, `differs`, or empty if there is none."""
     if not line["hash"]:
         return ""
     case, ticks = _cases()[line["row"]], int(line["hash_at"])
@@ -149,13 +149,13 @@ def _cases() -> dict[str, Case]:
 
 
 def stamp(row: str) -> str:
-    """Of the present sources and of what the table says in a row; empty for one that it has not."""
+    """Return a hash of the present sources and of the table's row; empty for an unknown row."""
     case = _cases().get(row)
     return "" if case is None else f"{SOURCES}+{hashlib.blake2b(repr(case).encode(), digest_size=4).hexdigest()}"
 
 
 def read(path: Path) -> list[dict[str, Any]]:
-    """The lines of the present sources and rows; none where there is no file."""
+    """Return the lines of the present sources and rows; none without a file."""
     if not path.exists():
         return []
     with path.open(newline="", encoding="utf-8") as file:

@@ -57,7 +57,7 @@ LONG = ("ten_thousand", "paper_plant", "thousands")
 
 
 def read(path: Path) -> list[Line]:
-    """A CSV file; nothing where there is none."""
+    """Read a CSV file; no lines if it doesn't exist."""
     if not path.exists():
         return []
     with path.open(newline="", encoding="utf-8") as file:
@@ -65,7 +65,7 @@ def read(path: Path) -> list[Line]:
 
 
 def page(text: str, folder: Path) -> str:
-    """The page with its tables made anew from a folder of studies; ValueError without a marker."""
+    """Return the page with its tables renewed from a folder of studies. Raise ValueError without a marker."""
     matrix = read(folder / "matrix.csv")
     parts = {
         "summary": summary(matrix, folder),
@@ -78,13 +78,13 @@ def page(text: str, folder: Path) -> str:
 
 
 def cases(folder: Path) -> str:
-    """The page of all cases: how each came out, and what was not kept."""
+    """Return the page of all cases: result of each, and broken promises."""
     matrix = read(folder / "matrix.csv")
     return f"{CASES}{rows(matrix)}\n\n## Not kept, not run or refused\n\n{exceptions(matrix)}\n"
 
 
 def kills(lines: Sequence[Line]) -> str:
-    """What recordings that were killed lost, by pace."""
+    """Return the losses of killed recordings, by pace."""
     if not lines:
         return "Not measured yet."
     table = ["| pace | kills | lost, s of wall time: median | at most | replays to the same bits |"]
@@ -98,7 +98,7 @@ def kills(lines: Sequence[Line]) -> str:
 
 
 def guard(lines: Sequence[Line]) -> str:
-    """What the guard costs."""
+    """Return the cost of the guard."""
     if not lines:
         return "Not measured yet."
     table = [f"| {' | '.join(lines[0])} |", f"| --- |{' ---: |' * (len(lines[0]) - 1)}"]
@@ -106,7 +106,7 @@ def guard(lines: Sequence[Line]) -> str:
 
 
 def summary(matrix: Sequence[Line], folder: Path) -> str:
-    """How many runs came out how, by integrator, and on what machine."""
+    """Return the number of runs by result and integrator, and the machine."""
     lines = [f"| | {' | '.join(MARKS)} | same on two threads |", f"| --- |{' ---: |' * (len(MARKS) + 1)}"]
     for integrator in INTEGRATOR_NAMES:
         mine = [line for line in matrix if line["integrator"] == integrator]
@@ -120,7 +120,7 @@ def summary(matrix: Sequence[Line], folder: Path) -> str:
 
 
 def rows(matrix: Sequence[Line]) -> str:
-    """A table a family: the row, what is hard, and each integrator at the preset `standard`; measures folded away."""
+    """Return one table per family: row, difficulty, and each integrator at the preset `standard`; details folded."""
     parts = []
     families: dict[str, list[Case]] = {}
     for case in read_table():
@@ -139,7 +139,7 @@ def rows(matrix: Sequence[Line]) -> str:
 
 
 def _verdicts(lines: Sequence[Line]) -> str:
-    """Of all presets and effects: one word if they agree, else how many of each."""
+    """Return the result over all presets and effects: one word if they agree, else the number of each."""
     counts = Counter(line["verdict"] for line in lines)
     if len(counts) == 1:
         return MARKS[next(iter(counts))]
@@ -147,7 +147,7 @@ def _verdicts(lines: Sequence[Line]) -> str:
 
 
 def _measured(lines: Sequence[Line]) -> str:
-    """What was measured, folded away."""
+    """Return the measurements, folded."""
     out = ["", "<details><summary>What was measured</summary>", ""]
     out.append("| row | effects | integrator | preset | verdict | s | overlap | residual | drift (m) | chatter |")
     out.append("| --- | --- | --- | --- | --- | ---: | ---: | ---: | ---: | ---: |")
@@ -203,7 +203,7 @@ def _ratio(text: str) -> str:
 
 
 def hour(lines: Sequence[Line], denormals: Sequence[Line]) -> str:
-    """What became of an hour, and what rest costs."""
+    """Return the result of an hour, and the cost of rest."""
     out = []
     if lines:
         first, last = lines[0], lines[-1]
@@ -231,9 +231,9 @@ def hour(lines: Sequence[Line], denormals: Sequence[Line]) -> str:
 
 
 def picture(path: Path) -> None:
-    """The rows that overlap deepest and go on, each at its deepest tick, with the paper's integrator at `standard`.
+    """Draw the rows with the deepest overlaps of completed runs, each at its deepest tick, with the paper's integrator.
 
-    Without those that put bottles into each other from outside.
+    The preset is `standard`. Rows that insert bottles into each other are excluded.
     """
     silent = (case for case in read_table() if not (case.refused or case.stops or case.put))
     cases = [case for case in silent if case.name not in LONG]

@@ -77,7 +77,7 @@ outputs: {{bottles: 0.0, poses: 0.0, contacts: 0.0, belts: 0.0, signals: 0.0}}
 
 
 class Machine(NamedTuple):
-    """How often it fails, and how long repairs take."""
+    """Failure rate and repair time of a machine."""
 
     between_failures: float
     """s of running time, mean."""
@@ -117,13 +117,12 @@ def efficiency(first: Machine, second: Machine, rate: float, buffer: float) -> f
 
 
 def conveyor_efficiency(first: Machine, second: Machine, rate: float, holds: float, transport: float) -> float:
-    """The same where the buffer is a conveyor that holds so many bottles, and takes `transport` s from end to end.
+    """Return the efficiency for a conveyor as buffer, which holds `holds` bottles and needs `transport` s end to end.
 
-    rate x transport bottles are on their way whenever the line flows. They buffer nothing: the room that counts is what
-    is left. (Seen in a clock of the first machine that is late by `transport`, bottles arrive as they leave, and it is
-    blocked by what the second one took `transport` earlier. In that time the second one takes rate x transport bottles
-    at most, so the value is a lower bound; it is short of the truth only by what happens where both machines fail
-    within one such time.)
+    rate x transport bottles are in transit while the line flows. They buffer nothing: the free room counts. Seen in a
+    rate x transport bottles are in transit while the line flows. They buffer nothing: only free room counts. Seen in a
+    the second one took `transport` earlier. In that time the second one takes at most rate x transport bottles, so the
+    value is a lower bound. It deviates only if both machines fail within one such time.
     """
     return efficiency(first, second, rate, holds - rate * transport)
 
@@ -134,7 +133,7 @@ def transport(length: float) -> float:
 
 
 def line(length: float, first: Machine, second: Machine, seed: int) -> Scene:
-    """A conveyor of a length (m) between two machines."""
+    """Build a conveyor of a length (m) between two machines."""
     ways = {name: _breakdown(machine) for name, machine in (("first", first), ("second", second))}
     places = {"length": length, "whole": length + 0.2, "reach": length - REGION, "radius": RADIUS}
     return parse_scene(LINE.format(rate=RATE, speed=SPEED, seed=seed, **places, **ways))

@@ -27,7 +27,7 @@ Data = dict[str, Any]
 
 
 def unseen_scenes(numbers: Iterable[int] = FIRST) -> Mapping[str, Data]:
-    """The fields of each scene, by name."""
+    """Return the fields of each scene, by name."""
     scenes = [_scene(number) for number in numbers]
     return {scene["name"]: scene for scene in scenes}
 
@@ -73,7 +73,7 @@ def _contact(draw: Random, law: str, speed: float, other: str) -> Data:
 
 
 def _stopped_lane(draw: Random, radius: float, speed: float) -> Data:
-    """A lane one to two and a half bottles wide, with a stop at its end."""
+    """Return a lane one to two and a half bottles wide, with a stop at its end."""
     width, length = radius * draw.uniform(2.2, 5.0), radius * 40.0
     return {
         "belts": {"lane": _straight(length, width, speed)},
@@ -83,7 +83,7 @@ def _stopped_lane(draw: Random, radius: float, speed: float) -> Data:
 
 
 def _turn_table(draw: Random, radius: float, speed: float) -> Data:
-    """A disc with a rim over 300 degrees, at whose end a stop holds what is carried along it."""
+    """Return a disc with a rim over 300 degrees, at whose end a stop holds the bottles."""
     rim, stop = _round(radius * draw.uniform(9.0, 13.0)), math.radians(300.0)
     end = (rim * math.cos(stop), rim * math.sin(stop))
     scene = _disc(draw, rim, radius, speed, "300 deg", stop - 5.0 * radius / rim)
@@ -94,7 +94,7 @@ def _turn_table(draw: Random, radius: float, speed: float) -> Data:
 
 
 def _turn_table_without_end(draw: Random, radius: float, speed: float) -> Data:
-    """A disc with a rim all around, along which bottles go round and round."""
+    """Return a disc with a complete rim, along which bottles circulate."""
     return _disc(draw, _round(radius * draw.uniform(9.0, 13.0)), radius, speed, "360 deg", 0.0)
 
 
@@ -119,7 +119,7 @@ def _disc(draw: Random, rim: float, radius: float, speed: float, span: str, firs
 
 
 def _curved_lane(draw: Random, radius: float, speed: float) -> Data:
-    """A bend of 150 degrees in single file, closed at its end."""
+    """Return a bend of 150 degrees in single file, closed at its end."""
     inner, width = radius * draw.uniform(8.0, 12.0), radius * draw.uniform(2.2, 2.6)
     outer, middle, span = inner + width, inner + width / 2, math.radians(150.0)
     arc = {"kind": "arc", "centre": [0.0, 0.0], "start_angle": 0.0, "span": span, "material": "steel"}
@@ -157,7 +157,7 @@ def _hopper(draw: Random, radius: float, speed: float) -> Data:
 
 
 def _gate_lane(draw: Random, radius: float, speed: float) -> Data:
-    """A lane in single file before a gate that closes it, half-way along."""
+    """Return a single-file lane before a gate that closes it halfway along."""
     width, length = radius * draw.uniform(2.2, 2.8), radius * 60.0
     rails = {
         f"wall_{n}": {"kind": "segment", "from": [0.0, y], "to": [length, y], "material": "steel"}
@@ -261,7 +261,7 @@ _EXTRAS: Mapping[str, Callable[[Random, Data], None]] = {
 
 
 def write(folder: Path, numbers: Iterable[int] = FIRST) -> list[Path]:
-    """The scenes as files; returns their paths."""
+    """Write the scenes as files and return their paths."""
     folder.mkdir(parents=True, exist_ok=True)
     files = []
     for name, scene in unseen_scenes(numbers).items():

@@ -32,7 +32,7 @@ IMAGES = ROOT / "docs" / "images"
 MOMENT = 80
 """ms that a frame of a moving line stands: two frames of the page at 25 Hz."""
 QUALITY = 40
-"""Of WebP, for those."""
+"""Quality of WebP pictures."""
 FAILING = """
 from test_jam import check_wedge, too_late, wedged
 
@@ -56,7 +56,7 @@ class Studio:
 
     @contextmanager
     def page(self, html: Path, size: tuple[int, int]) -> Iterator[Any]:
-        """A page, ready to be looked at."""
+        """Yield a page that is completely loaded."""
         with self.opened(size) as page:
             page.goto(html.as_uri())
             page.wait_for_selector("body[data-told]")
@@ -64,13 +64,13 @@ class Studio:
 
     @contextmanager
     def opened(self, size: tuple[int, int]) -> Iterator[Any]:
-        """An empty page."""
+        """Yield an empty page."""
         page = self._browser.new_page(viewport={"width": size[0], "height": size[1]})
         yield page
         page.close()
 
     def bag(self, name: str) -> Path:
-        """The line of the tests (`line`, `other`), or a shipped scene."""
+        """Return the bag of a test line (`line`, `other`), or of a shipped scene."""
         bag = self.folder / "runs" / name
         if not bag.exists():
             bag.parent.mkdir(exist_ok=True)
@@ -81,18 +81,18 @@ class Studio:
         return bag
 
     def state(self, state: State) -> Path:
-        """The page of a state of the tests."""
+        """Return the page of a state of the tests."""
         html = self.folder / f"{state.of}.html"
         failures = [FailedCondition(22.0, "always: no more than 20 bottles")] if state.of == "failed" else []
         other = self.bag("stays_open") if state.of == "pair" else None
         return write_page(self.bag("closes_at_6_s"), html, failures=failures, other=other)
 
     def shipped(self, scene: str) -> Path:
-        """The page of a shipped scene."""
+        """Return the page of a shipped scene."""
         return write_page(self.bag(scene), self.folder / f"{scene}.html")
 
     def failure(self) -> Path:
-        """The page that pytest leaves of a test that fails."""
+        """Return the page that pytest writes for a failed test."""
         file = self.folder / "test_late.py"
         file.write_text(FAILING)
         command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--line-failures", "left", file.name]
@@ -102,7 +102,7 @@ class Studio:
 
 
 def still(name: str) -> Callable[[Studio], None]:
-    """A state of the tests."""
+    """Return a function that takes a picture of a state of the tests."""
 
     def make(studio: Studio) -> None:
         state = STATES[name]
@@ -117,20 +117,20 @@ def still(name: str) -> Callable[[Studio], None]:
 
 
 def grab(page: Any, found: str = "body") -> Image.Image:
-    """What is to be seen now."""
+    """Take a picture of the present view."""
     page.wait_for_timeout(60)
     return Image.open(io.BytesIO(page.locator(found).screenshot())).convert("RGB")
 
 
 def save(name: str, pictures: list[Image.Image], each: list[int] | int, **options: Any) -> None:
-    """An animated picture without end. each: ms."""
+    """Save an endless animation. each: ms per picture."""
     pictures[0].save(
         IMAGES / f"{name}.webp", save_all=True, append_images=pictures[1:], duration=each, loop=0, method=6, **options
     )
 
 
 def moving(name: str, scene: str, size: tuple[int, int], start: int, count: int, step: int) -> Callable[[Studio], None]:
-    """A shipped scene as it moves from a time (s) on, every so many frames of its page: the plan alone, with forces."""
+    """Return a function that records a shipped scene from a time (s) on, every `step` frames: the plan, with forces."""
 
     def make(studio: Studio) -> None:
         with studio.page(studio.shipped(scene), size) as page:
@@ -149,7 +149,7 @@ def moving(name: str, scene: str, size: tuple[int, int], start: int, count: int,
 
 
 def scrubbed(studio: Studio) -> None:
-    """A failed test: its page, from the beginning to the failure by the scrubber, back, and on to it frame by frame."""
+    """Record the page of a failed test: by the scrubber to the failure, back, and frame by frame."""
     pictures, each = [], []
     with studio.page(studio.failure(), (1024, 600)) as page:
         page.select_option("#colour", "force")
@@ -179,7 +179,7 @@ def scrubbed(studio: Studio) -> None:
 
 
 def live(studio: Studio) -> None:
-    """A line that runs, on which an operator has put a belt into manual and slowed it down."""
+    """Record a running line whose operator sets a belt to manual mode and slows it down."""
     keep_user(studio.folder / "users", "jo", new_user("operator", PASSWORD))
     scene = load_scene(LINE, {"duration": 3600.0})
     with (

@@ -1,4 +1,4 @@
-"""What holds of every line in these scenarios: the guard has nothing to say, and what presses harder is known."""
+"""Checks of every line in these scenarios: the guard reports nothing, and strong sustained forces are known."""
 
 from collections.abc import Iterator
 
@@ -13,7 +13,7 @@ BEYOND = {"buffer_lane", "two_stations", "zoned_line"}
 
 @pytest.fixture(autouse=True)
 def quiet(line: Lines) -> Iterator[None]:
-    """Looks at the lines of a test after it."""
+    """Check the lines of a test after it."""
     yield
     for scenario, _ in line.made:
         simulation, model = scenario.simulation, scenario.simulation.model

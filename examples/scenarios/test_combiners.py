@@ -24,7 +24,7 @@ SPAN = 60.0  # s, that are looked at
 
 @dataclass(frozen=True)
 class Result:
-    """What came of a span."""
+    """Result of a time span."""
 
     rate: float
     """1/s, of bottles that left."""
@@ -33,7 +33,7 @@ class Result:
 
 
 def with_pressure() -> Controller:
-    """The backlog before the rails is kept at 14 to 16 bottles."""
+    """Build a controller that keeps 14 to 16 bottles in the backlog before the rails."""
     backlog = Count("zones/backlog/bottles")
     return LevelControl(backlog, "lanes", "mass", 16, 14, feeder_speed=0.3, table_slow=0.25, table_fast=0.25)
 
@@ -44,13 +44,13 @@ def without_pressure() -> Controller:
 
 
 def speeds(slow: float, middle: float, discharge: float) -> Controller:
-    """Of the three belts side by side, m/s."""
+    """Build a controller with these speeds of the three parallel belts, m/s."""
     given = {"slow": slow, "middle": middle, "discharge": discharge}
     return Constant({f"belts/{belt}/cmd_speed": speed for belt, speed in given.items()})
 
 
 def run(plant: Scenario, controller: Controller) -> Result:
-    """A span of a line, once it runs as it will."""
+    """Run a time span of a line in its steady state."""
     plant.attach(controller)
     plant.run_for(FILL)
     removed = plant.simulation.counts.removed
@@ -69,12 +69,12 @@ def run(plant: Scenario, controller: Controller) -> Result:
 
 @pytest.fixture(scope="module")
 def pressed() -> Result:
-    """Of the line that presses."""
+    """Run the line that works under pressure."""
     return run(Scenario("scenarios/pressure_combiner"), with_pressure())
 
 
 def check(result: Result, pressed: Result) -> None:
-    """The scenario: the rate, at half the scuffing at most."""
+    """Check the scenario: the rate, at no more than half the scuffing."""
     assert result.rate >= 0.98 * RATE
     assert result.scuffing <= 0.5 * pressed.scuffing
 

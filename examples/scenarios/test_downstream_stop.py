@@ -23,12 +23,12 @@ def cascade() -> Controller:
 
 
 def all_belts_run() -> Controller:
-    """What is often found: the belts slip under the bottles that wait."""
+    """Build a controller that is often found: belts run on and slip under the waiting bottles."""
     return Constant({f"belts/{zone}/cmd_speed": SPEED for zone in ZONES})
 
 
 def check(plant: Scenario) -> None:
-    """The scenario."""
+    """Check the scenario."""
     plant.run_for(26.0)  # until the first bottle has come to the packer
     plant.never(lambda s: s["machines/filler/blocked"])
     plant.always(lambda s: _largest_force(plant) < FORCE)

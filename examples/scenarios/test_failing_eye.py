@@ -16,19 +16,19 @@ FAULTS = {"stuck_on": (1.0, "stuck on"), "stuck_off": (1.0, "stuck off"), "chatt
 
 
 def monitored() -> Controller:
-    """The belt runs, unless the monitor holds it."""
+    """Build a controller that runs the belt unless the monitor stops it."""
     hold = {"belts/line/cmd_speed": 0.0, "machines/filler/run": 0.0}
     monitor = EyeMonitor("entry", "line", bottle=0.08, hold=hold, next_eye="exit", next_after=0.6)
     return priority(monitor, unwatched())
 
 
 def unwatched() -> Controller:
-    """The mutant: whatever an eye says is believed."""
+    """Build the mutant that believes every photo-eye."""
     return Constant({"belts/line/cmd_speed": 0.5, "machines/filler/run": 1.0})
 
 
 def check(plant: Scenario, fault: str) -> None:
-    """The scenario."""
+    """Check the scenario."""
     value, alarm = FAULTS[fault]
     plant.run_for(8.0)
     assert not plant.alarms

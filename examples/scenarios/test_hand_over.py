@@ -45,7 +45,7 @@ class Stubborn:
 
 
 def check(plant: Scenario, controller: Controller) -> None:
-    """The scenario: a lane taken, slowed down and handed back."""
+    """Check the scenario: a lane is taken over, slowed down and handed back."""
     plant.attach(controller)
     plant.run_for(1.0)
     plant.operator.mode(LANE, "manual")

@@ -27,44 +27,44 @@ WEDGES = {
 
 
 def wedged(line: Lines, wedge: str) -> Scenario:
-    """The line with two bottles in its mouth, others on their way, and its lane empty."""
+    """Build the line with two wedged bottles in its mouth, others on their way, and an empty lane."""
     return line(LINE, {"bottles": [{"type": "bottle", "position": list(axis)} for axis in WEDGES[wedge]]})
 
 
 def alarm(passages: str = "counters/exit/forward", waiting: str = "zones/mouth/bottles", time: float = 3.0) -> JamAlarm:
-    """The alarm as it should be: counted behind the mouth, waited for before it, nothing for three seconds."""
+    """Build the correct alarm: passages are counted behind the mouth, waiting bottles before it, for three seconds."""
     return JamAlarm("mouth", "mouth", (passages,), waiting, time, takes="machines/packer/running")
 
 
 def from_edges() -> JamAlarm:
-    """The mutant that takes edges of the eye for passages: nose to tail there are none."""
+    """Build the mutant that counts edges of the photo-eye as passages: nose to tail there are none."""
     return alarm(passages="photo_eyes/lane/edges")
 
 
 def behind_the_mouth() -> JamAlarm:
-    """The mutant that looks for bottles in the lane, which a jam in the mouth leaves empty."""
+    """Build the mutant that looks for bottles in the lane, which a jam in the mouth leaves empty."""
     return alarm(waiting="photo_eyes/lane/blocked")
 
 
 def too_late() -> JamAlarm:
-    """The mutant that waits longer than anybody would."""
+    """Build the mutant that waits too long."""
     return alarm(time=8.0)
 
 
 def check_wedge(plant: Scenario, controller: Controller) -> None:
-    """The scenario of a jam, which does not go away by itself."""
+    """Check the scenario of a jam, which does not resolve by itself."""
     plant.attach(controller)
     plant.eventually(lambda s: s[JAM], within=WITHIN)
     plant.always(lambda s: s[JAM] and s["counters/exit/forward"] == 0, for_=20.0)
 
 
 def nose_to_tail(s: Present) -> bool:
-    """The lane stands full, so that its eye sees no light, and more bottles come."""
+    """Return True if the lane is full, so that its photo-eye stays blocked, and more bottles come."""
     return s["photo_eyes/lane/blocked"] > 0 and s["zones/mouth/bottles"] > 0
 
 
 def check_queue(plant: Scenario, controller: Controller) -> None:
-    """The scenario of a queue that moves on by a bottle a second."""
+    """Check the scenario of a queue that moves on by one bottle per second."""
     plant.attach(controller)
     plant.always(nose_to_tail)
     plant.never(lambda s: s[JAM], for_=TEN_MINUTES)
@@ -98,7 +98,7 @@ def clearing(back_time: float) -> Controller:
 
 
 def check_clearing(plant: Scenario, controller: Controller) -> None:
-    """The scenario of a jam that is cleared: alarm, back, jog, and bottles pass as before."""
+    """Check the scenario of clearing a jam: alarm, back, jog; then bottles pass as before."""
     plant.attach(controller)
     plant.never(lambda s: s[NOT_CLEARED])
     plant.eventually(lambda s: s[JAM], within=WITHIN)

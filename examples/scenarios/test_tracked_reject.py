@@ -20,7 +20,7 @@ class ChangingSpeed:
     """The belt as it has to follow the machines around it."""
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
-        """A speed that changes every five seconds."""
+        """Return a speed that changes every five seconds."""
         return {"belts/line/cmd_speed": SPEEDS[int(inputs.time / 5.0) % len(SPEEDS)]}
 
 
@@ -46,7 +46,7 @@ class ByTime:
     _bad: float = 0.0
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
-        """Whether to fire."""
+        """Return the command to fire."""
         if inputs["machines/camera/bad"] > self._bad:
             self._bad = inputs["machines/camera/bad"]
             self._due.append(inputs["machines/camera/bad_time"] + self.delay)
@@ -57,7 +57,7 @@ class ByTime:
 
 
 def rejects(plant: Scenario, tracking: Controller, count: int) -> Mapping[str, float]:
-    """The signals once so many bad bottles have been seen and have passed the rejecter."""
+    """Return the signals when `count` bad bottles have been detected and have passed the rejecter."""
     plant.attach(together(ChangingSpeed(), tracking))
     plant.run_until(lambda s: s["machines/camera/bad"] >= count, within=1000.0)
     # What is bad in the meantime may be on its way still.

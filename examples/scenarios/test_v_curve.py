@@ -19,18 +19,18 @@ STOP = 12.0  # s
 
 
 def v_curve() -> Controller:
-    """The filler fills the buffer up again as soon as it is five bottles short."""
+    """Build a controller with which the filler refills the buffer as soon as five bottles are missing."""
     filler = Neighbour("machines/filler/rate", Count("zones/buffer/bottles"), LEVEL - 5.0, LEVEL, LEVEL + 5.0)
     return VCurve("machines/packer/rate", RATE, MARGIN, upstream=(filler,))
 
 
 def all_at_one_rate() -> Controller:
-    """A line without a V: each machine runs at the rate of the bottleneck, and what was lost stays lost."""
+    """Build a line without a V: each machine runs at the rate of the bottleneck, and losses are permanent."""
     return Constant({"machines/packer/rate": RATE, "machines/filler/rate": RATE})
 
 
 def check(plant: Scenario) -> None:
-    """The scenario."""
+    """Check the scenario."""
     plant.run_for(10.0)
     before = plant.signals["machines/packer/starved_time"]
     plant.inject("machines/filler/stop")

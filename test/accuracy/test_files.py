@@ -19,12 +19,12 @@ from facts import stating
 
 from conveyor_sim.accuracy.report.files import STUDY, read_study, write_study
 from conveyor_sim.accuracy.report.pareto import front
-from conveyor_sim.accuracy.results import Cost, Study
+from conveyor_sim.accuracy.results import AccuracyStudy, Cost
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.support.sealed_json import sealed
+from conveyor_sim.support.checked_json import with_checksum
 
 
-def bare() -> Study:
+def bare() -> AccuracyStudy:
     """A study that found nothing."""
     return replace(
         study(),
@@ -182,7 +182,7 @@ def test_a_file_that_was_edited_badly_is_told(tmp_path: Path, edit: Callable[[An
     data = json.loads(file.read_text(encoding="utf-8"))
     del data["sha256"]
     edit(data)
-    file.write_bytes(sealed(data))
+    file.write_bytes(with_checksum(data))
     with pytest.raises(ConveyorError) as raised:
         read_study(file)
     assert str(raised.value).startswith(f"{file}: {message}")

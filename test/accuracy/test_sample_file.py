@@ -15,7 +15,7 @@ from conveyor_sim.accuracy.results import Sample
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.scene import Scene, parse_scene
-from conveyor_sim.support.sealed_json import sealed
+from conveyor_sim.support.checked_json import with_checksum
 
 SCENE = scene()
 NAMES = [observable.name for observable in OBSERVABLES]
@@ -76,7 +76,7 @@ def test_runs_of_something_else_are_refused(tmp_path: Path) -> None:
             SampleFile(tmp_path, other)
     origin = json.loads((tmp_path / ORIGIN).read_text())
     del origin["sha256"]
-    (tmp_path / ORIGIN).write_bytes(sealed({**origin, "engine": "0", "definition of observables": "0"}))
+    (tmp_path / ORIGIN).write_bytes(with_checksum({**origin, "engine": "0", "definition of observables": "0"}))
     with pytest.raises(ConveyorError, match=stating("another engine", "another definition of observables")):
         SampleFile(tmp_path, SCENE)
     (tmp_path / ORIGIN).write_text("{}")

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from conveyor_sim.bag.outputs import Outputs
+from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
@@ -21,12 +21,12 @@ COMMANDS = {
 
 
 def record(scene: Scene, folder: Path, ticks: int, ticks_a_chunk: int = 0) -> Simulation:
-    """Runs a scene with COMMANDS and records it; after so many ticks a chunk ends (0: as it comes)."""
+    """Run a scene with COMMANDS and record it. ticks_a_chunk: ticks after which a chunk ends; 0: by size and time."""
     simulation = Simulation(scene)
     with pytest.MonkeyPatch.context() as patch, Recorder(folder) as recorder:
         if ticks_a_chunk:  # a busy machine would take longer than that for some ticks, and end a chunk between
             patch.setattr("conveyor_sim.bag.recorder.FLUSH_INTERVAL", 1e6)
-        outputs = Outputs(simulation, [recorder], run_id="run", frame_id="hall")
+        outputs = OutputWriter(simulation, [recorder], run_id="run", frame_id="hall")
         outputs.start()
         while simulation.tick < ticks:
             for names, values in COMMANDS.get(simulation.tick, []):

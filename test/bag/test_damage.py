@@ -1,4 +1,4 @@
-"""What bottles and rails bear, and limits that were passed, go into the bag, the summary and the pictures."""
+"""Loads of bottles and rails, and exceeded limits, are part of the bag, the summary and the figures."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from physics.test_damage import DRAGGED, HELD, LEFT, LIMITS, OBLIQUE, RIGHT, damage_of, experiments, wear_of
 from scenes import NO_OUTPUTS, scene
 
-from conveyor_sim.bag.outputs import Outputs
+from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.bag.replay import replay
@@ -33,7 +33,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Simulation
     sim = Simulation(scene(**experiments(outputs=rates, effects={"peaks": "off"}, duration=0.5)))
     path = tmp_path_factory.mktemp("damage") / "bag"
     with Recorder(path) as recorder:
-        outputs = Outputs(sim, [recorder], run_id="run")
+        outputs = OutputWriter(sim, [recorder], run_id="run")
         outputs.start()
         for _ in range(50):
             sim.advance()

@@ -1,4 +1,4 @@
-"""What happens on a line is recorded, read back, and replayed to the same events."""
+"""Events of a line are recorded, read back, and replayed to the same events."""
 
 import math
 from collections.abc import Callable
@@ -12,7 +12,7 @@ from bag.small_line import SMALL_LINE
 from rosbags.highlevel import AnyReader
 
 from conveyor_sim.bag.messages.topics import OUTPUTS
-from conveyor_sim.bag.outputs import Outputs
+from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.bag.replay import replay
@@ -37,7 +37,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[tuple[int,
     sim = Simulation(load_scene(SMALL_LINE, {"limits": {"impact_speed": 0.2}, "effects": {"energy_ledger": "on"}}))
     seen = []
     with Recorder(folder) as recorder:
-        outputs = Outputs(sim, [recorder], run_id="run")
+        outputs = OutputWriter(sim, [recorder], run_id="run")
         outputs.start()
         while sim.tick < 100:
             for names, values in GIVEN.get(sim.tick, []):
@@ -71,7 +71,7 @@ def test_another_library_reads_them_from_the_bag_alone(run: tuple[Path, Any]) ->
             found += [n for k, n in zip(message.kind, message.name, strict=True) if k.startswith("alarm")]
     said = [name for name in found if name.split("/")[1] not in ("belts", "limits")]
     assert said == ["alarms/table full", "alarms/jam — at exit", "alarms/table full"]
-    assert found[-1] == "alarms/belts/straight/watchdog"  # nobody commands it any more
+    assert found[-1] == "alarms/belts/straight/watchdog"  # no more commands come
 
 
 def test_alarms_and_events_are_replayed_bit_for_bit(run: tuple[Path, Any]) -> None:
@@ -115,7 +115,7 @@ def test_an_event_that_the_recording_lacks_is_found(run: tuple[Path, Any], tmp_p
 
 
 def test_an_event_that_does_not_happen_again_is_found(run: tuple[Path, Any], tmp_path: Path) -> None:
-    """That of a command which the line is not given, for its outcome claims that it never reached it."""
+    """The event belongs to a command whose outcome claims that it never reached the line, so it is not replayed."""
 
     def edit(topic: str, message: Any) -> None:
         if topic == "outcomes" and message.tick == 3:

@@ -7,7 +7,7 @@ import pytest
 from bag.small_line import SMALL_LINE, SPEED, TURN
 
 from conveyor_sim.bag.input_log import START_NAME
-from conveyor_sim.bag.outputs import Outputs
+from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.bag.replay import replay
@@ -36,7 +36,7 @@ INPUTS = {
 def play(simulation: Simulation, folder: Path, last: int) -> None:
     """Run on to a tick and record that."""
     with Recorder(folder) as recorder:
-        outputs = Outputs(simulation, [recorder], run_id="run", frame_id="hall")
+        outputs = OutputWriter(simulation, [recorder], run_id="run", frame_id="hall")
         outputs.start()
         while simulation.tick < last:
             for one in INPUTS.get(simulation.tick, []):

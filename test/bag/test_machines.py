@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from conveyor_sim.bag.input_log import START_NAME
-from conveyor_sim.bag.outputs import Outputs
+from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.bag.replay import replay
 from conveyor_sim.scene import Scene, load_scene
@@ -38,7 +38,7 @@ def scene() -> Scene:
 
 def record(simulation: Simulation, folder: Path, ticks: int) -> None:
     with Recorder(folder) as recorder:
-        outputs = Outputs(simulation, [recorder], run_id="run", frame_id="hall")
+        outputs = OutputWriter(simulation, [recorder], run_id="run", frame_id="hall")
         outputs.start()
         for _ in range(ticks):
             if simulation.tick in COMMANDS:

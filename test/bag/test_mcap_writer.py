@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from mcap.reader import NonSeekingReader, make_reader
 
-from conveyor_sim.bag.mcap.index import sealed
+from conveyor_sim.bag.mcap.index import is_complete
 from conveyor_sim.bag.mcap.writer import McapFileWriter, Schema
 
 TOPICS = ("/bottles", "/signals", "/never")
@@ -64,7 +64,7 @@ def test_mcap_reads_it_back(count: int, flush_every: int) -> None:
 @pytest.mark.parametrize("count", [0, 300])
 def test_checksums_cover_every_byte(count: int) -> None:
     data = written(count, 7)
-    assert sealed(data)
+    assert is_complete(data)
     stream = BytesIO(data)
     assert sum(1 for _ in NonSeekingReader(stream, validate_crcs=True).iter_messages()) == count
 

@@ -1,4 +1,4 @@
-"""What is written when, and that nothing is written that nobody wants."""
+"""Topics are written at their ticks, and only if a sink wants them."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -8,13 +8,13 @@ from bag.small_line import COMMANDS, SMALL_LINE, record
 from conveyor_sim.bag.messages.encode import BOOL
 from conveyor_sim.bag.messages.topics import OUTPUTS, photo_eye_topics
 from conveyor_sim.bag.messages.typestore import typestore
-from conveyor_sim.bag.outputs import Outputs
+from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.scene import Scene, load_scene
 from conveyor_sim.simulation import Simulation
 
 SILENT = {"ledger", "guard", "damage", "rail_wear", "damage_events"}
-"""Nothing is to be told, nothing asked for."""
+"""Topics without messages in these runs, because their causes are absent."""
 
 
 class Collector:
@@ -34,7 +34,7 @@ class Collector:
 def run(scene: Scene, sinks: list[Collector], ticks: int) -> Simulation:
     """Runs a scene into sinks."""
     simulation = Simulation(scene)
-    outputs = Outputs(simulation, sinks, run_id="run", frame_id="hall")
+    outputs = OutputWriter(simulation, sinks, run_id="run", frame_id="hall")
     outputs.start()
     for _ in range(ticks):
         for names, values in COMMANDS.get(simulation.tick, []):
@@ -80,7 +80,7 @@ def test_an_output_that_is_switched_off_is_not_written() -> None:
     scene = load_scene(SMALL_LINE, {"outputs": {"poses": 0, "contacts": 0}})
     sink = Collector(set(OUTPUTS))
     run(scene, [sink], 10)
-    off = {"poses", "markers", "contacts", "run_state", "variables"}  # the last two are said by whoever steps it
+    off = {"poses", "markers", "contacts", "run_state", "variables"}  # the caller of the simulation writes the last two
     assert {topic for topic, _, _ in sink.taken} == set(OUTPUTS) - SILENT - off
 
 
@@ -95,7 +95,7 @@ def test_stamps_are_simulated_time_above_zero_and_never_go_back(scene: Scene) ->
 
 def test_outcomes_are_returned_and_stamped_with_the_tick_that_applied_them(scene: Scene, bag: Path) -> None:
     simulation = Simulation(scene)
-    outputs = Outputs(simulation, [], run_id="run")
+    outputs = OutputWriter(simulation, [], run_id="run")
     outputs.start()
     simulation.command(["belts/turn/cmd_speed"], [0.1])
     simulation.advance()
@@ -112,7 +112,7 @@ def test_outcomes_are_returned_and_stamped_with_the_tick_that_applied_them(scene
 
 
 def test_two_runs_give_the_same_bytes(scene: Scene, record_line: Callable[[str, int], Path], tmp_path: Path) -> None:
-    """Of every message but Line, which names its run; here the names are equal, so of every message."""
+    """Line holds the name of its run, and the names are equal here, so all messages have the same bytes."""
     first, second = record_line("first", 60), tmp_path / "second"
     record(scene, second, 60)
     with open_bag(first) as one, open_bag(second) as two:

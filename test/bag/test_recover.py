@@ -13,7 +13,7 @@ from bag.small_line import SMALL_LINE, record
 from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
 
-from conveyor_sim.bag.outputs import Outputs
+from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.bag.recover import recover
@@ -29,13 +29,13 @@ ENDLESS = """
 import sys
 from pathlib import Path
 from bag.small_line import SMALL_LINE
-from conveyor_sim.bag.outputs import Outputs
+from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 simulation = Simulation(load_scene(SMALL_LINE))
 recorder = Recorder(Path(sys.argv[1]))
-outputs = Outputs(simulation, [recorder], run_id="run")
+outputs = OutputWriter(simulation, [recorder], run_id="run")
 outputs.start()
 while True:
     simulation.advance()
@@ -122,11 +122,11 @@ def test_cut_chunk_yields_the_messages_that_were_written_of_it(scene: Scene, tmp
 
 
 def test_a_damaged_first_chunk_takes_along_the_messages_whose_topics_it_names(tmp_path: Path) -> None:
-    """The first message makes a chunk of its own; a byte of that is wrong, and the file's end is missing."""
+    """The first message is in a separate chunk; a byte of that is wrong, and the file's end is missing."""
     folder = tmp_path / "bad"
     simulation = Simulation(load_scene(SMALL_LINE))
     with Recorder(folder) as recorder:
-        outputs = Outputs(simulation, [recorder], run_id="run")
+        outputs = OutputWriter(simulation, [recorder], run_id="run")
         outputs.start()
         for _ in range(20):
             simulation.advance()
@@ -165,7 +165,7 @@ def test_only_metadata_missing_is_rebuilt_without_touching_the_file(record_line:
 
 
 def test_zeros_at_the_end_are_left_out(record_line: Make) -> None:
-    """What some file systems leave after a loss of power."""
+    """Some file systems leave zeros after a loss of power."""
     folder = record_line("zeros", TICKS)
     before = whole(folder)
     file = next(folder.glob("*.mcap"))

@@ -15,7 +15,7 @@ from scenes import NO_OUTPUTS
 from conveyor_sim.bag.messages.encode import Header
 from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.bag.messages.typestore import typestore
-from conveyor_sim.bag.outputs import Outputs
+from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.bag.replay import replay
@@ -107,7 +107,7 @@ def test_changed_command_is_found(bag: Path, tmp_path: Path) -> None:
 
 
 def test_what_the_run_was_doing_is_not_compared(bag: Path, tmp_path: Path) -> None:
-    """Of who set a command, who it was is: a replay gives each input in the name of its writer."""
+    """The writer of a command is compared, because a replay repeats each input in the name of its writer."""
     folder = tmp_path / "told"
     with open_bag(bag) as opened, Recorder(folder) as recorder:
         run = TOPICS["run_state"].pack(RunState(STOPPED, "it was told so"), Header(0, 1, "hall"))
@@ -198,7 +198,7 @@ def test_a_table_is_replayed_without_its_file(tmp_path: Path) -> None:
 
 
 def stock(bag: Path, folder: Path, messages: Iterator[tuple[str, int, bytes]]) -> Path:
-    """What stock rosbag2 makes of the topics of a node in the namespace /hall: stamped with the wall clock."""
+    """Write the topics of a node in the namespace /hall as stock rosbag2 does, stamped with wall time."""
     store = typestore()
     with open_bag(bag) as opened, Writer(folder, version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
         connections = {
@@ -309,7 +309,7 @@ def held_up(folder: Path) -> Path:
     sim = press(damping=5.0, outputs={**NO_OUTPUTS, "signals": 100, "ledger": 100})
     inputs = {2: "push", 30: "jammed", 45: "jammed", 70: "push"}
     with Recorder(folder) as recorder:
-        outputs = Outputs(sim, [recorder], run_id="run", frame_id="hall")
+        outputs = OutputWriter(sim, [recorder], run_id="run", frame_id="hall")
         outputs.start()
         while sim.tick < 90:
             name = inputs.get(sim.tick)

@@ -44,7 +44,7 @@ def plant(belts: dict[str, Any] | None = None) -> Scene:
 
 def expected_carriers(points: np.ndarray, belts: dict[str, Any]) -> np.ndarray:
     """Return carriers by equations (11)-(15) and the sector about the centre, angles modulo a turn; -1: floor."""
-    found = np.full(len(points), -1)
+    carriers = np.full(len(points), -1)
     for index, shape in enumerate(belts.values()):
         if shape["kind"] == "straight":
             c, s = math.cos(shape["angle"]), math.sin(shape["angle"])
@@ -55,17 +55,17 @@ def expected_carriers(points: np.ndarray, belts: dict[str, Any]) -> np.ndarray:
             r = np.hypot(*seen.T)
             angle = np.mod(np.arctan2(seen[:, 1], seen[:, 0]) - shape["start_angle"], 2.0 * math.pi)
             on = (r >= shape["inner_radius"]) & (r <= shape["inner_radius"] + shape["width"]) & (angle <= shape["span"])
-        found[on] = index
-    return found
+        carriers[on] = index
+    return carriers
 
 
 def carriers(state: State, count: int) -> np.ndarray:
     world = state.world
-    found, carried = np.zeros(world.bottles.id.size, np.int32), np.zeros(len(state.model.belts), np.int32)
-    find_carriers(world.bottles, world.belts, world.surface, found, carried)
-    assert carried.tolist() == [np.count_nonzero(found == belt) for belt in range(len(carried))]
-    assert (found[count:] == -1).all()
-    return found[:count]
+    carriers, carried = np.zeros(world.bottles.id.size, np.int32), np.zeros(len(state.model.belts), np.int32)
+    find_carriers(world.bottles, world.belts, world.surface, carriers, carried)
+    assert carried.tolist() == [np.count_nonzero(carriers == belt) for belt in range(len(carried))]
+    assert (carriers[count:] == -1).all()
+    return carriers[:count]
 
 
 def test_the_last_listed_belt_under_the_axis_carries() -> None:

@@ -78,8 +78,8 @@ def kernel(tmp_path: Path, start: Callable[..., "subprocess.Popen[str]"]) -> Pat
     """Return the file that the program makes."""
     (tmp_path / "kernels").mkdir()
     assert start(WANTING, str(tmp_path / "kernels")).communicate()[0] == "0 loaded, 1 compiled\n"
-    (found,) = (tmp_path / "kernels").glob("*.kernel")
-    return found
+    (path,) = (tmp_path / "kernels").glob("*.kernel")
+    return path
 
 
 @pytest.mark.parametrize("outcome", ["compiled", "given up", "killed"])

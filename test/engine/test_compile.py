@@ -42,8 +42,8 @@ sim = Simulation(scene)
 sim.advance(2)
 sim.contacts()
 names = [module.name for module in pkgutil.walk_packages(conveyor_sim.engine.__path__, "conveyor_sim.engine.")]
-found = [value for name in names for value in vars(importlib.import_module(name)).values()]
-kernels = {id(value): value for value in found if isinstance(value, Dispatcher)}
+values = [value for name in names for value in vars(importlib.import_module(name)).values()]
+kernels = {id(value): value for value in values if isinstance(value, Dispatcher)}
 print(sum(sum(kernel.stats.cache_hits.values()) for kernel in kernels.values()))
 print(sum(sum(kernel.stats.cache_misses.values()) for kernel in kernels.values()))
 print(len(said))

@@ -191,20 +191,20 @@ def test_mindlins_spring_stiffens_with_the_overlap() -> None:
 
 def test_a_spring_that_stiffens_keeps_its_force_and_one_that_softens_its_elongation() -> None:
     """So a spring never gains energy by itself, and is without load when a contact begins."""
-    given, xi = law(**MINDLIN), 1e-5
+    mindlin, xi = law(**MINDLIN), 1e-5
     depth, before, after = 0.0020, 0.0019, 0.0021
-    stiffer = carried(given, 1, xi, depth, depth - before, 0.0)
+    stiffer = carried(mindlin, 1, xi, depth, depth - before, 0.0)
     assert stiffer * math.sqrt(depth) == pytest.approx(xi * math.sqrt(before))
     # The force grows by the mean stiffness times the displacement.
     way = 3e-6
-    force_after = (carried(given, 1, xi, depth, depth - before, way) + way) * math.sqrt(depth)
+    force_after = (carried(mindlin, 1, xi, depth, depth - before, way) + way) * math.sqrt(depth)
     mean = 0.5 * (math.sqrt(before) + math.sqrt(depth))
     assert force_after == pytest.approx(xi * math.sqrt(before) + way * mean)
     # k_t xi^2, with the force k_t xi as before.
     assert math.sqrt(depth) * stiffer**2 < math.sqrt(before) * xi**2
-    assert carried(given, 1, xi, depth, depth - after, 1e-5) == xi
-    assert carried(given, 1, xi, depth, 2.0 * depth, 0.0) == 0.0
-    assert carried(given, 1, xi, depth, 0.0, 1e-5) == xi
+    assert carried(mindlin, 1, xi, depth, depth - after, 1e-5) == xi
+    assert carried(mindlin, 1, xi, depth, 2.0 * depth, 0.0) == 0.0
+    assert carried(mindlin, 1, xi, depth, 0.0, 1e-5) == xi
     other = law(**{**MINDLIN, "tangential_stiffness": 4000.0, "tangential_mindlin": 0.0})
     assert carried(other, 1, xi, depth, 1e-4, 1e-5) == xi
 
@@ -234,7 +234,7 @@ def test_what_is_not_a_number_stays_visible() -> None:
 @pytest.mark.parametrize("share", [0.2, 0.5, 1.0])
 def test_a_share_of_a_contact_slides_at_mu_times_what_it_presses_with(share: float) -> None:
     """After a long slip the spring holds mu N of that share."""
-    given = {"stiffness": K, "friction": MU, "tangential_stiffness": 4000.0}
-    normal = force(0.002, share=share, **given)[0]
-    held = spring_after(law(**given), 1, 0.0, 0.002, 1.0, 1.0, normal, share)
-    assert force(0.002, share=share, spring=held, **given)[1] == pytest.approx(-MU * normal, rel=1e-12)
+    coefficients = {"stiffness": K, "friction": MU, "tangential_stiffness": 4000.0}
+    normal = force(0.002, share=share, **coefficients)[0]
+    held = spring_after(law(**coefficients), 1, 0.0, 0.002, 1.0, 1.0, normal, share)
+    assert force(0.002, share=share, spring=held, **coefficients)[1] == pytest.approx(-MU * normal, rel=1e-12)

@@ -96,16 +96,16 @@ def test_a_contact_of_two_bottles() -> None:
     )
     sim = Simulation(scene(bottles=[bottle(FAR, FAR), bottle(-FAR, FAR)], **fields))
     sim._state = state
-    found = sim.contacts()
-    assert found.kind.tolist() == [0]
-    assert (found.a[0], found.b[0]) == (0, 1)
+    listed = sim.contacts()
+    assert listed.kind.tolist() == [0]
+    assert (listed.a[0], listed.b[0]) == (0, 1)
     middle = np.array([1.0, 2.0]) + np.array([0.6, 0.8]) * (RADIUS - 0.002)
-    np.testing.assert_allclose([found.x[0], found.y[0]], middle)
-    np.testing.assert_allclose([found.nx[0], found.ny[0]], [0.6, 0.8])
-    assert found.overlap[0] == pytest.approx(0.004)
-    assert found.normal_force[0] == pytest.approx(20.0)
+    np.testing.assert_allclose([listed.x[0], listed.y[0]], middle)
+    np.testing.assert_allclose([listed.nx[0], listed.ny[0]], [0.6, 0.8])
+    assert listed.overlap[0] == pytest.approx(0.004)
+    assert listed.normal_force[0] == pytest.approx(20.0)
     # b moves along t = (-0.8, 0.6) and drags a along.
-    assert found.tangential_force[0] == pytest.approx(0.3 * 20.0)
+    assert listed.tangential_force[0] == pytest.approx(0.3 * 20.0)
 
 
 def test_a_contact_of_a_bottle_and_a_rail() -> None:
@@ -118,12 +118,13 @@ def test_a_contact_of_a_bottle_and_a_rail() -> None:
     }
     sim = Simulation(scene(**fields))
     sim._state = state_of(scene(**fields), [(0.3, -1.0 + RADIUS - 0.002)], [(0.7, 0.0)])
-    found = sim.contacts()
-    assert (found.kind.tolist(), found.a.tolist(), found.b.tolist()) == ([1], [0], [1])
-    np.testing.assert_allclose([found.x[0], found.y[0], found.nx[0], found.ny[0]], [0.3, -1.0, 0.0, -1.0], atol=1e-12)
-    assert found.normal_force[0] == pytest.approx(10.0)
+    listed = sim.contacts()
+    assert (listed.kind.tolist(), listed.a.tolist(), listed.b.tolist()) == ([1], [0], [1])
+    place = [listed.x[0], listed.y[0], listed.nx[0], listed.ny[0]]
+    np.testing.assert_allclose(place, [0.3, -1.0, 0.0, -1.0], atol=1e-12)
+    assert listed.normal_force[0] == pytest.approx(10.0)
     # The tangent is (1, 0): friction retards the bottle.
-    assert found.tangential_force[0] == pytest.approx(-3.0)
+    assert listed.tangential_force[0] == pytest.approx(-3.0)
 
 
 def test_more_contacts_than_the_first_room() -> None:
@@ -131,7 +132,7 @@ def test_more_contacts_than_the_first_room() -> None:
     fields = {"contacts": [contact(5000.0, friction=0.3)], "floor": "none"}
     origin = {"type": "bottle", "origin": [0.0, 0.0], "rows": 12, "columns": 12, "pitch": 2.0 * RADIUS - 5e-10}
     sim = Simulation(scene(bottles=[{"grid": origin}], **fields))
-    found = sim.contacts()
-    assert found.kind.size == 2 * 12 * 11
-    assert np.all(np.diff(found.a.astype(int) * 1000 + found.b.astype(int)) > 0)
-    np.testing.assert_array_equal(found.normal_force, sim.contacts().normal_force)
+    listed = sim.contacts()
+    assert listed.kind.size == 2 * 12 * 11
+    assert np.all(np.diff(listed.a.astype(int) * 1000 + listed.b.astype(int)) > 0)
+    np.testing.assert_array_equal(listed.normal_force, sim.contacts().normal_force)

@@ -95,11 +95,11 @@ class Line:
         now, y = 0.0, self.start
         events = [_event(gap) for gap in gaps]
         while now < time:
-            found = solve_ivp(
+            solution = solve_ivp(
                 self, (now, time), y, method=method, events=events, rtol=rtol, atol=1e-2 * rtol, max_step=longest
             )
-            assert found.success, found.message
-            now, y = float(found.t[-1]), found.y[:, -1]
+            assert solution.success, solution.message
+            now, y = float(solution.t[-1]), solution.y[:, -1]
             if now < time:
                 # Slightly beyond the sign change, otherwise it would be detected again.
                 y = y + 1e-12 * self(now, y)
@@ -132,20 +132,20 @@ def beyond(index: int, place: float) -> Gap:
 
 def oblique() -> tuple[Scene, list[Gap]]:
     """Return an oblique impact of two bottles: the paper's dashpot, friction that slides and sticks, spin."""
-    given = scene(
+    tested = scene(
         tick=0.025,
         accuracy={"integrator": "dormand_prince", "per_tick": 100, "error": 1e-12},
         **every_law([contact(5000.0, damping=("paper", 8.0), friction=0.2)]),
         bottles=[bottle(0.0, 0.0, 0.8, 0.1, spin=4.0), bottle(0.127, 0.04, -0.4, 0.0, spin=-1.0)],
         **NO_FLOOR,
     )
-    return given, [apart(2, 0, 1)]
+    return tested, [apart(2, 0, 1)]
 
 
 def three_and_a_rail() -> tuple[Scene, list[Gap]]:
     """Return three bottles in a bent row before a rail, Hertz with a clamped dashpot; the last one runs into them."""
     law: dict[str, Any] = {"damping": ("normal", 5.0), "friction": 0.2}
-    given = scene(
+    tested = scene(
         tick=0.04,
         accuracy={"integrator": "dormand_prince", "per_tick": 200, "error": 1e-12},
         contacts=[
@@ -157,12 +157,12 @@ def three_and_a_rail() -> tuple[Scene, list[Gap]]:
         **NO_FLOOR,
     )
     rail = [beyond(i, 0.001) for i in range(3)]
-    return given, [apart(3, 0, 1), apart(3, 1, 2), *rail]
+    return tested, [apart(3, 0, 1), apart(3, 1, 2), *rail]
 
 
 def across_belts() -> tuple[Scene, list[Gap]]:
     """Return a bottle that slides from one belt, at an angle, onto a faster one, on which it nearly comes to rest."""
-    given = scene(
+    tested = scene(
         tick=0.1,
         accuracy={"integrator": "dormand_prince", "per_tick": 100, "error": 1e-12},
         slip_limit=1e-3,
@@ -172,7 +172,7 @@ def across_belts() -> tuple[Scene, list[Gap]]:
         belts={"slow": belt(0.1, (-1.0, -1.0), 1.0, 2.0), "fast": belt(0.3, (0.0, -1.0), 1.0, 2.0)},
         bottles=[bottle(-0.01, 0.0, 0.35, 0.05, spin=1.0)],
     )
-    return given, [beyond(0, 0.0)]
+    return tested, [beyond(0, 0.0)]
 
 
 @pytest.mark.parametrize(
@@ -181,10 +181,10 @@ def across_belts() -> tuple[Scene, list[Gap]]:
 )
 def test_agrees_with_scipy(case: Callable[[], tuple[Scene, list[Gap]]], method: str, rtol: float) -> None:
     """Positions and velocities agree to 1e-9, through contacts that open and close, v_lim and the edge of a belt."""
-    given, gaps = case()
-    sim, line = Simulation(given, threads=1), Line(Simulation(given, threads=1))
+    tested, gaps = case()
+    sim, line = Simulation(tested, threads=1), Line(Simulation(tested, threads=1))
     sim.advance()
-    end = line.end(given.tick, method, gaps, rtol, given.tick / 100)
+    end = line.end(tested.tick, method, gaps, rtol, tested.tick / 100)
     assert np.abs(end - line.start).max() > 0.05
     np.testing.assert_allclose(columns(sim.bottles()), end, rtol=0.0, atol=1e-9)
 
@@ -192,7 +192,7 @@ def test_agrees_with_scipy(case: Callable[[], tuple[Scene, list[Gap]]], method: 
 def pair(law: str) -> State:
     """Return two bottles of one law. All laws are in every scene, so they share one kernel."""
     names, others = list(LAWS), cycle(OTHERS)
-    given = scene(
+    tested = scene(
         effects={"peaks": "on", "rotation": "on", "unequal_radii": "on"},
         accuracy={"integrator": "dormand_prince"},
         bottle_types={name: kind(material=name) for name in names},
@@ -202,7 +202,7 @@ def pair(law: str) -> State:
         bottles=[bottle(FAR, FAR, type=law), bottle(-FAR, FAR, type=law)],
         **NO_FLOOR,
     )
-    return state_of(given, [(0.0, 0.0), (1.0, 0.0)], kinds=[names.index(law)] * 2)
+    return state_of(tested, [(0.0, 0.0), (1.0, 0.0)], kinds=[names.index(law)] * 2)
 
 
 def impact(state: State, allowed: float, entry: float = 0.3, steps: int = 20) -> World:
@@ -259,8 +259,8 @@ def test_impulses_are_the_momentum_gained_and_peaks_are_met_between_substeps(law
 
 def test_what_is_not_a_number_ends_the_tick_and_is_found() -> None:
     """A force that is NaN causes an error for which no substep is short enough."""
-    given, _ = across_belts()
-    sim = Simulation(given, threads=1)
+    tested, _ = across_belts()
+    sim = Simulation(tested, threads=1)
     sim._state.world.bottles.vx[0] = math.nan
     with pytest.raises(SimulationError, match="bottle 0 has no finite position or velocity"):
         sim.advance()

@@ -17,7 +17,7 @@ DEPTH = 0.01
 
 def squeezed(integrator: str, speed: float = 0.0, **accuracy: float) -> State:
     """Return two bottles pressed into each other, with the paper's damping and equal spins, so their rims slip."""
-    given = scene(
+    tested = scene(
         accuracy={"integrator": integrator, **accuracy},
         **every_law([contact(K, damping=("paper", C))]),
         bottles=[bottle(FAR, FAR), bottle(-FAR, FAR)],
@@ -25,7 +25,7 @@ def squeezed(integrator: str, speed: float = 0.0, **accuracy: float) -> State:
         lever_arm="radius",
     )
     apart = 2.0 * RADIUS - DEPTH
-    return state_of(given, [(0.0, 0.0), (apart, 0.0)], [(speed / 2, 0.0), (-speed / 2, 0.0)], [3.0, 3.0])
+    return state_of(tested, [(0.0, 0.0), (apart, 0.0)], [(speed / 2, 0.0), (-speed / 2, 0.0)], [3.0, 3.0])
 
 
 def closed_form(t: float) -> tuple[float, float]:

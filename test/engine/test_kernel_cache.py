@@ -38,9 +38,9 @@ def counts(function: Any) -> tuple[int, int]:
 def file(tmp_path: Path) -> Path:
     """Return the kernel's file."""
     assert counts(compiled(tmp_path)) == (0, 1)
-    (found,) = tmp_path.glob("*.kernel")
+    (path,) = tmp_path.glob("*.kernel")
     assert counts(compiled(tmp_path)) == (1, 0)
-    return found
+    return path
 
 
 def flipped(content: bytes, place: float) -> bytes:
@@ -69,8 +69,8 @@ def total(values):
 
 sum_of = numba.njit(total)
 sum_of._cache = KernelCache(total, {}, KernelFolder(Path(sys.argv[1]), ""))
-found = sum_of(numpy.array([1.0, 2.0]))
-print(found, "numba.np.arraymath" in sys.modules, numba.njit(lambda values: values.max())(numpy.array([1.0, 2.0])))
+total_of = sum_of(numpy.array([1.0, 2.0]))
+print(total_of, "numba.np.arraymath" in sys.modules, numba.njit(lambda values: values.max())(numpy.array([1.0, 2.0])))
 """
 
 HEADER = len(MAGIC) + CHECKSUM

@@ -21,13 +21,13 @@ LAWS: dict[str, Any] = {"damping": ("normal", 0.1), "friction": 0.1}
 def test_a_spring_in_contact_keeps_its_energy() -> None:
     """The midpoint rule conserves a quadratic energy if the tangent is the spring's and the system is solved."""
     stiffness, depth, steps = 5000.0, 0.01, 30
-    given = scene(
+    tested = scene(
         **every_law([contact(stiffness)]),
         floor="none",
         accuracy={"integrator": METHOD},
         bottles=[bottle(FAR, FAR), bottle(-FAR, FAR)],
     )
-    state = state_of(given, [(0.0, 0.0), (2.0 * RADIUS - depth, 0.0)])
+    state = state_of(tested, [(0.0, 0.0), (2.0 * RADIUS - depth, 0.0)])
     quarter = 0.5 * math.pi * math.sqrt(0.5 * MASS / stiffness)
     bottles = state.world.bottles
     for _ in range(steps):
@@ -54,7 +54,7 @@ def packing(ratio: float, stiffness: float = 1e5) -> Simulation:
         "pattern": "hexagonal",
     }
     walls = [(0.0, -side), (length, -side), (length, height + side), (0.0, height + side)]
-    given = {
+    fields = {
         "tick": dt,
         "duration": 1000 * dt,
         "gravity": G,
@@ -66,7 +66,7 @@ def packing(ratio: float, stiffness: float = 1e5) -> Simulation:
         "rails": {"walls": polyline(walls)},
         "bottles": [{"grid": grid}],
     }
-    return simulation(**with_bends(given))
+    return simulation(**with_bends(fields))
 
 
 @pytest.mark.parametrize("ratio", [5.0, 20.0])
@@ -92,7 +92,7 @@ def test_base_friction_does_not_chatter_at_ten_times_its_explicit_limit() -> Non
     """A bottle set down on a belt is carried along: its slip falls to rest and never reverses."""
     limit = 0.01 / (MU * G)
     tick = round(10.0 * limit, 6)
-    given = {
+    fields = {
         "tick": tick,
         "duration": 1000 * tick,
         "gravity": G,
@@ -104,7 +104,7 @@ def test_base_friction_does_not_chatter_at_ten_times_its_explicit_limit() -> Non
         "rails": {"far": polyline([(0.0, 3.0), (1.0, 3.0)])},
         "bottles": [bottle(0.0, 0.0), bottle(0.0, 1.0)],
     }
-    sim = simulation(**with_bends(given))
+    sim = simulation(**with_bends(fields))
     slips = []
     for _ in range(60):
         sim.advance()

@@ -166,7 +166,7 @@ def test_rails_within_reach_are_listed_in_order() -> None:
     for near, apart in ((state.world.near_segments, to_straight), (state.world.near_arcs, to_bends)):
         assert near is not None
         for slot in range(len(points)):
-            found = near.piece[near.start[slot] : near.start[slot + 1]].tolist()
-            assert found == sorted(set(found))
-            assert {n for n, distance in enumerate(apart) if distance[slot] <= reach} <= set(found)
+            pieces = near.piece[near.start[slot] : near.start[slot + 1]].tolist()
+            assert pieces == sorted(set(pieces))
+            assert {n for n, distance in enumerate(apart) if distance[slot] <= reach} <= set(pieces)
         assert near.start[len(points)] > 100

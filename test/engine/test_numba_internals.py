@@ -109,8 +109,8 @@ def assignments(function: Any, op: str) -> Sequence[tuple[Any, Any]]:
     """Return numba's representation of a function, with each assignment of an operation."""
     function_ir = run_frontend(function)
     blocks = function_ir.blocks.values()
-    found = [one for block in blocks for one in block.find_insts(ir.Assign) if getattr(one.value, "op", "") == op]
-    return [(function_ir, one) for one in found]
+    matches = [one for block in blocks for one in block.find_insts(ir.Assign) if getattr(one.value, "op", "") == op]
+    return [(function_ir, one) for one in matches]
 
 
 @relies_on("core/ir.py: FunctionIR.get_definition", "core/ir_utils.py: build_definitions")

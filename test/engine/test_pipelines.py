@@ -179,15 +179,15 @@ def test_a_part_is_compiled_once_for_all_groups_that_differ_in_what_it_does_not_
         return outer.sums is not None
 
     @kernel
-    def found(outer: Any) -> Any:
+    def inspect_both(outer: Any) -> Any:
         return both(outer), is_there(outer)
 
     values = np.zeros(2)
     for sums, factor in ((None, 1.0), (3.0, 1), (np.zeros(2), None), (Inner(None, None), Inner(None, 2.0))):
-        assert found(Outer(Inner(values, factor), sums)) == (4, sums is not None)
-    assert (len(found.signatures), len(both.signatures), len(size.signatures)) == (4, 1, 1)
+        assert inspect_both(Outer(Inner(values, factor), sums)) == (4, sums is not None)
+    assert (len(inspect_both.signatures), len(both.signatures), len(size.signatures)) == (4, 1, 1)
     assert len(is_there.signatures) == 4, "of what kind the member is"
-    found(Outer(Inner(np.zeros(3, np.int64), 1.0), None))
+    inspect_both(Outer(Inner(np.zeros(3, np.int64), 1.0), None))
     assert (len(both.signatures), len(size.signatures)) == (2, 2)
 
 

@@ -329,11 +329,11 @@ def test_a_centre_exactly_on_a_rail_is_pushed_off() -> None:
 
 def test_more_contacts_than_there_is_room_for_keep_the_deepest() -> None:
     """In any order of contacts, the shallowest are left out."""
-    found = ALONE.rail_contacts
+    contacts = ALONE.rail_contacts
     overlaps = np.random.default_rng(1).permutation(np.arange(1.0, MOST_CONTACTS + 9.0))
     count = 0
     for overlap in overlaps:
-        count = keep_deepest(found, count, overlap, 1.0, 0.0, 0, int(overlap), 0, 0)
+        count = keep_deepest(contacts, count, overlap, 1.0, 0.0, 0, int(overlap), 0, 0)
     assert count == MOST_CONTACTS
-    assert sorted(found.overlap) == list(np.arange(9.0, MOST_CONTACTS + 9.0))
-    np.testing.assert_array_equal(found.rail, found.overlap)
+    assert sorted(contacts.overlap) == list(np.arange(9.0, MOST_CONTACTS + 9.0))
+    np.testing.assert_array_equal(contacts.rail, contacts.overlap)

@@ -38,7 +38,7 @@ def plant(*bottles: dict[str, Any], **more: Any) -> Scene:
     All have one of everything, so that the scenes share their kernels.
     """
     steel = {"material": "steel", "max_speed": 1.0, "acceleration": 10.0}
-    given: dict[str, Any] = {
+    base_fields: dict[str, Any] = {
         "accuracy": {"per_tick": 50},
         "bottle_types": {"bottle": kind(contact_height=0.1, gravity_height=0.08, base_radius=0.04)},
         "contacts": [
@@ -64,12 +64,12 @@ def plant(*bottles: dict[str, Any], **more: Any) -> Scene:
         "limits": {"tipping": 0.5},
         "effects": COMMON,
     }  # fmt: skip
-    return scene(**with_bends({**given, **more}))
+    return scene(**with_bends({**base_fields, **more}))
 
 
-def stepped(given: Scene, **more: Any) -> Simulation:
+def stepped(tested: Scene, **more: Any) -> Simulation:
     """Return the same scene without riding."""
-    return Simulation(parse_scene(given.source_text, "stepped", {"effects": {"riding": "off"}}), threads=1, **more)
+    return Simulation(parse_scene(tested.source_text, "stepped", {"effects": {"riding": "off"}}), threads=1, **more)
 
 
 def riders(sim: Simulation) -> set[int]:
@@ -83,16 +83,16 @@ def everything(sim: Simulation) -> list[bytes]:
     columns = [*vars(sim.bottles()).values(), *vars(sim.contacts()).values(), *vars(sim.belts()).values()]
     for asked in (sim.damage(), sim.rail_wear()):
         columns += [] if asked is None else list(vars(asked).values())
-    told = (sim.ledger(), sim.counts, sim.integration.deepest_overlap, sim.take_events())
-    return [*(np.asarray(column).tobytes() for column in columns), sim.signals().tobytes(), repr(told).encode()]
+    reports = (sim.ledger(), sim.counts, sim.integration.deepest_overlap, sim.take_events())
+    return [*(np.asarray(column).tobytes() for column in columns), sim.signals().tobytes(), repr(reports).encode()]
 
 
-def run(given: Scene, ticks: int, act: Act = lambda sim: None, **more: Any) -> tuple[Simulation, list[set[int]]]:
+def run(tested: Scene, ticks: int, act: Act = lambda sim: None, **more: Any) -> tuple[Simulation, list[set[int]]]:
     """Run with and without riding, and compare at every tick. act: called before a tick.
 
     Return the riding run at its end, and the riding bottles at each tick.
     """
-    riding, plain = Simulation(given, threads=1, **more), stepped(given, **more)
+    riding, plain = Simulation(tested, threads=1, **more), stepped(tested, **more)
     assert riding.model.has("riding")
     assert plain._state.world.riding is None
     rode = []
@@ -141,8 +141,8 @@ def test_a_whole_line_is_the_same_to_the_bit(integrator: str, solver: str) -> No
         if sim.tick == 500:
             sim.command(["gates/gate/open", "belts/main/cmd_speed"], [1.0, 0.7])
 
-    given = plant(accuracy={"per_tick": 50, "integrator": integrator}, friction_solver=solver)
-    sim, rode = run(given, 900, act)
+    tested = plant(accuracy={"per_tick": 50, "integrator": integrator}, friction_solver=solver)
+    sim, rode = run(tested, 900, act)
     assert sum(len(ids) for ids in rode) > 0.3 * 900 * 10
     assert (sim.counts.fed > 10, sim.counts.removed > 4) == (True, True)
     assert sim.integration.deepest_overlap > 0.0
@@ -245,13 +245,13 @@ def test_woken_by_an_edit_from_outside() -> None:
 
 def test_woken_by_a_restored_checkpoint(tmp_path: Path) -> None:
     """No bottle rides in the first step of a tick, with or without a checkpoint before it."""
-    given = plant()
-    sim, rode = run(given, RIDE)
+    tested = plant()
+    sim, rode = run(tested, RIDE)
     assert by(rode, RIDE) >= LEAST
     sim.save(tmp_path / "riding")
     for threads in (1, 2):
         loaded = Simulation.load(tmp_path / "riding", threads=threads)
-        straight = stepped(given)
+        straight = stepped(tested)
         straight.advance(RIDE)
         everything(straight)  # observed once
         for _ in range(60):
@@ -261,15 +261,15 @@ def test_woken_by_a_restored_checkpoint(tmp_path: Path) -> None:
 
 
 def test_what_is_not_a_number_is_found_in_the_same_tick() -> None:
-    given, told = plant(machines={}), []
-    for sim in (Simulation(given, threads=1), stepped(given)):
+    tested, reports = plant(machines={}), []
+    for sim in (Simulation(tested, threads=1), stepped(tested)):
         sim.advance(RIDE)
         with sim.editing() as (bottles, slots):
             bottles.vx[slots[5]] = math.nan
         with pytest.raises(SimulationError) as stopped:
             sim.advance(2)
-        told.append((str(stopped.value), sim.tick))
-    assert told[0] == told[1]
+        reports.append((str(stopped.value), sim.tick))
+    assert reports[0] == reports[1]
 
 
 def test_nobody_rides_on_a_belt_that_turns() -> None:
@@ -290,14 +290,14 @@ def test_the_division_into_calls_and_threads_leaves_no_trace() -> None:
     """More bottles than a block has, on one and on two threads, whose blocks differ."""
     crowd = {"grid": {"type": "bottle", "origin": [-3.0, -3.0], "rows": 30, "columns": 30, "pitch": 0.15}}
     far = {**TABLE, "centre": [0.0, 9.0]}
-    given = plant(
+    tested = plant(
         bottles=[crowd],
         belts={"main": belt(SPEED, (-4.0, -4.0), 6.5, 8.0), "next": belt(0.7, (2.5, -4.0), 4.0, 8.0), "table": far},
         machines={},
     )
     ticks = 160
-    one, two, chunks = Simulation(given, threads=1), Simulation(given, threads=2), Simulation(given, threads=1)
-    straight = stepped(given)
+    one, two, chunks = Simulation(tested, threads=1), Simulation(tested, threads=2), Simulation(tested, threads=1)
+    straight = stepped(tested)
     rode = 0
     for _ in range(ticks):
         one.advance()

@@ -141,8 +141,8 @@ def test_on_one_belt_it_is_the_closed_form() -> None:
 
 def test_without_spin_a_ring_on_one_belt_is_exact() -> None:
     """Every point slips alike, for any number of points."""
-    found = drag(table(STRAIGHT), field([0.3], [MU]), 1.0, 0.5, 0.1, 0.0, 0.0)
-    assert found == pytest.approx([0.2 / math.hypot(0.2, 0.5 * LIMIT), 0.0, 0.0], abs=1e-14)
+    result = drag(table(STRAIGHT), field([0.3], [MU]), 1.0, 0.5, 0.1, 0.0, 0.0)
+    assert result == pytest.approx([0.2 / math.hypot(0.2, 0.5 * LIMIT), 0.0, 0.0], abs=1e-14)
 
 
 BESIDE = [{**STRAIGHT, "y": 0.0}, {**STRAIGHT, "y": 1.0}]
@@ -165,15 +165,15 @@ def test_two_belts_side_by_side() -> None:
 
 def test_opposite_belts_spin_a_ring_that_stands_across() -> None:
     """Halves are dragged in opposite directions: no force and M = (2/pi) mu m g R_b at rest, clockwise here."""
-    found = drag(table(*BESIDE), field([-0.5, 0.5], [MU, MU]), 1.0, 1.0, 0.0, 0.0, 0.0)
-    assert found == pytest.approx([0.0, 0.0, -2.0 / math.pi], abs=0.01)
+    result = drag(table(*BESIDE), field([-0.5, 0.5], [MU, MU]), 1.0, 1.0, 0.0, 0.0, 0.0)
+    assert result == pytest.approx([0.0, 0.0, -2.0 / math.pi], abs=0.01)
 
 
 def test_over_the_edge_it_stands_on_the_floor_as_well() -> None:
     """Half on a running belt, half on a floor at rest with another friction coefficient."""
     surface, belts = field([0.5], [MU]), table(STRAIGHT)
-    found = drag(belts, surface, 1.0, 0.0, 0.0, 0.0, 0.0)
-    assert found[:2] == pytest.approx([0.5, 0.0], abs=0.01)
+    result = drag(belts, surface, 1.0, 0.0, 0.0, 0.0, 0.0)
+    assert result[:2] == pytest.approx([0.5, 0.0], abs=0.01)
     moving = drag(belts, surface, 1.0, 0.0, 0.25, 0.0, 0.0)
     assert moving[0] == pytest.approx(0.5 - 0.5 * 0.1 / MU, abs=0.01)
 
@@ -188,8 +188,8 @@ def test_the_force_hardly_jumps_as_the_ring_passes_an_edge() -> None:
 def test_a_certain_belt_is_not_searched_for() -> None:
     """`certain` has precedence over the candidates, as for a point."""
     surface = field([0.5, -0.5], [MU, MU])
-    found = drag(table(*BESIDE, certain=0), surface, 1.0, 1.5, 0.0, 0.0, 0.0)
-    assert found[0] > 0.9
+    result = drag(table(*BESIDE, certain=0), surface, 1.0, 1.5, 0.0, 0.0, 0.0)
+    assert result[0] > 0.9
 
 
 def test_on_a_belt_that_turns_a_ring_turns_with_it() -> None:

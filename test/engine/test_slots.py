@@ -23,8 +23,8 @@ def around_a_big_one() -> tuple[State, np.ndarray, np.ndarray]:
     kinds = np.ones(len(points), int)
     kinds[30:32] = 0
     fields = {"bottle_types": {"big": kind(BIG, 1.0), "small": kind(SMALL, 0.01)}, "contacts": [contact(STIFFNESS)]}
-    given = scene(**fields, floor="none", bottles=[bottle(FAR, FAR, type="big"), bottle(-FAR, FAR, type="small")])
-    return state_of(given, points, kinds=kinds), points, np.array([BIG, SMALL])[kinds]
+    tested = scene(**fields, floor="none", bottles=[bottle(FAR, FAR, type="big"), bottle(-FAR, FAR, type="small")])
+    return state_of(tested, points, kinds=kinds), points, np.array([BIG, SMALL])[kinds]
 
 
 def test_a_bottle_with_more_neighbours_than_slots() -> None:

@@ -18,13 +18,13 @@ DT = 2e-5
 def pressed() -> State:
     """Return twelve bottles squeezed in a corner of straight rails and an arc, sliding and spinning."""
     points = [(0.062 + 0.125 * column, 0.063 + 0.126 * row) for row in range(3) for column in range(4)]
-    given = scene(
+    tested = scene(
         contacts=[contact(5000.0, **SPRING), contact(8000.0, "steel", **SPRING)],
         rails={"corner": polyline([(0.0, 1.0), (0.0, 0.0), (1.0, 0.0)]), "bend": arc((0.25, 0.2), 0.26, 0.0, 1.5)},
         floor="none",
         bottles=[bottle(FAR, FAR), bottle(-FAR, FAR)],
     )
-    state, random = State(build_model(given)), np.random.default_rng(2)
+    state, random = State(build_model(tested)), np.random.default_rng(2)
     for x, y in points:
         state.add(0, x, y, 0.0, *random.normal(0.0, 0.2, 2), random.normal(0.0, 5.0))
     state.make_lists()
@@ -37,18 +37,18 @@ def run(state: State, steps: int) -> None:
 
 def elongations(state: State) -> dict[tuple[str, int, int], float]:
     """Return the elongations of all loaded springs, m, by their ends."""
-    world, found = state.world, {}
+    world, lengths = state.world, {}
     assert world.pairs is not None
     assert world.pairs.spring is not None
     for p in range(world.pairs.used[0]):
-        found["bottle", int(world.pairs.i[p]), int(world.pairs.j[p])] = float(world.pairs.spring.elongation[p])
+        lengths["bottle", int(world.pairs.i[p]), int(world.pairs.j[p])] = float(world.pairs.spring.elongation[p])
     for name, near in (("segment", world.near_segments), ("arc", world.near_arcs)):
         assert near is not None
         assert near.springs is not None
         for i in range(world.bottles.id.size):
             for entry in range(near.start[i], near.start[i + 1]):
-                found[name, i, int(near.piece[entry])] = float(near.springs.elongation[entry])
-    return {key: value for key, value in found.items() if value != 0.0}
+                lengths[name, i, int(near.piece[entry])] = float(near.springs.elongation[entry])
+    return {key: value for key, value in lengths.items() if value != 0.0}
 
 
 def test_a_rebuilt_list_keeps_the_springs() -> None:

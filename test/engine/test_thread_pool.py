@@ -21,7 +21,7 @@ def crowd(**fields: Any) -> Scene:
     width, height = COLUMNS * PITCH + 0.1, ROWS * PITCH + 0.1
     box = [(0.0, 0.0), (width, 0.0), (width, height), (0.0, height)]
     laws = {"damping": ("normal", 1.0), "friction": 0.2}
-    given: dict[str, Any] = {
+    base_fields: dict[str, Any] = {
         "bottle_types": {"bottle": kind(), "slim": kind(0.06, 0.15)},
         "contacts": [contact(5000.0, **laws), contact(8000.0, "steel", **laws)],
         "base": base(0.4),
@@ -38,7 +38,7 @@ def crowd(**fields: Any) -> Scene:
         "accuracy": {"per_tick": 50},
         "effects": COMMON,
     }  # fmt: skip
-    return scene(**with_bends({**given, **fields}))
+    return scene(**with_bends({**base_fields, **fields}))
 
 
 VARIANTS: dict[str, dict[str, Any]] = {
@@ -58,13 +58,13 @@ VARIANTS: dict[str, dict[str, Any]] = {
 @pytest.mark.parametrize("name", VARIANTS)
 def test_the_same_bits_on_any_number_of_threads(name: str) -> None:
     """The run is long enough for impacts and rebuilds; there may be more threads than blocks."""
-    ticks, given = 15, crowd(**VARIANTS[name])
-    one = Simulation(given, threads=1)
+    ticks, tested = 15, crowd(**VARIANTS[name])
+    one = Simulation(tested, threads=1)
     one.advance(ticks)
     assert one._state.world.bottles.id.size > 2 * BLOCK
     assert one.contacts().kind.size > 100
     for threads in (2, 3, 7):
-        other = Simulation(given, threads=threads)
+        other = Simulation(tested, threads=threads)
         other.advance(ticks)
         assert other.full_state_hash() == one.full_state_hash(), threads
         np.testing.assert_array_equal(other.bottles().peak_force, one.bottles().peak_force)
@@ -73,8 +73,8 @@ def test_the_same_bits_on_any_number_of_threads(name: str) -> None:
 
 
 def test_the_number_may_change_from_tick_to_tick() -> None:
-    given = crowd()
-    one, other = Simulation(given, threads=1), Simulation(given, threads=3)
+    tested = crowd()
+    one, other = Simulation(tested, threads=1), Simulation(tested, threads=3)
     one.advance(9)
     pool, sizes = other.integration._pool, [1, 3, 2, 2, 1, 3, 1, 2, 3]
     for size in sizes:

@@ -79,14 +79,14 @@ def test_contacts(names: list[str], atan: bool, spring: bool, implicit: bool) ->
         slip: Any,
         elongation: Any,
         compliance: Any,
-        found: Any,
+        results: Any,
     ) -> None:
         for c in range(uint64(count)):
             normal, tangential = contact_force(
                 law, c, None, 0.01, atan, overlap[c], 1.0, closing[c], slip[c], at(elongation, c), both(compliance, c)
             )
-            found[c] = normal
-            found[c + uint64(COUNT)] = tangential
+            results[c] = normal
+            results[c + uint64(COUNT)] = tangential
 
     law = ContactLaw(**{name: column() if name in names else None for name in ContactLaw._fields})  # type: ignore[arg-type]
     loop(
@@ -135,9 +135,9 @@ def test_friction_of_points(atan: Any) -> None:
     """Explicit and implicit quotients, on both curves."""
 
     @compiled
-    def loop(count: int, atan: Any, slip: Any, b: Any, found: Any) -> None:
+    def loop(count: int, atan: Any, slip: Any, b: Any, results: Any) -> None:
         for c in range(uint64(count)):
-            found[c] = regularisation(slip[c], 0.01, atan) - implicit_regularisation(slip[c], b[c], 0.01, atan)
+            results[c] = regularisation(slip[c], 0.01, atan) - implicit_regularisation(slip[c], b[c], 0.01, atan)
 
     loop(COUNT, atan, column(), column(), column())
     assert_vectorised(loop)

@@ -16,7 +16,7 @@ from fuzz.case import Case
 from fuzz.invariants import Invariants, Sent
 from fuzz.violation import Violation
 
-from conveyor_sim.bag.outputs import Outputs
+from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.bag.replay import replay
 from conveyor_sim.errors import SceneError, SimulationError
@@ -187,7 +187,7 @@ class _Watched:
 def _watched(scene: Scene, case: Case, ticks: int, bag: Path | None) -> _Watched:
     simulation = Simulation(scene, threads=1)
     recorder = Recorder(bag) if bag is not None else None
-    outputs = Outputs(simulation, [] if recorder is None else [recorder], run_id="fuzz")
+    outputs = OutputWriter(simulation, [] if recorder is None else [recorder], run_id="fuzz")
     outputs.start()
     invariants, sent = Invariants(simulation), by_tick(case)
     seen = _Watched([], [], "", simulation.counts.present, 0, 0)

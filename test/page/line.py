@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from conveyor_sim.bag.outputs import Outputs
+from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
@@ -15,7 +15,7 @@ def record(folder: Path, seconds: float = 24.0, closes: bool = True, line: Path 
     scene = load_scene(line)
     simulation = Simulation(scene)
     with Recorder(folder) as recorder:
-        outputs = Outputs(simulation, [recorder], run_id="run")
+        outputs = OutputWriter(simulation, [recorder], run_id="run")
         outputs.start()
         for tick in range(round(seconds / 0.01)):
             if tick == 600 and closes:

@@ -30,7 +30,7 @@ class Live:
     def serve(self, host: str = "127.0.0.1") -> None:
         settings = ServerSettings(host, users=self.folder / "users", opcua_certificates=self.folder / "certificates")
         self.serving = Serving(self.source, [(WEB, self.port)], settings)
-        self.port = int(self.serving.faces[0].address.rstrip("/").rpartition(":")[2])
+        self.port = int(self.serving.hosts[0].address.rstrip("/").rpartition(":")[2])
 
     def end(self) -> None:
         if self.serving is not None:

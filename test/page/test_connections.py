@@ -70,7 +70,7 @@ def test_a_line_whose_process_dies_is_lost_and_begins_anew(page: Any, live: Live
 
 
 def run(work: Coroutine[Any, Any, T]) -> T:
-    """In a thread of its own: the browser's driver has a loop in this one."""
+    """Run a coroutine in a separate thread, because the browser's driver has a loop in this one."""
     with ThreadPoolExecutor(1) as thread:
         return thread.submit(asyncio.run, asyncio.wait_for(work, PATIENCE)).result()
 
@@ -122,7 +122,7 @@ def test_files_outside_the_page_are_not_there(live: Live) -> None:
 
 
 async def messages(socket: Any, seconds: float) -> list[bytes]:
-    """What comes until nothing does for so long."""
+    """Return the messages until none comes for `seconds`."""
     found = []
     while True:
         try:
@@ -145,7 +145,7 @@ async def next_text(socket: Any, kind: str) -> dict[str, Any]:
 
 
 async def frames(socket: Any, count: int) -> None:
-    """Take so many, and say so."""
+    """Receive `count` frames and acknowledge each."""
     while count:
         message = await socket.receive()
         assert message.type is WSMsgType.BINARY, message
@@ -208,9 +208,9 @@ def test_requests_that_make_no_sense_are_refused(live: Live) -> None:
                 replies.append(reply["refused"])
             return replies
 
-    tick = live.source.shown.tick
+    tick = live.source.snapshot.tick
     assert all(run(work()))
-    assert live.source.shown.tick > tick and live.source.shown.values[SETPOINT] == 0.5
+    assert live.source.snapshot.tick > tick and live.source.snapshot.values[SETPOINT] == 0.5
 
 
 def test_a_flood_of_requests_is_cut_off_and_holds_up_nobody(live: Live) -> None:
@@ -228,7 +228,7 @@ def test_a_flood_of_requests_is_cut_off_and_holds_up_nobody(live: Live) -> None:
             return flood.close_code
 
     assert run(work()) == WSCloseCode.POLICY_VIOLATION
-    assert live.source.shown.values[SETPOINT] == 0.5
+    assert live.source.snapshot.values[SETPOINT] == 0.5
 
 
 @pytest.mark.parametrize("kind", [WSMsgType.PING, WSMsgType.PONG], ids=["pings", "pongs"])
@@ -252,7 +252,7 @@ def test_a_flood_of_what_needs_no_answer_is_cut_off_too(live: Live, kind: WSMsgT
 
 
 def is_open(connection: socket.socket) -> bool:
-    """Whether the server has left it open; what it sent is thrown away."""
+    """Return True if the server has left a connection open; its data is discarded."""
     connection.setblocking(False)
     try:
         while connection.recv(1 << 20):
@@ -265,7 +265,7 @@ def is_open(connection: socket.socket) -> bool:
 
 
 def test_connections_that_only_wait_make_room(live: Live) -> None:
-    """Of those that ask for nothing, for half a thing, and do not take what they asked for, the oldest; but no page."""
+    """The oldest clients without a request, with half a request, or with an unread answer are closed, but no page."""
     asked = [b"", b"GET / HTT", f"GET /lib/uplot.js HTTP/1.1\r\nHost: 127.0.0.1:{live.port}\r\n\r\n".encode()]
 
     async def work() -> None:
@@ -375,7 +375,7 @@ def test_what_waits_for_a_page_is_bounded() -> None:
 def test_nobody_who_is_not_let_in_sees_anything(browser: Any, live: Live, users: Path) -> None:
     settings = ServerSettings(users=users / "users", anonymous=False)
     with Serving(live.source, [(WEB, 0)], settings) as serving:
-        url = serving.faces[0].address.rstrip("/")
+        url = serving.hosts[0].address.rstrip("/")
 
         async def work() -> None:
             async with ClientSession() as session, session.ws_connect(f"{url}/live", origin=url) as socket:
@@ -399,7 +399,7 @@ def test_nobody_who_is_not_let_in_sees_anything(browser: Any, live: Live, users:
 def test_other_machines_get_it_by_tls_alone(open_page: Callable[[str], Any], live: Live, users: Path) -> None:
     settings = ServerSettings("127.0.0.2", users=users / "users", opcua_certificates=users / "certificates")
     with Serving(live.source, [(WEB, 0)], settings) as serving:
-        address = serving.faces[0].address
+        address = serving.hosts[0].address
         assert address.startswith("https://127.0.0.2:")
         page = open_page(address)
         signed_in(page, "jo")

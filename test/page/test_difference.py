@@ -1,4 +1,4 @@
-"""Where two recordings first differ: found at the tick, told in words, within tolerances where bits need not agree."""
+"""First difference of two recordings: at its tick, in words, within tolerances where bits need not agree."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from page.line import LINE, record
 
 from conveyor_sim.bag.messages.encode import Header
 from conveyor_sim.bag.messages.topics import TOPICS
-from conveyor_sim.bag.outputs import Outputs
+from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.columns.bottles import BottleColumns
@@ -63,7 +63,7 @@ def placed(folder: Path, x: Callable[[int], float], tick_ns: int = 10_000_000) -
     simulation = Simulation(load_scene(LINE, {"tick": tick_ns * 1e-9}))
     zero = np.zeros(1)
     with Recorder(folder) as recorder:
-        Outputs(simulation, [recorder], run_id="run").start()
+        OutputWriter(simulation, [recorder], run_id="run").start()
         for tick in range(1, 20):
             columns = BottleColumns(
                 np.array([7], np.uint64), np.zeros(1, np.uint16), np.array([x(tick)]), zero, zero, zero, zero, zero,

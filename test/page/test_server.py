@@ -25,7 +25,7 @@ from protocols.waiting import until
 from conveyor_sim.bag.mcap.chunk import next_chunk
 from conveyor_sim.bag.messages.encode import Header
 from conveyor_sim.bag.messages.topics import TOPICS
-from conveyor_sim.bag.outputs import Outputs
+from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.columns.bottles import BottleColumns
@@ -185,7 +185,7 @@ def written(folder: Path, seconds: float, bottles: int = 300, rejected: int = 0)
     ids, zeros = np.arange(bottles, dtype=np.uint64), np.zeros(bottles)
     kinds, belts = np.zeros(bottles, np.uint16), np.zeros(bottles, np.int32)
     with Recorder(folder) as recorder:
-        Outputs(simulation, [recorder], run_id="run").start()
+        OutputWriter(simulation, [recorder], run_id="run").start()
         if rejected:
             events = event_columns(
                 [Event(10, "bottle_rejected", "machines/x", one, 1.0, "") for one in range(rejected)], rejected

@@ -1,4 +1,4 @@
-"""What tests of SCADA faces share."""
+"""Fixtures for tests of protocol servers."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from protocols.served import Served
 
 @pytest.fixture
 def command(tmp_path: Path) -> Iterator[Callable[..., Served]]:
-    """Starts `conveyor-sim serve` in a folder of its own; what is left of it is ended."""
+    """Start `conveyor-sim serve` in a separate folder; end what is left of it after the test."""
     started: list[Served] = []
 
     def start(*arguments: str, fresh: bool = False, **environment: str) -> Served:

@@ -1,4 +1,4 @@
-"""Clients of test_load.py, as a process: they say whenever all of them have seen all tags at one value more."""
+"""Clients of test_load.py, as a process: they report each value that all of them have seen in all tags."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from pymodbus.client import AsyncModbusTcpClient
 from bench.scada_clients import CHANGING, CLIENTS, POLL, PUBLISH, Seen
 
 QUEUE = 20
-"""Changes of a tag that the server keeps for a subscriber of OPC UA."""
+"""Changes of a tag that the server queues for a subscriber of OPC UA."""
 
 
 class All:
-    """What the clients have seen."""
+    """Values that the clients have seen."""
 
     def __init__(self) -> None:
         self.seen = [Seen() for _ in range(CLIENTS)]
@@ -58,7 +58,7 @@ async def opcua(address: str, seen: Seen, more: Callable[[], bool]) -> None:
 
 
 async def main(address: str, last: int) -> None:
-    """All at once, until each has seen all tags at the last value."""
+    """Run all clients until each has seen all tags at the last value."""
     logging.disable()
     those, act = All(), {"modbus": modbus, "opc.tcp": opcua}[urlsplit(address).scheme]
 

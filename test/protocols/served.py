@@ -1,4 +1,4 @@
-"""`conveyor-sim serve` as a process of its own."""
+"""`conveyor-sim serve` as a separate process."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ COMMAND = ["-c", "from conveyor_sim.cli import main; main()", "serve"]
 
 
 class Served:
-    """One of them."""
+    """Process of `conveyor-sim serve`."""
 
     def __init__(self, folder: Path, *arguments: str, fresh: bool = False, **environment: str) -> None:
-        """In a folder of its own. fresh: by a Python of its own, as it is where an environment is given."""
+        """Start it in a separate folder. fresh: in a new Python, which an environment requires."""
         self.folder, self._log = folder, folder / "log"
         self._out = TemporaryFile("w+")  # noqa: SIM115  # read at the end
         with self._log.open("w") as log:
@@ -39,12 +39,12 @@ class Served:
 
     @property
     def told(self) -> str:
-        """What it has said so far."""
+        """Return its output so far."""
         return self._log.read_text()
 
     @property
     def address(self) -> str:
-        """Of its first server, once it listens."""
+        """Return the address of its first server, once it listens."""
         pattern = r"(modbus|opc\.tcp|ws)://127\.0\.0\.1:\d+"
         until(lambda: re.search(pattern, self.told) or self.process.poll() is not None, "the server")
         found = re.search(pattern, self.told)
@@ -53,12 +53,12 @@ class Served:
 
     @property
     def port(self) -> int:
-        """The same."""
+        """Return the port of its first server, once it listens."""
         return int(self.address.rpartition(":")[2])
 
     @property
     def simulator(self) -> int:
-        """The process that simulates."""
+        """Return the process that simulates."""
         (pid,) = (pid for pid, command in self.children.items() if "scene_process" in command)
         return pid
 
@@ -69,7 +69,7 @@ class Served:
 
     @property
     def children(self) -> dict[int, str]:
-        """Child processes, with their command lines."""
+        """Return the child processes with their command lines."""
         found = {}
         for task in Path(f"/proc/{self.process.pid}/task").glob("*/children"):
             with suppress(FileNotFoundError):  # a thread, or a child, that has just ended
@@ -77,7 +77,7 @@ class Served:
         return found
 
     def end(self, number: int = signal.SIGINT) -> str:
-        """What it printed, after a signal."""
+        """Send a signal, and return its complete output."""
         self.process.send_signal(number)
         self.process.wait(timeout=PATIENCE)
         self._out.seek(0)

@@ -1,4 +1,4 @@
-"""Waiting for what will happen."""
+"""Helpers that wait for conditions."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ PATIENCE = 60.0  # s of wall time; only a failing test waits so long
 
 
 def until(condition: Callable[[], Any], what: str) -> None:
-    """Wait for something that will happen."""
+    """Wait for a condition."""
     end = time.monotonic() + PATIENCE
     while not condition():
         assert time.monotonic() < end, f"in vain: {what}"

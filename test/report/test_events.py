@@ -13,7 +13,7 @@ from conveyor_sim.bag.mcap.writer import McapFileWriter, Schema
 from conveyor_sim.bag.messages.encode import Header, bool_message
 from conveyor_sim.bag.messages.topics import OUTPUTS
 from conveyor_sim.bag.messages.typestore import definition
-from conveyor_sim.bag.outputs import Outputs
+from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.cli import main
@@ -31,7 +31,7 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     sim = Simulation(load_scene(SMALL_LINE))
     given = {10: ("alarms/table full", 1.0), 20: ("belts/no\nwhere", 1.0), 50: ("alarms/table full", 0.0)}
     with Recorder(folder) as recorder:
-        outputs = Outputs(sim, [recorder], run_id="run")
+        outputs = OutputWriter(sim, [recorder], run_id="run")
         outputs.start()
         while sim.tick < 100:
             if sim.tick in given:

@@ -11,7 +11,7 @@ from bag.small_line import SMALL_LINE
 from click.testing import CliRunner
 from facts import missing, stating
 
-from conveyor_sim.bag.outputs import Outputs
+from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.bag.replay import replay
 from conveyor_sim.cli import main
@@ -41,7 +41,7 @@ def record(
     scene = scene or load_scene(FAILING_LINE)
     sim = Simulation(scene) if start is None else Simulation.load(start, scene=scene)
     with Recorder(folder) as recorder:
-        outputs = Outputs(sim, [recorder], run_id="run")
+        outputs = OutputWriter(sim, [recorder], run_id="run")
         outputs.start()
         if forced:
             sim.give(Input("operate", "Jo", "engineer", FORCE, (forced,), (1.0,)))
@@ -107,7 +107,7 @@ def test_alarms_are_counted(bag: Path, tmp_path: Path) -> None:
     scene = load_scene(FAILING_LINE)
     sim = Simulation(scene)
     with Recorder(tmp_path / "bag") as recorder:
-        outputs = Outputs(sim, [recorder], run_id="run")
+        outputs = OutputWriter(sim, [recorder], run_id="run")
         outputs.start()
         for tick in range(500):
             if tick % 20 == 0 and tick < 480:
@@ -209,7 +209,7 @@ def test_a_client_that_joins_late_sees_the_same(bag: Path, tmp_path: Path) -> No
 def test_a_recording_without_counters_is_refused_in_a_sentence(tmp_path: Path) -> None:
     sim = Simulation(load_scene(SMALL_LINE, {"outputs": {"counters": 0.0}}))
     with Recorder(tmp_path / "bag") as recorder:
-        outputs = Outputs(sim, [recorder], run_id="run")
+        outputs = OutputWriter(sim, [recorder], run_id="run")
         outputs.start()
         for _ in range(10):
             sim.advance()

@@ -10,7 +10,7 @@ from bag.editing import edited
 from bag.small_line import SMALL_LINE, record
 from rich.console import Console
 
-from conveyor_sim.bag.outputs import Outputs
+from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.line.commands.authority import AUTOMATIC, MANUAL
@@ -77,7 +77,7 @@ def test_a_long_hold_is_one_occasion(tmp_path: Path) -> None:
     simulation = Simulation(load_scene(SMALL_LINE))
     speed, device = "belts/straight/cmd_speed", "belts/straight"
     with Recorder(tmp_path / "bag") as recorder:
-        outputs = Outputs(simulation, [recorder], run_id="run")
+        outputs = OutputWriter(simulation, [recorder], run_id="run")
         outputs.start()
         for tick in range(60):
             if tick % 20 == 0:

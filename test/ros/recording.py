@@ -5,7 +5,7 @@ from pathlib import Path
 from bag.small_line import SMALL_LINE, SPEED, TURN
 
 from conveyor_sim.bag.messages import encode as types
-from conveyor_sim.bag.outputs import Outputs
+from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.line.run_state import RUNNING, RunState
 from conveyor_sim.scene import load_scene
@@ -45,7 +45,7 @@ def record(folder: Path) -> list[bytes]:
     simulation = Simulation(load_scene(SMALL_LINE, {"photo_eyes": PHOTO_EYES}))
     eye = EyeSink()
     with Recorder(folder) as recorder:
-        outputs = Outputs(simulation, [recorder, eye], run_id="run", frame_id="hall")
+        outputs = OutputWriter(simulation, [recorder, eye], run_id="run", frame_id="hall")
         outputs.start()
         outputs.show_run(RunState(RUNNING))
         while simulation.tick < TICKS:

@@ -21,7 +21,7 @@ from std_srvs.srv import Trigger
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.replay import replay
 from conveyor_sim.errors import BagError
-from conveyor_sim.physics.state.checkpoint import sealed
+from conveyor_sim.physics.state.checkpoint import to_bytes
 from conveyor_sim.ros.child import Child
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
@@ -219,7 +219,7 @@ def test_what_is_no_checkpoint_neither_stops_nor_ends_a_run(line: LineClient, sh
     x = arrays["bottles.x"]
 
     def written(name: str, header: dict[str, Any], **changes: Any) -> str:
-        (folder / name).write_bytes(sealed(json.dumps(header), {**arrays, **changes}))
+        (folder / name).write_bytes(to_bytes(json.dumps(header), {**arrays, **changes}))
         return name
 
     os.mkfifo(folder / "pipe")

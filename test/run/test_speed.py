@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from bag.small_line import SMALL_LINE
+from facts import missing
 from pressing import hopper
 from scenes import bottle, scene
 
@@ -22,10 +23,9 @@ BY_KERNELS = Spent(kernels=6.0, line=1.0, recording=2.0)
 def test_a_step_that_contact_friction_rules_has_the_implicit_solver_for_a_remedy() -> None:
     limit = step_limit(hopper(1000))
     speed, bound, change = measured(20.0, 10.0, BY_KERNELS, 0.5, limit, TOPICS)
-    assert speed == (
-        "speed: 20.00 s simulated in 10.00 s, 2 x real time; 60 % in the kernels, 10 % in devices and the guard, "
-        "20 % in recording; then 0.50 s for summary and pictures"
-    )
+    assert speed.startswith("speed: ")
+    assert missing(speed, ["20.00 s", "10.00 s", "2 x real time", "60 %", "kernels", "10 %", "devices", "guard"]) == []
+    assert missing(speed, ["20 %", "recording", "0.50 s", "summary", "pictures"]) == []
     assert bound.startswith(f"bound: contact friction needs {limit.steps} steps a tick, ")
     assert change.startswith("change: fewer steps: friction_solver: implicit: ")
     assert expected(limit)[1:] == [bound, change]
@@ -34,27 +34,29 @@ def test_a_step_that_contact_friction_rules_has_the_implicit_solver_for_a_remedy
 def test_where_nothing_bounds_the_step_the_lines_say_so() -> None:
     limit = step_limit(scene(bottles=[bottle(0.0, 0.0)], floor="none"))
     _, bound, change = expected(limit)
-    assert bound == "bound: nothing in the scene bounds the time step"
-    assert change == "change: no single change of the scene that is known to help takes fewer steps"
+    assert bound.startswith("bound: ") and change.startswith("change: ")
+    assert missing(bound, ["nothing", "time step"]) == []
+    assert missing(change, ["no single change", "fewer steps"]) == []
 
 
 def test_a_recording_that_takes_longest_names_its_topics() -> None:
     spent = Spent(kernels=3.0, line=1.0, recording=5.0)
     _, bound, change = measured(20.0, 10.0, spent, 0.0, step_limit(load_scene(SMALL_LINE)), TOPICS)
-    assert bound == "bound: the recording, 9 MB of messages, most of them contacts (67 %) and bottles (33 %)"
-    assert change == "change: lower rates of contacts and bottles under `outputs`, or --no-record"
+    assert bound.startswith("bound: ") and change.startswith("change: ")
+    assert missing(bound, ["recording", "9 MB", "contacts (67 %)", "bottles (33 %)"]) == []
+    assert missing(change, ["lower rates", "contacts", "bottles", "`outputs`", "--no-record"]) == []
 
 
 def test_devices_that_take_longest_are_named() -> None:
     spent = Spent(kernels=1.0, line=6.0, recording=2.0)
     _, bound, change = measured(20.0, 10.0, spent, 0.0, step_limit(load_scene(SMALL_LINE)), TOPICS)
     assert bound.startswith("bound: devices and the guard")
-    assert change == "change: a longer tick, which is the scan cycle too"
+    assert missing(change, ["change", "longer tick", "scan cycle"]) == []
 
 
 def test_pictures_that_take_longer_than_the_run_are_named() -> None:
     _, bound, change = measured(20.0, 10.0, BY_KERNELS, 10.5, step_limit(load_scene(SMALL_LINE)), TOPICS)
-    assert bound == "bound: the summary and the pictures take longer than the run"
+    assert missing(bound, ["bound", "summary", "pictures", "longer", "run"]) == []
     assert "--no-pictures" in change
 
 

@@ -1,4 +1,4 @@
-"""Garbage is looked for later, and then again."""
+"""Garbage collection is delayed and then restored."""
 
 import gc
 

@@ -13,7 +13,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 MAIN = "print('began', flush=True); import sys; from conveyor_sim.cli import main; sys.exit(main())"
-"""As the console script has it."""
+"""Code of the console script."""
 READING = f"""
 import os, signal, click
 read = click.Command.parse_args
@@ -35,7 +35,7 @@ with one_line():
     callback()
     time.sleep(60.0)
 """
-"""As llvmlite calls back from the compiler, where Python loses exceptions."""
+"""Callback from C, as llvmlite makes it from the compiler: Python loses its exceptions."""
 
 FAILS_LATER = SWALLOWED.replace(
     "    callback()\n    time.sleep(60.0)", "    callback()\n    raise RuntimeError('none yet')"
@@ -43,7 +43,7 @@ FAILS_LATER = SWALLOWED.replace(
 
 
 def interrupted(arguments: list[str], after: float = 0.0, words: str = "") -> tuple[int, str]:
-    """Status and output of a Python that is sent SIGINT so long after it was started, or has said some words."""
+    """Return status and output of a Python that gets SIGINT after some seconds, or after some output."""
     process = subprocess.Popen(
         [sys.executable, *arguments],
         cwd=ROOT,
@@ -121,7 +121,7 @@ def test_other_errors_stay_what_they_are() -> None:
 
 
 def test_an_interrupt_that_a_library_makes_an_error_of_is_one_all_the_same() -> None:
-    """As pydantic does, when it is struck while it builds a validator."""
+    """Pydantic does this when it is interrupted while it builds a validator."""
     code = (
         "import time\nfrom conveyor_sim.support.interrupt import one_line\nwith one_line():\n    try:\n"
         "        print('began', flush=True); time.sleep(60)\n"
@@ -131,7 +131,7 @@ def test_an_interrupt_that_a_library_makes_an_error_of_is_one_all_the_same() -> 
 
 
 def test_an_interrupt_that_is_held_back_comes_when_the_work_is_done() -> None:
-    """What is inside ends first; a second one ends the process at once."""
+    """The work ends first; a second interrupt ends the process at once."""
     code = (
         "import time\nfrom conveyor_sim.support.interrupt import one_line\n"
         "from conveyor_sim.support.signals import held_back\nwith one_line():\n    with held_back():\n"
@@ -143,7 +143,7 @@ def test_an_interrupt_that_is_held_back_comes_when_the_work_is_done() -> None:
 
 
 IGNORED = ["sh", "-c", 'trap "" INT; exec "$0" "$@"', sys.executable]
-"""Python as a shell starts it in the background: SIGINT is ignored."""
+"""Python with SIGINT ignored, as shells start background jobs."""
 
 
 def test_a_command_that_is_started_with_interrupts_ignored_goes_on() -> None:

@@ -1,4 +1,4 @@
-"""Foreign text as it is repeated."""
+"""Foreign text made printable."""
 
 import pytest
 

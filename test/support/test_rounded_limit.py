@@ -1,4 +1,4 @@
-"""A limit that a sender's type has rounded is the limit; every other value stays as it is, bit for bit."""
+"""A limit rounded by a sender's type is the limit; every other value is unchanged, bit for bit."""
 
 import math
 import struct

@@ -1,4 +1,4 @@
-"""Signals as something to wait for."""
+"""Signals as requests that a thread waits for."""
 
 import os
 import signal
@@ -54,7 +54,7 @@ IN_A_RUN = "from conveyor_sim.run.runner import _stop_request\nstop = _stop_requ
 
 @contextmanager
 def started(code: str) -> Iterator[subprocess.Popen[str]]:
-    """A process that runs code, ended for good at the end."""
+    """Start a process that runs code, and end it after the context."""
     with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as process:
         try:
             yield process

@@ -22,15 +22,15 @@ OPERATIONS = ("acknowledge", "reset", "shelve", "unshelve", "remove_from_service
 OPERATOR = "operator 1"
 
 
-def class_named(source: Path, name: str, method: str) -> Any:
-    """Return the class of this name, wherever the package has it; its file defines a method of this name."""
-    patterns = [re.compile(text, re.MULTILINE) for text in (rf"^class {name}\b", rf"^    def {method}\(")]
+def class_named(source: Path, names: str, method: str) -> Any:
+    """Return the class with one of these names (separated by `|`), in whose file a method of this name is defined."""
+    head, body = re.compile(rf"^class ({names})\b", re.MULTILINE), re.compile(rf"^    def {method}\(", re.MULTILINE)
     texts = {file: file.read_text("utf-8") for file in (source / "conveyor_sim").rglob("*.py")}
-    files = [file for file, text in texts.items() if all(pattern.search(text) for pattern in patterns)]
-    if len(files) != 1:
-        raise LookupError(f"class {name}: {len(files)} definitions in {source}, expected one")
-    module = ".".join(files[0].relative_to(source).with_suffix("").parts)
-    return getattr(importlib.import_module(module), name)
+    matches = {file: match for file, text in texts.items() if body.search(text) and (match := head.search(text))}
+    if len(matches) != 1:
+        raise LookupError(f"class {names}: {len(matches)} definitions in {source}, expected one")
+    ((file, match),) = matches.items()
+    return getattr(importlib.import_module(".".join(file.relative_to(source).with_suffix("").parts)), match[1])
 
 
 def member(simulation: Any, name: str) -> Any:
@@ -142,7 +142,7 @@ class Entry:
         self._source, self._out, self._entry = source, out, entry
         self._hashes: list[list[Any]] = []
         self._simulation_class = importlib.import_module("conveyor_sim.simulation").Simulation
-        self._outputs = class_named(source, "Outputs", "after_tick")
+        self._outputs = class_named(source, "OutputWriter|Outputs", "after_tick")
         self._recorder = class_named(source, "Recorder", "write")
         self._input = class_named(source, "Input", "by_line")
         self._error = importlib.import_module("conveyor_sim.errors").ConveyorError

@@ -16,7 +16,7 @@ if "rosidl" in "".join(sys.orig_argv[1:2]):
     folder = Path(os.environ["CONVEYOR_MSGS_PARSED"])
 
     def parse_once(text: str) -> object:
-        """The tree of an IDL file's text."""
+        """Return the syntax tree of an IDL file's text, parsed once."""
         file = folder / f"{sha256(text.encode()).hexdigest()}.pickle"
         if file.exists():
             return pickle.loads(file.read_bytes())

@@ -19,8 +19,8 @@ from conveyor_sim.engine.compiler.compile import ENGINE_HASH
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.physics.sources_hash import sources_hash
 from conveyor_sim.scene import Scene
+from conveyor_sim.support.checked_json import read_checked, with_checksum
 from conveyor_sim.support.files import MB, FileError, read_file, write_file
-from conveyor_sim.support.sealed_json import read_sealed, sealed
 
 SAMPLES = "samples.csv"
 MOST = 512 * MB
@@ -94,20 +94,20 @@ def check_origin(folder: Path, scene: Scene) -> None:
         if not path.exists() and (folder / OTHER_STUDY).exists():
             raise ConveyorError(f"{folder}: has another kind of study ({OTHER_STUDY}), expected another folder")
         if not path.exists() and not (folder / SAMPLES).exists():
-            write_file(path, sealed(origin, indent=2))
+            write_file(path, with_checksum(origin, indent=2))
     except OSError as error:
         raise _unwritable(folder, error) from None
     except FileError as error:
         raise ConveyorError(f"{path}: {error}, expected a folder to write to") from None
     try:
-        kept = read_sealed(path)
+        kept = read_checked(path)
     except FileError as error:
         raise ConveyorError(
             f"{path}: {error}, so the origin of the runs beside it is unknown; expected the file as it was, "
             "another folder, or this one emptied to begin anew"
         ) from None
     other = [what for what, value in origin.items() if kept.data.get(what) != value]
-    if other or not kept.sealed:
+    if other or not kept.has_checksum:
         other = other or ["version of conveyor_sim"]
         raise ConveyorError(
             f"{path}: its runs were made with another {' and another '.join(other)}, so they can't be compared with "

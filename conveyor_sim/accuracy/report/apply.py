@@ -78,6 +78,6 @@ def _take_tables_along(lines: list[str], data: Any, before: Path, copy: Path) ->
 def _write(file: Path, text: str) -> None:
     """Write the complete file or nothing."""
     try:
-        write_file(file, text.encode(), file.parent)
+        write_file(Path(file.name), text.encode(), file.parent)
     except FileError as error:
         raise ConveyorError(f"{file}: {error}, expected a file to write to") from None

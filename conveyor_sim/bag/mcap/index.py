@@ -77,7 +77,7 @@ def chained_to(data: Data) -> int | None:
     return end
 
 
-def sealed(data: Data) -> bool:
+def is_complete(data: Data) -> bool:
     """Return True if both checksums exist and are right. Then every byte is as it was written."""
     size = len(data)
     footer = size - len(MAGIC) - FOOTER.size

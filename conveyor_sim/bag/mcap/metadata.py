@@ -12,9 +12,9 @@ from textwrap import dedent, indent
 from typing import Any
 
 import yaml
-from ruamel.yaml import YAML
 
-from conveyor_sim.errors import BagError
+from conveyor_sim.errors import BagError, SceneError
+from conveyor_sim.scene.yaml_lines import Document
 from conveyor_sim.support.files import FileError, write_file
 
 FILE_NAME = "metadata.yaml"
@@ -112,18 +112,21 @@ def to_yaml(value: Any) -> str:
 def from_yaml(text: str) -> Any:
     """Parse YAML. Return None for text that is not YAML. Callers share the result and must not change it."""
     try:
-        return YAML(typ="safe").load(text)
-    except Exception:  # damaged text makes the parser raise more than its own YAMLError
+        return Document(text, FILE_NAME).data
+    except SceneError:
         return None
 
 
 def write_metadata(folder: Path, information: str) -> None:
-    """Write metadata.yaml into the folder, complete or not at all. information: `bag_information` as YAML."""
+    """Write metadata.yaml into the folder, complete or not at all. information: `bag_information` as YAML.
+
+    Raise OSError, by which a recorder distinguishes a full disk from a missing folder; BagError for other reasons.
+    """
     file = folder / FILE_NAME
     try:
         write_file(file, (_HEAD + indent(information, "  ")).encode())
     except FileError as error:
-        raise BagError(f"{file}: {error}") from error
+        raise error.__cause__ if isinstance(error.__cause__, OSError) else BagError(f"{file}: {error}") from error
 
 
 def read_metadata(folder: Path) -> dict[str, Any] | None:

@@ -1,4 +1,4 @@
-"""The topics, one row each: all that publishes, records, reads, replays, compares or lists topics asks here."""
+"""The topics, one row each, for publishing, recording, reading, replaying, comparing and listing them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 from conveyor_sim.bag.messages import encode
 from conveyor_sim.bag.messages.encode import Header, Outcome
-from conveyor_sim.bag.messages.entries import bin_name, bottle_name, command_name, contact_name
 from conveyor_sim.bag.messages.markers import bottles_markers, plant_markers
 from conveyor_sim.bag.messages.qos import ALARMS, CLOCK, DATA, EVENTS, LATCHED, OUTCOMES, Qos
 from conveyor_sim.columns.alarms import AlarmColumns
@@ -28,7 +27,7 @@ if TYPE_CHECKING:
 
 
 class Snapshot:
-    """A simulation at one tick: its bottles are observed at most once, however many topics show them."""
+    """A simulation at one tick. Its bottles are observed at most once for all topics."""
 
     def __init__(self, sim: Simulation, run_id: str = "") -> None:
         self.sim = sim
@@ -42,23 +41,24 @@ class Snapshot:
 
 @dataclass(frozen=True)
 class Compare:
-    """How a replay compares a topic's messages with those that were recorded, field by field."""
+    """Rule by which a replay compares a topic's messages with the recorded ones, field by field."""
 
     entry: Callable[[Any, Any, int], str] = lambda line, message, index: ""
-    """Entry i of a message in words, such as "belt feeder", from Line, message and i."""
+    """Returns entry i of a message in words, such as "belt feeder", from Line, message and i."""
     bottle: str | None = None
-    """The field that holds the ids of the bottles, where entries belong to bottles."""
+    """Field with the ids of the bottles, if entries belong to bottles."""
     within: Mapping[str, float] = field(default_factory=dict)
-    """By field, the tolerance on another machine or with other versions: absolute, in the unit of the field, plus
-    compare.RELATIVE of the value; other fields exactly. Empty: compared bit for bit on the same machine, else not.
+    """Tolerance on another machine or with other versions, by field: absolute, in the unit of the field, plus
+    compare.RELATIVE of the value. Other fields are compared exactly. Empty: the topic is compared on the same machine
+    only, bit for bit.
 
-    Wide against rounding, narrow against a collision that went another way: a dense line is chaotic, so runs on
-    different machines do part in the end.
+    The tolerances are wide compared with rounding, and narrow compared with a collision that ended differently. A dense
+    line is chaotic, so runs on different machines diverge in the end.
     """
 
 
 NOT_COMPARED = Compare()
-"""Of topics that say nothing else."""
+"""Rule of topics that state no other."""
 
 
 @dataclass(frozen=True)
@@ -69,61 +69,87 @@ class Topic:
     """Relative to the node's namespace, unless it begins with /. <...> stands for a name of the scene."""
     type: str
     what: str
-    """For docs/ros.md, as `when`."""
+    """Description for docs/ros.md, as `when`."""
     when: str = ""
-    """In words; "": as its rate says."""
+    """Times of its messages in words; "": at its rate."""
     qos: Qos = DATA
     rate: str | None = None
-    """The key of Scene.outputs whose rate it has; None: sent at the start (`once`), or when there is something."""
+    """Key of Scene.outputs with its rate; None: sent at the start (`once`), or when there is a message."""
     state: Callable[[Snapshot], Any] | None = None
-    """What it shows of a tick; None: nothing, and no message is sent."""
+    """Returns its data at a tick; None means that no message is sent."""
     events: Callable[[Events], Sequence[Any]] | None = None
     """View of the event stream (`Simulation.take_events`): one message per event, with the tick of the event."""
     write: Callable[[Any, Header], bytes] | None = None
-    """A message from what `state` or `events` gave; None: field by field."""
+    """Serializes the result of `state` or `events`; None: field by field."""
     columns: Callable[..., Any] | None = None
-    """The dataclass that a message is read back as, field by field."""
+    """Dataclass as which a message is read back, field by field."""
     read: Callable[[Any], Any] | None = None
-    """The same where it is not field by field."""
+    """Reads a message back in another way than field by field."""
     recorded: bool = True
-    """By default."""
+    """True if it is recorded by default."""
     once: bool = False
-    """Latched and sent at the start of a run only, though it has a `state`."""
+    """True if it has a `state`, but is latched and sent at the start of a run only."""
     compare: Compare = NOT_COMPARED
-    """By a replay."""
+    """Comparison by a replay."""
     subscribed: bool = False
-    """Whether it is sent to the line, and not by it."""
+    """True if it is sent to the line, and not by it."""
     by_controller: bool = False
-    """Whether it comes from a controller beside the line, and not from the node."""
+    """True if a controller beside the line sends it, and not the node."""
 
     @property
     def each_counts(self) -> bool:
-        """Whether each message counts for its own moment only, and none shows a state."""
+        """True if messages are single events, and not states."""
         return self.qos is EVENTS
 
     def pack(self, data: Any, header: Header) -> bytes:
-        """The message of what `state` or `events` gave."""
+        """Return the message of a result of `state` or `events`."""
         return encode.columns_message(self.type, data, header) if self.write is None else self.write(data, header)
 
     def unpack(self, message: Any) -> Any:
-        """What a decoded message is read back as; itself where nothing is said."""
+        """Return a decoded message as it is read back: columns, or the message itself if the row states none."""
         if self.read is not None:
             return self.read(message)
         return message if self.columns is None else to_columns(self.columns, message)
 
     @property
     def fields(self) -> tuple[str, ...]:
-        """Those of its messages that are compared."""
+        """Compared fields of its messages."""
         return ("values",) if self.columns is None else tuple(field.name for field in fields(self.columns))  # type: ignore[arg-type]
 
 
 def to_columns(kind: Callable[..., Any], message: Any) -> Any:
-    """The dataclass that a message holds field by field."""
+    """Read a message back as a dataclass, field by field."""
     return kind(**{field.name: getattr(message, field.name) for field in fields(kind)})  # type: ignore[arg-type]
 
 
 _MOTION = {"x": 1e-6, "y": 1e-6, "theta": 1e-5, "vx": 1e-4, "vy": 1e-4, "omega": 1e-3}
 """m, m, rad, m/s, m/s, rad/s."""
+
+
+def _bottle_name(line: Any, message: Any, index: int) -> str:
+    """Return an entry of columns by bottle in words."""
+    return f"bottle {message.id[index]}"
+
+
+def _contact_name(line: Any, message: Any, index: int) -> str:
+    """Return an entry of contacts in words."""
+    other = int(message.b[index])
+    if message.kind[index] == 0:
+        return f"the contact of bottles {message.a[index]} and {other}"
+    rail = line.rails[other] if other < len(line.rails) else other
+    return f"the contact of bottle {message.a[index]} and rail {rail}"
+
+
+def _command_name(line: Any, message: Any, index: int) -> str:
+    """Return an entry of read-back values in words."""
+    names = line.command_names
+    return f"command {names[index]}" if index < len(names) else ""  # there may be more writers than commands
+
+
+def _bin_name(line: Any, message: Any, index: int) -> str:
+    """Return an entry of rail wear in words."""
+    return f"rail {line.rails[message.rail[index]]} at ({message.x[index]:.4g}, {message.y[index]:.4g}) m"
+
 
 _ROWS = (
     Topic(
@@ -149,7 +175,7 @@ _ROWS = (
     Topic(
         "outcomes",
         encode.OUTCOME,
-        "what became of an input: who gave it, tick, accepted or the reason",
+        "result of an input: its writer, tick, accepted or the reason of a refusal",
         "when it happens",
         OUTCOMES,
         events=lambda events: events.outcomes,
@@ -160,7 +186,7 @@ _ROWS = (
     Topic(
         "guard",
         "conveyor_msgs/msg/GuardEvent",
-        "what the [guard](stability.md) noticed: which bottle, where, why, and what helps",
+        "report of the [guard](stability.md): bottle, place, reason, and remedy",
         "when it happens",
         EVENTS,
         events=lambda events: events.guard,
@@ -168,7 +194,7 @@ _ROWS = (
     Topic(
         "damage_events",
         "conveyor_msgs/msg/DamageEvent",
-        "a limit of the scene (`limits`) was passed: which bottle, what, where",
+        "exceeded limit of the scene (`limits`): bottle, quantity, place",
         "when it happens",
         EVENTS,
         events=lambda events: events.damage,
@@ -181,7 +207,7 @@ _ROWS = (
         rate="bottles",
         state=lambda now: now.bottles,
         columns=BottleColumns,
-        compare=Compare(bottle_name, "id", {**_MOTION, "peak_force": 1e-2, "impulse": 1e-4}),
+        compare=Compare(_bottle_name, "id", {**_MOTION, "peak_force": 1e-2, "impulse": 1e-4}),
     ),
     Topic(
         "poses",
@@ -195,7 +221,7 @@ _ROWS = (
         "markers",
         encode.MARKERS,
         "bottles for RViz and Foxglove",
-        "as `poses`, at most `marker_rate` a wall second",
+        "as `poses`, at most `marker_rate` per second of wall time",
         rate="poses",
         state=lambda now: (now.bottles, now.sim.model.type_radius, now.sim.moving_rails()),
         write=lambda data, header: bottles_markers(data[0], data[1], data[2], header),
@@ -207,7 +233,7 @@ _ROWS = (
         rate="contacts",
         state=lambda now: now.sim.contacts(),
         columns=ContactColumns,
-        compare=Compare(contact_name, "a"),
+        compare=Compare(_contact_name, "a"),
     ),
     Topic(
         "belts",
@@ -239,7 +265,7 @@ _ROWS = (
     Topic(
         "ledger",
         "conveyor_msgs/msg/Ledger",
-        "the energy ledger: work of each belt, dissipated, stored, and what does not close",
+        "the energy ledger: work of each belt, dissipated and stored energy, and the residual",
         rate="ledger",
         state=lambda now: now.sim.ledger(),
         columns=Ledger,
@@ -253,7 +279,7 @@ _ROWS = (
         rate="damage",
         state=lambda now: now.sim.damage(),
         columns=DamageColumns,
-        compare=Compare(bottle_name, "id"),
+        compare=Compare(_bottle_name, "id"),
     ),
     Topic(
         "rail_wear",
@@ -263,13 +289,13 @@ _ROWS = (
         rate="damage",
         state=lambda now: now.sim.rail_wear(),
         columns=RailWearColumns,
-        compare=Compare(bin_name),
+        compare=Compare(_bin_name),
     ),
     Topic(
         "events",
         "conveyor_msgs/msg/Events",
-        "what happened: bottles fed, removed, rejected, alarms, states of machines, faults, refusals, limits",
-        "each tick at which something did",
+        "events: bottles fed, removed, rejected, alarms, states of machines, faults, refusals, limits",
+        "each tick with events",
         EVENTS,
         state=lambda now: event_columns(now.sim.line.happened, now.sim.line.happened_so_far),
         columns=EventColumns,
@@ -278,18 +304,18 @@ _ROWS = (
     Topic(
         "readback",
         "conveyor_msgs/msg/ReadBack",
-        "what each command is set to, who set it, and when",
-        "latched, each tick at which something of it changed",
+        "read-back values of commands, with the writer and the time",
+        "latched, each tick with a change",
         LATCHED,
         state=lambda now: now.sim.line.read_back.changes(),
         columns=ReadBackColumns,
-        compare=Compare(command_name, within={"value": 1e-9}),
+        compare=Compare(_command_name, within={"value": 1e-9}),
     ),
     Topic(
         "alarm_states",
         "conveyor_msgs/msg/AlarmStates",
-        "all [alarms](alarms.md), with what was declared of them and their states by ISA-18.2",
-        "latched, each tick at which something of it changed",
+        "all [alarms](alarms.md), with their declarations and states by ISA-18.2",
+        "latched, each tick with a change",
         LATCHED,
         state=lambda now: now.sim.line.alarms.changes(),
         columns=AlarmColumns,
@@ -298,7 +324,7 @@ _ROWS = (
     Topic(
         "variables",
         "conveyor_msgs/msg/Variables",
-        "a PLC program's variables that were to be [recorded](structured_text.md#variables-in-recordings); as a node, "
+        "a PLC program's variables that are [recorded](structured_text.md#variables-in-recordings); as a node, "
         "by `controller_node`",
         "each scan of the program",
         columns=VariableColumns,
@@ -307,7 +333,7 @@ _ROWS = (
     Topic(
         "run_state",
         "conveyor_msgs/msg/RunState",
-        "what the run is doing: running, paused, lockstep, ended, stopped with the reason, replaying",
+        "state of the run: running, paused, lockstep, ended, stopped with the reason, replaying",
         "latched, when it changes",
         LATCHED,
         write=encode.run_state_message,
@@ -316,7 +342,7 @@ _ROWS = (
     Topic(
         "photo_eyes/<eye>",
         encode.BOOL,
-        "whether a photo-eye is blocked: for the simplest controllers; not recorded, `signals` has it",
+        "true while a photo-eye is blocked, for simple controllers; not recorded, because `signals` has it",
         "latched, when it changes",
         LATCHED,
         write=encode.bool_message,
@@ -325,7 +351,7 @@ _ROWS = (
     Topic(
         "alarms",
         "diagnostic_msgs/msg/DiagnosticArray",
-        "a controller's alarms, by `controller_node`: a status each, ERROR while it stands",
+        "a controller's alarms, by `controller_node`: one status per alarm, ERROR while it is active",
         "latched, when one comes or goes",
         ALARMS,
         recorded=False,
@@ -335,7 +361,7 @@ _ROWS = (
         "/clock",
         "rosgraph_msgs/msg/Clock",
         "simulated time, while paused too",
-        "each tick, at most `clock_rate` a wall second",
+        "each tick, at most `clock_rate` per second of wall time",
         CLOCK,
         recorded=False,
     ),
@@ -343,7 +369,7 @@ _ROWS = (
         "/diagnostics",
         "diagnostic_msgs/msg/DiagnosticArray",
         "state of the simulation, warnings and errors",
-        "once a wall second",
+        "once per second of wall time",
         recorded=False,
     ),
     Topic(
@@ -357,7 +383,7 @@ _ROWS = (
     Topic(
         "belts/<belt>/cmd_speed",
         encode.SPEED,
-        "speed of one belt, m/s, positive forward: the easy one to send by hand",
+        "speed of one belt, m/s, positive forward, for commands sent by hand",
         qos=EVENTS,
         recorded=False,
         subscribed=True,
@@ -365,22 +391,22 @@ _ROWS = (
 )
 
 TOPICS: dict[str, Topic] = {topic.name: topic for topic in _ROWS}
-"""By name; within a tick, messages are written in this order."""
+"""All topics by name. Within a tick, messages are written in this order."""
 
 CMD_SPEED = TOPICS["belts/<belt>/cmd_speed"]
-"""The row that stands for the speed commands of all belts."""
+"""Row for the speed commands of all belts."""
 
 OUTPUTS = {name: topic for name, topic in TOPICS.items() if topic.recorded}
-"""Those that the simulation makes and that are recorded."""
+"""Topics that are recorded."""
 
 COMPARED = {name: topic for name, topic in TOPICS.items() if topic.compare is not NOT_COMPARED}
-"""In the order in which a replay looks for differences of one tick."""
+"""Compared topics, in the order in which a replay looks for differences of one tick."""
 
 STATES = {name: topic for name, topic in COMPARED.items() if topic.rate is not None}
-"""Those of which a recording needs one at least, to be replayed or drawn."""
+"""Topics of which a recording must have at least one, to be replayed or drawn."""
 
 
 def photo_eye_topics(names: Iterable[str]) -> dict[str, Topic]:
-    """A topic for each photo-eye, by name."""
+    """Return one topic per photo-eye, by name."""
     row = TOPICS["photo_eyes/<eye>"]
     return {topic.name: topic for topic in (replace(row, name=f"photo_eyes/{name}") for name in names)}

@@ -1,10 +1,10 @@
-// The alarm list: what is not normal now, the first-out marked; a click jumps to where and when it came.
+// The alarm list: alarms that are not normal now, with the first-out marked; a click jumps to the place and time of an alarm.
 
 import { controlsOfAlarm } from "./controls.js";
 import { element, refill, seconds, titled } from "./dom.js";
 import { ALARM_STATES } from "./story.js";
 
-// Two lists of alarms with the same key look the same.
+// Lists of alarms with the same key look the same.
 const keyOfAlarms = (alarms) => alarms.map((alarm) => `${alarm.number} ${alarm.state} ${alarm.since} ${alarm.firstOut}`).join("|");
 
 function row(alarm, view) {
@@ -16,7 +16,7 @@ function row(alarm, view) {
       alarm.firstOut ? element("span", { class: "badge" }, "first out") : null), controlsOfAlarm(alarm, view));
 }
 
-// Writes a list of alarms if it has changed. key: of what it says already; the new one is returned.
+// Renews a list of alarms if it has changed. key: key of the present list. Returns the new key.
 export function fillAlarms(list, alarms, view, nothing, key) {
   const now = keyOfAlarms(alarms);
   if (now !== key) refill(list, alarms.length ? alarms.map((alarm) => row(alarm, view)) : [element("li", { class: "muted" }, nothing)]);

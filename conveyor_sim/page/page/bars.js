@@ -1,12 +1,12 @@
-// State bars: what machines do over the whole time, a bar each.
+// State bars: states of machines over the whole time, one bar each.
 
 import { lastUpTo } from "./block.js";
 import { palette } from "./colours.js";
 import { element, keyOf, seconds, sharp, short, titled } from "./dom.js";
 import { stateColour, stateName, stateOf } from "./story.js";
 
-const ROW = 38, BAR = 14, UNDER = 20; // px of a machine, of its bar, of what the ends of time stand under
-const LETTERS = 24; // of a name
+const ROW = 38, BAR = 14, UNDER = 20; // px: height of a machine's row, of its bar, of the time axis
+const LETTERS = 24; // longest name
 const STATE = /^machines\/.*\/state$/;
 
 export class Bars {
@@ -28,7 +28,7 @@ export class Bars {
     this.key.replaceChildren(...keyOf([...looks].map(([name, colour]) => [colour, name])));
     this.canvas.style.height = `${this.names.length * ROW + UNDER}px`;
     this.canvas.hidden = this.key.hidden = !this.names.length;
-    this.note.hidden = this.view.letter === "B"; // said once
+    this.note.hidden = this.view.letter === "B"; // one note for both recordings is enough
     this.note.textContent = this.names.length ? "A click on a bar jumps to that time, Enter to the next change." : "There is no machine.";
   }
 

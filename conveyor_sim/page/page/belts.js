@@ -1,12 +1,12 @@
-// Belts with a texture that moves as they do: slats across, chevrons along.
+// Belts with a moving texture: slats across, chevrons along.
 
 export class Belts {
   constructor(belts) {
     this.belts = belts;
-    this.gone = belts.map(() => 0); // m that each surface has gone in the picture
+    this.gone = belts.map(() => 0); // distance that each drawn surface has moved, m
   }
 
-  // seconds: of simulated time since the last picture.
+  // seconds: simulated time since the last frame.
   advance(speeds, seconds) {
     this.belts.forEach((_, i) => {
       this.gone[i] += (speeds[i] ?? 0) * seconds;
@@ -70,7 +70,7 @@ function lengthOf(belt) {
   return belt.kind === "straight" ? belt.length : belt.span * (belt.inner + belt.width / 2);
 }
 
-// A point of a belt in pixels: s along its centre line, across from its right edge (its inner one on a curve).
+// Return a point of a belt in pixels. s: distance along its centre line; across: from its right edge (inner edge of a curve).
 function place(belt, camera, s, across) {
   if (belt.kind === "straight") {
     const cos = Math.cos(belt.angle), sin = Math.sin(belt.angle);

@@ -1,10 +1,10 @@
-// Another recording of a line, drawn beside the first: at the same time, through the same camera, coloured alike.
+// A second recording of a line, drawn beside the first: same time, camera and colours.
 
 import { byId, element, seconds } from "./dom.js";
 import { Plan } from "./plan.js";
 import { Wear } from "./wear.js";
 
-const PARTS = 2; // of a path that are shown
+const PARTS = 2; // last parts of a path that are shown
 
 export class Beside {
   constructor(view, recording, story, names) {
@@ -13,7 +13,7 @@ export class Beside {
     this.captions = names.map((name, i) => element("div", { class: "caption", title: name }, element("b", {}, "AB"[i]), element("span", {}, name.split("/").slice(-PARTS).join("/")), element("small", {})));
     byId("plan").after(this.canvas, ...this.captions);
     byId("plan").setAttribute("aria-label", "Plan of recording A. W, A, S and D move both plans, plus and minus zoom, B chooses a bottle.");
-    // What is chosen and set is the first one's; the rest is its own.
+    // Choices and settings are shared with the first view; the rest belongs to this one.
     this.other = Object.create(view);
     view.letter = "A";
     Object.assign(this.other, { recording, story, rival: view, letter: "B", badge: () => {}, jump: (...where) => view.jump(...where) });
@@ -23,7 +23,7 @@ export class Beside {
     view.camera.listen(this.canvas, (px, py) => view.clicked(px, py, this.plan), () => view.setFollowing(false));
   }
 
-  // Side by side or one above the other: where the line is drawn larger.
+  // Side by side or one above the other, whichever draws the line larger.
   resize() {
     const stage = byId("stage"), [x0, y0, x1, y1] = this.view.camera.bounds;
     const scale = (across, up) => Math.min(stage.clientWidth / across / (x1 - x0), stage.clientHeight / up / (y1 - y0));

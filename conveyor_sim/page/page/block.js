@@ -1,4 +1,4 @@
-// Reads a block as conveyor_sim/page/block.py packs it. Whoever changes one changes the other.
+// Reads a block as conveyor_sim/page/block.py packs it. Both files must be changed together.
 
 class Numbers {
   constructor(bytes) {
@@ -10,7 +10,7 @@ class Numbers {
     let value = 0, place = 1, byte;
     do {
       byte = this.bytes[this.at++];
-      value += (byte & 0x7f) * place; // without shifts: numbers may have more than 32 bits
+      value += (byte & 0x7f) * place; // no shifts, because numbers may have more than 32 bits
       place *= 128;
     } while (byte & 0x80);
     return value % 2 ? -(value + 1) / 2 : value / 2;
@@ -29,7 +29,7 @@ class Numbers {
   }
 }
 
-// One in which nothing is.
+// An empty block.
 export function emptyBlock() {
   const table = () => ({ times: [], columns: [] });
   return { times: [], tracks: [], byId: new Map(), contacts: [], belts: table(), signals: table(), measured: true };
@@ -54,7 +54,7 @@ function newton(level, steps) {
 function readTracks(numbers, block, steps) {
   const ids = numbers.sums(), types = numbers.list(), firsts = numbers.list(), counts = numbers.list();
   const moves = [numbers.list(), numbers.list()], levels = numbers.sums();
-  let at = 0, slot = 0, place = -1; // of a bottle among all of them: contacts say between which
+  let at = 0, slot = 0, place = -1; // place of a bottle among all, by which contacts refer to bottles
   ids.forEach((id, i) => {
     const first = firsts[i], count = counts[i];
     const [x, y] = moves.map((bends) => {
@@ -77,7 +77,7 @@ function readTracks(numbers, block, steps) {
     if (!block.byId.has(id)) place++;
     const track = { id, type: types[i], first, count, x, y, force, firstSlot, place };
     block.tracks.push(track);
-    if (!block.byId.has(id)) block.byId.set(id, track); // the first one of a bottle that comes back
+    if (!block.byId.has(id)) block.byId.set(id, track); // first track of a bottle that comes back
   });
 }
 
@@ -102,7 +102,7 @@ function readContacts(numbers, block, steps, times) {
   });
 }
 
-// Of each column the rows at which it changes, and its values from there on.
+// Returns for each column the rows at which it changes, and its values from there on.
 function readColumns(numbers, times, unit, unknown) {
   const counts = numbers.list(), gaps = numbers.list(), changes = numbers.list();
   let at = 0;
@@ -118,7 +118,7 @@ function readColumns(numbers, times, unit, unknown) {
   return { times, columns };
 }
 
-// The last place of an ascending list whose entry is not above a value; -1: there is none.
+// Returns the last place of an ascending list whose entry is not above a value; -1: there is none.
 export function lastUpTo(list, value) {
   let low = 0, high = list.length;
   while (low < high) {

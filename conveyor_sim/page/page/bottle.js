@@ -1,9 +1,9 @@
-// One bottle: what it is, how fast, and its forces over the last seconds.
+// One bottle: type, speed, and forces over the last seconds.
 
 import { palette } from "./colours.js";
 import { element, seconds, sharp, titled } from "./dom.js";
 
-const SHOWN = 10; // s
+const SHOWN = 10; // seconds shown
 
 export class Bottle {
   constructor(view) {

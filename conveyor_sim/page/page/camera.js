@@ -1,7 +1,7 @@
-// From metres to pixels of the canvas, and back: zoomed by the wheel, two fingers or keys, moved by dragging.
+// Conversion between metres and pixels of the canvas: zoomed by wheel, two fingers or keys, moved by dragging.
 
-const MOST = 20000; // px a metre
-const UNDER = 36; // px at the lower edge that a legend may hide
+const MOST = 20000; // px per metre
+const UNDER = 36; // px at the lower edge that the legend may cover
 
 export class Camera extends EventTarget {
   constructor(bounds) {
@@ -11,7 +11,7 @@ export class Camera extends EventTarget {
     this.x = (bounds[0] + bounds[2]) / 2;
     this.y = (bounds[1] + bounds[3]) / 2;
     this.width = this.height = 1;
-    this.fitted = true; // nobody has moved it: it follows the size of the window
+    this.fitted = true; // true until the user moves it: then it follows the size of the window
   }
 
   resize(width, height) {
@@ -60,7 +60,7 @@ export class Camera extends EventTarget {
     this._changed();
   }
 
-  // Where a place can be seen, and no more than that.
+  // Centres a point unless it is visible.
   show(x, y, margin = 40) {
     const [px, py] = [this.toX(x), this.toY(y)];
     if (px < margin || py < margin || px > this.width - margin || py > this.height - margin) this.centre(x, y);
@@ -71,7 +71,7 @@ export class Camera extends EventTarget {
     this.dispatchEvent(new Event("change"));
   }
 
-  // What pointers do on a canvas; clicked(px, py) is called for a press without a move, moved() as somebody pans.
+  // Handles pointers on a canvas; clicked(px, py): a press without a move; moved(): the user pans.
   listen(canvas, clicked, moved) {
     const down = new Map();
     let far = 0, apart = 0;

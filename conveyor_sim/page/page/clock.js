@@ -1,9 +1,9 @@
-// The time that is shown: played, paused, stepped, sought.
+// The displayed time: playing, paused, stepped or sought.
 
 export const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 5, 10, 30];
 
 export class Clock extends EventTarget {
-  // other: a recording that is shown at the same time. The one that ends last says what times there are.
+  // other: a second recording, shown at the same time. The longer recording determines the range of times.
   constructor(recording, other = null) {
     super();
     this.all = other ? [recording, other] : [recording];
@@ -51,7 +51,7 @@ export class Clock extends EventTarget {
     this.setSpeed(SPEEDS[Math.min(SPEEDS.length - 1, Math.max(0, next))]);
   }
 
-  // seconds: of wall time since the last call. Time stands while what it needs is loading: nothing is left out.
+  // seconds: wall time since the last call. Time stands while data is loading, so no frame is left out.
   advance(seconds) {
     const there = (ahead) => this.all.map((one) => one.block(one.number(this.time) + ahead));
     if (!this.playing || there(0).includes(null)) return;

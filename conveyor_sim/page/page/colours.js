@@ -23,7 +23,7 @@ export function isDark() {
 export const COLOURED = (place) => [...SERIES, "#8a8678", "#b79bff"][place % 8];
 export const palette = () => (isDark() ? DARK : LIGHT);
 
-// Cividis at equal steps: from blue to yellow, as light as it is far.
+// Cividis at equal steps: from blue to yellow, with increasing lightness.
 const CIVIDIS = ["#00224e", "#123570", "#3b496c", "#575d6d", "#707173", "#8a8678", "#a59c74", "#c3b369", "#e1cc55", "#fee838"];
 // From pale to strong, for forces.
 const HEAT = ["#fff3c8", "#ffe08a", "#fdc04e", "#f99b2d", "#ee7420", "#db4d1a", "#b92c17", "#8f1614"];
@@ -41,11 +41,11 @@ function ramp(colours) {
 
 export const SCALES = { speed: ramp(CIVIDIS), force: ramp(HEAT), age: ramp([...CIVIDIS].reverse()) };
 
-const FAR = 50; // mm between two recordings, and all above it
+const FAR = 50; // mm between two recordings; larger distances have the same colour
 
 export const colourings = (view) => Object.keys(COLOURINGS).filter((name) => name !== "apart" || view.rival);
 
-// How bottles are coloured: a colour for each bottle, which are crossed out, and what the legend says of it.
+// Colourings of bottles: a colour for each bottle, the crossed-out bottles, and the legend.
 export const COLOURINGS = {
   type: {
     label: "by type",

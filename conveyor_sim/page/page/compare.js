@@ -1,4 +1,4 @@
-// What differs between two recordings, A and B: the first difference of each kind, and all that differs now.
+// Differences of two recordings, A and B: the first of each kind, and all differences at the displayed time.
 
 import { element, refill, seconds, shown } from "./dom.js";
 
@@ -6,7 +6,7 @@ const TITLES = {
   commands: "First different command", signals: "First different signal", bottles: "First different bottle", seen: "First bottle more than 1 mm apart",
 };
 const MOST = 40; // rows
-const APART = 1e-3; // m, of bottles that are told of
+const APART = 1e-3; // m, least distance of bottles that are listed
 
 export class Compare {
   constructor(view, compared) {
@@ -18,7 +18,7 @@ export class Compare {
     this.key = null;
   }
 
-  // The first difference of each kind, of those in a part of what is gone through.
+  // Adds the differences of one part: the first of each kind.
   add(part) {
     for (const one of part) if (!this.found.some(({ kind }) => kind === one.kind)) this.found.push(one);
     this.found.sort((a, b) => a.tick - b.tick);

@@ -1,4 +1,4 @@
-// What a tag is given by hand: fields and buttons for commands, modes, faults and forces.
+// Manual inputs of tags: fields and buttons for commands, modes, faults and forces.
 
 import { element } from "./dom.js";
 
@@ -8,7 +8,7 @@ function textsOf(tag) {
   return Array.from((tag.texts ?? "").matchAll(/(-?\d+) (.*?)(?=, -?\d+ |$)/g), ([, number, text]) => [number, text]);
 }
 
-// A field for a value of a tag, or two buttons; give is called with a number. now: what is chosen at first.
+// Returns a field for a value of a tag, or two buttons. give: called with a number. now: initial choice.
 export function field(tag, label, give, now, texts = textsOf(tag)) {
   if (tag.kind === "bool") {
     const button = (text, value) => element("button", { onclick: () => give(value), "aria-label": `${label} ${tag.name} ${text}` }, `${label} ${text}`);
@@ -27,7 +27,7 @@ function limits(tag) {
   return Number.isFinite(tag.min) && Number.isFinite(tag.max) ? `${tag.min} to ${tag.max}` : "";
 }
 
-// What a faceplate offers for a tag of a line that runs; null: nothing.
+// Returns the controls of a faceplate for a tag of a running line; null: none.
 export function controlsOf(tag, view) {
   const { desk, recording, story, clock } = view;
   if (!desk?.commands) return null;
@@ -40,9 +40,9 @@ export function controlsOf(tag, view) {
 
 const CAN = { acknowledge: [1, 3, 4], reset: [5], shelve: [1, 2, 3, 4, 5], unshelve: [6] };
 const WORDS = { acknowledge: "Acknowledge", reset: "Reset", shelve: "Shelve 1 min", unshelve: "Unshelve" };
-const SHELVED = 60; // s
+const SHELVED = 60; // shelving time, s
 
-// The same for an alarm in a state.
+// Returns the controls for an alarm in a state.
 export function controlsOfAlarm(alarm, view) {
   if (!view.desk?.commands) return null;
   const buttons = Object.keys(CAN).filter((what) => CAN[what].includes(alarm.state)).map((what) => element("button",

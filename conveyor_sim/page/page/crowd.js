@@ -1,6 +1,6 @@
-// Thousands of bottles: their pixels are copied into one picture, which is drawn at once. To draw each takes longer.
+// Thousands of bottles: their pixels are copied into one image, which is drawn at once. Single drawings take longer.
 
-export const MANY = 2000; // bottles from which on it pays
+export const MANY = 2000; // least number of bottles for which it is faster
 
 export class Crowd {
   constructor() {
@@ -18,7 +18,7 @@ export class Crowd {
     this.pixels.fill(0);
   }
 
-  // x, y: px of the picture, of the sprite's corner; false: it does not lie inside, and must be drawn otherwise.
+  // x, y: px of the image, corner of the sprite; returns false if it exceeds the image and must be drawn separately.
   add(image, x, y) {
     const left = Math.round(x), top = Math.round(y), { width, height } = this.canvas;
     if (left < 0 || top < 0 || left + image.width > width || top + image.height > height) return false;
@@ -32,7 +32,7 @@ export class Crowd {
     context.drawImage(this.canvas, 0, 0, width, height);
   }
 
-  // The pixels of a sprite that cover, and where they are from its corner on in this picture.
+  // Returns the opaque pixels of a sprite, as offsets from its corner in this image.
   _stamp(image) {
     let stamp = this.stamps.get(image);
     if (!stamp || stamp.width !== this.canvas.width) {

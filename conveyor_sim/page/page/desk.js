@@ -1,13 +1,13 @@
-// The bar of a line that runs: whether it is there, how late the picture is, its run, and who sits here.
+// The bar of a running line: connection, latency, run, and user.
 
 import { byId, element, seconds, warn } from "./dom.js";
 import { wallTime } from "./live.js";
 
-const SURE = 5000; // ms in which a second click counts
-const STANDS = ["paused", "ended", "stopped"]; // of a run
-const TOLD = 500; // ms between two latencies that are shown
-const STALE = 2; // s without a picture of a line that does not stand, after which that is said
-const REMEMBERED = 20; // s in which a refusal by the line is one of what was asked for here
+const SURE = 5000; // ms within which a second click confirms
+const STANDS = ["paused", "ended", "stopped"]; // states of a run in which time stands
+const TOLD = 500; // ms between two updates of the latency
+const STALE = 2; // s without a frame of a running line after which the bar reports it
+const REMEMBERED = 20; // s in which a refusal by the line is attributed to a request of this page
 
 export class Desk {
   constructor(view, about) {
@@ -34,12 +34,12 @@ export class Desk {
     line.addEventListener("connection", () => { this.at = this.before = null; this.connection(); });
     line.addEventListener("locked", () => this.connection());
     line.addEventListener("status", ({ detail }) => { this.status = detail.status; this.connection(); });
-    setInterval(() => view.touch(), 1000 * STALE / 2); // that nothing comes is shown, too
+    setInterval(() => view.touch(), 1000 * STALE / 2); // so that missing frames are shown
     line.addEventListener("frame", ({ detail }) => { [this.before, this.at] = [this.at, detail.at]; });
     this.connection();
   }
 
-  // Whether anything can be commanded from here, by whoever signs in.
+  // True if commands are possible from this page after a sign-in.
   get commands() {
     return this.about.users && this.about.takes;
   }
@@ -64,11 +64,11 @@ export class Desk {
     this.view.touch();
   }
 
-  // Called after each picture.
+  // Called after each frame.
   drawn(now) {
     const { clock } = this.view;
     this.now.setAttribute("aria-pressed", clock.live);
-    if (clock.live && this.before && this.at !== this.shown) { // the first one may be of a line that stands
+    if (clock.live && this.before && this.at !== this.shown) { // the first frame may be of a stopped line
       this.shown = this.at;
       const late = wallTime() + this.view.line.offset - this.at;
       this.latency = this.latency ? 0.9 * this.latency + 0.1 * late : late;
@@ -82,7 +82,7 @@ export class Desk {
     if (this.late.textContent !== text) this.late.textContent = text;
   }
 
-  // Ask the line for something; why it can't be is shown. Whether it was taken.
+  // Sends a request to the line and shows the reason of a refusal. Returns true if it was accepted.
   async ask(what, names, values = []) {
     for (const [text, time] of this.given) if (wallTime() > time + REMEMBERED) this.given.delete(text);
     this.given.set(names.join(", "), wallTime());
@@ -92,7 +92,7 @@ export class Desk {
     return !refused;
   }
 
-  // All that there is of the run is given up: only the second click does it.
+  // A reset discards the run, so it needs a second click.
   _sure(button, label) {
     const sure = `${label}: sure?`, isSure = button.textContent === sure;
     button.textContent = isSure ? label : sure;
@@ -100,7 +100,7 @@ export class Desk {
     else setTimeout(() => { button.textContent = label; }, SURE);
   }
 
-  // What the line itself has refused, a tick later.
+  // Shows requests that the line has refused one tick later.
   happened({ kind = [], name = [], text = [] }) {
     kind.forEach((one, i) => {
       if (one === "command_refused" && this.given.has(name[i])) warn(`Refused: ${text[i]}`);

@@ -1,4 +1,4 @@
-// Eyes, zones, machines, counters, and gates, pushers and diverters where they are.
+// Photo-eyes, zones, machines, counters, gates, pushers and diverters.
 
 import { short } from "./dom.js";
 import { outside, placeAt } from "./labels.js";
@@ -9,12 +9,12 @@ const FOLDERS = {
   station: "machines", source: "machines", sink: "machines", inspection: "machines", reject: "machines",
 };
 
-const LONG = 2; // regions so many times as wide as high have their names above or below
-const SHOWN_BAD = 0.5; // s that an inspection is lit after a bad bottle
+const LONG = 2; // regions with a larger ratio of width to height have their names above or below
+const SHOWN_BAD = 0.5; // s for which an inspection is lit after a bad bottle
 
 export const deviceOf = (mark) => `${FOLDERS[mark.kind] ?? `${mark.kind}s`}/${mark.name}`;
 
-// Colour and name of what a machine does now; null: it has no states.
+// Returns colour and name of a machine's state; null: it has no states.
 function doing(view, device) {
   const { state, category } = stateOf(view, device);
   return state === undefined ? null : { colour: stateColour(state, category), name: ` · ${stateName(state, category)}` };
@@ -57,7 +57,7 @@ export function drawAreas(context, camera, colours, view) {
   }
 }
 
-// beyond: px that are drawn farther than its points.
+// beyond: px by which the drawing exceeds its points.
 function label(view, camera, mark, note, importance, colour, beyond = 0) {
   const [x, y] = middle(mark.points), isLine = mark.points.length === 2, [from, to] = mark.points;
   const far = (point) => (isLine ? Math.hypot(point[0] - x, point[1] - y) : Math.abs(point[1] - y));
@@ -132,11 +132,11 @@ function drawEntry(context, camera, colours, view, mark, device) {
   context.lineWidth = 1;
   context.strokeStyle = colours.halo;
   context.stroke();
-  const isStation = mark.kind === "station"; // its region has its name and state
+  const isStation = mark.kind === "station"; // its region shows its name and state
   if (!isStation) label(view, camera, mark, now ? now.name : "", 6, colours.ink);
 }
 
-// Where the ends of a rail that moves are.
+// Returns the ends of a moving rail.
 export function moverEnds(mover, position) {
   const [x, y] = [mover.from[0] + mover.along[0] * position, mover.from[1] + mover.along[1] * position];
   const [dx, dy] = [mover.to[0] - mover.from[0], mover.to[1] - mover.from[1]];
@@ -161,7 +161,7 @@ export function drawMovers(context, camera, colours, view) {
     context.lineCap = "butt";
     const ends = moverEnds(mover, position), [x, y] = middle(ends), [ax, ay] = mover.along;
     const reach = 4 + 0.5 * camera.scale * Math.max(Math.abs(ends[1][0] - ends[0][0]), Math.abs(ends[1][1] - ends[0][1]));
-    const towards = ax || ay ? outside(Math.atan2(ay, ax)) : null; // where it goes
+    const towards = ax || ay ? outside(Math.atan2(ay, ax)) : null; // direction of its motion
     view.labels.add(short(mover.name.split("/")[1]), camera.toX(x), camera.toY(y), { importance: 4, reach, colour: colours.mover, towards });
   }
 }

@@ -1,4 +1,4 @@
-// Elements; what they say is text, never markup.
+// Elements; their content is text, never markup.
 
 export function element(tag, properties = {}, ...children) {
   const made = document.createElement(tag);
@@ -12,14 +12,14 @@ export function element(tag, properties = {}, ...children) {
   return made;
 }
 
-// Writes a list anew; what had the focus keeps it, by its data-key.
+// Replaces a list. The focus stays on the entry with the same data-key.
 export function refill(list, rows) {
   const now = document.activeElement, key = list.contains(now) ? now.dataset.key : undefined;
   list.replaceChildren(...rows);
   if (key !== undefined) list.querySelector(`[data-key="${CSS.escape(key)}"]`)?.focus({ preventScroll: true });
 }
 
-// What colours mean: pairs of colour and name.
+// Returns a legend from pairs of colour and name.
 export function keyOf(entries) {
   return entries.map(([colour, name]) => {
     const swatch = element("span", { class: "swatch" });
@@ -28,19 +28,19 @@ export function keyOf(entries) {
   });
 }
 
-// A name where there is room for so many letters.
+// Returns a name shortened to a number of letters.
 export const short = (name, most = 28) => (name.length > most ? `${name.slice(0, most - 1)}…` : name);
 
-// What heads a panel: where two recordings are shown, with whose it is.
+// Returns the title of a panel, with A or B if two recordings are shown.
 export const titled = (text, view) => (view.letter ? `${text} of ${view.letter}` : text);
 
-// What is to be noticed, over the plan; "": nothing.
+// Shows a notice over the plan; "": none.
 export function say(text, isWrong = false) {
   byId("notice").textContent = text;
   byId("news").className = text ? (isWrong ? "wrong" : "") : "none";
 }
 
-// The same of what is wrong, or was refused.
+// Shows an error or a refusal over the plan.
 export const warn = (text) => say(text, true);
 
 export const byId = (id) => document.getElementById(id);
@@ -49,7 +49,7 @@ export function seconds(time, digits = 2) {
   return `${time.toFixed(digits)} s`;
 }
 
-// A value of a tag in words.
+// Returns a value of a tag in words.
 export function shown(value, tag) {
   if (value === undefined) return "…";
   if (value === null || Number.isNaN(value)) return "–";
@@ -62,7 +62,7 @@ export function shown(value, tag) {
   return tag?.unit && tag.unit !== "1" ? `${number} ${tag.unit}` : number;
 }
 
-// A canvas as large as its box, for a context in CSS pixels; null while it has no box.
+// Returns the context of a canvas in CSS pixels, at the size of its box; null while it has none.
 export function sharp(canvas) {
   const ratio = devicePixelRatio || 1, { clientWidth, clientHeight } = canvas;
   if (!clientWidth || !clientHeight) return null;

@@ -1,4 +1,4 @@
-// The event list: what happened around now, by kind and by words; a click jumps there.
+// The event list: events around the displayed time, by kind and words; a click jumps to an event.
 
 import { lastUpTo } from "./block.js";
 import { element, refill, seconds, shown, titled } from "./dom.js";
@@ -11,7 +11,7 @@ const KINDS = {
   bottles: (kind) => kind.startsWith("bottle_"),
 };
 const titleOf = (event) => event.kind.replaceAll("_", " ");
-const AROUND = 60; // rows to either side of now
+const AROUND = 60; // rows before and after the displayed time
 
 export class Events {
   constructor(view) {

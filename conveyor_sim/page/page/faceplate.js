@@ -1,4 +1,4 @@
-// Faceplates: all tags of a device as they are now, in two recordings in both; a click on a tag puts it on the trends.
+// Faceplates: present values of all tags of a device, of A and B if two recordings are shown; a click adds a tag to the trends.
 
 import { fillAlarms } from "./alarms.js";
 import { controlsOf } from "./controls.js";
@@ -32,12 +32,12 @@ export class Faceplate {
     this.alarms = this.views.map((view) => ({ view, key: null, list: element("ul", { class: "rows", "aria-label": titled(`Alarms of ${device}`, view) }) }));
     const alarms = this.alarms.map(({ view, list }) => element("div", {}, element("h3", {}, titled("Alarms", view)), list));
     this.count = element("span", { class: "badge" });
-    // The alarms are below: fields must not move as one comes.
+    // The alarms are below, so that fields do not move when an alarm comes.
     this.body.replaceChildren(element("p", { class: "kind" }, tags[0]?.class?.replaceAll("_", " ") ?? "", this.count), ...groups, ...alarms);
     this.draw();
   }
 
-  // Of two recordings, which column is whose.
+  // Titles of the columns, if two recordings are shown.
   _whose() {
     return this.views.length < 2 ? [] : [element("tr", { class: "whose" }, element("td", {}), ...this.views.map(({ letter }) => element("th", { scope: "col" }, letter)))];
   }
@@ -73,7 +73,7 @@ export class Faceplate {
       const { tag, cells, note, choice } = row;
       const notes = cells.map((cell) => {
         const [now, said] = this._now(tag, cell, forced.get(cell.view)), text = shown(now, tag), { value } = cell;
-        if (choice && Number.isFinite(now) && now !== row.chosen && choice !== document.activeElement) choice.value = row.chosen = now; // by whomever
+        if (choice && Number.isFinite(now) && now !== row.chosen && choice !== document.activeElement) choice.value = row.chosen = now; // set by any writer
         if (value.textContent !== text) value.textContent = text;
         const isOn = tag.kind === "bool" && now === 1, isBad = tag.role === "fault" || tag.name.endsWith("/fault");
         value.classList.toggle("on", isOn);
@@ -87,7 +87,7 @@ export class Faceplate {
     }
   }
 
-  // The value of a tag in a recording, and what there is to say of it.
+  // Returns the value of a tag in a recording, and a remark on it.
   _now(tag, { view: { recording, story, clock }, signal, command }, forced) {
     if (signal !== undefined) return [recording.at("signals", signal, clock.time), forced.has(tag.name) ? "forced" : ""];
     if (command >= 0) {

@@ -1,4 +1,4 @@
-// Keys, as in a video player.
+// Keyboard shortcuts, as in a video player.
 
 import { byId, element } from "./dom.js";
 import { MARKS } from "./scrubber.js";

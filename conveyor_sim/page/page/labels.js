@@ -1,16 +1,16 @@
-// Names on the plan that keep out of each other's way: those that find no room are left out, the least important first.
+// Names on the plan without overlaps: the least important names are left out where there is no room.
 
 const PLACES = [[0, -1], [0, 1], [1, 0], [-1, 0], [1, -1], [-1, -1], [1, 1], [-1, 1]];
 const GAP = 5;
-const SURE = 6; // of this importance, rather over a small thing than elsewhere
+const SURE = 6; // names of this importance may cover small objects rather than stand elsewhere
 const snapped = (part) => (Math.abs(part) < Math.sin(Math.PI / 8) ? 0 : Math.sign(part));
 
 const placesTowards = ([x, y]) => [[x, y], [-x, -y], ...PLACES.filter(([dx, dy]) => dx * x + dy * y)];
 
-// The place in a direction of the plan (rad).
+// Returns the place in a direction of the plan (rad).
 export const outside = (angle) => [snapped(Math.cos(angle)), snapped(-Math.sin(angle))];
 
-// The same along a line, whichever way it runs: rather up than down, rather right than left.
+// Returns the place along a line, whatever its direction: up before down, right before left.
 export function placeAt(angle) {
   const [dx, dy] = outside(angle);
   return dy > 0 || (dy === 0 && dx < 0) ? [-dx, -dy] : [dx, dy];
@@ -21,25 +21,25 @@ const meet = (one, other) => one[0] < other[2] && other[0] < one[2] && one[1] < 
 export class Labels {
   constructor() {
     this.wanted = [];
-    this.kept = []; // boxes where no name is to stand, px
+    this.kept = []; // boxes without names, px
   }
 
   clear() {
     this.wanted.length = this.kept.length = 0;
   }
 
-  // Keep names off a square around a point, px.
+  // Keeps a square around a point free of names, px.
   keepOff(x, y, half) {
     this.kept.push([x - half, y - half, x + half, y + half]);
   }
 
-  // x, y: px; reach: px from there to where it may stand; the most important first. towards: the best of PLACES; what lies
-  // across to it is on what is named.
+  // x, y: px; reach: px between the point and the name; call for the most important names first. towards: best of PLACES; a
+  // place across to it lies on the named object.
   add(text, x, y, { importance = 0, reach = 6, colour = null, bold = false, towards = null } = {}) {
     this.wanted.push({ text, x, y, importance, reach, colour, bold, places: towards ? placesTowards(towards) : PLACES });
   }
 
-  // covered: boxes where none is to stand, px.
+  // covered: boxes without names, px.
   draw(context, camera, colours, covered) {
     const taken = [...covered], hides = (box) => this.kept.some((other) => meet(box, other));
     context.textBaseline = "middle";

@@ -1,13 +1,13 @@
-// A line that runs: pictures, and what happens, come by one websocket, which comes back by itself. Written by
-// conveyor_sim/protocols/web/feed.py; whoever changes one changes the other.
+// A running line: frames and events come by one websocket, which reconnects. Written by
+// conveyor_sim/protocols/web/feed.py. Both files must be changed together.
 
 import { readBlock } from "./block.js";
 import { SignIn } from "./sign_in.js";
 
 const TEXT = 0, HEADER = 17; // bytes before the block of a frame
-const FIRST_WAIT = 0.5, LONGEST_WAIT = 5; // s before it is tried again
+const FIRST_WAIT = 0.5, LONGEST_WAIT = 5; // s between attempts to connect
 const PING = 5; // s
-const SILENT = 15; // s without a word after which the connection is given up
+const SILENT = 15; // s without a message after which the connection is closed
 
 export const wallTime = () => (performance.timeOrigin + performance.now()) / 1000;
 
@@ -15,12 +15,12 @@ export class Line extends EventTarget {
   constructor() {
     super();
     this.person = { name: "", role: "viewer" };
-    this.offset = 0; // s that the server's clock is ahead
+    this.offset = 0; // s by which the server's clock is ahead
     this.asked = new Map();
     this.number = 0;
     this.wait = FIRST_WAIT;
     this.connected = false;
-    this.locked = false; // whether nobody sees it who has not signed in
+    this.locked = false; // true if the line is shown only after a sign-in
     this.head = null;
     this.signing = new SignIn(this);
     setInterval(() => this._ping(), 1000 * PING);
@@ -99,7 +99,7 @@ export class Line extends EventTarget {
     else this._send({ do: "ping", sent: wallTime() });
   }
 
-  // What is refused has the reason in `refused` of the answer.
+  // A refused request has the reason in `refused` of the answer.
   ask(request) {
     const id = ++this.number;
     return new Promise((answer) => {

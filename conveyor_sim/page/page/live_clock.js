@@ -1,4 +1,4 @@
-// The time that is shown of a line that runs: now, unless somebody looks back.
+// The displayed time of a running line: now, unless the user looks back.
 
 import { Clock } from "./clock.js";
 
@@ -10,7 +10,7 @@ export class LiveClock extends Clock {
     this.follow();
   }
 
-  // Show what is now, from now on.
+  // Follows the present from now on.
   follow() {
     this.live = this.playing = true;
     this.time = this.recording.end;
@@ -44,7 +44,7 @@ export class LiveClock extends Clock {
   advance(seconds) {
     const { recording } = this;
     if (!this.live) {
-      if (this.time < recording.start) this.time = recording.start; // the rest is forgotten
+      if (this.time < recording.start) this.time = recording.start; // earlier data has been dropped
       const wasPlaying = this.playing;
       super.advance(seconds);
       if (wasPlaying && !this.playing) this.follow();

@@ -1,10 +1,10 @@
-// What has been received of a line that runs, as a recording that grows at its end and is forgotten at its beginning.
+// Received data of a running line, as a recording that grows at its end and drops its beginning.
 
 import { emptyBlock } from "./block.js";
 import { Recording } from "./recording.js";
 
-const MOST = 300; // blocks that are kept
-const MOST_POINTS = 6e6; // bottles and contacts in all of them
+const MOST = 300; // blocks in memory, at most
+const MOST_POINTS = 6e6; // bottles and contacts in all of them, at most
 
 const nothing = () => ({ ...emptyBlock(), last: new Map(), points: 0 });
 const NOTHING = nothing();
@@ -15,7 +15,7 @@ export class LiveRecording extends Recording {
     this.begin(head);
   }
 
-  // The line begins anew, or what is between was not received.
+  // Takes a new head. The recording starts over after a reset of the line, or a gap in the data.
   begin(head) {
     const { first } = head.times;
     const goesOn = this.origin !== undefined && head.run === this.head.run && first * head.tick >= this.end;
@@ -42,7 +42,7 @@ export class LiveRecording extends Recording {
     return Promise.resolve(this.block(number));
   }
 
-  // time: of the moment, s; read: a block of this moment alone.
+  // time: s; read: a block of this moment alone.
   append({ time, block: read }) {
     this.end = Math.max(this.end, time);
     this.count = this.number(this.end) + 1;
@@ -69,13 +69,13 @@ export class LiveRecording extends Recording {
 
   _bottles(read) {
     if (!read.times.length || read.times[0] < this.start) return;
-    if (!this.points) this.start = Math.max(this.start, read.times[0]); // before, not all was known
+    if (!this.points) this.start = Math.max(this.start, read.times[0]); // the data before is incomplete
     const block = this._blockAt(read.times[0]), { forceFrames } = this.head.steps;
     if (!(read.times[0] <= block.times[block.times.length - 1])) {
       const frame = block.times.push(read.times[0]) - 1, slot = Math.floor(frame / forceFrames);
       for (const { id, type, x, y, force } of read.tracks) {
         let track = block.last.get(id);
-        if (!track || track.first + track.count !== frame) { // a machine may have held it meanwhile
+        if (!track || track.first + track.count !== frame) { // a machine may have held it in between
           track = { id, type, first: frame, count: 0, x: [], y: [], force: [], firstSlot: slot, place: track?.place ?? block.last.size };
           block.tracks.push(track);
           block.last.set(id, track);

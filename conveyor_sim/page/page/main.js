@@ -1,4 +1,4 @@
-// The page: it opens a recording, two, or a line that runs, and lets its view draw.
+// The page: opens a recording, two recordings, or a running line, and starts the drawing.
 
 import { SPEEDS } from "./clock.js";
 import { COLOURINGS, colourings, isDark } from "./colours.js";
@@ -12,7 +12,7 @@ import { Story } from "./story.js";
 import { View } from "./view.js";
 import { WEARS } from "./wear.js";
 
-const BEFORE = 2; // s before the first difference, where a comparison opens
+const BEFORE = 2; // s before the first difference at which a comparison opens
 
 function wire(view) {
   const { clock, camera, recording } = view, { head } = recording;
@@ -47,14 +47,14 @@ function wire(view) {
   view.setColouring("type");
 }
 
-// A recording and what happened; of a long one that is read later.
+// Opens a recording and its story; the story of a long one is read later.
 async function opened(source) {
   const head = await read(source, "head"), story = new Story(head);
   const failed = head.times.stories === 1 ? await told(source, 0, (part) => story.add(part)) : "";
   return { recording: new Recording(source, head), story, failed };
 }
 
-// Reads what happened in a part of a recording; why that can't be, or "".
+// Reads the story of a part of a recording. Returns the reason of a failure, or "".
 async function told(source, part, take) {
   try {
     take(await read(source, `story/${part}`));
@@ -68,7 +68,7 @@ async function read(source, name) {
   return JSON.parse(new TextDecoder().decode(await source.bytes(name)));
 }
 
-// Goes through both recordings until the first difference of each kind is found, and then before the first of all.
+// Compares both recordings until the first difference of each kind, then moves to just before the first of all.
 async function compare(view, source, { stretches }) {
   const untouched = !view.clock.playing && view.clock.time === view.clock.recording.start;
   for (let part = 0; part < stretches && !view.compare.complete; part++) {
@@ -92,7 +92,7 @@ async function compare(view, source, { stretches }) {
   document.body.dataset.compared = "yes";
 }
 
-// A line that runs, or what is known of one that did.
+// Opens the recordings of the page, or the running line.
 async function start() {
   if (!document.querySelector("meta[name=line]")) {
     await startRecording();
@@ -102,7 +102,7 @@ async function start() {
   say("Waiting for the line.");
   line.addEventListener("locked", () => {
     say("Sign in to see the line.");
-    if (!document.body.dataset.told) { // who cancels can try again
+    if (!document.body.dataset.told) { // the user may cancel and try again
       byId("desk").replaceChildren(element("button", { onclick: () => line.signing.open() }, "Sign in"));
       byId("desk").hidden = false;
     }
@@ -152,7 +152,7 @@ async function startRecording() {
   await Promise.all(view.clock.all.map((one) => one.load(one.number(view.clock.time))));
   view.snap();
   run(view);
-  // A long recording is gone through while one looks at it already.
+  // The story of a long recording is read while the page already draws.
   for (let part = 0; parts > 1 && part < parts; part++) {
     say(`Reading what happened: ${Math.round((100 * part) / parts)} %`);
     unread = await told(source, part, (more) => view.toldMore(more)) || unread;

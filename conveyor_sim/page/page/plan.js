@@ -1,4 +1,4 @@
-// The plan: what is drawn of the line at a moment, in one pass over the canvas.
+// The plan: the line at a moment, drawn in one pass over the canvas.
 
 import { Belts } from "./belts.js";
 import { COLOURINGS, palette } from "./colours.js";
@@ -7,7 +7,7 @@ import { drawAreas, drawLines, drawMovers } from "./devices.js";
 import { byId, short } from "./dom.js";
 import { Labels, outside, placeAt } from "./labels.js";
 
-const WIDTHS = 6; // of lines of force
+const WIDTHS = 6; // widths of contact lines
 
 export class Plan {
   constructor(canvas, view) {
@@ -18,14 +18,14 @@ export class Plan {
     this.labels = view.labels = new Labels();
     this.sprites = [];
     this.crowd = new Crowd();
-    this.look = ""; // what they were made for
-    this.last = null; // time of the last picture
+    this.look = ""; // look for which the sprites were made
+    this.last = null; // time of the last frame
     this.frame = null;
     this.covered = [];
-    this.said = ""; // over it
+    this.said = ""; // text over the plan
   }
 
-  // What stands over it: no name is to be there.
+  // Elements over the plan, which must cover no names.
   cover() {
     const { left, top } = this.canvas.getBoundingClientRect(), over = byId("stage").querySelectorAll("#legend, #zoom, #news:not(.none), .caption");
     this.covered = Array.from(over, (one) => one.getBoundingClientRect()).map((box) => [box.left - left, box.top - top, box.right - left, box.bottom - top]);
@@ -42,7 +42,7 @@ export class Plan {
     this.view.camera.resize(clientWidth, clientHeight);
   }
 
-  // What there is to draw now; while it loads, what was there.
+  // Returns the frame to draw; while it loads, the last one.
   update() {
     const { clock, recording } = this.view;
     this.frame = recording.frame(clock.time, clock.playing) ?? this.frame;
@@ -133,7 +133,7 @@ export class Plan {
     }
   }
 
-  // A bottle as a picture: to copy it takes a fraction of drawing it. They are kept while the scale stays.
+  // Returns the sprite of a bottle. Copying it takes a fraction of drawing it. Sprites are cached while the scale stays.
   _sprite(sprites, colour, radius, edge, crossed) {
     const key = crossed ? `${colour} crossed` : colour, found = sprites.get(key);
     if (found) return found;
@@ -161,7 +161,7 @@ export class Plan {
     context.strokeStyle = colours.force;
     context.lineCap = "round";
     const radius = Math.max(...view.recording.head.types.map((type) => type.radius)) * camera.scale;
-    const unit = Math.min(2, Math.max(0.25, radius / 14)); // so that lines leave bottles to be seen
+    const unit = Math.min(2, Math.max(0.25, radius / 14)); // so that bottles remain visible under the lines
     paths.forEach((path, i) => {
       context.lineWidth = (0.6 + 1.1 * i) * unit;
       context.stroke(path);
@@ -203,7 +203,7 @@ export class Plan {
     this.labels.add(`bottle ${bottle.id}`, camera.toX(bottle.x), camera.toY(bottle.y), { importance: 9, reach: radius + 4, colour: colours.select, bold: true });
   }
 
-  // The bottle, or else the device, at a point of the canvas.
+  // Returns the bottle, or else the device, at a point of the canvas.
   bottleAt(px, py) {
     const { camera, recording: { head } } = this.view;
     let best = null, least = Infinity;

@@ -1,14 +1,14 @@
-// A recording by time: frames of bottles, signals, contacts, in blocks that are loaded as they are asked for.
+// A recording by time: frames of bottles, signals, contacts, in blocks that are loaded on request.
 
 import { emptyBlock, lastUpTo, readBlock } from "./block.js";
 
-const KEPT = 64; // blocks: more than trends show
-const AT_ONCE = 2; // blocks that are read
-const FAR = 50; // blocks from the one that is shown: what is farther is not waited for
+const KEPT = 64; // blocks in memory: more than trends show
+const AT_ONCE = 2; // blocks that are requested at a time
+const FAR = 50; // blocks; a request farther from the displayed block is dropped
 const NEAR = 1e-6; // s
-const SPAN = 2; // frames to either side by which a speed is measured
+const SPAN = 2; // frames before and after a time between which a speed is measured
 
-// How many blocks are on their way is told to whoever waits for a picture.
+// The number of loading blocks, also as an attribute of the page.
 let onTheWay = 0;
 function reading(more) {
   onTheWay += more;
@@ -23,13 +23,13 @@ export class Recording extends EventTarget {
     const { first, last, block, blocks } = head.times;
     this.start = this.began = first * head.tick;
     this.end = last * head.tick;
-    this.length = block * head.tick; // of a block
+    this.length = block * head.tick; // length of a block, s
     this.count = blocks;
     this.blocks = new Map();
     this.pending = new Map();
-    this.waiting = []; // to be read: number, and who is told
+    this.waiting = []; // requests: number of the block, and callbacks
     this.reading = 0;
-    this.near = null; // number of the block that is shown
+    this.near = null; // number of the displayed block
     this.signalIndex = new Map(head.signals.map((name, index) => [name, index]));
     this.tags = new Map(head.tags.map((tag) => [tag.name, tag]));
   }
@@ -38,13 +38,13 @@ export class Recording extends EventTarget {
     return Math.min(this.count - 1, Math.max(0, Math.floor((time - this.start + NEAR) / this.length)));
   }
 
-  // The block of a number if it is there; else it is loaded, and "loaded" says when.
+  // Returns a block if it is in memory; else requests it, and "loaded" reports when it is.
   block(number) {
     if (number < 0 || number >= this.count) return null;
     const found = this.blocks.get(number);
     if (found) {
       this.blocks.delete(number);
-      this.blocks.set(number, found); // the last one used is forgotten last
+      this.blocks.set(number, found); // the block used last is dropped last
       return found;
     }
     this.load(number);
@@ -60,7 +60,7 @@ export class Recording extends EventTarget {
     return this.pending.get(number) ?? Promise.resolve(this.blocks.get(number));
   }
 
-  // What is nearest to the time that is shown comes first; where somebody only went by is forgotten.
+  // Blocks near the displayed time come first; requests that are far from it are dropped.
   _readNext() {
     const far = ({ number }) => (this.near === null ? 0 : Math.abs(number - this.near));
     this.waiting.sort((one, other) => far(other) - far(one));
@@ -83,7 +83,7 @@ export class Recording extends EventTarget {
       block = readBlock(bytes, this.head.steps, first + number * length, this.head.tick);
     } catch (error) {
       this.dispatchEvent(new CustomEvent("failed", { detail: error.message }));
-      block = emptyBlock(); // it can't be read: time goes on over it
+      block = emptyBlock(); // the block can't be read; the time continues over it
     }
     this.blocks.set(number, block);
     for (const old of this.blocks.keys()) {
@@ -96,7 +96,7 @@ export class Recording extends EventTarget {
     this.dispatchEvent(new Event("loaded"));
   }
 
-  // The block and the place in it of the last frame up to a time; null while it is loading, or before the first.
+  // Returns the block and the place of the last frame up to a time; null while it loads, or before the first.
   place(time) {
     this.near = this.number(time);
     for (let number = this.near; number >= 0; number--) {
@@ -108,7 +108,7 @@ export class Recording extends EventTarget {
     return null;
   }
 
-  // The time of the frame some steps after that of a time; null while it is loading.
+  // Returns the time of the frame some steps after that of a time; null while it loads.
   async stepped(time, steps) {
     await this.load(this.number(time));
     let at = this.place(time);
@@ -127,7 +127,7 @@ export class Recording extends EventTarget {
     return block.times[Math.min(block.times.length - 1, Math.max(0, frame))];
   }
 
-  // Bottles at a time, between two frames if it is moving; null while they are loading.
+  // Returns the bottles at a time, interpolated while playing; null while they load.
   frame(time, moving) {
     const at = this.place(time);
     if (!at) return null;
@@ -164,7 +164,7 @@ export class Recording extends EventTarget {
     return found;
   }
 
-  // A column of `belts` or `signals` at a time; undefined: not there, or not yet.
+  // Returns a column of `belts` or `signals` at a time; undefined if it is absent or not loaded.
   at(table, column, time) {
     for (let number = this.number(time), tries = 0; number >= 0 && tries < 2; number--, tries++) {
       const block = this.block(number);
@@ -183,7 +183,7 @@ export class Recording extends EventTarget {
     return column === undefined ? undefined : this.at("signals", column, time);
   }
 
-  // What a signal was, from a time to another: times and values, of loaded blocks; others are sent for.
+  // Returns times and values of a signal in a span, of loaded blocks; requests the others.
   series(name, from, to) {
     const column = this.signalIndex.get(name), times = [], found = [];
     if (column === undefined) return { times, values: found };
@@ -203,7 +203,7 @@ export class Recording extends EventTarget {
     return { times, values: found };
   }
 
-  // Where a bottle has been, in the loaded blocks up to a time: points in order.
+  // Returns the path of a bottle in the loaded blocks up to a time: points in order.
   trace(id, from, to) {
     const points = [];
     for (let number = this.number(from); number <= this.number(to); number++) {

@@ -1,9 +1,9 @@
-// The scrubber: where in time one is, with marks of alarms, faults, refusals and failed conditions.
+// The scrubber: position in time, with marks of alarms, faults, refusals and failed conditions.
 
 import { palette } from "./colours.js";
 import { byId, element, seconds, sharp } from "./dom.js";
 
-// Colour, weight, and shape: colours alone do not say it to everybody.
+// Colour, weight, and shape, because colours alone are not accessible.
 const KINDS = {
   alarm: ["#d55e00", 0, "triangle"], fault: ["#cc79a7", 1, "diamond"], refused: ["#e69f00", 1, "cross"], failed: ["#d1330d", 2, "disc"],
   difference: ["#8250df", 2, "square"],
@@ -14,7 +14,7 @@ const SHAPES = {
   triangle: [[-1, -0.8], [1, -0.8], [0, 1]], diamond: [[0, -1.2], [1.1, 0], [0, 1.2], [-1.1, 0]], square: [[-0.9, -0.9], [0.9, -0.9], [0.9, 0.9], [-0.9, 0.9]],
 };
 
-// Draws the shape of a kind of mark.
+// Draws the symbol of a kind of mark.
 function drawShape(context, shape, x, y, reach) {
   context.beginPath();
   if (shape === "disc") context.arc(x, y, reach, 0, 2 * Math.PI);

@@ -1,6 +1,6 @@
 // Points and polygons of the plan, m.
 
-// The least x and y, and the greatest, of all that is drawn of recordings.
+// Returns the least x and y, and the greatest, of all drawn parts of recordings.
 export function boundsOf(recordings) {
   const points = recordings.filter(Boolean).flatMap(({ head }) => [...head.belts.flatMap(({ outline }) => outline), ...head.rails.flat(), ...head.marks.flatMap(({ points: all }) => all)]);
   const [xs, ys] = [0, 1].map((k) => points.map((point) => point[k]));
@@ -8,7 +8,7 @@ export function boundsOf(recordings) {
   return points.length ? [least(xs), least(ys), most(xs), most(ys)] : [-1, -1, 1, 1];
 }
 
-// Whether a point lies in a polygon.
+// Returns true if a point lies in a polygon.
 export function inside(points, x, y) {
   let found = false;
   points.forEach(([ax, ay], k) => {
@@ -18,7 +18,7 @@ export function inside(points, x, y) {
   return found;
 }
 
-// How far a point is from a stretch between two others.
+// Returns the distance of a point from the segment between two others.
 export function awayFrom([ax, ay], [bx, by], x, y) {
   const length = (bx - ax) ** 2 + (by - ay) ** 2;
   const share = length ? Math.min(1, Math.max(0, ((x - ax) * (bx - ax) + (y - ay) * (by - ay)) / length)) : 0;

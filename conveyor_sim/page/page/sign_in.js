@@ -1,9 +1,9 @@
-// The dialog by which somebody says who they are.
+// The sign-in dialog.
 
 import { element } from "./dom.js";
 
 export class SignIn {
-  // done: called when somebody has signed in.
+  // done: called after a sign-in.
   constructor(line, done = () => {}) {
     Object.assign(this, { line, done });
     this.name = element("input", { autocomplete: "username", required: true, maxlength: "40" });

@@ -1,4 +1,4 @@
-// Where a page's data comes from: bytes by name ("head", "story", "block/0"). A recording in the page itself, or a server.
+// Sources of the page's data, bytes by name ("head", "story", "block/0"): the page itself, or a server.
 
 import { byId, say, warn } from "./dom.js";
 
@@ -28,7 +28,7 @@ class Served {
     return inflated(bytes);
   }
 
-  // Of a server that does not answer it is asked again, and the page says so meanwhile.
+  // A request without an answer is repeated, and the page shows a notice in the meantime.
   async _answer(name) {
     for (;;) {
       try {

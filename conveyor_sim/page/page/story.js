@@ -1,4 +1,4 @@
-// What happened: events, alarms, states of machines, counters, as they were at a time.
+// The story: events, alarms, states of machines, counters at a time.
 
 import { lastUpTo } from "./block.js";
 import { CATEGORIES } from "./colours.js";
@@ -18,13 +18,13 @@ const EXECUTE = 6;
 const WAITS = new Set(["starved", "blocked"]);
 const OF_MACHINE = /^(.*)\/(\w+)$/;
 
-// Of a machine's signal `category`: where its time goes.
+// Values of a machine's signal `category`, its time account.
 const categoryOf = (value) => Object.keys(CATEGORIES)[value];
 
-// What a machine does now.
+// Returns state and category of a machine.
 export const stateOf = (view, device) => ({ state: view.signal(`${device}/state`), category: categoryOf(view.signal(`${device}/category`)) });
 
-// A state of PackML, and for what a machine waits in it. Execute is one state, however often it waits for a bottle.
+// Returns a PackML state with the reason of waiting. Execute is one state, however often the machine waits for a bottle.
 export function stateName(number, category) {
   const name = STATE_NAMES[number] ?? `state ${number}`;
   return number !== EXECUTE && WAITS.has(category) ? `${name}, ${category}` : name;
@@ -33,7 +33,7 @@ export function stateName(number, category) {
 export const stateColour = (number, category) => CATEGORIES[number === EXECUTE ? "running" : category] ?? CATEGORIES.idle;
 
 const HOLDS = /^(machine_state|signal_|fault_)/;
-const OF_ONE = new Set(["alarm_changes", "readback"]); // whose second entry says of what they are
+const OF_ONE = new Set(["alarm_changes", "readback"]); // lists whose second entry states the subject
 const timeOf = (row) => row.at ?? row[0];
 const LISTS = ["alarm_changes", "readback", "counters", "runs", "wear"];
 
@@ -42,17 +42,17 @@ export class Story {
     this.begin(head);
   }
 
-  // Nothing has happened yet.
+  // Starts an empty story.
   begin(head) {
     this.head = head;
     this.initial = new Map(head.tags.map(({ name, initial }) => [name, initial]));
-    this.differences = []; // from another recording: marks
+    this.differences = []; // differences from another recording, shown as marks
     this.data = { events: {}, alarms: {} };
     for (const list of LISTS) this.data[list] = [];
     this.build();
   }
 
-  // What happened after what is there already.
+  // Appends a later part.
   add(data) {
     for (const [name, column] of Object.entries(data.events)) this.data.events[name] = (this.data.events[name] ?? []).concat(column);
     for (const list of LISTS) this.data[list] = this.data[list].concat(data[list]);
@@ -61,7 +61,7 @@ export class Story {
     this.build();
   }
 
-  // Give up what was before a time, but for what still held then.
+  // Drops entries before a time, except those that are still valid then.
   forget(before) {
     const { data } = this, { events } = data, last = new Map();
     const keep = (events.at ?? []).map((at) => at >= before);
@@ -82,8 +82,8 @@ export class Story {
     this.events = at.map((time, i) => ({ time, kind: kind[i], name: name[i], bottle: bottle[i], value: value[i], text: text[i] }));
     this.fed = new Map();
     this.rejected = new Set();
-    this.machines = new Map(); // of each, when it began to do something else
-    this.reasons = new Map(); // of machines and times, why they stand
+    this.machines = new Map(); // by machine, times of state changes
+    this.reasons = new Map(); // reasons of stops by machine and time
     const now = new Map();
     for (const event of this.events) {
       if (event.kind === "bottle_fed") this.fed.set(event.bottle, event.time);
@@ -101,19 +101,19 @@ export class Story {
     this.marks = this._marks();
   }
 
-  // What a machine does at first, if that is known.
+  // Returns the initial state of a machine, if it is known.
   initially(device) {
     const [state, category] = ["state", "category"].map((what) => this.initial.get(`${device}/${what}`));
     return { state, category: categoryOf(category) };
   }
 
-  // The machine of an event that only says in other words what its state does at that tick; "": it says more.
+  // Returns the machine of an event that repeats its change of state at that tick; "": the event says more.
   repeats({ kind, name }) {
     const [, device, what] = OF_MACHINE.exec(name) ?? [];
     return kind === "machine_state" && what !== "state" && this.machines.has(device) ? device : "";
   }
 
-  // A state that a machine goes to, with what is known of why.
+  // Returns the new state of an event in words, with its reason if known.
   whyOf({ name, time, value }) {
     const [, device] = OF_MACHINE.exec(name);
     const change = this.machines.get(device)?.find((other) => other.time === time), reason = this.reasons.get(`${device} ${time}`) ?? "";
@@ -121,7 +121,7 @@ export class Story {
     return value !== EXECUTE && reason && !WAITS.has(reason) ? `${text}, ${reason}` : text;
   }
 
-  // now: of each machine, what it did last.
+  // now: last state of each machine.
   _state({ name, time, value, text }, now) {
     const [, device, what] = OF_MACHINE.exec(name) ?? [];
     if (what === "stop_reason") this.reasons.set(`${device} ${time}`, text);
@@ -130,7 +130,7 @@ export class Story {
     const after = { ...before, [what]: what === "state" ? value : categoryOf(value) };
     now.set(device, after);
     this.machines.set(device, changes);
-    if (changes.length && changes[changes.length - 1].time === time) changes.pop(); // of one tick, the last
+    if (changes.length && changes[changes.length - 1].time === time) changes.pop(); // the last change of a tick counts
     const last = changes.length ? changes[changes.length - 1] : this.initially(device);
     const looks = ({ state, category }) => `${stateName(state, category)} ${stateColour(state, category)}`;
     if (looks(after) !== looks(last)) changes.push({ time, ...after });
@@ -147,7 +147,7 @@ export class Story {
     return marks.sort((a, b) => a.time - b.time);
   }
 
-  // Alarms that are not normal at a time, those that stand first, by priority.
+  // Returns the alarms that are not normal at a time, active ones first, by priority.
   alarmsAt(time) {
     const found = [];
     for (const [number, alarm] of this.alarms) {
@@ -170,7 +170,7 @@ export class Story {
     return found;
   }
 
-  // Names of signals that are forced at a time.
+  // Returns the names of the signals that are forced at a time.
   forcedAt(time) {
     const forced = new Set(this.head.forced.map((index) => this.head.signals[index]));
     for (const event of this.events) {

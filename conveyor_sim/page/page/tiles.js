@@ -1,4 +1,4 @@
-// OEE tiles: what each machine and the line have made since their last reset.
+// OEE tiles: production of each machine and of the line since the last reset.
 
 import { CATEGORIES } from "./colours.js";
 import { element, keyOf, titled } from "./dom.js";

@@ -5,11 +5,11 @@ import { byId, element, seconds, short, shown } from "./dom.js";
 
 const MOST = 8; // signals
 const MARKS = { alarm: "#d55e00", fault: "#cc79a7", refused: "#e69f00", failed: "#d1330d", difference: "#8250df" };
-const LONGEST = 28; // letters of a mark
+const LONGEST = 28; // longest text of a mark
 const WINDOWS = [10, 30, 60, 120]; // s
 const GUTTER = 76, GUTTER_LETTERS = 11; // px beside the trends, and letters that fit there
-const LANE = 1.5; // of a switch, which goes from 0 to 1 in it
-const LANES_SHARE = 0.17, LANES_MOST = 0.65; // of the height: one lane, and all of them at most
+const LANE = 1.5; // height of a switch's lane, whose values are 0 and 1
+const LANES_SHARE = 0.17, LANES_MOST = 0.65; // share of the height: one lane, and all lanes at most
 
 export class Trends {
   constructor(view) {
@@ -29,7 +29,7 @@ export class Trends {
     for (const name of this._first()) this.add(name);
   }
 
-  // What there is to see at first: what a test has read; else machines and eyes say most, belts are everywhere.
+  // Chooses the signals shown at first: those that a test has read; else machines and photo-eyes before belts.
   _first() {
     const { signals, trends } = this.view.recording.head, found = [];
     if (trends?.length) return trends.slice(0, MOST);
@@ -55,7 +55,7 @@ export class Trends {
   remove(name) {
     this.names = this.names.filter((other) => other !== name);
     this._chipped();
-    this.input.focus(); // what had it is gone
+    this.input.focus(); // the focused element was removed
   }
 
   _chipped() {
@@ -70,18 +70,18 @@ export class Trends {
     this.view.touch();
   }
 
-  // How a signal is drawn: switches in lanes, all others of one unit on one axis.
+  // Returns the scale of a signal: switches in lanes, all others of one unit on one axis.
   _scale(name) {
     const tag = this.view.recording.tags.get(name);
     return tag?.kind === "bool" ? "switch" : tag?.unit || "1";
   }
 
-  // Which lane a switch has, from above.
+  // Returns the lane of a switch, counted from above.
   _lane(name) {
     return this.switches.length - 1 - this.switches.indexOf(name);
   }
 
-  // The share of the height that lanes take: all of it if there is nothing else.
+  // Returns the share of the height for lanes: all of it if there are only switches.
   _lanesShare() {
     const { length } = this.switches;
     return length === this.names.length ? 1 : Math.min(LANES_MOST, LANES_SHARE * length);
@@ -89,7 +89,7 @@ export class Trends {
 
   _make() {
     this.switches = this.names.filter((name) => this._scale(name) === "switch");
-    this.lowest = new Map(); // of each scale, what stands just above the lanes
+    this.lowest = new Map(); // by scale, the value just above the lanes
     const colours = palette(), scales = { x: { time: false } }, axes = [{ stroke: colours.muted, size: 28, gap: 2, grid: { stroke: colours.slat, width: 1 }, values: (_, at) => at.map((time) => `${time} s`) }];
     for (const scale of new Set(this.names.map((name) => this._scale(name)))) {
       scales[scale] = { auto: false };
@@ -107,7 +107,7 @@ export class Trends {
     this.theme = colours;
   }
 
-  // A line for each signal, and a dashed one for what it is in the recording beside.
+  // One line per signal, and a dashed one for its value in the other recording.
   _drawn() {
     const lines = this.names.map((name, i) => ({ name, i, of: this.view.recording, dash: null })), { rival } = this.view;
     return rival ? [...lines, ...lines.map((line) => ({ ...line, of: rival.recording, dash: [5, 4] }))] : lines;
@@ -128,7 +128,7 @@ export class Trends {
     return { times, values: this.switches.includes(name) ? values.map((value) => value + LANE * this._lane(name)) : values };
   }
 
-  // Whose lane each is: beside it, for colours alone do not say it to everybody.
+  // Names beside the lanes, because colours alone are not accessible.
   _lanes(plot) {
     const { ctx: context, bbox } = plot;
     context.save();
@@ -145,7 +145,7 @@ export class Trends {
 
   _marks(plot) {
     const { ctx: context, bbox } = plot, { clock, story } = this.view, [from, to] = this._span(), colours = palette();
-    let free = 0; // px from which on there is room for a text
+    let free = 0; // px from which there is room for a text
     const line = (time, colour, dash) => {
       const x = plot.valToPos(time, "x", true);
       context.strokeStyle = colour;
@@ -205,7 +205,7 @@ export class Trends {
     this.box.setAttribute("aria-label", `Trends up to ${seconds(this.view.clock.time)}: ${now.join(", ")}`);
   }
 
-  // What each signal is now, on its chip.
+  // Writes the present value of each signal on its chip.
   _written() {
     this.names.forEach((name, i) => {
       const tag = this.view.recording.tags.get(name), value = this.chips.children[i].querySelector("b");

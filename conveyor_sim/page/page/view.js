@@ -1,4 +1,4 @@
-// The view: what is shown of a line, what is chosen on it, and the parts that draw and tell it.
+// The view: displayed state of a line, selection, and the parts that draw it.
 
 import { Alarms } from "./alarms.js";
 import { Bars } from "./bars.js";
@@ -23,20 +23,20 @@ import { Trends } from "./trends.js";
 import { Watch } from "./watch.js";
 import { NO_WEAR, WEARS, Wear } from "./wear.js";
 
-const MEASURED = 5000; // forces of a block that its scale is made from
-const MOST_EVENTS = 5000; // of a line that runs; then those before what can still be seen are forgotten
-const PANELS_EVERY = 120; // ms between two pictures of the panels while time goes on
+const MEASURED = 5000; // forces of a block from which the scale is made
+const MOST_EVENTS = 5000; // events of a running line; beyond that, events before the visible time are dropped
+const PANELS_EVERY = 120; // ms between two updates of the panels during playback
 
 export class View {
-  // other: a recording that is shown beside it, and its story; else null. line: if it runs, and what is known of it (of
-  // a message "begin").
+  // other: a second recording that is shown beside the first, and its story; else null. line: of a running line, its
+  // message "begin"; else null.
   constructor(recording, story, other, line = null, about = null) {
     Object.assign(this, { recording, story, line, bottle: null, following: false, colouring: "type", shownWear: "", showForces: true, showNames: true, dirty: true });
-    this.rival = null; // what is shown beside this
-    this.letter = ""; // of two that are shown side by side, A
+    this.rival = null; // the other view
+    this.letter = ""; // A, if two recordings are shown side by side
     this.fastest = 0.1;
     this.strongest = 1;
-    this.touching = false; // whether there have been contacts
+    this.touching = false; // true once contacts have been seen
     this.oldest = line ? 60 : Math.max(1, Math.min(60, recording.end - recording.start));
     this.clock = line ? new LiveClock(recording) : new Clock(recording, other?.recording);
     this.desk = line ? new Desk(this, about) : null;
@@ -85,7 +85,7 @@ export class View {
     this.toldMoreOf(this.story, part);
   }
 
-  // The same of the recording beside.
+  // Does the same for the other recording.
   toldMoreOf(story, part) {
     story.add(part);
     this.events.filter();
@@ -94,7 +94,7 @@ export class View {
     this.touch();
   }
 
-  // What a line that runs shows, and what happens on it.
+  // Adds frames and events of a running line.
   receive() {
     const { line, recording, story } = this;
     line.addEventListener("frame", ({ detail }) => {
@@ -119,7 +119,7 @@ export class View {
     });
   }
 
-  // The choice of heat maps is there if the recording has any.
+  // Shows the choice of heat maps if the recording has any.
   worn() {
     byId("worn").hidden = !this.story.data.wear.length;
   }
@@ -130,7 +130,7 @@ export class View {
     this.touch();
   }
 
-  // Scales that only grow, so that a colour means the same from frame to frame.
+  // Scales only grow, so that a colour means the same in all frames.
   _measure() {
     for (const block of this.clock.all.flatMap(({ blocks }) => [...blocks.values()])) {
       if (!block.measured) this.measure(block);
@@ -146,7 +146,7 @@ export class View {
     this.touching ||= forces.length > 0;
   }
 
-  // Time stands at a frame of the recording, once that is there.
+  // Holds the time at a frame of the recording, once it is loaded.
   snap() {
     if (this.clock.playing) return;
     const at = this.clock.recording.place(this.clock.time);
@@ -154,7 +154,7 @@ export class View {
     if (at && this.clock.time !== at.block.times[at.frame]) this.clock.seek(at.block.times[at.frame]);
   }
 
-  // How far a bottle is from where the other recording has it, m; not there: no end.
+  // Returns the distance of a bottle from its position in the other recording, m; infinite if it is not there.
   apart(bottle) {
     const { frame } = this.rival.plan;
     if (!frame) return 0;
@@ -163,7 +163,7 @@ export class View {
     return other ? Math.hypot(bottle.x - other.x, bottle.y - other.y) : Infinity;
   }
 
-  // What the comparison has found: said, and marked.
+  // Shows the result of the comparison as a notice and as marks.
   compared() {
     this.story.differences = this.compare.marks();
     this.story.build();
@@ -171,7 +171,7 @@ export class View {
     this.touch();
   }
 
-  // To a time, and to the place of a tag or a bottle.
+  // Jumps to a time, and to the place of a tag or a bottle.
   jump(time, tag = "", bottle = -1) {
     this.clock.pause();
     this.clock.seek(time);
@@ -236,7 +236,7 @@ export class View {
     this.setColouring(names[(names.indexOf(this.colouring) + 1) % names.length]);
   }
 
-  // What colours and lines mean, once their scales are known.
+  // Writes the legend of colours and lines, once their scales are known.
   _legend() {
     const colouring = COLOURINGS[this.colouring], entries = [], { shown, most } = this.wear, lines = this.showForces && this.touching;
     const key = [this.colouring, colouring.ends?.(this), shown, most, lines && this.strongest].join(" ");
@@ -254,7 +254,7 @@ export class View {
     if (lines) entries.push(element("span", { class: "entry" }, "contacts 0 ", element("span", { class: "wedge" }), ` ${+this.strongest.toPrecision(2)} N`));
     byId("legend").replaceChildren(...entries);
     for (const plan of this.plans) plan.cover();
-    this.touch(); // names make room
+    this.touch(); // names move aside
   }
 
   clicked(px, py, plan = this.plan) {
@@ -310,5 +310,5 @@ export class View {
   }
 }
 
-// What must be the same of a line for a page of it to go on.
+// Returns the key of a line; a page continues only with a line of the same key.
 const still = (head) => JSON.stringify({ ...head, run: "", seed: 0, times: null, forced: null });

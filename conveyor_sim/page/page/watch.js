@@ -1,4 +1,4 @@
-// The watch table of a line that runs: signals that somebody has chosen, as they are, and forced.
+// The watch table of a running line: values of chosen signals, and forced ones.
 
 import { field } from "./controls.js";
 import { element, shown } from "./dom.js";

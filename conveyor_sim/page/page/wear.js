@@ -1,4 +1,4 @@
-// What rails have borne up to a time, as a heat map along them: scuffing or mean pressure in each bin.
+// Wear of rails up to a time as a heat map along them: scuffing or mean pressure in each bin.
 
 import { lastUpTo } from "./block.js";
 import { SCALES, STEPS } from "./colours.js";
@@ -9,7 +9,7 @@ export const WEARS = {
   pressure: { label: "by pressure", unit: "N/m", of: ([time, , impulse], i, bins, start) => impulse[i] / bins.length[i] / Math.max(time - start, 1e-9) },
 };
 
-export const NO_WEAR = 1e-9; // what is not above it is none
+export const NO_WEAR = 1e-9; // values up to this are treated as none
 
 export class Wear {
   constructor(view) {
@@ -21,7 +21,7 @@ export class Wear {
     return this.view.shownWear;
   }
 
-  // The scale is that of the end, so that a colour means the same all the time.
+  // The scale is that of the end, so that a colour means the same at all times.
   scale() {
     const { story, recording } = this.view, { bins, wear } = story.data, last = wear[wear.length - 1];
     return last ? Math.max(NO_WEAR, ...bins.x.map((_, i) => WEARS[this.shown].of(last, i, bins, recording.began))) : NO_WEAR;
@@ -39,7 +39,7 @@ export class Wear {
       if (share <= 0.01) return;
       context.beginPath();
       for (const side of [-1, 0, 1]) {
-        // Halfway to the next bin; at the end of a rail as far as on the other side.
+        // Halfway to the next bin; at the end of a rail symmetric to the other side.
         const there = bins.rail[i + side] === bins.rail[i], near = there ? i + side : i - side, half = there ? 0.5 : -0.5;
         const known = bins.rail[near] === bins.rail[i] ? half : 0;
         context[side < 0 ? "moveTo" : "lineTo"](camera.toX(x + known * ((bins.x[near] ?? x) - x)), camera.toY(bins.y[i] + known * ((bins.y[near] ?? 0) - bins.y[i])));

@@ -98,7 +98,7 @@ def write_checkpoint(
     if size > MOST - MB:
         raise CheckpointError(f"{path}: would have {in_mb(size)}, expected a state of less than {in_mb(MOST - MB)}")
     try:
-        write_file(path, sealed(json.dumps(header), arrays), folder, _objection)
+        write_file(path, to_bytes(json.dumps(header), arrays), folder, _objection)
     except FileError as error:
         raise CheckpointError(f"{path}: {error}, expected {_place(path, folder)}") from error
 
@@ -113,8 +113,8 @@ def _objection(stream: BinaryIO) -> str:
     return "" if is_one else "is not a checkpoint and is not replaced"
 
 
-def sealed(header: str, arrays: Arrays) -> bytes:
-    """The content of a file with a checksum that fits."""
+def to_bytes(header: str, arrays: Arrays) -> bytes:
+    """Return the content of a checkpoint file, with its checksum."""
     buffer = io.BytesIO()
     np.savez(buffer, **{_HEADER: np.frombuffer(header.encode(), np.uint8)}, **arrays)  # type: ignore[arg-type]
     with zipfile.ZipFile(buffer, "a") as archive:

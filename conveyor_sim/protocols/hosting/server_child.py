@@ -15,7 +15,7 @@ class ServerChild:
     """One process with its pipes, from its start until `end`. It dies with the thread that starts it."""
 
     def __init__(self, name: str) -> None:
-        """name: of the protocol server."""
+        """Start the process. name: of the protocol server."""
         self.pipe, its_pipe = Pipe()
         """Calls and answers."""
         its_frames, self.frames = Pipe(duplex=False)

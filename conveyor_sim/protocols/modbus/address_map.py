@@ -47,7 +47,7 @@ def modbus_map(tags: Iterable[Tag], kept: Sequence[Row] = (), word_order: WordOr
         if row.addresses.stop > HANDSHAKE and row.table in ("input register", "holding register"):
             raise MapError(f"{printable(row.name)}: address {row.address} given, expected one below {HANDSHAKE}")
     ends = {table: max((row.addresses.stop for row in kept if row.table == table), default=0) for table in TABLES}
-    found: dict[str, Row] = {}
+    current: dict[str, Row] = {}
     known = [tag for tag in tags if tag.role in (*SIGNALS, *COMMANDS)]
     modes = [_mode_row(tag, word_order) for tag in known if is_mode(tag)]
     for new in [*(_row(tag, word_order) for tag in known), *modes]:
@@ -63,9 +63,9 @@ def modbus_map(tags: Iterable[Tag], kept: Sequence[Row] = (), word_order: WordOr
             )
         else:
             new = replace(new, address=old.address, word_order=old.word_order)
-        found[new.name] = new
-    gone = {row.name: replace(row, description=GONE, access="read") for row in kept if row.name not in found}
-    rows = [*found.values(), *gone.values(), *handshake]
+        current[new.name] = new
+    gone = {row.name: replace(row, description=GONE, access="read") for row in kept if row.name not in current}
+    rows = [*current.values(), *gone.values(), *handshake]
     return sorted(rows, key=lambda row: (TABLES.index(row.table), row.address))
 
 

@@ -13,9 +13,9 @@ import os
 import secrets
 from pathlib import Path
 
+from conveyor_sim.support.checked_json import parsed
 from conveyor_sim.support.file_lock import locked
 from conveyor_sim.support.files import FileError, read_file, write_file
-from conveyor_sim.support.sealed_json import parsed
 
 COUNT = 256
 """Numbers go from 0 to COUNT - 1, and round."""
@@ -35,7 +35,9 @@ class BirthNumbers:
     """Numbers of the connections of one edge node to one broker, from all its processes."""
 
     def __init__(self, broker: str, group: str, node: str, folder: Path | None = None) -> None:
-        """broker: its address. group, node: ids. folder: holds one file per edge node; None: `state_folder()`."""
+        """Prepare the numbers. broker: its address. group, node: IDs. folder: holds one file per edge node; None:
+        `state_folder()`.
+        """
         self._node = {"broker": broker, "group": group, "node": node}
         self._folder = folder
         digest = hashlib.sha256(json.dumps(self._node, sort_keys=True).encode()).hexdigest()

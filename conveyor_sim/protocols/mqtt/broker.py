@@ -57,9 +57,9 @@ class Broker:
         """True if the broker is on this machine."""
         return self.host in ("localhost", "::1") or self.host.startswith("127.")
 
-    def named(self, about: LineInfo) -> tuple[str, str]:
+    def named(self, info: LineInfo) -> tuple[str, str]:
         """Return the group and edge node of a line."""
-        return self.group or about.where.replace("/", ":") or about.name, self.node or about.name
+        return self.group or info.where.replace("/", ":") or info.name, self.node or info.name
 
     def context(self) -> ssl.SSLContext:
         """Return the context for TLS. Raises ServerError."""
@@ -87,12 +87,12 @@ def broker_of(
 
     Raises ServerError.
     """
-    given = f"mqtt: {printable(url)} given"
+    prefix = f"mqtt: {printable(url)} given"
     try:
         parts = urlsplit(url)
         port = parts.port
     except ValueError as error:
-        raise ServerError(f"{given} ({error}), {EXPECTED}") from error
+        raise ServerError(f"{prefix} ({error}), {EXPECTED}") from error
     names = parts.path.strip("/").split("/") if parts.path.strip("/") else []
     if parts.password is not None:
         raise ServerError(
@@ -100,7 +100,7 @@ def broker_of(
             f"variable {PASSWORD} or by --mqtt-password-file"
         )
     if parts.scheme not in _PORTS or not parts.hostname or parts.query or parts.fragment or len(names) > 2:
-        raise ServerError(f"{given}, {EXPECTED}")
+        raise ServerError(f"{prefix}, {EXPECTED}")
     for name in (*names, primary_host or "none"):
         if not _ID.fullmatch(name) or name == "STATE":
             raise ServerError(f"mqtt: {printable(name)} given as a name, expected letters, digits, or any of _ . : -")

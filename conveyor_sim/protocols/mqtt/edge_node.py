@@ -70,10 +70,10 @@ class EdgeNode:
         were refused, before a restart.
         """
         self._source, self._broker = source, broker
-        self._names = SparkplugTopics(*broker.named(source.about))
+        self._names = SparkplugTopics(*broker.named(source.info))
         self._commands = HostCommands(source, role, f"{broker.host}:{broker.port}", silence, holding)
         self._commands.before = before
-        self._line = LineMetrics(source.about, TickClock(source.about, stamps), writes=role is not None)
+        self._line = LineMetrics(source.info, TickClock(source.info, stamps), writes=role is not None)
         self._numbers = BirthNumbers(broker.address, self._names.group, self._names.node)
         self._births = 0  # number of the present connection
         self._version = NEWEST
@@ -82,7 +82,7 @@ class EdgeNode:
         self._waiting: deque[tuple[LineSnapshot, datetime]] = deque()
         self._left_out = 0
         self._longest = 0.0
-        self._told = False
+        self._is_woken = False
         self._tasks: list[asyncio.Task[None]] = []
 
     @property
@@ -197,7 +197,7 @@ class EdgeNode:
             while not link.lost:
                 await self._wake.wait()
                 self._wake.clear()
-                self._told = False
+                self._is_woken = False
                 was_online = host.online
                 for message in link.take():
                     if message.topic == host.topic:
@@ -230,15 +230,15 @@ class EdgeNode:
             if link.full:
                 return again
             self._waiting.clear()
-            session.bear(self._source.shown, datetime.now(timezone.utc))
+            session.bear(self._source.snapshot, datetime.now(timezone.utc))
         while self._waiting and not link.full:
-            shown, heard = self._waiting.popleft()
-            session.bring(shown, heard)
+            snapshot, heard = self._waiting.popleft()
+            session.bring(snapshot, heard)
             self._longest = max(self._longest, (datetime.now(timezone.utc) - heard).total_seconds())
             await asyncio.sleep(0)
         if not link.full:
             session.catch_up()
-            session.tell(self._source.shown)
+            session.tell(self._source.snapshot)
         if session.behind:
             self._loop.call_later(BETWEEN, self._wake.set)
         return 0
@@ -266,13 +266,13 @@ class EdgeNode:
             with suppress(IndexError):
                 self._waiting.pop()
                 self._left_out += 1
-        self._waiting.append((self._source.shown, datetime.now(timezone.utc)))
+        self._waiting.append((self._source.snapshot, datetime.now(timezone.utc)))
         self._notice()
 
     def _notice(self) -> None:
         """Wake the loop. May be called by any thread."""
-        if not self._told:
-            self._told = True
+        if not self._is_woken:
+            self._is_woken = True
             with suppress(RuntimeError):  # the loop is closed
                 self._loop.call_soon_threadsafe(self._wake.set)
 

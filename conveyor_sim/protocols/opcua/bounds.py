@@ -35,7 +35,7 @@ class Bounds:
     """Limits of one session."""
 
     def __init__(self, session: Any, limits: OpcUaLimits) -> None:
-        """session: an asyncua InternalSession."""
+        """Start with full budgets. session: an asyncua InternalSession."""
         self._session, self.limits = session, limits
         self.views = Views(session.aspace, limits)
         rate = limits.subscription_units_per_second

@@ -177,7 +177,7 @@ class Methods:
     def __init__(self, source: TagProvider, requests: Requests, is_last_event: Callable[[str, bytes], bool]) -> None:
         """Prepare the calls. is_last_event: returns True if an ID is that of the last event of an alarm."""
         self._source, self._requests, self._is_last_event = source, requests, is_last_event
-        tags = source.about.tags
+        tags = source.info.tags
         self._tags = {tag.name: tag for tag in tags}
         self._devices = {tag.device for tag in tags}
         self._known: dict[str, Callable[[str], bool]] = {
@@ -190,7 +190,7 @@ class Methods:
 
     def knows_alarm(self, id: str) -> bool:
         """Return True if there is such an alarm."""
-        alarms = self._source.shown.alarms
+        alarms = self._source.snapshot.alarms
         return alarms is not None and id in alarms.id
 
     def call(self, client: User, request: ua.CallMethodRequest) -> ua.CallMethodResult | None:
@@ -210,20 +210,21 @@ class Methods:
         alarm = target.removeprefix(f"{ALARM_STATES}/")
         if target != owner and (owner != ALARM_STATES or alarm == target or not self.knows_alarm(alarm)):
             return _result(Codes.BadMethodInvalid)
-        given = [] if request.InputArguments is None else list(request.InputArguments)
+        inputs = [] if request.InputArguments is None else list(request.InputArguments)
         may = self._requests.may(client, method.operation) if method.operation else self._requests.may_control(client)
         if not may:
             return _result(Codes.BadUserAccessDenied)
-        if len(given) != len(method.parameters):
-            few = len(given) < len(method.parameters)
+        if len(inputs) != len(method.parameters):
+            few = len(inputs) < len(method.parameters)
             return _result(Codes.BadArgumentsMissing if few else Codes.BadTooManyArguments)
-        codes = [self._judge(parameter, value) for parameter, value in zip(method.parameters, given, strict=True)]
+        codes = [self._judge(parameter, value) for parameter, value in zip(method.parameters, inputs, strict=True)]
         if any(code != Codes.Good for code in codes):
             return _result(Codes.BadInvalidArgument, codes)
-        arguments = [value.Value for value in given]
+        arguments = [value.Value for value in inputs]
         if method.control is not None:
             value = float(arguments[0]) if arguments else 0.0
-            return _of_arguments(self._requests.control(client, method.control, value), {Codes.BadOutOfRange: 0}, given)
+            code = self._requests.control(client, method.control, value)
+            return _of_arguments(code, {Codes.BadOutOfRange: 0}, inputs)
         if owner == ALARM_STATES:
             return _result(self._requests.operate(client, method.operation, () if target == owner else (alarm,)))
         return self._operate(client, method, arguments)
@@ -235,10 +236,10 @@ class Methods:
             return _result(Codes.BadNodeIdInvalid)
         if not self._requests.may(client, "acknowledge"):
             return _result(Codes.BadUserAccessDenied)
-        given = request.InputArguments or []
-        if not given or not isinstance(given[0].Value, bytes) or not self._is_last_event(alarm, given[0].Value):
+        inputs = request.InputArguments or []
+        if not inputs or not isinstance(inputs[0].Value, bytes) or not self._is_last_event(alarm, inputs[0].Value):
             return _result(Codes.BadEventIdUnknown)
-        alarms = self._source.shown.alarms
+        alarms = self._source.snapshot.alarms
         if alarms is None or alarms.state[list(alarms.id).index(alarm)] not in WAITING:
             return _result(Codes.BadConditionBranchAlreadyAcked)
         return _result(self._requests.operate(client, "acknowledge", (alarm,)))
@@ -257,11 +258,11 @@ class Methods:
         code = self._requests.operate(client, method.operation, names, values)
         return _of_arguments(code, _NAME_AND_VALUE, arguments)
 
-    def _judge(self, parameter: MethodParameter, given: ua.Variant) -> int:
-        values = given.Value if parameter.array else [given.Value]
-        if given.VariantType is not parameter.kind or isinstance(given.Value, list) != parameter.array:
+    def _judge(self, parameter: MethodParameter, argument: ua.Variant) -> int:
+        values = argument.Value if parameter.array else [argument.Value]
+        if argument.VariantType is not parameter.kind or isinstance(argument.Value, list) != parameter.array:
             # An array without elements may come as a null.
-            return Codes.Good if parameter.array and given.Value is None else Codes.BadTypeMismatch
+            return Codes.Good if parameter.array and argument.Value is None else Codes.BadTypeMismatch
         if len(values) > _MOST or any(isinstance(value, str) and len(value) > _LONGEST for value in values):
             return Codes.BadOutOfRange
         if any(value is None and not parameter.optional for value in values):

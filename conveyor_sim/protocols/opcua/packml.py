@@ -111,8 +111,8 @@ class PackMl:
 
     def __init__(self, source: TagProvider, requests: Requests, clock: TickClock) -> None:
         self._source, self._requests, self._clock = source, requests, clock
-        self._tags: Mapping[str, Tag] = {tag.name: tag for tag in source.about.tags}
-        self._machines = [tag.device for tag in source.about.tags if tag.name == f"{tag.device}/cntrl_cmd"]
+        self._tags: Mapping[str, Tag] = {tag.name: tag for tag in source.info.tags}
+        self._machines = [tag.device for tag in source.info.tags if tag.name == f"{tag.device}/cntrl_cmd"]
         self._admins = {machine: Admin(machine, self._tags, clock) for machine in self._machines}
         self._nodes: Nodes | None = None
         self._index = 0
@@ -142,8 +142,8 @@ class PackMl:
             rate = self._tags[f"{machine}/rate"]
             span = ua.Variant(ua.Range(rate.low * A_MINUTE, rate.high * A_MINUTE))
             now = self._clock.simulated(0)
-            for name, found in parts.items():
-                await nodes.write(f"{root}.{name}", found, now)
+            for name, result in parts.items():
+                await nodes.write(f"{root}.{name}", result, now)
             await nodes.write(f"{root}.Status.UnitSupportedModes", ua.Variant(modes), now)
             mode = server.get_node(node_id(f"{root}.Status.UnitModeCurrent"))
             await mode.write_attribute(data_type, ua.DataValue(ua.Variant(modes)))
@@ -152,25 +152,25 @@ class PackMl:
 
     async def _parts(self, server: Server) -> dict[str, ua.Variant]:
         """Return the IDs of the states and transitions of each state machine, by the variables that list them."""
-        found: dict[str, ua.Variant] = {}
+        result: dict[str, ua.Variant] = {}
         for state_machine, kind in _TYPES.items():
             parts = await server.get_node(ua.NodeId(kind, self._index)).get_children_descriptions()
             for name, kinds in _PARTS.items():
                 ids = [part.NodeId for part in parts if part.TypeDefinition in [ua.NodeId(each) for each in kinds]]
-                found[f"{state_machine}.{name}"] = ua.Variant(ids, ua.VariantType.NodeId, is_array=True)
-        return found
+                result[f"{state_machine}.{name}"] = ua.Variant(ids, ua.VariantType.NodeId, is_array=True)
+        return result
 
-    async def follow(self, shown: LineSnapshot, heard: datetime, back: bool) -> None:
+    async def follow(self, snapshot: LineSnapshot, heard: datetime, back: bool) -> None:
         """Write the variables that have changed."""
         if self._nodes is None:
             return
-        status, stamp = status_of(shown), self._clock.stamp(shown.tick, heard)
+        status, stamp = status_of(snapshot), self._clock.stamp(snapshot.tick, heard)
         if status != self._status or back:
             self._status = status
             self._written.clear()
         for machine in self._machines:
-            admin = {f"{ADMIN}.{name}": value for name, value in self._admins[machine].values(shown).items()}
-            for name, value in {**self._values(machine, shown.values), **admin}.items():
+            admin = {f"{ADMIN}.{name}": value for name, value in self._admins[machine].values(snapshot).items()}
+            for name, value in {**self._values(machine, snapshot.values), **admin}.items():
                 if self._written.get((machine, name)) != value:
                     self._written[machine, name] = value
                     inactive = value.Value in _NONE and status == Codes.Good
@@ -186,7 +186,7 @@ class PackMl:
         machine, _, _ = name_of(request.ObjectId).partition(f"/{NAME}")
         if machine not in self._machines:
             return None
-        given = [each.Value for each in request.InputArguments or []]
+        arguments = [each.Value for each in request.InputArguments or []]
         method = int(request.MethodId.Identifier) if request.MethodId.NamespaceIndex == self._index else 0
         name = name_of(request.MethodId).rpartition(".")[2] or {362: "SetUnitMode", 400: "SetMachSpeed"}.get(method, "")
         if method in _METHODS:
@@ -195,24 +195,24 @@ class PackMl:
             return None
         if not self._requests.may(client, SET if name == "SetMachSpeed" else MODE):
             return _result(Codes.BadUserAccessDenied)
-        if len(given) != 1 or not isinstance(given[0], int | float) or isinstance(given[0], bool):
+        if len(arguments) != 1 or not isinstance(arguments[0], int | float) or isinstance(arguments[0], bool):
             return _result(Codes.BadInvalidArgument)
-        value = float(given[0])
+        value = float(arguments[0])
         if name == "SetMachSpeed":
             is_single = request.InputArguments[0].VariantType is ua.VariantType.Float
             rate = _a_second(value, self._tags[f"{machine}/rate"], is_single)
             return _result(self._requests.write_together(client, [f"{machine}/rate"], [rate]))
-        if isinstance(given[0], float) or value not in self._tags[f"{machine}/mode"].texts:
+        if isinstance(arguments[0], float) or value not in self._tags[f"{machine}/mode"].texts:
             return _result(Codes.BadInvalidArgument)
         return _result(self._requests.operate(client, MODE, (machine,), (value,)))
 
     def _command(self, client: User, machine: str, command: Command) -> int:
-        name, shown = f"{machine}/cntrl_cmd", self._source.shown.values
+        name, snapshot = f"{machine}/cntrl_cmd", self._source.snapshot.values
         if not self._requests.may(client, SET):
             return int(Codes.BadUserAccessDenied)
-        if objection(command, int(shown[f"{machine}/state"])):
+        if objection(command, int(snapshot[f"{machine}/state"])):
             return int(Codes.BadInvalidState)
-        if shown.get(name) == command:  # a command acts when its value changes
+        if snapshot.get(name) == command:  # a command acts when its value changes
             code = self._requests.write_together(client, [name], [0.0])
             if code != Codes.GoodCompletesAsynchronously:
                 return code
@@ -227,7 +227,7 @@ class PackMl:
         def speed(name: str) -> ua.Variant:
             return ua.Variant(values[f"{machine}/{name}"] * A_MINUTE, ua.VariantType.Float)
 
-        found = {
+        result = {
             "Status.UnitModeCurrent": ua.Variant(int(values[f"{machine}/mode"]), ua.VariantType.Int32),
             "Status.MachSpeed": speed("rate"),
             "Status.CurMachSpeed": speed("cur_rate"),
@@ -236,11 +236,11 @@ class PackMl:
         }
         number = int(values[f"{machine}/state"])
         for state_machine, (text, state) in self._current(number).items():
-            found[f"{state_machine}.CurrentState"] = ua.Variant(ua.LocalizedText(text))
-            found[f"{state_machine}.CurrentState.Id"] = ua.Variant(
+            result[f"{state_machine}.CurrentState"] = ua.Variant(ua.LocalizedText(text))
+            result[f"{state_machine}.CurrentState.Id"] = ua.Variant(
                 ua.NodeId(state, self._index) if state else ua.NodeId()
             )
-        return found
+        return result
 
     def _current(self, number: int) -> dict[str, tuple[str | None, int]]:
         """Return the present state of each state machine; without a text: it is not active."""

@@ -72,9 +72,9 @@ class Admin:
         self._reasons = tags[f"{machine}/stop_reason"].texts
         self._design = tags[f"{machine}/rate"].nominal
         self._counts = {
-            name: tags[f"{machine}/{found[0]}"]
+            name: tags[f"{machine}/{counters[0]}"]
             for name, ends in _COUNTS.items()
-            if (found := [end for end in ends if f"{machine}/{end}" in tags])
+            if (counters := [end for end in ends if f"{machine}/{end}" in tags])
         }
         self._reason, self._since = 0, NEVER
         self._alarms: AlarmColumns | None = None
@@ -94,25 +94,25 @@ class Admin:
                 # Unlike the public function, it keeps the type of reference: HasAlarm and others.
                 await copy_node(session, parent, each, node_id(f"{root}.{NAME}.{each.BrowseName.Name}"), False)
 
-    def values(self, shown: LineSnapshot) -> dict[str, ua.Variant]:
+    def values(self, snapshot: LineSnapshot) -> dict[str, ua.Variant]:
         """Return the values of the variables by name."""
-        found = {name: self._count(tag, shown.values) for name, tag in self._counts.items()}
+        variables = {name: self._count(tag, snapshot.values) for name, tag in self._counts.items()}
         if self._design is not None:
-            found["MachDesignSpeed"] = ua.Variant(self._design * A_MINUTE, ua.VariantType.Float)
-        found["StopReason"] = self._stop_reason(shown)
-        if shown.alarms is not self._alarms and shown.alarms is not None:
-            self._alarms, self._rows = shown.alarms, self._standing(shown.alarms)
-        return found | self._rows
+            variables["MachDesignSpeed"] = ua.Variant(self._design * A_MINUTE, ua.VariantType.Float)
+        variables["StopReason"] = self._stop_reason(snapshot)
+        if snapshot.alarms is not self._alarms and snapshot.alarms is not None:
+            self._alarms, self._rows = snapshot.alarms, self._standing(snapshot.alarms)
+        return variables | self._rows
 
     def _count(self, tag: Tag, values: Mapping[str, float]) -> ua.Variant:
         count = min(_MOST, int(values.get(tag.name, 0.0)))
         return _array([PackMLCountDataType(0, "bottles", unit_of(tag), count, count)])
 
-    def _stop_reason(self, shown: LineSnapshot) -> ua.Variant:
-        reason = int(shown.values[f"{self._machine}/stop_reason"])
+    def _stop_reason(self, snapshot: LineSnapshot) -> ua.Variant:
+        reason = int(snapshot.values[f"{self._machine}/stop_reason"])
         if reason != self._reason:
-            self._reason, self._since = reason, self._clock.simulated(shown.tick) if reason else NEVER
-        category = int(shown.values[f"{self._machine}/category"])
+            self._reason, self._since = reason, self._clock.simulated(snapshot.tick) if reason else NEVER
+        category = int(snapshot.values[f"{self._machine}/category"])
         text, on = self._reasons.get(reason, ""), category != 0
         made = PackMLAlarmDataType(reason, reason, text, category, self._since, NEVER, on)
         return ua.Variant(made, ua.VariantType.ExtensionObject)
@@ -128,11 +128,11 @@ class Admin:
                 text, priority, active = columns.text[place], int(columns.priority[place]), bool(columns.active[place])
                 made = PackMLAlarmDataType(place, state, text, priority, since, acknowledged, active)
                 rows[kind].append(made)
-        found: dict[str, ua.Variant] = {}
+        variables: dict[str, ua.Variant] = {}
         for name, kind in (("Alarm", "error"), ("Warning", "warning")):
-            found[name] = _array(rows[kind])
-            found[f"{name}Extent"] = ua.Variant(len(rows[kind]), ua.VariantType.Int32)
-        return found
+            variables[name] = _array(rows[kind])
+            variables[f"{name}Extent"] = ua.Variant(len(rows[kind]), ua.VariantType.Int32)
+        return variables
 
 
 def _array(values: Sequence[object]) -> ua.Variant:

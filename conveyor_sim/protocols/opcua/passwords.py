@@ -33,7 +33,7 @@ class Passwords:
     """Checks of one OPC UA server. Clients wait in the order of their requests."""
 
     def __init__(self, logins: LoginService) -> None:
-        """logins: checks passwords. Its method may block."""
+        """Prepare the checks. logins: checks passwords; its method may block."""
         self._logins = logins
         self._turn = asyncio.Lock()
 

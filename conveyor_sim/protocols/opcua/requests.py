@@ -64,9 +64,9 @@ class Requests:
 
     def __init__(self, source: TagProvider) -> None:
         self._source = source
-        self._receipt = Receipt(source.about.tags, source.about.where)
-        self._commands: Mapping[str, Tag] = {tag.name: tag for tag in source.about.tags if tag.role in COMMANDS}
-        self._modes: Mapping[str, Tag] = {tag.name: tag for tag in source.about.tags if is_mode(tag)}
+        self._receipt = Receipt(source.info.tags, source.info.where)
+        self._commands: Mapping[str, Tag] = {tag.name: tag for tag in source.info.tags if tag.role in COMMANDS}
+        self._modes: Mapping[str, Tag] = {tag.name: tag for tag in source.info.tags if is_mode(tag)}
         self.writes = self.refused = 0
         """Requests that were passed on to the line, and requests that were refused."""
 
@@ -89,8 +89,8 @@ class Requests:
                 places.append(place)
             codes.append(code)
         self._flush(client, together, places, codes)
-        self.writes += (given := codes.count(Codes.GoodCompletesAsynchronously))
-        self.refused += len(codes) - given
+        self.writes += (accepted := codes.count(Codes.GoodCompletesAsynchronously))
+        self.refused += len(codes) - accepted
         return [ua.StatusCode(code) for code in codes]
 
     def write_together(self, client: User, names: Sequence[str], values: Sequence[float]) -> int:
@@ -173,8 +173,8 @@ class Requests:
         kind, writer = _kind(client), _writer(client)
         if kind is None:
             return Codes.BadUserAccessDenied
-        given = Input(OPCUA, writer, kind, SET, (tag.name,), (number,))
-        if refusal := refused_for_good(self._source, self._receipt, given):
+        request = Input(OPCUA, writer, kind, SET, (tag.name,), (number,))
+        if refusal := refused_for_good(self._source, self._receipt, request):
             return CODES[refusal.cause]
         if objection(self._source, tag, number, kind, writer):
             return Codes.BadInvalidState
@@ -194,13 +194,13 @@ class Requests:
         kind = _kind(client)
         if kind is None or not self.may(client, operation):
             return Codes.BadUserAccessDenied
-        given = Input(OPCUA, _writer(client), kind, operation, names, values, texts)
-        if refusal := refused_for_good(self._source, self._receipt, given):
+        request = Input(OPCUA, _writer(client), kind, operation, names, values, texts)
+        if refusal := refused_for_good(self._source, self._receipt, request):
             return CODES[refusal.cause]
-        shown = self._source.shown
-        if shown.lost or shown.run.state in TAKES_NO_INPUT:
+        snapshot = self._source.snapshot
+        if snapshot.lost or snapshot.run.state in TAKES_NO_INPUT:
             return Codes.BadInvalidState
-        return Codes.BadTooManyOperations if self._source.give(given) else Codes.GoodCompletesAsynchronously
+        return Codes.BadTooManyOperations if self._source.give(request) else Codes.GoodCompletesAsynchronously
 
 
 def _judge_form(value: ua.WriteValue, kind: ua.VariantType) -> int:

@@ -90,10 +90,10 @@ class SafeServer(InternalServer):
 
     def lookup_external_session(self, auth_token: ua.NodeId) -> InternalSession | None:
         """Return the session of a client on a new connection; None if its certificate is another one."""
-        found, connection = super().lookup_external_session(auth_token), channel.get()
-        if not isinstance(found, OpcUaSession) or connection is None or found.peer != connection.peer:
+        session, connection = super().lookup_external_session(auth_token), channel.get()
+        if not isinstance(session, OpcUaSession) or connection is None or session.peer != connection.peer:
             return None
-        return found
+        return session
 
     async def get_endpoints(self, params: Any = None, sockname: Any = None) -> list[ua.EndpointDescription]:
         """Return all endpoints. Raise ServiceError for a URL that can't be parsed."""
@@ -208,7 +208,7 @@ class OpcUaSession(InternalSession):
         results = []
         for request in params or []:
             answers = (answer(self.user, request) for answer in self.iserver.answers)
-            result = next((found for found in answers if found is not None), None)
+            result = next((reply for reply in answers if reply is not None), None)
             if result is None and request.MethodId in REFRESH:
                 (result,) = await super().call([request])
             results.append(result or ua.CallMethodResult(ua.StatusCode(Codes.BadMethodInvalid), [], [], []))

@@ -143,11 +143,11 @@ def _read(path: Path) -> bytes:
 def _der(path: Path) -> bytes:
     content = _read(path)
     try:
-        found = (
+        certificate = (
             x509.load_pem_x509_certificate(content)
             if b"-----BEGIN" in content
             else x509.load_der_x509_certificate(content)
         )
     except ValueError as error:
         raise CertificateError(f"{path}: can't be read, expected a certificate (DER or PEM)") from error
-    return found.public_bytes(serialization.Encoding.DER)
+    return certificate.public_bytes(serialization.Encoding.DER)

@@ -117,8 +117,8 @@ def keep_user(path: Path, name: str, user: User) -> None:
 def authenticate(users: Mapping[str, User], name: str, password: str) -> User | None:
     """Return the user of a name if the password is right. The time does not show whether there is such a user."""
     user = users.get(name, _UNKNOWN)
-    given = _hash(password[: _LONGEST_PASSWORD + 1], user.salt)
-    return user if hmac.compare_digest(given, user.hash) and user is not _UNKNOWN else None
+    digest = _hash(password[: _LONGEST_PASSWORD + 1], user.salt)
+    return user if hmac.compare_digest(digest, user.hash) and user is not _UNKNOWN else None
 
 
 class LoginService(Protocol):

@@ -35,7 +35,7 @@ class SceneTask:
 class InputRequest(NamedTuple):
     """Sent to the process: an input for the next tick."""
 
-    given: Input
+    input: Input
 
 
 class ControlRequest(NamedTuple):

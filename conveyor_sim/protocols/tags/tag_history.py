@@ -50,7 +50,7 @@ class TagHistory:
         Raises BagError for a damaged file.
         """
         first, last = max(first, self._first), min(last, self._last)
-        found: list[TagSample] = []
+        result: list[TagSample] = []
         looked_at = 0
         if name not in self._places:
             return [], None
@@ -63,13 +63,13 @@ class TagHistory:
                 pairs = zip([before, *samples[:-1]], samples, strict=True) if samples else ()
                 changes = [now for was, now in pairs if was is None or was.value != now.value]
                 before = samples[-1] if samples else before
-                found += reversed(changes) if back else changes
-                if len(found) > most:
-                    return found[:most], found[most].tick
+                result += reversed(changes) if back else changes
+                if len(result) > most:
+                    return result[:most], result[most].tick
                 looked_at += len(samples)
                 if looked_at > MOST_READ and (low > first if back else high < last):
-                    return found, low - 1 if back else high + 1
-        return found, None
+                    return result, low - 1 if back else high + 1
+        return result, None
 
     def close(self) -> None:
         """Close the files, after a call in progress."""
@@ -81,9 +81,9 @@ class TagHistory:
         span = WINDOW
         while True:
             start = max(self._first, tick - span)
-            found = deque(self._samples(name, start * self._tick_ns, max(1, tick * self._tick_ns)), maxlen=1)
-            if found or start == self._first:
-                return found[0] if found else None
+            last_sample = deque(self._samples(name, start * self._tick_ns, max(1, tick * self._tick_ns)), maxlen=1)
+            if last_sample or start == self._first:
+                return last_sample[0] if last_sample else None
             span *= 4
 
     def _samples(self, name: str, start_ns: int, stop_ns: int) -> Iterator[TagSample]:

@@ -93,11 +93,11 @@ class TagProvider(Protocol):
     """Tags with their values, and an entry for inputs. Its methods may be called from any thread."""
 
     @property
-    def about(self) -> LineInfo:
+    def info(self) -> LineInfo:
         """Constant properties of the line."""
 
     @property
-    def shown(self) -> LineSnapshot:
+    def snapshot(self) -> LineSnapshot:
         """Latest snapshot of the line."""
 
     @property
@@ -105,23 +105,23 @@ class TagProvider(Protocol):
         """Requests that `control` accepts."""
 
     @property
-    def past(self) -> TagHistory | None:
+    def history(self) -> TagHistory | None:
         """History of the tags; None: no history is available."""
 
     def events(self, after: int) -> tuple[int, Sequence[Event]]:
         """Return the number of events so far, and the events after the first `after`, unless they are too old."""
 
     def listen(self, heard: Callable[[], None]) -> Callable[[], None]:
-        """Call `heard` after each change of `shown`, from any thread. Return a function that ends this.
+        """Call `heard` after each change of `snapshot`, from any thread. Return a function that ends this.
 
         `heard` must not block and must not raise.
         """
 
-    def give(self, given: Input) -> str:
-        """Have an input judged and applied as the next tick begins. Why it can't wait for that, "" if it does."""
+    def give(self, request: Input) -> str:
+        """Queue an input for the next tick. Return the reason for a refusal, "" if it was queued."""
 
     def control(self, what: Control, value: float, by: str) -> str:
-        """Ask something of the run, in the name of somebody. Why that can't be, "" if it will be done."""
+        """Control the run in the name of `by`. Return the reason for a refusal, "" if the request was accepted."""
 
 
 class Listeners:
@@ -193,22 +193,22 @@ class SteppedTagProvider:
         image, scene = simulation.process_image, simulation.scene
         self._names = (*image.signal_names, *image.command_names)
         self._signal_names = image.signal_names
-        self._about = LineInfo(scene.name, scene.where, scene.tick, scene.start_time, image.tags)
+        self._info = LineInfo(scene.name, scene.where, scene.tick, scene.start_time, image.tags)
         self._alarms, self._read_back = simulation.line.alarms.columns(), simulation.line.read_back.columns()
         self._show()
 
     @property
-    def about(self) -> LineInfo:
+    def info(self) -> LineInfo:
         """Constant properties of the line."""
-        return self._about
+        return self._info
 
     @property
-    def shown(self) -> LineSnapshot:
+    def snapshot(self) -> LineSnapshot:
         """Snapshot at the end of the last tick."""
-        return self._shown
+        return self._snapshot
 
     @property
-    def past(self) -> TagHistory | None:
+    def history(self) -> TagHistory | None:
         """No history is available."""
         return None
 
@@ -220,11 +220,11 @@ class SteppedTagProvider:
         """Call `heard` after each tick. Return a function that ends this."""
         return self._listeners.add(heard)
 
-    def give(self, given: Input) -> str:
-        """Have an input judged and applied as the next tick begins. Why it can't wait for that, "" if it does."""
+    def give(self, request: Input) -> str:
+        """Queue an input for the next tick. Return the reason for a refusal, "" if it was queued."""
         if len(self._waiting) >= MOST_WAITING:
             return f"{MOST_WAITING} inputs wait for the next tick already"
-        self._waiting.append(given)
+        self._waiting.append(request)
         return ""
 
     def control(self, what: Control, value: float, by: str) -> str:
@@ -257,7 +257,7 @@ class SteppedTagProvider:
         simulation = self._simulation
         signals = simulation.line.signals()
         values = [*signals.values.tolist(), *simulation.line.read_back.values]
-        self._shown = LineSnapshot(
+        self._snapshot = LineSnapshot(
             simulation.tick,
             dict(zip(self._names, values, strict=True)),
             frozenset(self._signal_names[place] for place in signals.forced),

@@ -50,9 +50,9 @@ class PageCommands:
 
     def __init__(self, source: DrawableProvider) -> None:
         self._source = source
-        tags = source.about.tags
+        tags = source.info.tags
         self._commands: Mapping[str, Tag] = {tag.name: tag for tag in tags if tag.role in COMMANDS}
-        self._receipt = Receipt(tags, source.about.where)
+        self._receipt = Receipt(tags, source.info.where)
         self.controls = source.controls - {"target"}  # the controller sets the target of a line in lockstep
         """Requests to control the run that pages may make."""
         self.writes = self.refused = 0
@@ -90,30 +90,30 @@ class PageCommands:
             return f"expected one of {', '.join(sorted(self.controls)) or 'nothing'}"
         return self._source.control(control, float(values[0]) if values else 0.0, f"{kind} {person.writer}")
 
-    def _give(self, given: Input) -> str:
-        if reason := unauthorized(given, OPERATIONS):
+    def _give(self, request: Input) -> str:
+        if reason := unauthorized(request, OPERATIONS):
             return reason
-        if refusal := refused_for_good(self._source, self._receipt, given):
+        if refusal := refused_for_good(self._source, self._receipt, request):
             return refusal.reason
-        shown = self._source.shown
-        if shown.lost:
-            return shown.lost
-        if shown.run.state in TAKES_NO_INPUT:
-            return f"the run is {shown.run.text}, expected one that goes on"
-        if given.operation == SET and (reason := self._objection(given)):
+        snapshot = self._source.snapshot
+        if snapshot.lost:
+            return snapshot.lost
+        if snapshot.run.state in TAKES_NO_INPUT:
+            return f"the run is {snapshot.run.text}, expected one that goes on"
+        if request.operation == SET and (reason := self._objection(request)):
             return reason
-        return self._source.give(given)
+        return self._source.give(request)
 
-    def _objection(self, given: Input) -> str:
+    def _objection(self, request: Input) -> str:
         """Return why commands would be refused in the latest state of the line; "" if they would not."""
-        if unknown := [name for name in given.names if name not in self._commands]:
+        if unknown := [name for name in request.names if name not in self._commands]:
             return f"{unknown[0]}: expected a command"
-        kind: Any = given.writer_kind
-        found = (
-            objection(self._source, self._commands[name], value, kind, given.writer)
-            for name, value in zip(given.names, given.values, strict=True)
+        kind: Any = request.writer_kind
+        reasons = (
+            objection(self._source, self._commands[name], value, kind, request.writer)
+            for name, value in zip(request.names, request.values, strict=True)
         )
-        return next(filter(None, found), "")
+        return next(filter(None, reasons), "")
 
 
 def _are(values: Any, kind: Any) -> bool:

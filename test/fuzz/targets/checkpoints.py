@@ -24,7 +24,7 @@ from fuzz.invariants import Violation
 from fuzz.play import check_sentence
 
 from conveyor_sim.errors import CheckpointError, SimulationError
-from conveyor_sim.physics.state.checkpoint import sealed
+from conveyor_sim.physics.state.checkpoint import to_bytes
 from conveyor_sim.scene import Scene, load_scene
 from conveyor_sim.simulation import Simulation
 
@@ -187,7 +187,7 @@ def _header(draw: np.random.Generator, good: Base) -> bytes:
                 above[key] += int(draw.choice([-1, 1, 1000]))
             case _:
                 above[key] = odd
-    return sealed(json.dumps(header), good.arrays)
+    return to_bytes(json.dumps(header), good.arrays)
 
 
 def _places(data: Any) -> Iterator[tuple[Any, Any]]:
@@ -227,7 +227,7 @@ def _arrays(draw: np.random.Generator, good: Base) -> bytes:
         arrays[name] = array
     if "header" in arrays:
         return _resealed(good.content[:-200] + draw.bytes(10) + good.content[-190:])
-    return sealed(json.dumps(good.header), arrays)
+    return to_bytes(json.dumps(good.header), arrays)
 
 
 def _limits(kind: Any) -> list[int]:

@@ -19,7 +19,7 @@ from fuzz.device_invariants import DeviceWatch
 from fuzz.play import check_sentence
 from fuzz.violation import Violation
 
-from conveyor_sim.bag.outputs import Outputs
+from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.bag.replay import replay
 from conveyor_sim.columns.counters import CounterColumns
@@ -231,7 +231,7 @@ def run(
     checkpoint of that tick, inputs that wait included. watched: under the eyes of the invariants.
     """
     recorder = None if bag is None else Recorder(bag)
-    outputs = Outputs(sim, [] if recorder is None else [recorder], run_id="fuzz")
+    outputs = OutputWriter(sim, [] if recorder is None else [recorder], run_id="fuzz")
     outputs.start()
     watch = Watch(sim) if watched else None
     states, outcomes = [], []

@@ -21,11 +21,11 @@ from studies.small import Here, setup_of
 from conveyor_sim.accuracy.report.files import STUDY, read_study, write_study
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.studies.results import PARQUET, Results, read_results, write_parquet
-from conveyor_sim.studies.row import Row
+from conveyor_sim.studies.row import RunRow
 from conveyor_sim.studies.runs import Runs
 from conveyor_sim.studies.setup import Setup
 from conveyor_sim.studies.sweep import sweep
-from conveyor_sim.support.sealed_json import sealed
+from conveyor_sim.support.checked_json import with_checksum
 
 Rng = np.random.Generator
 SEEDS = {"seeds": 2, "metrics": ["stops", {"queue": "mean belts/conveyor/bottles"}]}
@@ -58,7 +58,7 @@ class Base:
 
     setup: Setup
     folder: Path
-    rows: list[Row]
+    rows: list[RunRow]
     results: Results
     files: frozenset[str]
     """Below the folder, without the lock."""
@@ -188,7 +188,7 @@ def _check(error: ConveyorError) -> None:
         raise Violation("words of a refusal", str(error)[:500])
 
 
-def _exact(row: Row | None) -> str:
+def _exact(row: RunRow | None) -> str:
     """All of a row but its times, for which there is no second truth."""
     if row is None:
         return ""
@@ -224,7 +224,7 @@ def _edit(copy: Path, rng: Rng, only: Path | None = None) -> bool:
         case "forged" if file.suffix == ".json":
             data = _data(file.read_bytes())
             _change(data, rng)
-            file.write_bytes(sealed(data or {"a": 1}))
+            file.write_bytes(with_checksum(data or {"a": 1}))
             return True
     return False
 

@@ -4,6 +4,7 @@ import math
 from typing import Any
 
 import pytest
+from facts import missing
 from pressing import hopper
 from scenes import MASS, base, belt, bottle, contact, kind, scene
 
@@ -69,13 +70,12 @@ def test_the_hopper_of_1000_bottles_is_told_in_two_lines() -> None:
     assert (tightest.name, limit.steps) == ("contact friction", model.steps_per_tick)
     assert limit.ratio == pytest.approx(second.dt / tightest.dt)
     first, remedies = limit.lines
-    assert first == (
-        f"contact friction needs {limit.steps} steps a tick, {limit.ratio:.2g} times the next bound, {second.name} "
-        f"({math.ceil(0.01 / second.dt)})"
-    )
+    facts = ["contact friction", f"{limit.steps} steps a tick", f"{limit.ratio:.2g} times the next bound", second.name]
+    assert missing(first, [*facts, str(math.ceil(0.01 / second.dt))]) == []
     implicit = build_model(with_remedy(BIG, {"friction_solver": "implicit"})).steps_per_tick
     fewer = limit.steps / implicit
-    assert remedies == f"fewer steps: friction_solver: implicit: {implicit} steps a tick, {fewer:.2g} times fewer"
+    facts = ["fewer steps", "friction_solver: implicit", f"{implicit} steps a tick", f"{fewer:.2g} times fewer"]
+    assert missing(remedies, facts) == []
 
 
 def test_semi_implicit_euler_on_a_turning_belt_has_leapfrog_for_a_remedy() -> None:
@@ -130,7 +130,7 @@ def test_many_steps_are_told_to_be_slow() -> None:
         for steps in (MANY_STEPS - 1, MANY_STEPS)
     )
     assert "slow" not in few
-    assert many == "slow: a simulated second of 100 bottles will take about 6.6 s of computing on one core"
+    assert missing(many, ["slow", "simulated second", "100 bottles", "6.6 s", "one core"]) == []
 
 
 def test_a_scene_that_nothing_bounds_has_nothing_to_tell() -> None:

@@ -1,4 +1,4 @@
-"""A line in Foxglove: heard by a websocket client, decoded by rosbags from the definitions that the server states."""
+"""A line in Foxglove: a WebSocket client decodes messages with rosbags, by the definitions that the server states."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ SPHERE_LIST, LINE_STRIP = 7, 4
 
 
 class Client:
-    """One connection, as the app makes it."""
+    """Connection like that of the app."""
 
     def __init__(self, socket: Any) -> None:
         self._socket = socket
@@ -42,7 +42,7 @@ class Client:
         self.sessions: list[str] = []
 
     async def advertised(self, *topics: str) -> None:
-        """Wait until these are there."""
+        """Wait until topics are advertised."""
         while not set(topics) <= self.channels.keys():
             await self.receive()
 
@@ -52,7 +52,7 @@ class Client:
         await self._socket.send_json({"op": "subscribe", "subscriptions": wanted})
 
     async def receive(self) -> tuple[str, Any] | None:
-        """The topic and the message that comes next; None: it was something else."""
+        """Return the next topic and message; None: it was something else."""
         heard = await self._socket.receive(PATIENCE)
         assert heard.type in (aiohttp.WSMsgType.TEXT, aiohttp.WSMsgType.BINARY), heard
         if heard.type is aiohttp.WSMsgType.TEXT:
@@ -72,7 +72,7 @@ class Client:
         return channel["topic"], self._store.deserialize_cdr(heard.data[13:], name)
 
     async def messages(self, *topics: str, until: Callable[[dict[str, list[Any]]], bool]) -> dict[str, list[Any]]:
-        """Subscribe, and collect what comes, until that is enough."""
+        """Subscribe and collect messages until there are enough."""
         await self.subscribe(*topics)
         found: dict[str, list[Any]] = {topic: [] for topic in topics}
         while not until(found):
@@ -82,7 +82,7 @@ class Client:
 
 
 def connected(address: str, act: Callable[[Client], Any]) -> Any:
-    """What a coroutine of a client gives."""
+    """Return the result of a coroutine of a client."""
 
     async def run() -> Any:
         async with (
@@ -97,7 +97,7 @@ def connected(address: str, act: Callable[[Client], Any]) -> Any:
 
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Ten seconds; a gate closes at 6 s, and opens at 9 s."""
+    """Record ten seconds; a gate closes at 6 s and opens at 9 s."""
     return record(tmp_path_factory.mktemp("foxglove") / "bag", 10.0)
 
 
@@ -115,7 +115,7 @@ def serving(source: BagTagProvider) -> Iterator[Serving]:
 
 @pytest.fixture
 def address(serving: Serving) -> str:
-    return serving.faces[0].address
+    return serving.hosts[0].address
 
 
 def test_messages_come_as_they_were_recorded(address: str, bag: Path) -> None:
@@ -148,7 +148,7 @@ def test_who_comes_late_is_sent_what_is_latched(address: str, bag: Path) -> None
 
 def test_bottles_and_gates_are_drawn_where_they_are(source: BagTagProvider, address: str, bag: Path) -> None:
     assert source.control("pause", 0.0, "a test") == "" and source.control("seek", 7.0, "a test") == ""
-    until(lambda: source.shown.tick == 700, "7 s")
+    until(lambda: source.snapshot.tick == 700, "7 s")
 
     def drawn(found: dict[str, list[Any]]) -> bool:
         return any(marker.header.stamp.sec == 7 for message in found["/markers"] for marker in message.markers)
@@ -195,7 +195,7 @@ def test_a_port_that_is_taken_is_said_in_one_sentence(source: BagTagProvider, se
 
 
 def test_a_scene_is_served_to_foxglove(command: Callable[..., Served]) -> None:
-    """Simulated by a process of its own, which draws as long as somebody looks."""
+    """A separate process simulates it and sends drawings while they are requested."""
     served = command("scenarios/zoned_line", "--foxglove", "0", "--no-record")
     found = connected(
         served.address,

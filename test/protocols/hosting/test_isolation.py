@@ -36,7 +36,7 @@ SCENE = "scenarios/zoned_line"
 PASSWORD = "open sesame"
 BUSY = 6
 TICK = 65_534
-"""Address of its two registers."""
+"""Address of the two registers of the handshake."""
 
 
 class Line(Served):
@@ -108,7 +108,7 @@ class Line(Served):
 
 @pytest.fixture(scope="module")
 def line(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Line]:
-    """One for all tests of this file, which leave it running."""
+    """Serve one line for all tests of this file, which leave it running."""
     served = Line(tmp_path_factory.mktemp("line"), tmp_path_factory.mktemp("certificates") / "own")
     yield served
     if served.process.poll() is None:
@@ -117,7 +117,7 @@ def line(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Line]:
 
 
 def code_of(client: ModbusTcpClient, value: float) -> int:
-    """Exception code of a write of the first belt's speed; 0: none."""
+    """Return the exception code of a write of the first belt's speed; 0: none."""
     answer = client.write_registers(0, client.convert_to_registers(value, client.DATATYPE.FLOAT32))
     return int(answer.exception_code) if answer.isError() else 0
 

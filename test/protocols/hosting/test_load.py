@@ -29,16 +29,16 @@ from conveyor_sim.protocols.hosting.settings import ServerSettings
 ROOT = Path(__file__).parents[3]
 CHANGES = 200
 AHEAD = {"opcua": QUEUE // 2, "modbus": 0}
-"""Changes by which the line may be ahead of the slowest client: of who polls, none."""
+"""Changes by which the line may be ahead of the slowest client; none for clients that poll."""
 MEMORY = 5e6
-"""Bytes more in the second half: a hundred for each of the notifications would be as much."""
+"""Growth of memory in the second half, bytes; a hundred bytes for each notification would be as much."""
 
 
 class Clients:
-    """Those of one protocol, as a process of their own."""
+    """Clients of one protocol, in a separate process."""
 
     def __init__(self, name: str, address: str) -> None:
-        command = [sys.executable, "-m", "scada.load_clients", address, str(CHANGES)]
+        command = [sys.executable, "-m", "protocols.load_clients", address, str(CHANGES)]
         path = os.pathsep.join((str(ROOT), str(ROOT / "test")))
         self.process = subprocess.Popen(
             command, cwd=ROOT, env={**os.environ, "PYTHONPATH": path}, stdout=subprocess.PIPE, text=True
@@ -58,18 +58,18 @@ class Clients:
                 self._told = found
 
     def wait_for(self, change: int) -> None:
-        """Until all of them have seen all tags there."""
+        """Wait until all clients have seen all tags at a value."""
         until(lambda: self._reached >= change, f"change {change} at all clients of {self.name}")
 
     def told(self) -> list[list[int]]:
-        """Changes that each has seen, and lost, at the end."""
+        """Return the changes that each client has seen and lost, at the end."""
         assert self.process.wait(PATIENCE) == 0, self.name
         until(lambda: self._told, "what they have seen")
         return self._told
 
 
 def resident() -> int:
-    """Bytes of this process that are in memory."""
+    """Return the resident memory of this process, bytes."""
     return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
 
 
@@ -77,7 +77,7 @@ def test_no_client_that_keeps_up_misses_a_change_and_memory_stays_flat() -> None
     source, memory = Counting(), 0
     with Serving(source, [(kind, 0) for kind in KINDS], ServerSettings()) as serving:
         names = [kind.name for kind in KINDS]
-        clients = {name: Clients(name, face.address) for name, face in zip(names, serving.faces, strict=True)}
+        clients = {name: Clients(name, face.address) for name, face in zip(names, serving.hosts, strict=True)}
         try:
             for those in clients.values():
                 those.wait_for(0)

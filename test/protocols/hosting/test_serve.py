@@ -1,4 +1,4 @@
-"""The command `serve`, as a process of its own: from its first line to its last, and killed in between."""
+"""The command `serve` as a separate process: from its first line to its last, and killed in between."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`serve --lockstep`: a PLC in a process of its own steps the line, and has the bits of the same program in a test."""
+"""`serve --lockstep`: a PLC in a separate process steps the line, with the same bits as the same program in a test."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ STATES = {"bottles", "belts", "signals", "counters"}
 
 
 class Twin:
-    """The program of the PLC, in a test."""
+    """Program of the PLC, run by a test."""
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
         return {SETPOINT: speed(inputs[BOTTLES])}
@@ -36,7 +36,7 @@ class Twin:
 
 @pytest.fixture(scope="module")
 def expected(tmp_path_factory: pytest.TempPathFactory) -> dict[tuple[str, int], bytes]:
-    """What a line records that has the program inside."""
+    """Return the recording of a line whose test runs the program."""
     bag = tmp_path_factory.mktemp("inside") / "bag"
     with Scenario(SCENE, bag=bag) as line:
         line.attach(Twin())
@@ -46,13 +46,13 @@ def expected(tmp_path_factory: pytest.TempPathFactory) -> dict[tuple[str, int], 
 
 
 def states(bag: Path) -> dict[tuple[str, int], bytes]:
-    """Of a recording: messages by topic and simulated time."""
+    """Return the messages of a recording by topic and simulated time."""
     with open_bag(bag) as found:
         return {(topic, time): data for topic, time, data in found.raw(STATES)}
 
 
 def served(command: Callable[..., Served], folder: Path, face: str, bag: str) -> None:
-    """Have a PLC take a line through all its scans, up to its end."""
+    """Let a PLC step a line to its end."""
     (folder / "users").write_text(line_of("plc", new_user("controller", "open sesame")))
     of_face = {
         "modbus": ("--modbus", "0", "--modbus-role", "controller"),

@@ -40,7 +40,7 @@ def speed_of(client: ModbusTcpClient) -> float | None:
 
 @dataclass
 class Line:
-    """One that is stepped by the test, and served."""
+    """Line that the test steps and serves."""
 
     simulation: Simulation
     source: SteppedTagProvider
@@ -49,7 +49,7 @@ class Line:
     client: ModbusTcpClient
 
     def lose_patience(self) -> None:
-        """From now on with whoever has been silent."""
+        """Treat all clients as silent from now on."""
         assert self.server._server is not None
         self.server._server.places.idle = SHORT
 
@@ -60,7 +60,7 @@ class Line:
             self.source.after_tick()
 
     def advance_until(self, condition: Callable[[], Any], what: str) -> None:
-        """What clients do comes when it comes."""
+        """Step until a condition holds, because requests of clients arrive at any time."""
 
         def is_so() -> bool:
             self.advance()
@@ -69,7 +69,7 @@ class Line:
         until(is_so, what)
 
     def read(self, name: str) -> float:
-        """As the client's own library decodes it."""
+        """Return a value as the client's library decodes it."""
         return self.read_with(self.client, name)
 
     def read_with(self, client: ModbusTcpClient, name: str) -> float:
@@ -98,10 +98,10 @@ class Line:
 
 @contextmanager
 def serving(role: WriterKind | None) -> Iterator[Line]:
-    """role: in which clients write; None: they may not."""
+    """Serve the line. role: role in which clients write; None: they may not."""
     simulation = Simulation(load_scene("config/scenarios/zoned_line.yaml"), threads=1)
     source = SteppedTagProvider(simulation)
-    rows = modbus_map(source.about.tags)
+    rows = modbus_map(source.info.tags)
     server = ModbusServer(source, rows, role, quota=Quota(idle=LONG))
     with ServerThread() as thread:
         thread.run(server.start())

@@ -1,4 +1,4 @@
-"""What a Modbus client sends, byte by byte: it is answered as the standard has it, or its connection ends."""
+"""Packets of Modbus clients: each is answered by the standard, or ends the connection."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from conveyor_sim.protocols.modbus.server import MOST_UNANSWERED
 
 @pytest.fixture
 def line() -> Iterator[Line]:
-    """The zoned line, of which clients are the controller."""
+    """Serve the zoned line to clients that write as a controller."""
     with serving("controller") as found:
         yield found
 
 
 def ask(line: Line, requests: bytes, count: int = 1) -> list[tuple[int, bytes]]:
-    """Transaction, and function with data, of so many answers to what is sent at once."""
+    """Return transaction, and function with data, of `count` answers to bytes that are sent at once."""
     with socket.create_connection(("127.0.0.1", line.server.port), timeout=60) as raw, raw.makefile("rb") as answers:
         raw.sendall(requests)
         found = []
@@ -41,7 +41,7 @@ def ask(line: Line, requests: bytes, count: int = 1) -> list[tuple[int, bytes]]:
 
 
 def request(body: bytes, transaction: int = 1) -> bytes:
-    """Function and data as a packet."""
+    """Return function and data as a packet."""
     return struct.pack(">HHHB", transaction, 0, len(body) + 1, 1) + body
 
 
@@ -58,7 +58,7 @@ def test_requests_that_come_together_are_answered_in_their_order(line: Line) -> 
 
 
 def test_a_single_write_is_answered_by_what_was_asked(line: Line) -> None:
-    """As the standard has it, though the value acts at the next tick only: clients compare."""
+    """The standard requires it, although the value acts at the next tick: clients compare."""
     run, command = line.rows["belts/zone1/reverse"], line.rows["machines/filler/cntrl_cmd"]
     coil = struct.pack(">BHH", 5, run.address, 0xFF00)
     register = struct.pack(">BHH", 6, command.address, 3)

@@ -1,5 +1,6 @@
-"""A line over Modbus TCP, with clients that others wrote: what they read is what the simulation shows, and what they
-write acts at a tick, or is refused with an exception."""
+"""A line over Modbus TCP, with independent clients: they read the values of the simulation, and writes act at a tick or
+are refused with an exception.
+"""
 
 from __future__ import annotations
 
@@ -46,7 +47,7 @@ from conveyor_sim.protocols.modbus.server import ModbusServer
 
 @pytest.fixture(params=["operator"])
 def line(request: pytest.FixtureRequest) -> Iterator[Line]:
-    """The zoned line, in which clients write as what the test says; None: they may not."""
+    """Serve the zoned line, with the role that the test states; None: clients may not write."""
     with serving(request.param) as found:
         yield found
 
@@ -157,7 +158,7 @@ def test_more_writes_than_can_wait_are_refused_and_no_more_is_kept(line: Line) -
 
 
 READ_COIL = struct.pack(">HHHBBHH", 1, 0, 6, 1, 1, 0, 1)
-"""MBAP header, function 1, address 0, one coil."""
+"""Packet: MBAP header, function 1, address 0, one coil."""
 
 
 def test_connections_are_bounded_and_come_free_again(line: Line) -> None:
@@ -210,7 +211,7 @@ def test_the_first_to_write_holds_the_line_until_it_leaves(line: Line) -> None:
 
 @controller
 def test_who_is_silent_no_longer_holds_the_line(line: Line) -> None:
-    """As when its cable is cut: nothing ends the connection."""
+    """This is a cut cable: the connection does not end."""
     with socket.create_connection(("127.0.0.1", line.server.port), timeout=60) as silent:
         speed = struct.pack(">f", 0.1)
         silent.sendall(struct.pack(">HHHBBHHB", 1, 0, 11, 1, 16, line.rows[SETPOINT].address, 2, 4) + speed)
@@ -232,14 +233,14 @@ def test_a_release_waits_for_room(line: Line) -> None:
 
 @controller
 def test_what_is_lost_is_not_read_as_if_it_were_there(line: Line) -> None:
-    """A client gets exception 11, whatever it asks for, until the line is back."""
+    """All requests get exception 11 until the line is back."""
     header = Header(1, 1, "world")
 
     def hear(topic: str, data: bytes) -> None:
         view.take(topic, typestore().deserialize_cdr(data, TOPICS[topic].type))
 
     class Source(LineMirror):
-        """What is heard of the line, and a way in."""
+        """Tag provider that records inputs."""
 
         controls = frozenset[Control]()
         give, control = line.source.give, line.source.control

@@ -1,4 +1,4 @@
-"""The fixtures of `kit.py`, where there is what they need; without it each module of tests says what is missing."""
+"""Fixtures of `kit.py`, if their requirements are installed; otherwise each module of tests says what is missing."""
 
 from contextlib import suppress
 from pathlib import Path

@@ -45,7 +45,7 @@ LONG = 600.0  # s of wall time that a controller may be silent
 
 
 class Mosquitto:
-    """A broker of this machine, on a port of its own, which may be killed and begun again."""
+    """Broker of this machine, on a separate port, which tests kill and restart."""
 
     def __init__(self, folder: Path, *lines: str) -> None:
         with socket.create_server(("127.0.0.1", 0)) as free:
@@ -82,7 +82,7 @@ class Mosquitto:
 
 
 class Heard:
-    """One message that a host has heard."""
+    """Message that a host has received."""
 
     def __init__(self, message: MQTTMessage) -> None:
         _, self.group, self.kind, self.node, *device = message.topic.split("/")
@@ -96,7 +96,7 @@ class Heard:
 
 
 def value_of(metric: Any) -> Any:
-    """None: none."""
+    """Return the value of a metric; None: it has no value."""
     field = metric.WhichOneof("value")
     if field is None:
         assert metric.is_null
@@ -112,7 +112,7 @@ def properties_of(metric: Any) -> dict[str, Any]:
 
 
 class Host:
-    """A host application: hears all of one line, and holds what it heard against the rules that it goes by."""
+    """Host application that follows one line and checks each message against the rules of Sparkplug."""
 
     def __init__(self, port: int, group: str = GROUP, node: str = NODE) -> None:
         self.heard: list[Heard] = []
@@ -157,7 +157,7 @@ class Host:
         self.heard.append(heard)
 
     def _follow(self, heard: Heard) -> None:
-        """By the rules of Sparkplug 3.0."""
+        """Check a message against the rules of Sparkplug 3.0."""
         kind, payload = heard.kind, heard.payload
         assert not heard.kept and payload.timestamp > 0
         if kind == "NDEATH":
@@ -195,7 +195,7 @@ class Host:
         return next(heard for heard in reversed(self.heard) if heard.kind == kind)
 
     def state(self, online: bool, stamp: int) -> None:
-        """Say as a primary host whether it is there."""
+        """Publish the state of a primary host."""
         told = json.dumps({"online": online, "timestamp": stamp})
         self._client.publish(f"spBv1.0/STATE/{HOST}", told, qos=1, retain=True).wait_for_publish(PATIENCE)
 
@@ -217,7 +217,7 @@ class Host:
 
 
 class Stepped(SteppedTagProvider):
-    """A simulation that a test steps, and what the test says of its run."""
+    """Simulation that a test steps, with a run state that the test sets."""
 
     run = RunState(RUNNING)
 
@@ -226,14 +226,14 @@ class Stepped(SteppedTagProvider):
         return self.run
 
     def show(self, **changes: Any) -> None:
-        """The line as it is, but for some things."""
+        """Show the line with some fields replaced."""
         self._shown = replace(self._shown, **changes)
         self._listeners.tell()
 
 
 @dataclass
 class Line:
-    """One that is stepped by the test, and at a broker."""
+    """Line that the test steps, connected to a broker."""
 
     source: Stepped
     node: EdgeNode
@@ -246,7 +246,7 @@ class Line:
         return self.source._simulation
 
     def advance(self, ticks: int = 1) -> None:
-        """Step, and wait until the host has heard of it."""
+        """Step, and wait until the host has received the tick."""
         for _ in range(ticks):
             self.source.before_tick()
             self.simulation.advance()
@@ -257,19 +257,19 @@ class Line:
         self.thread.run(self.node.stop())
 
     def until(self, condition: Callable[[], Any], what: str) -> None:
-        """Wait for what the host will hear, which must be by the rules."""
+        """Wait for a condition of the host, whose messages must follow the rules."""
         until(condition, what)
         assert not self.host.broken, self.host.broken
 
     def outcomes(self) -> list[tuple[str, str, tuple[str, ...], tuple[float, ...], bool]]:
-        """Of what was given so far: writer, operation, names, values, accepted."""
+        """Return the results of all inputs so far: writer, operation, names, values, accepted."""
         return [
             (outcome.input.writer, outcome.operation, outcome.names, outcome.values, outcome.accepted)
             for outcome in self.simulation.take_outcomes()
         ]
 
     def refused(self, count: int) -> str:
-        """Why the last one was, once so many are."""
+        """Return the reason of the latest refusal, once `count` commands are refused."""
         self.until(lambda: self.host.values["commands/refused"] >= count, f"refusal {count}")
         assert self.host.values["commands/refused"] == count
         return str(self.host.values["commands/refusal"])
@@ -277,7 +277,7 @@ class Line:
 
 @pytest.fixture
 def mosquitto(tmp_path: Path) -> Iterator[Callable[..., Mosquitto]]:
-    """Starts brokers: `mosquitto("allow_anonymous true")`."""
+    """Return a function that starts brokers: `mosquitto("allow_anonymous true")`."""
     started: list[Mosquitto] = []
 
     def start(*lines: str) -> Mosquitto:
@@ -291,7 +291,7 @@ def mosquitto(tmp_path: Path) -> Iterator[Callable[..., Mosquitto]]:
 
 @pytest.fixture
 def broker(mosquitto: Callable[..., Mosquitto]) -> Mosquitto:
-    """One that lets everybody in."""
+    """Start a broker without authentication."""
     return mosquitto()
 
 
@@ -300,7 +300,7 @@ Serve = Callable[..., Line]
 
 @pytest.fixture
 def serve(broker: Mosquitto) -> Iterator[Serve]:
-    """Puts the zoned line there, from its first tick on, and a host that hears it: `serve(role="operator")`."""
+    """Return a function that connects the zoned line from its first tick on, and a host: `serve(role="operator")`."""
     lines: list[Line] = []
     with ServerThread() as thread:
 
@@ -323,5 +323,5 @@ def serve(broker: Mosquitto) -> Iterator[Serve]:
 
 @pytest.fixture
 def line(serve: Serve) -> Line:
-    """The zoned line, which operators may command."""
+    """Serve the zoned line, which operators may command."""
     return serve(role="operator")

@@ -1,4 +1,4 @@
-"""Numbers of connections: each once, from process to process, and what becomes of them without a folder."""
+"""Numbers of connections: unique from process to process, and their sequence without a folder."""
 
 from __future__ import annotations
 

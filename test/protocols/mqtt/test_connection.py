@@ -1,4 +1,4 @@
-"""How a line comes to its broker: by which version of MQTT, as whom, by TLS; and why it does not."""
+"""Connection of a line to its broker: versions of MQTT, users, TLS, and reasons of failures."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ WORD = "open sesame"
 
 
 class OldBroker:
-    """A broker that knows MQTT 3.1.1 and no later: it refuses what is newer, and hands all else to mosquitto."""
+    """Broker that supports only MQTT 3.1.1: it refuses newer versions, and passes everything else to mosquitto."""
 
     def __init__(self, port: int, answer: bytes = b"\x20\x02\x00\x01", reset: bool = False) -> None:
-        """answer: to newer versions, before the connection is closed. reset: it is closed by RST."""
+        """Start it. answer: to newer versions, before the connection is closed. reset: close by RST."""
         self._to, self.answer, self.reset = port, answer, reset
         self._server = socket.create_server(("127.0.0.1", 0))
         self.port = int(self._server.getsockname()[1])
@@ -150,7 +150,7 @@ def serving(url: str, **settings: object) -> Serving:
 
 @pytest.fixture
 def strict(mosquitto: Callable[..., Mosquitto], tmp_path: Path) -> Mosquitto:
-    """A broker that asks for a password, and lets user line publish what is its own only."""
+    """Start a broker with a password, where user line may publish only its own topics."""
     passwords, rights = tmp_path / "passwords", tmp_path / "rights"
     command = shutil.which("mosquitto_passwd")
     assert command is not None
@@ -185,7 +185,7 @@ def test_a_password_comes_from_the_environment_or_a_file(
 
 @pytest.fixture
 def certificates(tmp_path: Path) -> Path:
-    """ca.pem, and server.pem with server.key for 127.0.0.1, which it has signed."""
+    """Make ca.pem, and server.pem with server.key for 127.0.0.1, which it has signed."""
     x509 = pytest.importorskip("cryptography.x509")
     from ipaddress import ip_address
 

@@ -1,4 +1,4 @@
-"""`conveyor-sim serve --mqtt`, as a process of its own: what a host hears of it, and what is on record afterwards."""
+"""`conveyor-sim serve --mqtt` as a separate process: messages to a host, and the recording."""
 
 from __future__ import annotations
 

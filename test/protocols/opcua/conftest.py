@@ -38,7 +38,7 @@ ROLES = ("viewer", "operator", "engineer", "controller", "test")
 
 
 class Renewed(SteppedTagProvider):
-    """A simulation that a test steps, and what the test says of its run. Another one may take its place: a reset."""
+    """Simulation that a test steps, with a run state that the test sets. A reset replaces it by another one."""
 
     def __init__(self, simulation: Simulation) -> None:
         self._reason = ""
@@ -49,7 +49,7 @@ class Renewed(SteppedTagProvider):
         return RunState(RUNNING, self._reason)
 
     def begin(self, simulation: Simulation, reason: str) -> None:
-        """Another simulation of the same scene. reason: by which clients tell it from the one before."""
+        """Start another simulation of the same scene. reason: distinguishes it for clients."""
         self._simulation, self._reason = simulation, reason
         self._waiting.clear()
         self._alarms, self._read_back = simulation.line.alarms.columns(), simulation.line.read_back.columns()
@@ -57,14 +57,14 @@ class Renewed(SteppedTagProvider):
         self._listeners.tell()
 
     def show(self, **changes: Any) -> None:
-        """The line as it is, but for some things."""
+        """Show the line with some fields replaced."""
         self._shown = replace(self._shown, **changes)
         self._listeners.tell()
 
 
 @dataclass
 class Line:
-    """One that is stepped by the test, and served. Each role has a user of its name."""
+    """Line that the test steps and serves. Each role has a user of its name."""
 
     source: Renewed
     server: OpcUaServer
@@ -76,14 +76,14 @@ class Line:
         return self.source._simulation
 
     def begin(self, simulation: Simulation) -> None:
-        """Serve another simulation of the same scene, to nobody but who comes from now on."""
+        """Serve another simulation of the same scene, to clients that connect from now on."""
         reason = f"the line of a test, at {time.monotonic()}"
         self.source.begin(simulation, reason)
         server: Any = self.server._server
         self.until(lambda: self.thread.run(server.get_node("ns=2;s=run/reason").read_value()) == reason)
 
     def leave(self) -> None:
-        """Have all clients go; return once the server has noticed."""
+        """Disconnect all clients, and wait until the server has noticed."""
         for client in self.open:
             client.disconnect()
         self.open.clear()
@@ -91,7 +91,7 @@ class Line:
 
     @property
     def clients(self) -> tuple[int, int]:
-        """How many there are, and for how many subscriptions."""
+        """Return the numbers of clients and of subscriptions."""
         server: Any = self.server._server
         return self.server.status().clients, len(server.iserver.subscription_service.subscriptions)
 
@@ -110,7 +110,7 @@ class Line:
             time.sleep(0.01)
 
     def client(self, user: str = "", password: str = PASSWORD, security: str = "") -> Client:
-        """A new one, connected; it is closed with the test."""
+        """Return a new connected client, which is closed with the test."""
         client = Client(self.server.address, timeout=PATIENCE, watchdog_intervall=PATIENCE)
         if user:
             client.set_user(user)
@@ -134,7 +134,7 @@ class Line:
         return self.node(name).read_value()
 
     def outcomes(self) -> list[tuple[str, str, tuple[str, ...], tuple[float, ...], bool]]:
-        """Of what was given so far: writer, operation, names, values, accepted."""
+        """Return the results of all inputs so far: writer, operation, names, values, accepted."""
         return [
             (outcome.input.writer, outcome.operation, outcome.names, outcome.values, outcome.accepted)
             for outcome in self.simulation.take_outcomes()
@@ -143,7 +143,7 @@ class Line:
 
 @pytest.fixture(scope="session")
 def certificates(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Keys take a while to be made."""
+    """Return a folder for certificates, shared because making keys takes a while."""
     return tmp_path_factory.mktemp("opcua") / "own"
 
 
@@ -157,9 +157,9 @@ Serve = Callable[..., Line]
 
 @pytest.fixture(scope="module")
 def serve(certificates: Path, users: dict[str, User]) -> Iterator[Serve]:
-    """Serves a scene of a test's own, for as long as its module runs: `serve(anonymous=False)`.
+    """Return a function that serves a scene while a module runs: `serve(anonymous=False)`.
 
-    To start a server takes a second or two: most tests share those below.
+    A server takes one to two seconds to start, so most tests share those below.
     """
     with serving(certificates, users) as make:
         yield make
@@ -167,7 +167,7 @@ def serve(certificates: Path, users: dict[str, User]) -> Iterator[Serve]:
 
 @contextmanager
 def serving(certificates: Path, users: dict[str, User]) -> Iterator[Serve]:
-    """What `serve` is, for as long as is wanted."""
+    """Yield the function of `serve`, within a context."""
     with ServerThread() as thread:
         lines: list[Line] = []
 
@@ -187,7 +187,7 @@ def serving(certificates: Path, users: dict[str, User]) -> Iterator[Serve]:
 
 @pytest.fixture(scope="session")
 def shared(certificates: Path, users: dict[str, User]) -> Iterator[Callable[[Stamps], Line]]:
-    """The zoned line, served by a server for each kind of stamps that all tests share."""
+    """Serve the zoned line by one shared server for each kind of time stamps."""
     with serving(certificates, users) as make:
         lines: dict[Stamps, Line] = {}
 
@@ -202,7 +202,7 @@ def shared(certificates: Path, users: dict[str, User]) -> Iterator[Callable[[Sta
 
 @pytest.fixture
 def line(shared: Callable[[Stamps], Line]) -> Iterator[Line]:
-    """The zoned line from its first tick, with wall time; its clients are this test's own."""
+    """Serve the zoned line from its first tick, with wall time; clients are separate for each test."""
     found = shared("wall")
     yield found
     found.leave()
@@ -210,7 +210,7 @@ def line(shared: Callable[[Stamps], Line]) -> Iterator[Line]:
 
 @pytest.fixture
 def simulated(shared: Callable[[Stamps], Line]) -> Iterator[Line]:
-    """The same with simulated time."""
+    """Serve the zoned line from its first tick, with simulated time."""
     found = shared("simulated")
     yield found
     found.leave()
@@ -218,7 +218,7 @@ def simulated(shared: Callable[[Stamps], Line]) -> Iterator[Line]:
 
 @contextmanager
 def refused(code: int) -> Iterator[None]:
-    """A request that is answered with a status code."""
+    """Check that a request is answered with a status code."""
     with pytest.raises(ua.UaStatusCodeError) as caught:
         yield
     assert caught.value.code == code, caught.value

@@ -1,4 +1,4 @@
-"""Clients of the tests of limits: requests by the library's own client, and what they are answered."""
+"""Clients of the tests of limits: requests by the library's client, and their answers."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ CASES: dict[str, tuple[int, int, int, int]] = {
     "good": (2048, -1, 40, Codes.Good),
     "long": (3072, -1, 40, Codes.Good),
 }
-"""bits of the key; first and last day of validity, from today on; status code."""
+"""Bits of the key; first and last day of validity, from today on; status code."""
 
 
 def made(folder: Path, bits: int, first: int, last: int) -> str:

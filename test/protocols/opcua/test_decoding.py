@@ -122,7 +122,7 @@ def test_the_largest_requests_are_decoded() -> None:
 
 
 class Raw:
-    """A client that sends bytes over a channel without security."""
+    """Client that sends bytes over a channel without security."""
 
     def __init__(self, line: Line) -> None:
         self.socket = socket.create_connection(("127.0.0.1", line.server.port), timeout=PATIENCE)
@@ -142,7 +142,7 @@ class Raw:
         self._number = 1
 
     def receive(self) -> bytes:
-        """One message, or what there is before the connection ends."""
+        """Return one message, or the bytes before the connection ends."""
         answer = b""
         try:
             while len(answer) < 8 or len(answer) < struct.unpack_from("<I", answer, 4)[0]:

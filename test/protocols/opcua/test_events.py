@@ -1,4 +1,4 @@
-"""Alarms as variables and conditions, and what happens on a line as events."""
+"""Alarms as variables and conditions, and events of a line."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ ALARM = f"alarm_states/{TRIPPED}"
 
 @dataclass
 class Events:
-    """What a client is told of."""
+    """Events that a client receives."""
 
     line: Line
     client: Client

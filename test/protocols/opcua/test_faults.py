@@ -1,4 +1,4 @@
-"""Clients that misbehave: each is refused, others are served on, and memory is bounded."""
+"""Clients that misbehave: each is refused, others are still served, and memory is bounded."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def raw(line: Line) -> socket.socket:
 
 
 def closed(connection: socket.socket) -> bytes:
-    """What is answered before the server closes."""
+    """Return the answer before the server closes the connection."""
     answer = b""
     try:
         while came := connection.recv(65536):
@@ -150,7 +150,7 @@ def test_long_strings_are_refused(line: Line) -> None:
 
 
 def test_subscriptions_of_a_client_that_is_gone_are_not_kept(line: Line, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whether the line changes or not, and one that is there keeps its own."""
+    """This holds whether the line changes or not; a connected client keeps its subscriptions."""
     monkeypatch.setattr(session, "UNFETCHED", 4.0)  # as long as a busy machine may forget a client that is there
 
     async def come_and_vanish() -> None:
@@ -171,7 +171,7 @@ def test_subscriptions_of_a_client_that_is_gone_are_not_kept(line: Line, monkeyp
 
 class _Deaf:
     def datachange_notification(self, *_: Any) -> None:
-        """Whatever comes."""
+        """Ignore a notification."""
 
 
 def test_three_clients_that_write_as_fast_as_they_can(line: Line) -> None:
@@ -233,7 +233,7 @@ def test_a_server_that_is_started_again_is_found_where_it_was(serve: Serve, cert
     line.server = OpcUaServer(line.source, certificates=certificates, port=port)
     line.thread.run(line.server.start())
     line.advance()
-    assert line.server.port == port and line.read(SETPOINT) == line.source.shown.values[SETPOINT]
+    assert line.server.port == port and line.read(SETPOINT) == line.source.snapshot.values[SETPOINT]
 
 
 def test_what_waits_for_a_client_is_bounded(serve: Serve) -> None:

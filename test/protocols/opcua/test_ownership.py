@@ -67,7 +67,7 @@ WITHOUT_IDS = {
 }
 
 UNREACHABLE = {"add_method_callback"}
-"""Methods that no request of a client leads to."""
+"""Methods that requests of clients never call."""
 
 
 def test_every_method_of_a_session_is_accounted_for() -> None:
@@ -139,7 +139,7 @@ async def stepped(line: Line, awaited: Coroutine[Any, Any, T]) -> T:
 
 
 class Screen:
-    """A client of an operator that shows the tick."""
+    """Client of an operator that shows the tick."""
 
     def __init__(self) -> None:
         self.values: list[int] = []
@@ -152,7 +152,7 @@ class Screen:
         self.changes.append(change.Status)
 
     async def follow(self, client: AsyncClient) -> tuple[Any, int]:
-        """Subscribe; the subscription and its item."""
+        """Subscribe. Return the subscription and its item."""
         subscription = await client.create_subscription(20, self)
         return subscription, await subscription.subscribe_data_change(client.get_node(TICK), queuesize=10)
 
@@ -299,9 +299,9 @@ async def fetched(client: AsyncClient, wanted: int) -> None:
 
 
 def transferred(line: Line, ends: str, old: dict[str, str], new: dict[str, str]) -> int:
-    """Transfer a subscription from a session to another one, and see values by the one that has it then.
+    """Transfer a subscription to another session, which then gets its values. Return the status code.
 
-    ends: how the old session ended before, "closed" or "aborted"; "": it goes on. Returns the status code.
+    ends: how the old session ended before, "closed" or "aborted"; "": it goes on.
     """
 
     async def come() -> int:

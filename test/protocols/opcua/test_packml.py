@@ -24,7 +24,7 @@ OBJECT = "machines/filler/PackML"
 
 
 def child(client: Client, *names: str) -> SyncNode:
-    """By the standard's browse names."""
+    """Return a node by the browse names of the standard."""
     index = client.get_namespace_index(NAMESPACE)
     filler = client.get_node(f"ns=2;s={OBJECT}")
     standard = ("CurrentState", "Id", "EURange", "AvailableStates", "AvailableTransitions")
@@ -32,7 +32,7 @@ def child(client: Client, *names: str) -> SyncNode:
 
 
 def states(line: Line) -> list[str | None]:
-    """Of the three state machines, one in the other; None: it is not active."""
+    """Return the states of the three nested state machines; None: it is not active."""
     found: list[str | None] = []
     path: list[str] = []
     for name in ("BaseStateMachine", "MachineState", "ExecuteState"):
@@ -49,7 +49,7 @@ def test_a_machine_is_an_object_of_the_standards_type(line: Line) -> None:
     kind = client.get_node(client.get_node(f"ns=2;s={OBJECT}").read_type_definition())
     assert kind.read_browse_name().Name == "PackMLBaseObjectType"
     assert kind.nodeid.NamespaceIndex == client.get_namespace_index(NAMESPACE) > 2
-    shown = line.source.shown.values
+    shown = line.source.snapshot.values
     assert child(client, "Status", "CurMachSpeed").read_value() == pytest.approx(shown["machines/filler/cur_rate"] * 60)
     assert child(client, "Status", "MachSpeed").read_value() == pytest.approx(shown["machines/filler/rate"] * 60)
     assert child(client, "Status", "MachSpeed", "EURange").read_value().High == pytest.approx(96.0)  # 1.6 a second
@@ -72,7 +72,7 @@ def test_a_machine_is_an_object_of_the_standards_type(line: Line) -> None:
 
 
 def call(client: Client, method: str, *arguments: Any) -> None:
-    """The method where the standard has it."""
+    """Call a method where the standard has it."""
     path = ("BaseStateMachine", "MachineState", "ExecuteState")
     depth = {"Clear": 1, "Abort": 1, "Stop": 2}.get(method, 3)
     owner = child(client, *path[:depth])
@@ -108,7 +108,7 @@ def test_admin_has_counts_the_stop_reason_and_alarms(line: Line) -> None:
     line.client()
     line.advance(300)
     (count,) = admin(line, "ProdProcessedCount")
-    produced = line.source.shown.values["machines/filler/produced"]
+    produced = line.source.snapshot.values["machines/filler/produced"]
     assert (count.Count, count.AccCount, count.Name, count.Unit.UnitId) == (produced, produced, "bottles", 4404786)
     assert produced > 0 and admin(line, "MachDesignSpeed") == pytest.approx(96.0)
     assert (admin(line, "AlarmExtent"), admin(line, "Alarm")) == (0, [])
@@ -116,7 +116,7 @@ def test_admin_has_counts_the_stop_reason_and_alarms(line: Line) -> None:
     line.simulation.inject("machines/filler/stop", 1.0)
     line.advance(3)
     reason = admin(line, "StopReason")
-    shown = line.source.shown.values
+    shown = line.source.snapshot.values
     assert (reason.ID, reason.Value) == (shown["machines/filler/stop_reason"],) * 2
     assert (reason.Message, reason.Category, reason.Trigger) == ("fault stop", shown["machines/filler/category"], True)
     assert reason.DateTime.timestamp() == pytest.approx(946684803.01, abs=0.02)

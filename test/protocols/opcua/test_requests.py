@@ -1,4 +1,4 @@
-"""Writes and methods: judged at once, applied at a tick, and read back."""
+"""Writes and methods: checked at once, applied at a tick, and read back."""
 
 from __future__ import annotations
 

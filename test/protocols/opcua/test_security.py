@@ -1,4 +1,4 @@
-"""Who is let in, and what they can do: the library's defaults let anybody do anything."""
+"""Access and permissions: the library's defaults allow everything to everybody."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ SETPOINT = "belts/zone1/cmd_speed"
 
 
 def own_certificate(folder: Path, uri: str = "urn:freeopcua:client", name: str = "client") -> str:
-    """Of a client; the parts of a security string that name it."""
+    """Make a certificate of a client. Return the parts of a security string that name it."""
     key = generate_private_key()
     made = generate_self_signed_app_certificate(key, name, {}, [x509.UniformResourceIdentifier(uri)], [])
     (folder / f"{name}.der").write_bytes(made.public_bytes(Encoding.DER))
@@ -123,14 +123,14 @@ def test_without_anonymous_readers_a_name_is_needed(serve: Serve) -> None:
 
 
 class _Plain(AsyncClient):
-    """Sends its password as it is."""
+    """Client that sends its password as plain text."""
 
     def _add_user_auth(self, params: Any, username: Any, password: Any) -> None:
         params.UserIdentityToken = ua.UserNameIdentityToken("username", username, password.encode(), None)
 
 
 class _Again(AsyncClient):
-    """Sends a password as it was encrypted for another session, as one would who had listened."""
+    """Client that replays a password that was encrypted for another session."""
 
     heard: tuple[bytes, str] | None = None
 
@@ -174,7 +174,7 @@ def test_a_secured_channel_carries_all(line: Line, client_files: str) -> None:
 
 @pytest.fixture(scope="module")
 def trusting(serve: Serve, tmp_path_factory: pytest.TempPathFactory) -> tuple[Line, str]:
-    """A server that trusts one certificate, and that."""
+    """Start a server that trusts one certificate; return both."""
     folder = tmp_path_factory.mktemp("trusting")
     identity(folder / "own")
     known = own_certificate(folder, name="known")
@@ -298,7 +298,7 @@ def test_a_client_that_guesses_is_shut_out(serve: Serve, users: dict[str, User])
 
 
 async def _steal(address: str, tokens: Sequence[ua.NodeId]) -> None:
-    """Begin with the session of somebody else, by the token that stands for it, and write in their name."""
+    """Take over the session of another user by its token, and write in that user's name."""
     setpoint = ua.WriteValue(ua.NodeId(SETPOINT, 2), ua.AttributeIds.Value, None, ua.DataValue(ua.Variant(0.5)))
     for token in tokens:
         thief = AsyncClient(address, timeout=PATIENCE, watchdog_intervall=PATIENCE)

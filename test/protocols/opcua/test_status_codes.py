@@ -1,4 +1,4 @@
-"""Requests that are odd: each has its own status code, and none is an error inside the server."""
+"""Malformed requests: each has a specific status code, and none is an error inside the server."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How values follow the line: time stamps, status, steps back, and every change to who keeps up."""
+"""Updates of values: time stamps, status, steps back, and all changes for clients that keep up."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Codes = ua.StatusCodes
 
 @dataclass
 class Heard:
-    """What a client's subscription has told it."""
+    """Notifications of one subscription."""
 
     values: list[Any] = field(default_factory=list)
     stamps: list[datetime] = field(default_factory=list)
@@ -46,7 +46,7 @@ WORTH = [
 
 
 def test_the_status_says_what_values_are_worth(line: Line) -> None:
-    """Of all variables, who has written a command among them: nothing old is Good."""
+    """This includes all variables, the writers of commands among them: no stale value is Good."""
     for run, lost, code in WORTH:
         line.source.show(run=RunState(run, f"{run} {lost}"), lost=lost, forced=frozenset({SPEED}))
         worth = Codes.BadNoCommunication if lost else Codes.Good
@@ -96,7 +96,7 @@ def test_after_a_step_back_nothing_is_of_the_future(simulated: Line) -> None:
     simulated.source.show(tick=20)
     simulated.until(lambda: heard.values == [50, 20])
     assert heard.stamps == [START + timedelta(seconds=0.5), START + timedelta(seconds=0.2)]
-    for tag in simulated.source.about.tags:
+    for tag in simulated.source.info.tags:
         if tag.role != "fault" and tag.role != "run":
             assert simulated.node(tag.name).read_data_value().SourceTimestamp == heard.stamps[-1], tag.name
     for name in ("run/state", "run/reason", "run/lost", "run/date_time", f"{SETPOINT}/written_by"):

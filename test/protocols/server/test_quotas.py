@@ -1,4 +1,4 @@
-"""Places of connections, and the order in which connections make room."""
+"""Slots of connections, and the order in which connections make room."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ HERE, THERE = "10.0.0.1", "10.0.0.2"
 
 
 class Clients:
-    """Connections to one server with 16 places, 12 per address, 4 per user."""
+    """Connections to one server with 16 slots, 12 per address, 4 per user."""
 
     def __init__(self, keeps_active: bool = False, idle: float = 1000.0) -> None:
         self.places = ConnectionSlots(Quota(16, 12, 4, idle), keeps_active)

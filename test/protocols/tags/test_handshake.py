@@ -1,4 +1,4 @@
-"""Lockstep by two tags: what was written before a target acts as one set, at the tick that the one before named."""
+"""Lockstep by two tags: writes before a target act as one set at the previous target."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def source() -> HandshakeTagProvider:
 
 
 def advance(source: HandshakeTagProvider) -> list[float]:
-    """One tick, and what acted in it; it must not have to wait."""
+    """Step one tick, and return its inputs; the target must be set."""
     taken = source.take(0.0)
     assert taken is not None
     for given in taken:
@@ -60,7 +60,7 @@ def test_a_target_once_more_does_nothing(source: HandshakeTagProvider) -> None:
 
 def test_no_tick_is_seen_before_the_target(source: HandshakeTagProvider) -> None:
     seen = []
-    source.listen(lambda: seen.append(source.shown.tick))
+    source.listen(lambda: seen.append(source.snapshot.tick))
     source.control("target", 3, "plc")
     for _ in range(3):
         advance(source)

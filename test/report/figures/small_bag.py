@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from conveyor_sim.bag.outputs import Outputs
+from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
@@ -28,7 +28,7 @@ def record(path: Path, topics: list[str] | None = None, changes: dict[str, objec
     scene = load_scene(Path(__file__).with_name("small_plant.yaml"), CHANGES | (changes or {}))
     simulation = Simulation(scene)
     with Recorder(path, topics=topics) as recorder:
-        outputs = Outputs(simulation, [recorder], run_id="test")
+        outputs = OutputWriter(simulation, [recorder], run_id="test")
         outputs.start()
         while simulation.tick < scene.duration_ticks:
             if simulation.tick == SLOW_AT:

@@ -7,7 +7,7 @@ import pytest
 from physics.test_moving_rails import SPEED, plant
 from scenes import NO_OUTPUTS, RADIUS, bottle
 
-from conveyor_sim.bag.outputs import Outputs
+from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.report.figures import style
@@ -24,7 +24,7 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     outputs = {**NO_OUTPUTS, "bottles": 100, "signals": 50, "ledger": 50}
     sim = plant(bottle(RADIUS + 0.01, 0.0), outputs=outputs, effects={"peaks": "off", "energy_ledger": "on"})
     with Recorder(path) as recorder:
-        told = Outputs(sim, [recorder], run_id="test")
+        told = OutputWriter(sim, [recorder], run_id="test")
         told.start()
         sim.command(["pushers/p/push"], [1])
         for _ in range(10):

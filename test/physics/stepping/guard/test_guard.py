@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from facts import missing, stating
 from scenes import (
     COMMON,
     MASS,
@@ -98,7 +99,7 @@ def test_a_spring_that_a_step_is_too_long_for_is_cured_by_shorter_ones() -> None
 def test_without_shorter_steps_the_same_is_told_and_the_tick_not_taken() -> None:
     sim = struck_too_hard(shorten=False)
     before = []
-    with pytest.raises(SimulationError, match="is the fastest while the energy of all rises") as stopped:
+    with pytest.raises(SimulationError, match=stating("fastest", "energy", "rises")) as stopped:
         for _ in range(20):
             before.append((sim.tick, sim.bottles().x[0], sim.bottles().vx[0]))
             sim.advance()
@@ -130,7 +131,7 @@ def test_a_bottle_that_would_step_over_a_rail_is_caught() -> None:
     sim.advance(2)
     assert sim.bottles().x[0] < 0.6 - RADIUS
     assert sim.bottles().vx[0] == pytest.approx(-20.0, rel=0.2)
-    assert "moves 200 mm in one step of 0.01 s" in sim.take_events().guard[0].text
+    assert missing(sim.take_events().guard[0].text, ["bottle 0", "200 mm", "one step of 0.01 s"]) == []
 
 
 def test_what_no_step_can_stop_is_told_with_the_stiffness_that_can() -> None:
@@ -231,7 +232,7 @@ def test_a_scene_too_stiff_for_an_error_control_is_told_in_time() -> None:
         **NO_FLOOR,
     )
     displace(sim, np.zeros(1), np.full(1, -0.5))
-    with pytest.raises(SimulationError, match="dormand_prince does not keep an error of 1e-09 m/s within 1,000,000"):
+    with pytest.raises(SimulationError, match=stating("dormand_prince", "error", "1e-09 m/s", "1,000,000")):
         sim.advance()
     assert sim.tick == 0
 

@@ -1,4 +1,4 @@
-"""JSON with a checksum: every flipped bit is found, and no content ends in another error than a sentence."""
+"""JSON with a checksum: every flipped bit is detected, and all content errors are one sentence."""
 
 from __future__ import annotations
 
@@ -9,38 +9,38 @@ from pathlib import Path
 import pytest
 from facts import stating
 
+from conveyor_sim.support.checked_json import DEEPEST, read_checked, with_checksum
 from conveyor_sim.support.files import FileError
-from conveyor_sim.support.sealed_json import DEEPEST, read_sealed, sealed
 
 DATA = {"a": 1, "b": [0.1, -0.0, "\u00fc", None, True], "c": {"d": {}}}
 
 
 @pytest.mark.parametrize("indent", [None, 1])
 def test_what_is_read_is_what_was_written(tmp_path: Path, indent: int | None) -> None:
-    (tmp_path / "file").write_bytes(sealed(DATA, indent))
-    kept = read_sealed(tmp_path / "file")
-    assert repr(kept.data) == repr(DATA) and kept.sealed
+    (tmp_path / "file").write_bytes(with_checksum(DATA, indent))
+    kept = read_checked(tmp_path / "file")
+    assert repr(kept.data) == repr(DATA) and kept.has_checksum
     assert json.loads((tmp_path / "file").read_text())["b"] == DATA["b"]
     (tmp_path / "file").write_text(json.dumps(DATA))
-    assert not read_sealed(tmp_path / "file").sealed
+    assert not read_checked(tmp_path / "file").has_checksum
 
 
 def test_every_flipped_bit_and_cut_is_found(tmp_path: Path) -> None:
     """Or the file is one without a checksum that has a field of a strange name, which its reader refuses."""
-    content = sealed(DATA)
+    content = with_checksum(DATA)
     for place in range(len(content)):
         for bit in (place % 8, (place + 5) % 8):
             damaged = bytearray(content)
             damaged[place] ^= 1 << bit
             (tmp_path / "file").write_bytes(damaged)
             try:
-                kept = read_sealed(tmp_path / "file")
+                kept = read_checked(tmp_path / "file")
             except FileError:
                 continue
-            assert not kept.sealed and kept.data.keys() != DATA.keys(), (place, bit)
+            assert not kept.has_checksum and kept.data.keys() != DATA.keys(), (place, bit)
         (tmp_path / "file").write_bytes(content[:place])
         with pytest.raises(FileError):
-            read_sealed(tmp_path / "file")
+            read_checked(tmp_path / "file")
 
 
 @pytest.mark.parametrize(
@@ -61,31 +61,31 @@ def test_every_flipped_bit_and_cut_is_found(tmp_path: Path) -> None:
         (b'{"a": ' + b"9" * 400 + b"}", "has a whole number of more than 300 digits"),
         (b'{"a": "\\ud800"}', "has a text with half a character"),
         (b'{"a": 1, "sha256": "0"}', "its checksum does not fit"),
-        (sealed(DATA) + b" ", "its checksum does not fit"),
-        (sealed({"sha256": "x", "a": 1}), "has the field 'sha256' twice"),
+        (with_checksum(DATA) + b" ", "its checksum does not fit"),
+        (with_checksum({"sha256": "x", "a": 1}), "has the field 'sha256' twice"),
     ],
 )
 def test_what_can_not_be_is_refused_in_words(tmp_path: Path, content: bytes, told: str) -> None:
     (tmp_path / "file").write_bytes(content)
     with pytest.raises(FileError) as caught:
-        read_sealed(tmp_path / "file")
+        read_checked(tmp_path / "file")
     assert str(caught.value).startswith(told)
 
 
 def test_a_file_is_bounded_and_regular(tmp_path: Path) -> None:
-    (tmp_path / "file").write_bytes(sealed(DATA))
+    (tmp_path / "file").write_bytes(with_checksum(DATA))
     with pytest.raises(FileError, match=stating("0.000143 MB", "more than", "1e-05 MB")):
-        read_sealed(tmp_path / "file", most=10)
+        read_checked(tmp_path / "file", most=10)
     for place, told in (
         (tmp_path, "is a folder"),
         (tmp_path / "nowhere", "no such file"),
         (Path("/dev/zero"), "device"),
     ):
         with pytest.raises(FileError, match=told):
-            read_sealed(place)
+            read_checked(place)
 
 
 def test_numbers_that_are_not_finite_are_read_where_they_can_be(tmp_path: Path) -> None:
-    (tmp_path / "file").write_bytes(sealed({"a": [math.nan, math.inf, -math.inf]}))
-    found = read_sealed(tmp_path / "file", finite=False).data["a"]
+    (tmp_path / "file").write_bytes(with_checksum({"a": [math.nan, math.inf, -math.inf]}))
+    found = read_checked(tmp_path / "file", finite=False).data["a"]
     assert math.isnan(found[0]) and found[1:] == [math.inf, -math.inf]

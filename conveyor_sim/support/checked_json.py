@@ -15,7 +15,7 @@ from typing import Any
 
 from conveyor_sim.support.files import MB, FileError, in_mb, read_file
 
-SEAL = "sha256"
+CHECKSUM = "sha256"
 """Name of the last field."""
 MOST = 64 * MB
 """Bytes of a file that are read."""
@@ -26,27 +26,27 @@ _HALF = re.compile(r"[\ud800-\udc7f\udd00-\udfff]")
 LARGEST = 10**300
 """Largest whole number that is read, so that each of them fits a float."""
 
-_BEFORE, _DIGITS, _AFTER = f'"{SEAL}": "'.encode(), 64, b'"}\n'
+_BEFORE, _DIGITS, _AFTER = f'"{CHECKSUM}": "'.encode(), 64, b'"}\n'
 
 
 @dataclass(frozen=True)
-class Kept:
+class CheckedJson:
     """Content of a file."""
 
     data: dict[str, Any]
     """Fields without the checksum."""
-    sealed: bool
+    has_checksum: bool
     """True if a checksum was there and is right; False if there is none."""
 
 
-def sealed(data: Mapping[str, Any], indent: int | None = None) -> bytes:
+def with_checksum(data: Mapping[str, Any], indent: int | None = None) -> bytes:
     """Return a mapping of at least one field as JSON with its checksum. It may hold NaN and Infinity."""
     text = json.dumps(dict(data), indent=indent)
     body = text[:-1].rstrip().encode() + (b", " if indent is None else b",\n ") + _BEFORE
     return body + hashlib.sha256(body).hexdigest().encode() + _AFTER
 
 
-def read_sealed(path: Path, most: int = MOST, finite: bool = True) -> Kept:
+def read_checked(path: Path, most: int = MOST, finite: bool = True) -> CheckedJson:
     """Return the content of a file of at most `most` bytes.
 
     finite: refuse NaN and infinite numbers. Raises FileError, in words that follow the path, for a file that can't be
@@ -54,20 +54,20 @@ def read_sealed(path: Path, most: int = MOST, finite: bool = True) -> Kept:
     """
     content = read_file(path, most)
     place = len(content) - len(_AFTER) - _DIGITS
-    has_seal = place > 0 and content.endswith(_AFTER) and content[:place].endswith(_BEFORE)
-    if has_seal and hashlib.sha256(content[:place]).hexdigest().encode() != content[place : -len(_AFTER)]:
+    has_checksum = place > 0 and content.endswith(_AFTER) and content[:place].endswith(_BEFORE)
+    if has_checksum and hashlib.sha256(content[:place]).hexdigest().encode() != content[place : -len(_AFTER)]:
         raise FileError("its checksum does not fit")
     data = parsed(content, finite)
     if not isinstance(data, dict):
         raise FileError("is no mapping of fields")
-    if (SEAL in data) is not has_seal:
+    if (CHECKSUM in data) is not has_checksum:
         raise FileError("its checksum does not fit")
-    data.pop(SEAL, None)
-    return Kept(data, has_seal)
+    data.pop(CHECKSUM, None)
+    return CheckedJson(data, has_checksum)
 
 
 def parsed(content: bytes, finite: bool = True) -> Any:
-    """Return JSON as plain data. Raises FileError as `read_sealed`."""
+    """Return JSON as plain data. Raises FileError as `read_checked`."""
     if len(content) > MOST:
         raise FileError(f"has {in_mb(len(content))}, more than the {in_mb(MOST)} that are read")
     try:
@@ -103,7 +103,7 @@ def _constant(finite: bool) -> Any:
 
 
 def _check(data: Any, finite: bool) -> None:
-    """Raise FileError for content that `json` accepts and `read_sealed` excludes."""
+    """Raise FileError for content that `json` accepts and `read_checked` excludes."""
     todo = [(data, 0)]
     while todo:
         value, depth = todo.pop()
