@@ -1,6 +1,6 @@
 """Some seconds of a recording as bytes: bottles, contacts, belts and signals as differences of whole numbers.
 
-A block is a list of arrays (`varints.packed`), in the order of `pack`. page/block.js reads it, and must be changed
+A block is a list of arrays (`packed`), in the order of `pack`. page/block.js reads it, and must be changed
 together with this file. Positions in mm, speeds in mm/s, forces in steps of a ninth (`levels`), signals in steps of
 1e-4.
 """
@@ -11,10 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from conveyor_sim.columns.bottles import BottleColumns, ContactColumns
-from conveyor_sim.page.varints import differences, packed
 
 Integers = NDArray[np.int64]
 Floats = NDArray[np.float64]
@@ -28,6 +27,8 @@ LEVELS = 8.0
 """Steps from a force to twice that."""
 UNKNOWN = -(2**40)
 """Represents NaN and values out of range."""
+_MOST_BYTES = 10
+"""Bytes of a number in a block, at most."""
 FORCE_FRAMES = 5
 """Frames that share one peak force."""
 SECONDS = 4.0
@@ -155,3 +156,35 @@ def _columns(rows: Sequence[tuple[int, Floats]], start: int) -> list[Integers]:
     begins = np.concatenate([[0], begins])[counts > 0]
     gaps[begins] = row[begins]
     return [differences(ticks - start), counts.astype(np.int64), gaps, steps.T[changed]]
+
+
+def varints(values: ArrayLike) -> bytes:
+    """Return numbers (n,) as bytes of seven bits each, the lowest bits first, the sign in the lowest bit.
+
+    The highest bit of a byte means that more follow, so small numbers take one byte.
+    """
+    signed = np.asarray(values, dtype=np.int64)
+    rest = ((signed << 1) ^ (signed >> 63)).view(np.uint64)
+    parts = np.empty((len(rest), _MOST_BYTES), dtype=np.uint8)
+    used = np.zeros((len(rest), _MOST_BYTES), dtype=np.bool_)
+    used[:, 0] = True
+    for place in range(_MOST_BYTES):
+        parts[:, place] = rest & np.uint64(0x7F)
+        rest = rest >> np.uint64(7)
+        more = rest > 0
+        if not more.any():
+            parts, used = parts[:, : place + 1], used[:, : place + 1]
+            break
+        parts[more, place] |= 0x80
+        used[:, place + 1] = more
+    return bytes(parts[used])
+
+
+def packed(arrays: list[NDArray[np.int64]]) -> bytes:
+    """Return arrays as bytes, each after its length."""
+    return b"".join(varints([len(array)]) + varints(array) for array in arrays)
+
+
+def differences(values: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the first value, then each value less the one before."""
+    return np.diff(values, prepend=np.int64(0))

@@ -21,7 +21,7 @@ COMMANDS = {
 
 
 def record(scene: Scene, folder: Path, ticks: int, ticks_a_chunk: int = 0) -> Simulation:
-    """Runs a scene with COMMANDS and records it; after so many ticks a chunk ends (0: as it comes)."""
+    """Run a scene with COMMANDS and record it. ticks_a_chunk: ticks after which a chunk ends; 0: by size and time."""
     simulation = Simulation(scene)
     with pytest.MonkeyPatch.context() as patch, Recorder(folder) as recorder:
         if ticks_a_chunk:  # a busy machine would take longer than that for some ticks, and end a chunk between

@@ -1,4 +1,4 @@
-"""Messages packed by hand: the bytes that rosbags makes of the same values."""
+"""Serialized messages have the bytes that rosbags makes of the same values."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where two messages differ first."""
+"""First difference of two messages."""
 
 import math
 from dataclasses import replace

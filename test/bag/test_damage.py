@@ -1,4 +1,4 @@
-"""What bottles and rails bear, and limits that were passed, go into the bag, the summary and the pictures."""
+"""Loads of bottles and rails, and exceeded limits, are part of the bag, the summary and the figures."""
 
 from __future__ import annotations
 

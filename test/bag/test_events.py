@@ -1,4 +1,4 @@
-"""What happens on a line is recorded, read back, and replayed to the same events."""
+"""Events of a line are recorded, read back, and replayed to the same events."""
 
 import math
 from collections.abc import Callable
@@ -71,7 +71,7 @@ def test_another_library_reads_them_from_the_bag_alone(run: tuple[Path, Any]) ->
             found += [n for k, n in zip(message.kind, message.name, strict=True) if k.startswith("alarm")]
     said = [name for name in found if name.split("/")[1] not in ("belts", "limits")]
     assert said == ["alarms/table full", "alarms/jam — at exit", "alarms/table full"]
-    assert found[-1] == "alarms/belts/straight/watchdog"  # nobody commands it any more
+    assert found[-1] == "alarms/belts/straight/watchdog"  # no more commands come
 
 
 def test_alarms_and_events_are_replayed_bit_for_bit(run: tuple[Path, Any]) -> None:
@@ -115,7 +115,7 @@ def test_an_event_that_the_recording_lacks_is_found(run: tuple[Path, Any], tmp_p
 
 
 def test_an_event_that_does_not_happen_again_is_found(run: tuple[Path, Any], tmp_path: Path) -> None:
-    """That of a command which the line is not given, for its outcome claims that it never reached it."""
+    """The event belongs to a command whose outcome claims that it never reached the line, so it is not replayed."""
 
     def edit(topic: str, message: Any) -> None:
         if topic == "outcomes" and message.tick == 3:

@@ -56,7 +56,7 @@ def written(bag: Path, folder: Path, files: int = 1, **options: Any) -> Path:
 
 @pytest.mark.parametrize("files", [1, 2])
 def test_a_bag_without_chunks_is_compared_to_its_end(folder: Path, tmp_path: Path, files: int) -> None:
-    """As the profile "fastwrite" of rosbag2 writes."""
+    """The profile "fastwrite" of rosbag2 writes such bags."""
     compared = replay(folder).compared
     assert replay(written(folder, tmp_path / "flat", files, use_chunking=False)).compared == compared
 
@@ -122,7 +122,7 @@ def test_a_recording_whose_folder_is_moved_is_complete_but_for_its_metadata(fold
 
 
 def test_a_topic_that_only_the_index_names_is_damage(folder: Path, tmp_path: Path) -> None:
-    """Whoever reads the file from its beginning can't tell what the messages are."""
+    """A reader that starts at the beginning of the file can't identify the messages."""
     bag = written(folder, tmp_path / "flat", use_chunking=False)
     file = bag / "flat_0.mcap"
     content = file.read_bytes()
@@ -150,7 +150,7 @@ def test_a_damaged_begin_costs_no_message(folder: Path, count: int) -> None:
 
 
 def test_an_empty_file_does_not_cost_the_others(folder: Path, tmp_path: Path) -> None:
-    """As a loss of power leaves the last file of a bag that was split."""
+    """A loss of power can leave an empty last file of a split bag."""
     split = written(folder, tmp_path / "split", 3)
     (split / "split_2.mcap").write_bytes(b"")
     (split / "split_2.mcap.recovering").write_bytes(b"left by a repair that was killed")

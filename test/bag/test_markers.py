@@ -18,9 +18,9 @@ RADII = np.array([0.03, 0.05, 0.04, 0.06])
 
 
 def decode(data: bytes) -> list[Any]:
-    """What is shown, as rosbags reads it; ROS must read the same.
+    """Return the markers as rosbags reads them; ROS must read the same.
 
-    Whatever was shown before goes first: a viewer outlives the scenes. RViz refuses a DELETEALL anywhere else.
+    The first marker deletes earlier ones, because a viewer outlives scenes. RViz refuses a DELETEALL anywhere else.
     """
     message: Any = typestore().deserialize_cdr(data, MARKERS)
     assert_same(deserialize(MARKERS, data), message)

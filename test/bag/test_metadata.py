@@ -1,4 +1,4 @@
-"""metadata.yaml: written by hand, and not parsed where it is what the recording's file states itself."""
+"""metadata.yaml: readable by every parser, and not parsed if it equals the record in the recording's file."""
 
 from pathlib import Path
 from typing import Any
@@ -52,7 +52,7 @@ def recorded(folder: Path) -> Path:
 
 
 def test_it_is_the_text_that_the_file_states(tmp_path: Path) -> None:
-    """Not of a file by another name, nor once a letter of it has changed: then it is parsed."""
+    """It is parsed for a file with another name, and if a letter of it has changed."""
     file = recorded(tmp_path / "run")
     assert is_stated_in(file)
     assert not is_stated_in(file.rename(file.with_name("other.mcap")))

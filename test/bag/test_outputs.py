@@ -1,4 +1,4 @@
-"""What is written when, and that nothing is written that nobody wants."""
+"""Topics are written at their ticks, and only if a sink wants them."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -14,7 +14,7 @@ from conveyor_sim.scene import Scene, load_scene
 from conveyor_sim.simulation import Simulation
 
 SILENT = {"ledger", "guard", "damage", "rail_wear", "damage_events"}
-"""Nothing is to be told, nothing asked for."""
+"""Topics without messages in these runs, because their causes are absent."""
 
 
 class Collector:
@@ -80,7 +80,7 @@ def test_an_output_that_is_switched_off_is_not_written() -> None:
     scene = load_scene(SMALL_LINE, {"outputs": {"poses": 0, "contacts": 0}})
     sink = Collector(set(OUTPUTS))
     run(scene, [sink], 10)
-    off = {"poses", "markers", "contacts", "run_state", "variables"}  # the last two are said by whoever steps it
+    off = {"poses", "markers", "contacts", "run_state", "variables"}  # the caller of the simulation writes the last two
     assert {topic for topic, _, _ in sink.taken} == set(OUTPUTS) - SILENT - off
 
 
@@ -112,7 +112,7 @@ def test_outcomes_are_returned_and_stamped_with_the_tick_that_applied_them(scene
 
 
 def test_two_runs_give_the_same_bytes(scene: Scene, record_line: Callable[[str, int], Path], tmp_path: Path) -> None:
-    """Of every message but Line, which names its run; here the names are equal, so of every message."""
+    """Line holds the name of its run, and the names are equal here, so all messages have the same bytes."""
     first, second = record_line("first", 60), tmp_path / "second"
     record(scene, second, 60)
     with open_bag(first) as one, open_bag(second) as two:

@@ -42,7 +42,7 @@ COUNTS = {
     "/events": 8,
 }
 SILENT = dict.fromkeys(("/guard", "/ledger", "/damage", "/rail_wear", "/damage_events", "/run_state", "/variables"), 0)
-"""Nothing was to be told, nothing asked for."""
+"""Topics without messages in this run: they are off, or had no events."""
 
 
 def test_rosbags_decodes_every_topic_from_the_bag_alone(bag: Path) -> None:
@@ -139,7 +139,7 @@ def test_closing_twice_is_harmless_and_ends_the_recording(tmp_path: Path) -> Non
 
 
 def test_run_folders_do_not_collide(tmp_path: Path) -> None:
-    """Those of processes that begin in the same second."""
+    """Processes that begin in the same second get different folders."""
     folders = [new_run_folder(tmp_path / "runs") for _ in range(3)]
     assert sorted(folders) == sorted((tmp_path / "runs").iterdir())
 

@@ -122,7 +122,7 @@ def test_cut_chunk_yields_the_messages_that_were_written_of_it(scene: Scene, tmp
 
 
 def test_a_damaged_first_chunk_takes_along_the_messages_whose_topics_it_names(tmp_path: Path) -> None:
-    """The first message makes a chunk of its own; a byte of that is wrong, and the file's end is missing."""
+    """The first message is in a separate chunk; a byte of that is wrong, and the file's end is missing."""
     folder = tmp_path / "bad"
     simulation = Simulation(load_scene(SMALL_LINE))
     with Recorder(folder) as recorder:
@@ -165,7 +165,7 @@ def test_only_metadata_missing_is_rebuilt_without_touching_the_file(record_line:
 
 
 def test_zeros_at_the_end_are_left_out(record_line: Make) -> None:
-    """What some file systems leave after a loss of power."""
+    """Some file systems leave zeros after a loss of power."""
     folder = record_line("zeros", TICKS)
     before = whole(folder)
     file = next(folder.glob("*.mcap"))

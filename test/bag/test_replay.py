@@ -107,7 +107,7 @@ def test_changed_command_is_found(bag: Path, tmp_path: Path) -> None:
 
 
 def test_what_the_run_was_doing_is_not_compared(bag: Path, tmp_path: Path) -> None:
-    """Of who set a command, who it was is: a replay gives each input in the name of its writer."""
+    """The writer of a command is compared, because a replay repeats each input in the name of its writer."""
     folder = tmp_path / "told"
     with open_bag(bag) as opened, Recorder(folder) as recorder:
         run = TOPICS["run_state"].pack(RunState(STOPPED, "it was told so"), Header(0, 1, "hall"))
@@ -198,7 +198,7 @@ def test_a_table_is_replayed_without_its_file(tmp_path: Path) -> None:
 
 
 def stock(bag: Path, folder: Path, messages: Iterator[tuple[str, int, bytes]]) -> Path:
-    """What stock rosbag2 makes of the topics of a node in the namespace /hall: stamped with the wall clock."""
+    """Write the topics of a node in the namespace /hall as stock rosbag2 does, stamped with wall time."""
     store = typestore()
     with open_bag(bag) as opened, Writer(folder, version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
         connections = {

@@ -1,4 +1,4 @@
-"""Damage is seen: no flipped bit is called whole or replayed; sound chunks are kept, what is lost is named."""
+"""Damage is detected: no flipped bit is called intact or replayed; valid chunks are kept, losses are reported."""
 
 from __future__ import annotations
 
@@ -237,7 +237,7 @@ def test_a_size_that_is_wrong_takes_no_memory(folder: Path) -> None:
 
 
 def test_what_carries_no_checksum_is_never_called_whole(folder: Path, tmp_path: Path) -> None:
-    """As stock recorders write: without a checksum over all data, or without any."""
+    """Stock recorders write files without a checksum over all data, or without any checksum."""
     partly = tmp_path / "partly.mcap"
     with file_of(folder).open("rb") as source, partly.open("wb") as stream:
         writer = Writer(stream, compression=CompressionType.LZ4, chunk_size=30_000, index_types=IndexType.ALL)

@@ -30,13 +30,13 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def other_bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The same, but the gate does not close at 6 s. Not to be written to."""
+    """Return a recording in which the gate does not close at 6 s. Tests must not write to it."""
     return record(tmp_path_factory.mktemp("view") / "other", closes=False)
 
 
 @pytest.fixture(scope="session")
 def html(bag: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The same as one file, with a condition that failed at 22 s."""
+    """Return the page of `bag` as one file, with a condition that failed at 22 s."""
     failures = [FailedCondition(22.0, "always: no more than 20 bottles <script>alert(3)</script>")]
     return write_page(bag, tmp_path_factory.mktemp("page") / "line.html", failures=failures)
 
@@ -63,7 +63,7 @@ def page(browser: Any, html: Path) -> Iterator[Any]:
 
 @contextmanager
 def opened_page(browser: Any, html: Path, size: tuple[int, int] = (1280, 720)) -> Iterator[Any]:
-    """As `page`, on some file, in a window of some size in px."""
+    """Open a file as `page` does, in a window of a size in px."""
     context = browser.new_context(viewport={"width": size[0], "height": size[1]}, offline=True)
     context.set_default_timeout(60_000)
     opened, wrong = context.new_page(), []

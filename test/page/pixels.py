@@ -1,4 +1,4 @@
-"""What is drawn on a page, as pixels."""
+"""Pixels of a page's drawings."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from conveyor_sim.columns.bottles import BottleColumns
 
 TYPE_COLOURS = ((0, 114, 178), (213, 94, 0))
-"""Of the first two bottle types, in the colouring by type."""
+"""Colours of the first two bottle types, in the colouring by type."""
 
 
 def settled(page: Any) -> None:
@@ -24,7 +24,7 @@ def settled(page: Any) -> None:
 
 
 def to_pixels(page: Any, x: float, y: float) -> tuple[float, float]:
-    """Where a point of the line is on the canvas."""
+    """Return the pixel of the canvas at a point of the line."""
     at_x, at_y, scale, width, height = map(float, page.get_attribute("#plan", "data-camera").split())
     return width / 2 + (x - at_x) * scale, height / 2 - (y - at_y) * scale
 

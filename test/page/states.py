@@ -51,7 +51,7 @@ def failed(page: Any) -> None:
 
 
 def two(page: Any) -> None:
-    """Where two recordings have gone apart."""
+    """Show a time after two recordings have diverged."""
     at(page, 12)
     page.select_option("#colour", "apart")
 

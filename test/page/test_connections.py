@@ -70,7 +70,7 @@ def test_a_line_whose_process_dies_is_lost_and_begins_anew(page: Any, live: Live
 
 
 def run(work: Coroutine[Any, Any, T]) -> T:
-    """In a thread of its own: the browser's driver has a loop in this one."""
+    """Run a coroutine in a separate thread, because the browser's driver has a loop in this one."""
     with ThreadPoolExecutor(1) as thread:
         return thread.submit(asyncio.run, asyncio.wait_for(work, PATIENCE)).result()
 
@@ -122,7 +122,7 @@ def test_files_outside_the_page_are_not_there(live: Live) -> None:
 
 
 async def messages(socket: Any, seconds: float) -> list[bytes]:
-    """What comes until nothing does for so long."""
+    """Return the messages until none comes for `seconds`."""
     found = []
     while True:
         try:
@@ -145,7 +145,7 @@ async def next_text(socket: Any, kind: str) -> dict[str, Any]:
 
 
 async def frames(socket: Any, count: int) -> None:
-    """Take so many, and say so."""
+    """Receive `count` frames and acknowledge each."""
     while count:
         message = await socket.receive()
         assert message.type is WSMsgType.BINARY, message
@@ -252,7 +252,7 @@ def test_a_flood_of_what_needs_no_answer_is_cut_off_too(live: Live, kind: WSMsgT
 
 
 def is_open(connection: socket.socket) -> bool:
-    """Whether the server has left it open; what it sent is thrown away."""
+    """Return True if the server has left a connection open; its data is discarded."""
     connection.setblocking(False)
     try:
         while connection.recv(1 << 20):
@@ -265,7 +265,7 @@ def is_open(connection: socket.socket) -> bool:
 
 
 def test_connections_that_only_wait_make_room(live: Live) -> None:
-    """Of those that ask for nothing, for half a thing, and do not take what they asked for, the oldest; but no page."""
+    """The oldest clients without a request, with half a request, or with an unread answer are closed, but no page."""
     asked = [b"", b"GET / HTT", f"GET /lib/uplot.js HTTP/1.1\r\nHost: 127.0.0.1:{live.port}\r\n\r\n".encode()]
 
     async def work() -> None:

@@ -1,4 +1,4 @@
-"""Where two recordings first differ: found at the tick, told in words, within tolerances where bits need not agree."""
+"""First difference of two recordings: at its tick, in words, within tolerances where bits need not agree."""
 
 from __future__ import annotations
 

@@ -204,7 +204,7 @@ def test_what_a_tester_does_is_shown(page: Any, live: Live) -> None:
 
 
 def test_alarms_are_shelved_acknowledged_and_reset(page: Any) -> None:
-    """Of an eye that is forced, so that the alarm does nothing by itself meanwhile."""
+    """The photo-eye is forced, so that the alarm does not change by itself in the meantime."""
     signed_in(page, "tess")
     show_device(page, "photo_eyes/queue")
     page.click("[aria-label='Watch photo_eyes/queue/blocked']")

@@ -1,4 +1,4 @@
-"""What a page is packed of: small, whole, and no larger than it may be."""
+"""Packed data of a page: complete, and no larger than its limit."""
 
 from __future__ import annotations
 
@@ -14,10 +14,9 @@ from conveyor_sim.bag.messages.typestore import typestore
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.columns.bottles import BottleColumns, ContactColumns
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.page.block import BlockContent, levels, pack
+from conveyor_sim.page.block import BlockContent, levels, pack, varints
 from conveyor_sim.page.one_file import write_page
 from conveyor_sim.page.recording import Detail, PageRecording
-from conveyor_sim.page.varints import varints
 
 BOTTLES, SECONDS, RATE = 300, 60.0, 25.0
 ALLOWED = 1_000_000

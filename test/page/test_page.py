@@ -70,7 +70,7 @@ def test_time_is_played_and_paused_by_button_and_key(page: Any) -> None:
     page.click("#plan", position={"x": 20, "y": 20})
     press(page, "k")
     stopped = clock(page)
-    for _ in range(10):  # so many frames would show time going on
+    for _ in range(10):  # enough frames to show a time that goes on
         settled(page)
     assert clock(page) == stopped
     press(page, "End")

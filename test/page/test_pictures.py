@@ -18,9 +18,9 @@ from conveyor_sim.page.one_file import FailedCondition, write_page
 
 IMAGES = Path(__file__).resolve().parents[2] / "docs" / "images"
 BLOCK = 20
-"""px of a block that one colour stands for: about a word."""
+"""Size of a block that is reduced to one colour, px: about a word."""
 OFF = 30.0
-"""Of 255, in the mean over the colours: such a block looks different."""
+"""Least difference of a block that looks different, of 255, as the mean over the colours."""
 ALLOWED = 0.06
 """Share of blocks that may. In other fonts (serif, monospaced, a fifth larger) 0.04 do, for words shift by a block;
 between two of the states at least 0.1."""

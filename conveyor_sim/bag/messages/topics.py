@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 from conveyor_sim.bag.messages import encode
 from conveyor_sim.bag.messages.encode import Header, Outcome
-from conveyor_sim.bag.messages.entries import bin_name, bottle_name, command_name, contact_name
 from conveyor_sim.bag.messages.markers import bottles_markers, plant_markers
 from conveyor_sim.bag.messages.qos import ALARMS, CLOCK, DATA, EVENTS, LATCHED, OUTCOMES, Qos
 from conveyor_sim.columns.alarms import AlarmColumns
@@ -126,6 +125,32 @@ def to_columns(kind: Callable[..., Any], message: Any) -> Any:
 _MOTION = {"x": 1e-6, "y": 1e-6, "theta": 1e-5, "vx": 1e-4, "vy": 1e-4, "omega": 1e-3}
 """m, m, rad, m/s, m/s, rad/s."""
 
+
+def _bottle_name(line: Any, message: Any, index: int) -> str:
+    """Return an entry of columns by bottle in words."""
+    return f"bottle {message.id[index]}"
+
+
+def _contact_name(line: Any, message: Any, index: int) -> str:
+    """Return an entry of contacts in words."""
+    other = int(message.b[index])
+    if message.kind[index] == 0:
+        return f"the contact of bottles {message.a[index]} and {other}"
+    rail = line.rails[other] if other < len(line.rails) else other
+    return f"the contact of bottle {message.a[index]} and rail {rail}"
+
+
+def _command_name(line: Any, message: Any, index: int) -> str:
+    """Return an entry of read-back values in words."""
+    names = line.command_names
+    return f"command {names[index]}" if index < len(names) else ""  # there may be more writers than commands
+
+
+def _bin_name(line: Any, message: Any, index: int) -> str:
+    """Return an entry of rail wear in words."""
+    return f"rail {line.rails[message.rail[index]]} at ({message.x[index]:.4g}, {message.y[index]:.4g}) m"
+
+
 _ROWS = (
     Topic(
         "line",
@@ -182,7 +207,7 @@ _ROWS = (
         rate="bottles",
         state=lambda now: now.bottles,
         columns=BottleColumns,
-        compare=Compare(bottle_name, "id", {**_MOTION, "peak_force": 1e-2, "impulse": 1e-4}),
+        compare=Compare(_bottle_name, "id", {**_MOTION, "peak_force": 1e-2, "impulse": 1e-4}),
     ),
     Topic(
         "poses",
@@ -208,7 +233,7 @@ _ROWS = (
         rate="contacts",
         state=lambda now: now.sim.contacts(),
         columns=ContactColumns,
-        compare=Compare(contact_name, "a"),
+        compare=Compare(_contact_name, "a"),
     ),
     Topic(
         "belts",
@@ -254,7 +279,7 @@ _ROWS = (
         rate="damage",
         state=lambda now: now.sim.damage(),
         columns=DamageColumns,
-        compare=Compare(bottle_name, "id"),
+        compare=Compare(_bottle_name, "id"),
     ),
     Topic(
         "rail_wear",
@@ -264,7 +289,7 @@ _ROWS = (
         rate="damage",
         state=lambda now: now.sim.rail_wear(),
         columns=RailWearColumns,
-        compare=Compare(bin_name),
+        compare=Compare(_bin_name),
     ),
     Topic(
         "events",
@@ -284,7 +309,7 @@ _ROWS = (
         LATCHED,
         state=lambda now: now.sim.line.read_back.changes(),
         columns=ReadBackColumns,
-        compare=Compare(command_name, within={"value": 1e-9}),
+        compare=Compare(_command_name, within={"value": 1e-9}),
     ),
     Topic(
         "alarm_states",
