@@ -60,19 +60,19 @@ class Counting:
         tags = [
             replace(count(f"belts/belt{n}/count", "counter", "Goes up."), device=f"belts/belt{n}") for n in range(TAGS)
         ]
-        self.about = LineInfo(
+        self.info = LineInfo(
             "bench", "", TICK, "2025-01-01T00:00:00Z", [replace(tag, device_class="belt") for tag in tags]
         )
         self._listeners = Listeners()
-        self.shown = self._at(0)
+        self.snapshot = self._at(0)
 
     def show(self, tick: int) -> None:
         """Set the tick of the line."""
-        self.shown = self._at(tick)
+        self.snapshot = self._at(tick)
         self._listeners.tell()
 
     def _at(self, tick: int) -> LineSnapshot:
-        values = {tag.name: float(tick // EVERY if n < CHANGING else n) for n, tag in enumerate(self.about.tags)}
+        values = {tag.name: float(tick // EVERY if n < CHANGING else n) for n, tag in enumerate(self.info.tags)}
         return LineSnapshot(tick, values, run=RunState(RUNNING))
 
     def events(self, after: int) -> tuple[int, Sequence[Event]]:

@@ -219,7 +219,7 @@ class Answer:
 
 
 @dataclass(frozen=True)
-class Study:
+class AccuracyStudy:
     """Result of a study of a scene, from which tables, figures and files are built."""
 
     scene: str

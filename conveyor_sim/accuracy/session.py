@@ -14,7 +14,7 @@ from conveyor_sim.accuracy.report.forecast import forecast
 from conveyor_sim.accuracy.report.interim import PRELIMINARY, Interim, predicted
 from conveyor_sim.accuracy.report.lines import summary
 from conveyor_sim.accuracy.report.no_contact import NoContact, without_contact
-from conveyor_sim.accuracy.results import Study
+from conveyor_sim.accuracy.results import AccuracyStudy
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.accuracy.study import run_study
 from conveyor_sim.scene import Scene
@@ -52,7 +52,7 @@ class Session:
             "the same command goes on"
         )
 
-    def run(self, folder: Path, effort: Effort, bars: Bars) -> Study | None:
+    def run(self, folder: Path, effort: Effort, bars: Bars) -> AccuracyStudy | None:
         """Make the study and show its answers; None on a line without contacts, of which there is none.
 
         On Ctrl-C the best answer so far is shown, and KeyboardInterrupt raised. Else raises what `run_study` does.

@@ -18,7 +18,7 @@ from conveyor_sim.accuracy.report.answer import eligible, find_answer, largest_e
 from conveyor_sim.accuracy.report.files import write_study
 from conveyor_sim.accuracy.report.interim import Interim, after_measuring, preliminary, unfinished
 from conveyor_sim.accuracy.report.lines import FEW
-from conveyor_sim.accuracy.results import Answer, Comparison, Point, Sample, StiffnessRow, Study
+from conveyor_sim.accuracy.results import AccuracyStudy, Answer, Comparison, Point, Sample, StiffnessRow
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.scene import Scene
@@ -48,7 +48,7 @@ def run_study(
     bars: Bars,
     report: Callable[[Interim], None] = lambda _: None,
     compiles: Callable[[], None] = lambda: None,
-) -> Study:
+) -> AccuracyStudy:
     """Make a study, or go on with one that was interrupted: what is finished is in the folder and stays.
 
     tolerance: relative error in impacts, in resting load, and in what long runs are judged by. `report` gets each
@@ -82,8 +82,8 @@ def _study(
     samples: Sequence[Sample] = (),
     comparisons: Sequence[Comparison] = (),
     reference: Setting | None = None,
-) -> Study:
-    return Study(
+) -> AccuracyStudy:
+    return AccuracyStudy(
         scene=scene.name,
         source=scene.source_name,
         machine=measured.machine,

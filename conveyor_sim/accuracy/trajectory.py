@@ -15,7 +15,7 @@ from conveyor_sim.simulation import Simulation
 
 
 @dataclass(frozen=True)
-class Frame:
+class TickRecord:
     """Recorded state at one tick."""
 
     time: float
@@ -31,7 +31,7 @@ class Frame:
 class Trajectory:
     """A run from a start."""
 
-    frames: tuple[Frame, ...]
+    frames: tuple[TickRecord, ...]
     """The start, then one a tick."""
     broken: str
     """Why it ended early, in the words of the SimulationError; empty if it did not."""
@@ -64,6 +64,6 @@ def follow(simulation: Simulation, start: Simulation, ticks: int) -> Trajectory:
     return Trajectory(tuple(frames), "")
 
 
-def _frame(simulation: Simulation) -> Frame:
+def _frame(simulation: Simulation) -> TickRecord:
     bottles, contacts = simulation.bottles(), simulation.contacts()
-    return Frame(simulation.time, bottles, contacts, energies(simulation.model, bottles, contacts))
+    return TickRecord(simulation.time, bottles, contacts, energies(simulation.model, bottles, contacts))

@@ -24,7 +24,7 @@ from conveyor_sim.support.printable import SENTENCE, printable
 KINDS: tuple[str, ...] = get_args(Kind)
 
 
-class Row(NamedTuple):
+class EventRow(NamedTuple):
     """One event."""
 
     time: float
@@ -44,7 +44,7 @@ def chosen_events(
     names: Sequence[str] = (),
     start: float | None = None,
     stop: float | None = None,
-) -> list[Row]:
+) -> list[EventRow]:
     """Return the selected events of a bag in order.
 
     kinds, names: patterns (`alarm_*`, `machines/*`), one of which must match; empty: all. start, stop: first and last
@@ -67,7 +67,7 @@ def _fits(text: str, patterns: Sequence[str]) -> bool:
     return not patterns or any(fnmatchcase(text, pattern) for pattern in patterns)
 
 
-def _all(path: Path) -> Iterator[Row]:
+def _all(path: Path) -> Iterator[EventRow]:
     with open_bag(path) as bag, bag.sense():
         expected, found = TOPICS["events"].type, bag.types.get("events")
         if found is None:
@@ -81,7 +81,7 @@ def _all(path: Path) -> Iterator[Row]:
             data = frame.data
             columns = (data.at, data.kind, data.name, data.bottle, data.value, data.text)
             for at, kind, name, bottle, value, text in zip(*columns, strict=True):
-                yield Row(
+                yield EventRow(
                     round(bag.time(int(at)), 9),
                     int(at),
                     printable(kind),
@@ -92,7 +92,7 @@ def _all(path: Path) -> Iterator[Row]:
                 )
 
 
-def event_table(rows: Sequence[Row]) -> RenderableType:
+def event_table(rows: Sequence[EventRow]) -> RenderableType:
     """For a terminal."""
     if not rows:
         return "no such event"
@@ -110,7 +110,7 @@ def event_table(rows: Sequence[Row]) -> RenderableType:
     return table
 
 
-def write_csv(rows: Sequence[Row], file: Path, bag: Path) -> None:
+def write_csv(rows: Sequence[EventRow], file: Path, bag: Path) -> None:
     """Write one line per event below a header; a failure leaves the previous content of the file.
 
     Raise ConveyorError if the file can't be written, or if it is part of the bag.
@@ -120,7 +120,7 @@ def write_csv(rows: Sequence[Row], file: Path, bag: Path) -> None:
         raise ConveyorError(f"--csv: {file} given, which is a file of the recording, expected another one")
     text = io.StringIO(newline="")
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(Row._fields)
+    writer.writerow(EventRow._fields)
     writer.writerows(rows)
     try:
         write_file(file, text.getvalue().encode())

@@ -19,7 +19,7 @@ NONE = "-"
 """Placeholder for an absent property: no nominal rate, no texts, no name in another standard."""
 
 
-class Row(NamedTuple):
+class TagRow(NamedTuple):
     """Properties of a tag as texts; none is empty."""
 
     path: str
@@ -47,13 +47,13 @@ def line_tags(scene: Scene) -> tuple[Tag, ...]:
     return image_of(scene).tags
 
 
-def tag_rows(scene: Scene) -> list[Row]:
+def tag_rows(scene: Scene) -> list[TagRow]:
     """Return one row per tag, in the order of the process image."""
     return [_row(tag, scene.where) for tag in line_tags(scene)]
 
 
-def _row(tag: Tag, where: str) -> Row:
-    return Row(
+def _row(tag: Tag, where: str) -> TagRow:
+    return TagRow(
         f"{where}/{tag.name}".lstrip("/"),
         tag.name,
         tag.kind,
@@ -102,6 +102,6 @@ def tag_csv(scene: Scene) -> str:
     """Return one CSV line per tag, below a header."""
     text = io.StringIO(newline="")
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(Row._fields)
+    writer.writerow(TagRow._fields)
     writer.writerows(tag_rows(scene))
     return text.getvalue()

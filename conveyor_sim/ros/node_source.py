@@ -114,7 +114,7 @@ class NodeSource(LineMirror, AbstractContextManager["NodeSource"]):
         """Request an action of the run. by: name of the user. Return why it is refused, or ""."""
         if what not in self.controls:
             return f"{what}: expected one of {', '.join(sorted(self.controls))} of a node"
-        if reason := self.shown.lost:
+        if reason := self.snapshot.lost:
             return reason
         if what == "step" and not (1.0 <= value < 2**32 and float(value).is_integer()):
             return f"step: {value:g} given, expected a whole number of ticks of at least 1"
@@ -219,11 +219,11 @@ class NodeSource(LineMirror, AbstractContextManager["NodeSource"]):
         self._sign = self._alive_client.call_async(srv.GetSimulationState.Request())
         if now > max(self._alive, self._heard) + SILENCE:
             self._lose(f"nothing was heard of the node for {SILENCE:g} s")
-        elif self.shown.lost and not self._why and now < self._alive + LOOK:
+        elif self.snapshot.lost and not self._why and now < self._alive + LOOK:
             self.show()  # the simulation stands still, without new messages
 
     def _lose(self, reason: str) -> None:
-        if self._reported != reason and not self.shown.lost:
+        if self._reported != reason and not self.snapshot.lost:
             self._say(reason)
         self._reported = reason
         self.lose(reason)

@@ -1,4 +1,4 @@
-"""The scene: what a user writes about a line, read, validated and turned into shapes."""
+"""The scene: a user's description of a line, read, validated and turned into shapes."""
 
 from conveyor_sim.scene.geometry import belt_shapes, initial_bottles, rail_shapes
 from conveyor_sim.scene.load import load_scene, parse_overrides, parse_scene

@@ -1,4 +1,4 @@
-"""How exactly a scene is simulated: a preset, a tolerance, or an integrator with its time step."""
+"""Accuracy of a simulation: a preset, a tolerance, or an integrator with its time step."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, get_args
@@ -16,22 +16,22 @@ IntegratorName = Literal[
 INTEGRATOR_NAMES: tuple[IntegratorName, ...] = get_args(IntegratorName)
 
 MOST_STEPS = 1_000_000
-"""In a tick. A step of 100 bottles takes about 3 us: so many take 3 s a tick, 5 min a simulated second at 10 ms a tick.
+"""Largest number of steps in a tick. With 100 bottles (3 us per step) such a tick takes 3 s, a simulated second 5 min.
 
-The stiffest shipped scene at the preset `fine`, ten times finer again, stays below it.
+The stiffest shipped scene at the preset `fine`, with steps shorter by another factor of ten, stays below.
 """
 
 MANY_STEPS = 20_000
-"""In a tick, from which on a scene is reported as slow: 100 bottles take a minute for ten simulated seconds."""
+"""Steps in a tick from which a scene is reported as slow: 100 bottles take a minute for ten simulated seconds."""
 
 StepCount = Annotated[int, Strict(), Ge(1), Le(MOST_STEPS), Says(f"a whole number from 1 to {MOST_STEPS}")]
 
 CHOICES = ("preset", "tolerance", "dt", "per_tick")
-"""The fields that each choose the time step; one of them at most."""
+"""Fields that choose the time step. At most one may be given."""
 
 
 class Accuracy(Part):
-    """How exactly a tick is integrated. A word alone is a preset: `accuracy: fine` is `accuracy: {preset: fine}`.
+    """Accuracy of the integration of a tick. A word alone is a preset: `accuracy: fine` is `accuracy: {preset: fine}`.
 
     At most one of `preset`, `tolerance`, `dt` and `per_tick`; without one it is the preset `standard`.
     """
@@ -61,7 +61,7 @@ class Accuracy(Part):
 
 
 def explicit(integrator: str, per_tick: int, error: float | None = None) -> Mapping[str, Any]:
-    """`accuracy` as an override that leaves nothing of what the scene says there."""
+    """Return `accuracy` as an override that replaces all fields of the scene."""
     return {
         "preset": None,
         "tolerance": None,

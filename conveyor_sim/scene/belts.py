@@ -38,7 +38,7 @@ class _Belt(DevicePart):
     )
 
     def problems(self, path: Path, others: Others) -> Iterator[Problem]:
-        """A speed beyond its limits, or limits in the wrong order."""
+        """Yield a problem for a speed beyond its limits, or limits in the wrong order."""
         least, greatest = self.speed_limits
         if least > greatest:
             text = f"{shown(self.speed_limits)} given, expected the smaller number first (m/s)"
@@ -63,7 +63,7 @@ class StraightBelt(_Belt):
 
 
 class BeltRails(Part):
-    """Which rails a curved belt has along its arcs."""
+    """Rails along the arcs of a curved belt."""
 
     inner: Flag = quantity("A rail along the inner arc, named `<belt>_inner`.", default=False)
     outer: Flag = quantity("A rail along the outer arc, named `<belt>_outer`.", default=False)

@@ -1,4 +1,4 @@
-"""Settings of `accuracy` that exclude each other or that a tick has no room for."""
+"""Checks of `accuracy`: settings that exclude each other, and steps longer than a tick."""
 
 from collections.abc import Iterator
 
@@ -9,11 +9,11 @@ from conveyor_sim.scene.words import listed, shown
 
 
 def accuracy_problems(scene: Scene) -> Iterator[Problem]:
-    """Problems of how a scene chooses its time step."""
+    """Yield problems of the choice of the time step."""
     accuracy = scene.accuracy
-    given = [field for field in CHOICES if getattr(accuracy, field) is not None]
-    if len(given) > 1:
-        yield Problem(("accuracy",), f"{' and '.join(given)} given, expected at most one of {listed(list(CHOICES))}")
+    choices = [field for field in CHOICES if getattr(accuracy, field) is not None]
+    if len(choices) > 1:
+        yield Problem(("accuracy",), f"{' and '.join(choices)} given, expected at most one of {listed(list(CHOICES))}")
     if accuracy.error is not None and accuracy.integrator != "dormand_prince":
         yield Problem(
             ("accuracy", "error"),

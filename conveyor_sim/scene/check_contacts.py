@@ -1,4 +1,4 @@
-"""Contacts that can't be: laws that exclude each other, restitution that has no closed form, tables that fall."""
+"""Checks of contacts: laws that exclude each other, restitution without closed form, tables that fall."""
 
 from collections.abc import Iterable, Iterator
 
@@ -9,16 +9,16 @@ from conveyor_sim.scene.types import MOST
 from conveyor_sim.scene.words import listed, shown
 
 BASE_SPRINGS = ("leapfrog", "semi_implicit_euler", "velocity_verlet")
-"""Integrators with springs under the bottles: one evaluation a step, at places that bottles really come to."""
+"""Integrators with springs under the bottles: one evaluation per step, at positions that bottles reach."""
 STEPPED = ("leapfrog", "semi_implicit_euler", "velocity_verlet", "rk4")
-"""Integrators with tangential springs and implicit friction: a step that is begun is taken, and its length is known.
+"""Integrators with tangential springs and implicit friction: every step is accepted, and its length is known.
 
-dormand_prince gives steps up and chooses others; linearly_implicit solves for all velocities at once.
+dormand_prince rejects steps and chooses others; linearly_implicit solves for all velocities at once.
 """
 
 
 def contact_problems(scene: Scene) -> Iterator[Problem]:
-    """Problems of contacts, of rings that bottles stand on, and of how friction is solved."""
+    """Yield problems of contacts, of ring-shaped bases, and of the friction solver."""
     for index, contact in enumerate(scene.contacts):
         path: Path = ("contacts", index)
         yield from _elastic(path, contact)

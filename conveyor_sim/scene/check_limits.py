@@ -1,4 +1,4 @@
-"""What a schema can't see of limits: whether there is something for them to limit."""
+"""Checks of limits: each needs something that it can limit."""
 
 from collections.abc import Iterator
 
@@ -8,7 +8,7 @@ from conveyor_sim.scene.words import shown
 
 
 def limit_problems(scene: Scene) -> Iterator[Problem]:
-    """Heights of bottle types that come alone, and limits of what the scene does not have."""
+    """Yield problems of single heights of bottle types, and of limits of absent quantities."""
     tips = False
     for name, kind in scene.bottle_types.items():
         given = {"contact_height": kind.contact_height, "gravity_height": kind.gravity_height}

@@ -1,4 +1,4 @@
-"""Machines that take bottles: what can wait before them, whether a belt brings it, who else takes it."""
+"""Checks of machines that take bottles: room for waiting bottles, belts, and other machines at the same place."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -15,17 +15,17 @@ from conveyor_sim.scene.types import XY
 from conveyor_sim.scene.words import shown
 
 CELLS = 200
-"""Along each side of the box about a region: it is looked at in cells of that size."""
+"""Cells along each side of the bounding box of a region."""
 
 CORNERS = np.array([(-0.5, -0.5), (-0.5, 0.5), (0.5, -0.5), (0.5, 0.5)])
-"""Of a cell, from its centre, over its size."""
+"""Corners of a cell from its centre, over its size."""
 
 GIVES = 0.02
-"""Of a diameter: by so much bottles that are pressed may overlap."""
+"""Overlap of pressed bottles over their diameter."""
 
 
 def machine_problems(scene: Scene, rails: Sequence[RailShape]) -> Iterator[Problem]:
-    """Problems of the machines that take bottles. rails: those whose geometry can be."""
+    """Yield problems of machines that take bottles. rails: those with a valid geometry."""
     takers = {path: part for path, part in scene.exits() if isinstance(part, TakingPart)}
     for path, taker in takers.items():
         if why_not_simple(taker.region) is None:
@@ -36,7 +36,7 @@ def machine_problems(scene: Scene, rails: Sequence[RailShape]) -> Iterator[Probl
 
 
 def _fill_problems(path: Path, taker: TakingPart, scene: Scene, rails: Sequence[RailShape]) -> Iterator[Problem]:
-    """A minimum fill beyond what its region, or zone, can hold."""
+    """Yield a problem for a minimum fill beyond the capacity of the region or zone."""
     if taker.start_fill is None:
         return
     where, region = "its region", taker.region
@@ -53,7 +53,7 @@ def _fill_problems(path: Path, taker: TakingPart, scene: Scene, rails: Sequence[
 
 
 def _station_problems(path: Path, station: Station, scene: Scene) -> Iterator[Problem]:
-    """A station that takes what it gives, that takes from where others take, and that no belt brings bottles to."""
+    """Yield problems of a station that takes its own bottles, shares its region, or has no belt in it."""
     if inside(np.array([station.position]), station.region)[0]:
         text = f"{shown(station.position)} given, expected a place outside its region: it would take the bottle again"
         yield Problem((*path, "position"), text)
@@ -62,7 +62,7 @@ def _station_problems(path: Path, station: Station, scene: Scene) -> Iterator[Pr
         if other == path:
             before = False
             continue
-        # Of two stations the one that is listed first says it.
+        # Only the first of two stations reports the problem.
         if (before and isinstance(part, Station)) or why_not_simple(part.region) is not None:
             continue
         if inside(points, part.region).any() or inside(_centres(part.region)[0], station.region).any():
@@ -73,14 +73,14 @@ def _station_problems(path: Path, station: Station, scene: Scene) -> Iterator[Pr
 
 
 def most_axes(region: Sequence[XY], rails: Sequence[RailShape], radius: float) -> int:
-    """A number that the bottles of a radius (m) whose axes are in a region can't exceed, beside rails.
+    """Return an upper bound on the number of bottles of a radius (m) with axes in a region, beside rails.
 
     Axes keep a radius from rails. Of points at a distance d from each other, a convex area A of perimeter P holds at
     most 2 A / (sqrt(3) d^2) + P / (2 d) + 1 (Oler, 1961, Acta Math. 105).
     """
     points, cell = _centres(region)
     points = np.vstack([points, np.array(region)])  # a corner may be thinner than a cell
-    # A cell is taken for free if any point in it may be.
+    # A cell counts as free if any point in it may be free.
     far = radius * (1.0 - GIVES) - 0.5 * math.hypot(*cell)
     pieces: list[Piece] = [piece for rail in rails for piece in rail.pieces]
     for piece in pieces:
@@ -96,7 +96,7 @@ def most_axes(region: Sequence[XY], rails: Sequence[RailShape], radius: float) -
 
 
 def _centres(region: Sequence[XY]) -> tuple[Array, Array]:
-    """Centres (n, 2), m, of cells that cover a region, and how wide and high they are (m)."""
+    """Return centres (n, 2), m, of cells that cover a region, and their width and height (m)."""
     low, high = np.min(region, axis=0), np.max(region, axis=0)
     cell = (high - low) / CELLS
     x, y = (low[k] + cell[k] * (np.arange(CELLS) + 0.5) for k in (0, 1))
@@ -108,7 +108,7 @@ def _centres(region: Sequence[XY]) -> tuple[Array, Array]:
 
 
 def _convex_hull(points: Array) -> Array:
-    """Corners of the convex hull of points (n, 2), counter-clockwise (Andrew's monotone chain)."""
+    """Return the corners of the convex hull of points (n, 2), counter-clockwise (Andrew's monotone chain)."""
     ordered = np.unique(points, axis=0)
     # Of points of the same x only the lowest and the highest can be corners.
     _, first = np.unique(ordered[:, 0], return_index=True)

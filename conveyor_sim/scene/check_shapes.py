@@ -1,4 +1,4 @@
-"""Geometry that can't be, and bottles that are born where something else is."""
+"""Checks of geometry, and of bottles that start or enter where something else is."""
 
 import math
 from collections.abc import Iterator
@@ -31,12 +31,12 @@ _MOST_BOTTLES = 1_000_000  # of one grid
 
 
 def shape_problems(scene: Scene) -> list[Problem]:
-    """Problems of belts, rails, and of where bottles are born."""
+    """Return problems of belts, of rails, and of the places of new bottles."""
     belts = list(_curved_belts(scene))
     rails = list(_rails(scene))
     wrong = {problem.path[:2] for problem in belts + rails}
-    resting = _sound_rails(scene, wrong)
-    shapes = [*resting, *_sound_moving(scene)]
+    resting = _valid_rails(scene, wrong)
+    shapes = [*resting, *_valid_moving(scene)]
     groups = list(_groups(scene))
     return [
         *belts,
@@ -103,8 +103,8 @@ def _rails(scene: Scene) -> Iterator[Problem]:
                     )
 
 
-def _sound_rails(scene: Scene, wrong: set[Path]) -> list[RailShape]:
-    """The rails at rest whose geometry can be, to go on checking with."""
+def _valid_rails(scene: Scene, wrong: set[Path]) -> list[RailShape]:
+    """Return the rails at rest with a valid geometry."""
     shapes = [
         RailShape(name, rail.material, rail_pieces(rail))
         for name, rail in scene.rails.items()
@@ -116,15 +116,15 @@ def _sound_rails(scene: Scene, wrong: set[Path]) -> list[RailShape]:
     return shapes
 
 
-def _sound_moving(scene: Scene) -> list[RailShape]:
-    """Those that move, where they are at first."""
+def _valid_moving(scene: Scene) -> list[RailShape]:
+    """Return the moving rails with a valid geometry, at their initial positions."""
     moving = [moving_shape(path, mover) for path, mover in movers_of(scene) if not any(mover.shape_problems(path))]
     return [shape.shape(shape.first) for shape in moving]
 
 
 @dataclass(frozen=True)
 class _Group:
-    """The bottles of one entry of `bottles`."""
+    """Bottles of one entry of `bottles`."""
 
     path: Path
     points: Array
@@ -171,14 +171,14 @@ def _grid_problem(scene: Scene, index: int, entry: Grid) -> Problem | None:
 
 @dataclass(frozen=True)
 class _All:
-    """The points of many groups, one behind the other."""
+    """Points of many groups, one behind the other."""
 
     points: Array
     radius: Array
     owner: NDArray[np.intp]
-    """The group of each point."""
+    """Group of each point."""
     start: NDArray[np.intp]
-    """Where each group's points begin."""
+    """Index of the first point of each group."""
 
     @classmethod
     def of(cls, groups: list[_Group]) -> "_All":
@@ -205,7 +205,7 @@ def _infeeds_in_rails(scene: Scene, rails: list[RailShape]) -> Iterator[Problem]
     radii = {name: kind.radius for name, kind in scene.bottle_types.items()}
     feeds, groups = [], []
     for path, feed in scene.givers():
-        # Any bottle may come to what gives others' bottles back.
+        # Any bottle may come to a machine that returns bottles.
         radius = radii.get(feed.bottle) if isinstance(feed, Entry) else max(radii.values())
         if radius is not None:
             feeds.append(feed)
@@ -221,7 +221,7 @@ def _infeeds_in_rails(scene: Scene, rails: list[RailShape]) -> Iterator[Problem]
 
 
 def _inside(every: _All, rails: list[RailShape]) -> Iterator[tuple[int, RailShape, NDArray[np.intp], Array]]:
-    """By group, then by rail: the group, the rail, which of its points are in it, and how far from it each is (m)."""
+    """Yield group, rail, numbers of the group's points in the rail, and their distances (m), by group and rail."""
     if not len(every.points):
         return
     pieces = [piece for rail in rails for piece in rail.pieces]
@@ -235,7 +235,7 @@ def _inside(every: _All, rails: list[RailShape]) -> Iterator[tuple[int, RailShap
     point, rail, distance = (np.concatenate(columns) for columns in zip(*hits, strict=True))
     order = np.lexsort((distance, point, rail, every.owner[point]))
     point, rail, distance = point[order], rail[order], distance[order]
-    # Of a rail's pieces the nearest has the say.
+    # The nearest piece of a rail decides.
     first = np.append(True, (np.diff(point) != 0) | (np.diff(rail) != 0))[: len(point)]
     point, rail, distance = point[first], rail[first], distance[first]
     changes = np.flatnonzero((np.diff(every.owner[point]) != 0) | (np.diff(rail) != 0)) + 1
@@ -263,7 +263,7 @@ def _in_each_other(groups: list[_Group]) -> Iterator[Problem]:
 
 
 def _at(group: _Group, hit: NDArray[np.intp]) -> str:
-    """The first bottle that something is wrong with, and how many of its grid are like it."""
+    """Return the first wrong bottle in words, and the number of others in its grid."""
     point = _xy(group.points[hit[0]])
     if len(group.points) == 1:
         return point

@@ -1,4 +1,4 @@
-"""What a schema can't see: names that refer to nothing, pairs of materials left out, times that don't fit together."""
+"""Checks beyond the schema: unknown names, missing pairs of materials, times that don't fit together."""
 
 import math
 from collections.abc import Iterator
@@ -17,7 +17,7 @@ from conveyor_sim.scene.types import is_whole_nanoseconds, nanoseconds
 from conveyor_sim.scene.words import listed, shown, some_of
 
 MOVE_RAILS = ("leapfrog", "semi_implicit_euler", "velocity_verlet")
-"""Integrators that move rails: the others take forces within a step, or solve for what a rail at rest exerts."""
+"""Integrators with moving rails. The others evaluate forces within a step, or solve for forces of rails at rest."""
 
 
 def problems_of(scene: Scene) -> list[Problem]:
@@ -37,7 +37,7 @@ def problems_of(scene: Scene) -> list[Problem]:
         limit_problems,
         shape_problems,
     )
-    # Each check begins only once those before it are exhausted.
+    # Checks run in order: each begins when the previous one has ended.
     return list(islice(chain.from_iterable(check(scene) for check in checks), MOST_SAID + 1))
 
 
@@ -54,7 +54,7 @@ def _times(scene: Scene) -> Iterator[Problem]:
     tick_rate = 1e9 / scene.tick_ns
     for topic in scene.TOPICS:
         if topic == "counters" and topic not in scene.outputs.model_fields_set:
-            continue  # scenes of any tick were written before there was such a topic
+            continue  # older scenes have ticks that its default rate does not divide
         rate = getattr(scene.outputs, topic)
         ticks = tick_rate / rate if rate else 1.0
         if ticks < 0.5 or not math.isclose(ticks, round(ticks), rel_tol=1e-12):
@@ -79,7 +79,7 @@ def _repeated(scene: Scene) -> Iterator[Problem]:
 
 
 def _missing_contacts(scene: Scene) -> Iterator[Problem]:
-    """Every pair of materials that can touch needs a contact."""
+    """Yield a problem for each pair of materials that can touch without a contact."""
     known = {frozenset(contact.between) for contact in scene.contacts}
     for pair, what in _touching(scene):
         if pair not in known:
@@ -108,7 +108,7 @@ def _touching(scene: Scene) -> Iterator[tuple[frozenset[str], str]]:
 
 
 def _missing_base(scene: Scene) -> Iterator[Problem]:
-    """Every pair of bottle and belt materials needs a base friction."""
+    """Yield a problem for each pair of bottle and belt materials without base friction."""
     known = {base.between for base in scene.base}
     first: dict[str, str] = {}
     for name, belt in scene.belts.items():
@@ -129,7 +129,7 @@ def _bottle_materials(scene: Scene) -> list[str]:
 
 
 def _several_bottles(scene: Scene) -> bool:
-    """Whether two bottles can ever meet."""
+    """Return True if two bottles can meet."""
     return any(scene.entries()) or len(scene.bottles) > 1 or any(isinstance(entry, Grid) for entry in scene.bottles)
 
 

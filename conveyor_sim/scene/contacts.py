@@ -1,4 +1,4 @@
-"""What a scene says where two materials meet: contacts with their laws, and friction of bottles on belts."""
+"""Pairs of materials in a scene file: contacts with their laws, and friction of bottles on belts."""
 
 from collections.abc import Mapping
 from typing import Annotated, Literal, NamedTuple
@@ -9,18 +9,18 @@ from conveyor_sim.scene.part import Part
 from conveyor_sim.scene.types import Component, NotNegative, Pair, Positive, Restitution, Says, quantity
 
 ELASTIC = ("stiffness", "hertz_stiffness", "table")
-"""The fields of a contact that each choose an elastic law."""
+"""Fields of a contact that choose an elastic law."""
 
 
 class DampingChoice(NamedTuple):
-    """What goes with a law of damping."""
+    """Fields that are valid with a damping law."""
 
     restitution: tuple[str, ...]
-    """The elastic laws beside which it can be given by a restitution."""
+    """Elastic laws with which it can be given by a restitution."""
     at_speed: bool = False
-    """Whether that depends on the speed of impact, and so is given at one."""
+    """True if the restitution depends on the impact speed, so that a speed is needed."""
     elastic: tuple[str, ...] = ELASTIC
-    """The elastic laws beside which it can be at all."""
+    """Elastic laws with which it is valid."""
 
 
 DAMPING_CHOICES: Mapping[str, DampingChoice] = {
@@ -29,10 +29,10 @@ DAMPING_CHOICES: Mapping[str, DampingChoice] = {
     "onset": DampingChoice(ELASTIC, at_speed=True),
     "viscoelastic": DampingChoice(("hertz_stiffness",), at_speed=True, elastic=("hertz_stiffness",)),
 }
-"""The values of `Damping.law` but none; the laws themselves are in `engine/contact/laws/`."""
+"""Values of `Damping.law` except none. The laws are in `engine/contact/laws/`."""
 
 DampingEffect = Literal["paper_damping", "normal_damping", "tsuji_damping", "onset_damping", "viscoelastic_damping"]
-"""The effects that they are."""
+"""Names of the effects of these laws."""
 
 TablePoints = Annotated[
     tuple[tuple[Component, Component], ...],
@@ -70,7 +70,7 @@ class Damping(Part):
 
 
 class Tangential(Part):
-    """A spring along the contact that remembers (Cundall and Strack): bottles can rest on it, and arch.
+    """A tangential spring with memory (Cundall and Strack): bottles can rest on it, and form arches.
 
     One of `stiffness` and `stiffness_ratio` is needed.
     """
@@ -86,7 +86,7 @@ class Tangential(Part):
 
 
 class Contact(Part):
-    """What happens where two materials touch: bottle and bottle, or bottle and rail.
+    """Contact law of two materials: bottle and bottle, or bottle and rail.
 
     One of `stiffness`, `hertz_stiffness` and `table` is needed.
     """

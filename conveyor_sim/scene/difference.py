@@ -1,4 +1,4 @@
-"""Where two scenes differ."""
+"""Comparison of two scenes."""
 
 import json
 from collections.abc import Collection
@@ -10,9 +10,9 @@ _LONGEST = 60  # characters of a value that is shown
 
 
 def scene_difference(one: Scene, other: Scene, ignored: Collection[str] = ()) -> tuple[str, str, str] | None:
-    """The first field in which two scenes differ, such as `belts.main.speed`, and its value in each; None if none.
+    """Return the first field in which two scenes differ, such as `belts.main.speed`, and its values; None if none.
 
-    Texts and files that the scenes were read from do not count, nor do the `ignored` fields of a scene.
+    Texts and files that the scenes were read from are not compared, nor are the `ignored` fields of a scene.
     """
     return _difference("", _fields(one, ignored), _fields(other, ignored))
 
@@ -32,7 +32,7 @@ def _difference(path: str, one: Any, other: Any) -> tuple[str, str, str] | None:
             return (place, _words(one[key]), "nothing") if key in one else (place, "nothing", _words(other[key]))
         if (found := _difference(place, one[key], other[key])) is not None:
             return found
-    # Of overlapping belts the last listed carries.
+    # The order of belts counts: the last of overlapping belts carries.
     return None if list(one) == list(other) else (path, ", ".join(one), ", ".join(other))
 
 

@@ -1,4 +1,4 @@
-"""Drives of belts in a scene file: how a belt gets from one speed to another."""
+"""Drives of belts in a scene file."""
 
 from conveyor_sim.scene.part import Part
 from conveyor_sim.scene.types import Positive, quantity

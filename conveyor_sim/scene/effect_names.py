@@ -1,4 +1,4 @@
-"""The names of the effects, as a scene may write them; what each is stands in `conveyor_sim/physics/effects/`."""
+"""Names of the effects in a scene file. `conveyor_sim/physics/effects/` declares them."""
 
 from typing import Annotated, Literal, get_args
 

@@ -1,4 +1,4 @@
-"""How machines of a scene file fail, and when they are stopped by plan."""
+"""Failures and planned stops of machines in a scene file."""
 
 from collections.abc import Iterator
 from typing import Annotated, Literal
@@ -15,14 +15,14 @@ Shape = Annotated[float, Strict(), AllowInfNan(False), Ge(0.1), Le(100), Says("a
 
 
 class Exponential(Part):
-    """Times that are drawn from the seed, whatever has passed before."""
+    """Random times without memory, drawn from the seed."""
 
     kind: Literal["exponential"] = quantity("The kind of distribution.")
     mean: Positive = quantity("Mean time.", "s")
 
 
 class Weibull(Part):
-    """Times that are drawn from the seed: early failures (shape below 1) or wear (above)."""
+    """Random times drawn from the seed: early failures (shape below 1) or wear (above)."""
 
     kind: Literal["weibull"] = quantity("The kind of distribution.")
     mean: Positive = quantity("Mean time: the scale parameter times Gamma(1 + 1/shape).", "s")
@@ -30,7 +30,7 @@ class Weibull(Part):
 
 
 class FixedTimes(Part):
-    """Times that are given."""
+    """Listed times."""
 
     kind: Literal["list"] = quantity("The kind of distribution.")
     times: Annotated[tuple[Positive, ...], Len(1), Holds("a list of numbers greater than 0, at least one")] = quantity(
@@ -44,14 +44,14 @@ Times = Annotated[
     | Annotated[FixedTimes, Tag("(list)")],
     one_of({"exponential": "(exponential)", "weibull": "(weibull)", "list": "(list)"}),
 ]
-"""Where times come from."""
+"""Distributions of times."""
 
 
 _Times = Annotated[Times, Holds('a mapping with kind "exponential", "weibull" or "list"')]
 
 
 class Failure(Part):
-    """A way in which a machine fails, again and again."""
+    """A recurring failure of a machine."""
 
     between: _Times = quantity("From the end of one repair, or the start of the run, to the next failure.")
     repair: _Times = quantity("How long it is down.")
@@ -62,7 +62,7 @@ class Failure(Part):
 
 
 class PlannedStop(Part):
-    """A stop by plan: a break, a changeover, cleaning. The machine stops, and starts again by itself."""
+    """A planned stop: a break, a changeover, cleaning. The machine stops, and starts again automatically."""
 
     start: NotNegative = quantity("When the first one begins.", "s")
     duration: Positive = quantity("How long it lasts.", "s")
@@ -71,7 +71,7 @@ class PlannedStop(Part):
     )
 
     def problems(self, path: Path) -> Iterator[Problem]:
-        """One that begins before the one before it has ended."""
+        """Yield a problem for a planned stop that begins before the previous one has ended."""
         if self.every is not None and self.every <= self.duration:
             text = f"{shown(self.every)} given, expected more than the duration, {self.duration:g} (s)"
             yield Problem((*path, "every"), text)

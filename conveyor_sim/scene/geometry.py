@@ -1,4 +1,4 @@
-"""Shapes of a scene: belts, rails and the bottles that are there at the start. Pure functions; m and rad."""
+"""Shapes of a scene: belts, rails and initial bottles. Pure functions; m and rad."""
 
 import math
 from collections.abc import Iterator
@@ -47,7 +47,7 @@ class BeltShape:
         return 1.0 if self.kind == "straight" else (self.inner_radius + self.width) / self.centre_radius
 
     def outline(self, n: int = 64) -> Array:
-        """Corners of the area, (k, 2), counter-clockwise, first not repeated; an arc has n points.
+        """Return the corners of the area, (k, 2), counter-clockwise, first not repeated; an arc has n points.
 
         A full ring is cut open along its start angle; one without a hole is a circle.
         """
@@ -59,13 +59,13 @@ class BeltShape:
         return outer[:-1] if is_full_turn(self.span) else np.vstack([outer, [self.centre]])
 
     def centre_line(self, n: int = 64) -> Array:
-        """Points along the middle, (n, 2), in the direction of positive speed."""
+        """Return points along the middle, (n, 2), in the direction of positive speed."""
         if self.kind == "straight":
             return self._point(np.linspace(0.0, self.length, n), np.full(n, self.width / 2))
         return arc_points(self.centre, self.centre_radius, self.start_angle, self.span, n)
 
     def _point(self, xi: list[float] | Array, eta: list[float] | Array) -> Array:
-        """Global coordinates (k, 2) of belt coordinates (11)-(13)."""
+        """Return global coordinates (k, 2) of belt coordinates (11)-(13)."""
         cos, sin = math.cos(self.angle), math.sin(self.angle)
         xi, eta = np.asarray(xi), np.asarray(eta)
         return np.column_stack([self.corner[0] + cos * xi - sin * eta, self.corner[1] + sin * xi + cos * eta])
@@ -84,7 +84,7 @@ class SegmentPiece:
         return self.p1, self.p2
 
     def points(self, n: int = 64) -> Array:
-        """The end points, (2, 2)."""
+        """Return the end points, (2, 2)."""
         return np.array([self.p1, self.p2])
 
     @property
@@ -94,7 +94,7 @@ class SegmentPiece:
         return (min(x1, x2), min(y1, y2)), (max(x1, x2), max(y1, y2))
 
     def distance(self, points: Array) -> Array:
-        """Distance (k,) of points (k, 2) from the piece, its end points included."""
+        """Return the distance (k,) of points (k, 2) from the piece, its end points included."""
         start = np.array(self.p1)
         along = np.array(self.p2) - start
         share = np.clip((points - start) @ along / (along @ along), 0.0, 1.0)
@@ -117,7 +117,7 @@ class ArcPiece:
         return (float(first[0]), float(first[1])), (float(last[0]), float(last[1]))
 
     def points(self, n: int = 64) -> Array:
-        """Points along the arc, (n, 2)."""
+        """Return points along the arc, (n, 2)."""
         return arc_points(self.centre, self.radius, self.start_angle, self.span, n)
 
     @property
@@ -127,7 +127,7 @@ class ArcPiece:
         return (x - radius, y - radius), (x + radius, y + radius)
 
     def distance(self, points: Array) -> Array:
-        """Distance (k,) of points (k, 2) from the arc, its end points included."""
+        """Return the distance (k,) of points (k, 2) from the arc, its end points included."""
         seen = points - np.array(self.centre)
         angle = np.mod(np.arctan2(seen[:, 1], seen[:, 0]) - self.start_angle, 2 * math.pi)
         to_circle = np.abs(_length(seen) - self.radius)
@@ -147,26 +147,27 @@ class RailShape:
     pieces: tuple[Piece, ...]
 
     def outline(self, n: int = 64) -> Array:
-        """Points along the rail, (k, 2); an arc has n points."""
+        """Return points along the rail, (k, 2); an arc has n points."""
         return np.vstack([self.pieces[0].points(n), *(piece.points(n)[1:] for piece in self.pieces[1:])])
 
 
 def arc_points(centre: XY, radius: float, start_angle: float, span: float, n: int) -> Array:
-    """Points of an arc, (n, 2), counter-clockwise (21)."""
+    """Return points of an arc, (n, 2), counter-clockwise (21)."""
     angle = start_angle + np.linspace(0.0, span, n)
     return np.column_stack([centre[0] + radius * np.cos(angle), centre[1] + radius * np.sin(angle)])
 
 
 def is_full_turn(span: float) -> bool:
-    """Whether a span closes on itself."""
+    """Return True if a span is a full turn."""
     return span >= 2 * math.pi - 1e-12
 
 
 def arc_centre(p1: XY, p2: XY, radius: float, side: str) -> XY:
-    """Centre of the circle of a radius (m) through two points, on the "left" or "right" of the way from p1 to p2.
+    """Return the centre of the circle of a radius (m) through two points, "left" or "right" of the line from p1 to p2.
 
-    From the chord's midpoint and perpendicular, so that horizontal chords are nothing special (the paper's (16)-(20)
-    divide by their height). ValueError if the radius is shorter than half the chord, or the points coincide.
+    It follows from the chord's midpoint and perpendicular, so that horizontal chords need no special case (the paper's
+    (16)-(20) divide by their height). Raise ValueError if the radius is shorter than half the chord, or the points
+    coincide.
     """
     chord_x, chord_y = p2[0] - p1[0], p2[1] - p1[1]
     chord = math.hypot(chord_x, chord_y)
@@ -180,9 +181,9 @@ def arc_centre(p1: XY, p2: XY, radius: float, side: str) -> XY:
 
 
 def curved_shape(name: str, belt: CurvedBelt) -> BeltShape:
-    """A curved belt's area; from two points on the inner race the shorter arc between them, which ends on both.
+    """Return the area of a curved belt. Two points on the inner race mean the shorter arc between them.
 
-    ValueError as in `arc_centre`.
+    Raise ValueError as in `arc_centre`.
     """
     if belt.centre is not None and belt.start_angle is not None and belt.span is not None:
         centre, start, span = belt.centre, belt.start_angle, belt.span
@@ -199,19 +200,19 @@ def curved_shape(name: str, belt: CurvedBelt) -> BeltShape:
 
 
 def belt_shape(name: str, belt: Belt) -> BeltShape:
-    """A belt's area. ValueError as in `curved_shape`."""
+    """Return the area of a belt. Raise ValueError as in `curved_shape`."""
     if isinstance(belt, CurvedBelt):
         return curved_shape(name, belt)
     return BeltShape(name, "straight", belt.width, corner=belt.start, angle=belt.angle, length=belt.length)
 
 
 def belt_shapes(scene: Scene) -> list[BeltShape]:
-    """The areas of the belts, in the scene's order."""
+    """Return the areas of the belts, in the scene's order."""
     return [belt_shape(name, belt) for name, belt in scene.belts.items()]
 
 
 def rail_pieces(rail: Rail) -> tuple[Piece, ...]:
-    """The pieces of a rail."""
+    """Return the pieces of a rail."""
     if isinstance(rail, ArcRail):
         return (ArcPiece(rail.centre, rail.radius, rail.start_angle, rail.span),)
     if not isinstance(rail, PolylineRail):
@@ -221,18 +222,18 @@ def rail_pieces(rail: Rail) -> tuple[Piece, ...]:
 
 
 def rails_of_curved(shape: BeltShape, belt: CurvedBelt) -> Iterator[RailShape]:
-    """The rails along a curved belt's arcs that it asks for: `<belt>_inner`, `<belt>_outer`."""
-    for side, wanted, radius in (
+    """Yield the rails along the arcs of a curved belt: `<belt>_inner`, `<belt>_outer`."""
+    for side, enabled, radius in (
         ("inner", belt.rails.inner, shape.inner_radius),
         ("outer", belt.rails.outer, shape.inner_radius + shape.width),
     ):
-        if wanted and belt.rails.material is not None:
+        if enabled and belt.rails.material is not None:
             piece = ArcPiece(shape.centre, radius, shape.start_angle, shape.span)
             yield RailShape(f"{shape.name}_{side}", belt.rails.material, (piece,))
 
 
 def rail_shapes(scene: Scene) -> list[RailShape]:
-    """The scene's rails in its order, then those of its curved belts; a rail's index everywhere is its place here."""
+    """Return the scene's rails in its order, then those of its curved belts. The index is the number of a rail."""
     shapes = [RailShape(name, rail.material, rail_pieces(rail)) for name, rail in scene.rails.items()]
     for name, belt in scene.belts.items():
         if isinstance(belt, CurvedBelt):
@@ -241,7 +242,7 @@ def rail_shapes(scene: Scene) -> list[RailShape]:
 
 
 def grid_points(grid: GridOfBottles) -> Array:
-    """Positions (rows x columns, 2) of a grid's bottles, row by row."""
+    """Return the positions (rows x columns, 2) of a grid's bottles, row by row."""
     row, column = np.divmod(np.arange(grid.rows * grid.columns), grid.columns)
     hexagonal = grid.pattern == "hexagonal"
     along = grid.pitch * (column + (row % 2) / 2 if hexagonal else column)
@@ -251,7 +252,7 @@ def grid_points(grid: GridOfBottles) -> Array:
 
 
 def initial_bottles(scene: Scene) -> list[InitialBottle]:
-    """Bottles at the start, in order, grids row by row: (type, x, y, theta, vx, vy, omega)."""
+    """Return the initial bottles in order, grids row by row: (type, x, y, theta, vx, vy, omega)."""
     bottles: list[InitialBottle] = []
     for entry in scene.bottles:
         if isinstance(entry, Grid):

@@ -1,11 +1,11 @@
-"""Limits of a scene file: what goes beyond them is an event (topic `damage_events`); nothing else happens."""
+"""Limits of loads in a scene file. A load beyond a limit is an event (topic `damage_events`)."""
 
 from conveyor_sim.scene.part import Part
 from conveyor_sim.scene.types import Positive, quantity
 
 
 class Limits(Part):
-    """What bottles should bear at most. Each that is given has its effect looked at in every step."""
+    """Largest loads of bottles. The effect of each given limit is evaluated in every step."""
 
     scuffing_work: Positive | None = quantity(
         "Sliding work at the wall of a bottle since it entered.", "J", default=None

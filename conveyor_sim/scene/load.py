@@ -1,4 +1,4 @@
-"""Reads a scene: YAML and overrides in, a validated Scene out, or an error that names file, line, field and value."""
+"""Reading a scene: YAML and overrides to a validated Scene, or an error with file, line, field and value."""
 
 import io
 from collections.abc import Mapping
@@ -20,18 +20,18 @@ from conveyor_sim.scene.tables import Beside, with_tables
 from conveyor_sim.scene.yaml_lines import LONGEST_TEXT, Document
 from conveyor_sim.support.files import FileError, in_mb, read_file
 
-_KEPT_TEXT = 200_000
-"""Letters of a text that is kept once it was read: a run asks for its scene some ten times, in 3 ms each."""
-_MOST_PROBLEMS = 50  # listed; more would scroll the first ones away
+_CACHED_TEXT = 200_000
+"""Largest cached text, characters. A run reads its scene some ten times, in 3 ms each."""
+_MOST_PROBLEMS = 50  # listed; more would scroll the first off the screen
 
 
 def load_scene(
     path: str | PathLike[str], overrides: Mapping[str, Any] | None = None, outside_tables: bool = False
 ) -> Scene:
-    """Read a scene file. `overrides` is laid over it before it is validated: mappings merge, all else replaces.
+    """Read a scene file. `overrides` change it before it is validated: mappings merge, other values replace.
 
-    outside_tables: whether tables that the scene names by path may lie outside its own folder.
-    Raises SceneError with one line for each problem of the file.
+    outside_tables: True allows tables outside the scene's folder.
+    Raise SceneError with one line for each problem of the file.
     """
     file = FilePath(path)
     try:
@@ -50,7 +50,7 @@ def parse_scene(
     overrides: Mapping[str, Any] | None = None,
     beside: Beside | None = None,
 ) -> Scene:
-    """Read a scene from YAML text; `name` stands for the file in errors. beside: where files that it names may lie.
+    """Read a scene from YAML text; `name` stands for the file in errors. beside: place of the files that it names.
 
     See `load_scene`.
     """
@@ -66,20 +66,20 @@ def parse_scene(
     problems = problems_of(scene)
     if problems:
         raise refused(problems, document, name, changes)
-    # A recording keeps the text and the overrides: with the tables among them, it needs no file.
+    # Recordings store the text and the overrides. With the tables among them, they need no file.
     changes_text = _yaml_text(changes)
-    kept_text = changes_text if data is laid_over else _yaml_text({**changes, "contacts": data["contacts"]})
-    if len(kept_text) > LONGEST_TEXT:
+    stored_text = changes_text if data is laid_over else _yaml_text({**changes, "contacts": data["contacts"]})
+    if len(stored_text) > LONGEST_TEXT:
         most = in_mb(LONGEST_TEXT)
-        raise SceneError(f"{name}: tables and overrides of {in_mb(len(kept_text))} as YAML, expected at most {most}")
-    scene._source = Origin(text, name, changes_text, kept_text)
+        raise SceneError(f"{name}: tables and overrides of {in_mb(len(stored_text))} as YAML, expected at most {most}")
+    scene._source = Origin(text, name, changes_text, stored_text)
     return scene
 
 
 def _document(text: str, name: str) -> Document:
-    """Read YAML, or what was read of the same text before: not to be changed. Raises SceneError."""
-    if len(text) <= _KEPT_TEXT:
-        with suppress(SceneError):  # which is to have the name
+    """Read YAML, or return the cached Document of the text, which must not be changed. Raise SceneError."""
+    if len(text) <= _CACHED_TEXT:
+        with suppress(SceneError):  # raised again below, with the name
             return _read(text)
     return Document(text, name)
 
@@ -90,7 +90,7 @@ def _read(text: str) -> Document:
 
 
 def parse_overrides(text: str) -> dict[str, Any]:
-    """Overrides from the YAML that `Scene.overrides_text` holds ("" is none). SceneError if it is not a mapping."""
+    """Return overrides from the YAML of `Scene.overrides_text` ("": none). Raise SceneError if it is not a mapping."""
     if not text.strip():
         return {}
     data = Document(text, "overrides").data
@@ -100,7 +100,7 @@ def parse_overrides(text: str) -> dict[str, Any]:
 
 
 def plain(value: Any, name: str) -> Any:
-    """Overrides as plain data. SceneError if there is something in them that YAML has no form for."""
+    """Return overrides as plain data. Raise SceneError for values that YAML can't represent."""
     if isinstance(value, Mapping):
         return {str(key): plain(item, name) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
@@ -114,7 +114,7 @@ def plain(value: Any, name: str) -> Any:
 
 
 def merged(data: Any, changes: Any) -> Any:
-    """Changes laid over plain data: mappings merge, all else replaces."""
+    """Return plain data with changes: mappings merge, other values replace."""
     if not (isinstance(data, dict) and isinstance(changes, dict)):
         return changes
     return {**data, **{key: merged(data.get(key), change) for key, change in changes.items()}}
@@ -140,7 +140,7 @@ def refused(problems: list[Problem], document: Document, name: str, changes: Any
 
 
 def holds(changes: Any, path: Path) -> bool:
-    """Whether the value at a path, or one above it, comes from the overrides."""
+    """Return True if the value at a path, or one above it, comes from the overrides."""
     for part in path:
         if not isinstance(changes, dict):
             return True

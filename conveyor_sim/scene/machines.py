@@ -1,4 +1,4 @@
-"""The kinds of machine in a scene file."""
+"""Kinds of machine in a scene file."""
 
 from typing import Annotated
 

@@ -1,4 +1,4 @@
-"""What is drawn of the devices of a scene, as their parts say."""
+"""Marks of a scene's devices in pictures."""
 
 from typing import get_args
 
@@ -6,10 +6,10 @@ from conveyor_sim.scene.parts.device_part import Look, Mark
 from conveyor_sim.scene.schema import Scene
 
 LOOKS: tuple[Look, ...] = get_args(Look)
-"""In the order in which they are listed."""
+"""All looks in listing order."""
 
 
 def marks_of(scene: Scene) -> list[Mark]:
-    """Of every device that is drawn by a mark, by look, then in listing order."""
+    """Return the marks of all devices, by look, then in listing order."""
     found = (mark for (_, name), part in scene.devices() for mark in part.marks(name))
     return sorted(found, key=lambda mark: LOOKS.index(mark.look))

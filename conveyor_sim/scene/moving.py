@@ -1,4 +1,4 @@
-"""Shapes of the rails that move: where they are at a position of their course. Pure functions; m and rad."""
+"""Shapes of moving rails at a position of their stroke. Pure functions; m and rad."""
 
 import math
 from collections.abc import Iterator
@@ -18,7 +18,7 @@ class MovingShape:
     """A straight rail from `start` to `end` at home, which slides along a direction or swings about its start."""
 
     name: str
-    """Such as `gates/exit`."""
+    """Name such as `gates/exit`."""
     material: str
     start: XY
     end: XY
@@ -27,7 +27,7 @@ class MovingShape:
     turning: float
     """1 swings counter-clockwise, -1 clockwise; 0 slides."""
     stroke: float
-    """m, or rad: its position goes from 0, at home, to this."""
+    """Largest position, m or rad; 0 is home."""
     max_speed: float
     """m/s, or rad/s."""
     acceleration: float
@@ -35,7 +35,7 @@ class MovingShape:
     first: float
     """Position at the beginning of the run."""
     limit: float | None
-    """N, or N m: the most that its drive can exert; None: whatever it takes."""
+    """Largest force or torque of its drive, N or N m; None without limit."""
     mass: float
     """kg, or kg m^2 about its start."""
 
@@ -46,21 +46,21 @@ class MovingShape:
 
     @property
     def fastest_point(self) -> float:
-        """m that its fastest point goes when its position changes by 1."""
+        """Path of its fastest point per change of position."""
         return self.length if self.turning else 1.0
 
     def at(self, position: float) -> SegmentPiece:
-        """The rail at a position (m or rad)."""
+        """Return the rail at a position (m or rad)."""
         (x, y), (dx, dy) = self.start, (self.end[0] - self.start[0], self.end[1] - self.start[1])
         x, y = x + self.along[0] * position, y + self.along[1] * position
         cos, sin = math.cos(self.turning * position), math.sin(self.turning * position)
         return SegmentPiece((x, y), (x + dx * cos - dy * sin, y + dx * sin + dy * cos))
 
     def sweep(self) -> Array:
-        """Box of all places that it can be at, (4,): least x and y, greatest x and y."""
+        """Return the box of all its places, (4,): least x and y, greatest x and y."""
         places = [0.0, self.stroke]
         if self.turning:
-            # Its end is farthest along an axis where it crosses that.
+            # Its end is farthest along an axis where it crosses the axis.
             home = math.atan2(self.end[1] - self.start[1], self.end[0] - self.start[0])
             crossings = (self.turning * (quarter * math.pi / 2.0 - home) for quarter in range(-12, 13))
             places += [place for place in crossings if 0.0 < place < self.stroke]
@@ -68,19 +68,19 @@ class MovingShape:
         return np.concatenate([points.min(axis=0), points.max(axis=0)])
 
     def shape(self, position: float) -> RailShape:
-        """The rail at a position (m or rad), as a rail like others."""
+        """Return the rail at a position (m or rad) as a RailShape."""
         return RailShape(self.name, self.material, (self.at(position),))
 
 
 def movers_of(scene: Scene) -> Iterator[tuple[Path, Mover]]:
-    """Every gate, pusher and diverter with its path, in the order of the numbers of their rails."""
+    """Yield every gate, pusher and diverter with its path, in the order of their rails' numbers."""
     for field, movers in (("gates", scene.gates), ("pushers", scene.pushers), ("diverters", scene.diverters)):
         for name, mover in movers.items():
             yield (field, name), mover
 
 
 def moving_shape(path: Path, mover: Mover) -> MovingShape:
-    """The shape of one mover."""
+    """Return the shape of a mover."""
     if isinstance(mover, (SwingingGate, Diverter)):
         along, turning, stroke = (0.0, 0.0), math.copysign(1.0, mover.angle), abs(mover.angle)
     else:
@@ -103,5 +103,5 @@ def moving_shape(path: Path, mover: Mover) -> MovingShape:
 
 
 def moving_shapes(scene: Scene) -> list[MovingShape]:
-    """The rails that move; their numbers follow those of the rails that don't."""
+    """Return the moving rails. Their numbers follow those of the rails at rest."""
     return [moving_shape(path, mover) for path, mover in movers_of(scene)]

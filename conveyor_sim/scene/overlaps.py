@@ -1,4 +1,4 @@
-"""Which of many circles overlap, and which of many points are near rails: by cells and boxes, vectorised."""
+"""Search for overlapping circles, and for points near rails: by cells and boxes, vectorised."""
 
 from collections.abc import Iterator, Sequence
 
@@ -55,9 +55,9 @@ def overlapping(
 def near_pieces(
     points: NDArray[np.float64], pieces: Sequence[Piece], within: float
 ) -> Iterator[tuple[int, NDArray[np.intp], NDArray[np.float64]]]:
-    """For each piece that points (n, 2) may be near: its index, their indices in order, and their distances (m).
+    """Yield pieces that may be near points (n, 2): index of the piece, indices of points in order, distances (m).
 
-    All that are `within` (m) of a piece are among them; others may be.
+    All points `within` (m) of a piece are included; others may be.
     """
     if not len(points) or not pieces:
         return
@@ -86,7 +86,7 @@ def _parts(counts: NDArray[np.int64]) -> Iterator[tuple[int, int]]:
 
 
 def _ranges(begin: NDArray[np.int64], end: NDArray[np.int64]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """All (k, place) with begin[k] <= place < end[k]."""
+    """Return all (k, place) with begin[k] <= place < end[k]."""
     count = end - begin
     one = np.repeat(np.arange(len(begin)), count)
     first = np.repeat(np.cumsum(count) - count, count)

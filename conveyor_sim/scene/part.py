@@ -1,4 +1,4 @@
-"""What every mapping of a scene file is built on: frozen, no unknown fields, its errors in plain words."""
+"""Base class of all mappings in a scene file."""
 
 from collections.abc import Mapping
 from typing import Any, TypeVar
@@ -53,7 +53,7 @@ def _untagged(path: Path) -> Path:
 
 
 def part_from(kind: type[P], data: object) -> P | str:
-    """A part from plain data that is not of a scene file, or the first thing that is wrong with it, in words."""
+    """Return a part from plain data that is not from a scene file, or its first problem in words."""
     try:
         return kind.model_validate(data)
     except ValidationError as error:
@@ -63,7 +63,7 @@ def part_from(kind: type[P], data: object) -> P | str:
 
 
 def one_of(kinds: dict[str, str]) -> Discriminator:
-    """Chooses a model by `kind`; tags are in brackets, so that they can't be taken for names of a scene."""
+    """Return the choice of a model by `kind`. Tags have brackets, so that they differ from all names of a scene."""
 
     def tag(data: Any) -> str | None:
         kind = data.get("kind") if isinstance(data, Mapping) else getattr(data, "kind", None)

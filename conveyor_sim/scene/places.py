@@ -1,4 +1,4 @@
-"""Where in its file a field of a scene stands."""
+"""Place of a scene's field in its file."""
 
 from conveyor_sim.scene.load import holds, parse_overrides
 from conveyor_sim.scene.problems import Path
@@ -7,7 +7,7 @@ from conveyor_sim.scene.yaml_lines import Document
 
 
 class Places:
-    """Answers for one scene; reads its text once more, as scenes do not keep the lines."""
+    """Places of one scene. Its text is read again, because scenes do not store lines."""
 
     def __init__(self, scene: Scene) -> None:
         self._name = scene.source_name
@@ -15,19 +15,19 @@ class Places:
         self._given = parse_overrides(scene.given_overrides)
 
     def line_of(self, path: Path) -> int | None:
-        """Line (from 1) of a field, or of the nearest one above it; None where it was overridden or left out."""
+        """Return the line (from 1) of a field, or of the nearest one above; None if it was overridden or left out."""
         if holds(self._given, path) or not self._written(path):
             return None
         return self._document.line_of(path)
 
     def of(self, path: Path) -> str:
-        """`plant.yaml:7`, or `plant.yaml (override)`."""
+        """Return the place such as `plant.yaml:7`, or `plant.yaml (override)`."""
         if holds(self._given, path):
             return f"{self._name} (override)"
         return f"{self._name}:{self._document.line_of(path)}"
 
     def unwritten(self, path: Path) -> str:
-        """Where a field without a line comes from: `override` or `default`."""
+        """Return the origin of a field without a line: `override` or `default`."""
         return "override" if holds(self._given, path) else "default"
 
     def _written(self, path: Path) -> bool:

@@ -1,4 +1,4 @@
-"""Polygons: which points are in them, and whether one is simple: no side without length, no two sides that meet."""
+"""Polygons: points inside, and simplicity: no side without length, no two sides that meet."""
 
 import math
 from collections.abc import Sequence
@@ -10,7 +10,7 @@ from conveyor_sim.scene.types import TOUCH, XY
 
 
 def inside(points: NDArray[np.float64], corners: Sequence[XY] | NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Whether points (k, 2) are in a polygon (even-odd rule); (k,)."""
+    """Return True for points (k, 2) in a polygon (even-odd rule), (k,)."""
     x, y = points.T
     found = np.zeros(len(points), dtype=bool)
     ends = np.asarray(corners, dtype=np.float64)
@@ -21,7 +21,7 @@ def inside(points: NDArray[np.float64], corners: Sequence[XY] | NDArray[np.float
 
 
 def why_not_simple(corners: tuple[XY, ...]) -> str | None:
-    """Why a polygon is not simple, or None if it is."""
+    """Return why a polygon is not simple, or None if it is."""
     sides = list(zip(corners, (*corners[1:], corners[0]), strict=True))
     for index, (start, end) in enumerate(sides):
         if math.dist(start, end) <= TOUCH:
@@ -35,7 +35,7 @@ def why_not_simple(corners: tuple[XY, ...]) -> str | None:
 
 
 def _fold_back(one: tuple[XY, XY], other: tuple[XY, XY]) -> bool:
-    """Whether two sides with a common corner lie on each other."""
+    """Return True if two sides with a common corner lie on each other."""
     common, first = (one[1], one[0]) if one[1] == other[0] else (one[0], one[1])
     second = other[1] if common == other[0] else other[0]
     away = (first[0] - common[0]) * (second[0] - common[0]) + (first[1] - common[1]) * (second[1] - common[1])
@@ -51,7 +51,7 @@ def _touch(one: tuple[XY, XY], other: tuple[XY, XY]) -> bool:
 
 
 def _turn(a: XY, b: XY, c: XY) -> int:
-    """Sign of the turn a to b to c; 0 if c is within touching distance of the line."""
+    """Return the sign of the turn a to b to c; 0 if c is within touching distance of the line."""
     cross = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
     return 0 if abs(cross) <= TOUCH * math.dist(a, b) else (1 if cross > 0 else -1)
 

@@ -1,4 +1,4 @@
-"""A problem of a scene: where it is, and what is wrong."""
+"""A problem of a scene: path and words."""
 
 from dataclasses import dataclass
 
@@ -9,14 +9,14 @@ Path = tuple[str | int, ...]
 
 @dataclass(frozen=True)
 class Problem:
-    """One thing that is wrong at a path of the scene, in words that follow the path."""
+    """A problem at a path of the scene, in words that follow the path."""
 
     path: Path
     text: str
 
 
 def dotted(path: Path) -> str:
-    """A path as users write it: `bottles[3].position`; names that are too long are cut."""
+    """Return a path as users write it: `bottles[3].position`. Long names are cut."""
     text = ""
     for part in path:
         text += f"[{part}]" if isinstance(part, int) else f".{printable(part)}"

@@ -1,4 +1,4 @@
-"""The reference of a scene file, from the schema: `python -m conveyor_sim.scene.reference > docs/scene.md`."""
+"""Reference of a scene file, from the schema: `python -m conveyor_sim.scene.reference > docs/scene.md`."""
 
 from collections.abc import Iterator
 from inspect import getdoc
@@ -31,7 +31,7 @@ problem is one line that names the file, the line, the field, the value and what
   bottle and belt one in `base`.
 - Where a rail ends on another (within 1e-6 m), both are one surface. Rails of curved belts follow those under
   `rails` in the order of indices, then come gates, pushers and diverters.
-- Gates, pushers and diverters are straight rails that move on command, each a surface of its own: where one ends on
+- Gates, pushers and diverters are straight rails that move on command, each a separate surface: where one ends on
   another rail, a bottle that slides past touches both. They take `leapfrog`, `semi_implicit_euler` or
   `velocity_verlet`.
 - No bottle may be born inside a rail or another bottle; touching is allowed.
@@ -54,7 +54,7 @@ WITHIN: dict[str, list[tuple[str, type[BaseModel]]]] = {
     "outputs": [("`outputs`", schema.Outputs)],
     "limits": [("`limits`", limits.Limits)],
 }
-"""Sections of fields that are no mappings of names to parts, by field."""
+"""Sections of fields other than mappings of names to parts, by field."""
 
 BEHIND: dict[str, list[tuple[str, type[BaseModel]]]] = {
     "belts": [("`rails` of a curved belt", belts.BeltRails), ("`drive` of a belt", drives.Drive)],
@@ -73,7 +73,7 @@ BEHIND: dict[str, list[tuple[str, type[BaseModel]]]] = {
 
 
 def sections() -> Iterator[tuple[str, type[BaseModel]]]:
-    """Title and model of each section, in the order of the fields of a scene."""
+    """Yield title and model of each section, in the order of the fields of a scene."""
     yield "The whole file", schema.Scene
     for name, field in schema.Scene.model_fields.items():
         yield from WITHIN.get(name, [])
@@ -85,7 +85,7 @@ def sections() -> Iterator[tuple[str, type[BaseModel]]]:
 
 
 def _models(annotation: Any) -> Iterator[type[BaseModel]]:
-    """The parts that a mapping of names may hold; none for what is no such mapping."""
+    """Yield the parts that a mapping of names may hold; none for other types."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         yield annotation
     elif get_origin(annotation) is Annotated:
@@ -98,7 +98,7 @@ def _models(annotation: Any) -> Iterator[type[BaseModel]]:
 
 
 def reference() -> str:
-    """The text of docs/scene.md."""
+    """Return the text of docs/scene.md."""
     return "\n".join([INTRODUCTION, *(_section(title, model) for title, model in sections())])
 
 

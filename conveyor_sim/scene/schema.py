@@ -1,4 +1,4 @@
-"""The scene: everything that a user writes about a line, typed. SI units, angles in rad.
+"""The scene: a user's description of a line, typed. SI units, angles in rad.
 
 A scene is read with `load_scene`; `docs/scene.md` is generated from the fields below.
 """
@@ -65,7 +65,7 @@ class BottleType(Part):
     )
     base_radius: Positive | None = quantity(
         "Radius of the ring that the bottle stands on: sliding and spinning on it are one motion, solved explicitly "
-        "whatever the friction_solver, with a curve of its own. Left out: it stands on a point, as in the paper, "
+        "with every friction_solver, with a special curve. Left out: it stands on a point, as in the paper, "
         "beside types with a ring as well.",
         "m",
         default=None,
@@ -79,7 +79,7 @@ class BottleType(Part):
 
 
 class Floor(Part):
-    """What a bottle stands on where there is no belt: a plane at rest."""
+    """Support of bottles without a belt: a plane at rest."""
 
     friction: NotNegative | None = quantity(
         "Coefficient of friction of a bottle's base on the floor. "
@@ -91,7 +91,7 @@ class Floor(Part):
 
 
 class Single(Part):
-    """One bottle that is there at the start."""
+    """One bottle at the start."""
 
     type: Name = quantity("Bottle type.")
     position: Point = quantity("Where its axis is.", "m")
@@ -116,13 +116,13 @@ class GridOfBottles(Part):
 
 
 class Grid(Part):
-    """An entry of `bottles` that stands for many."""
+    """An entry of `bottles` for a grid of bottles."""
 
     grid: GridOfBottles = quantity("The bottles of the grid.")
 
 
 class Outputs(Part):
-    """How often each topic is published and recorded, in simulated time; 0 is never, and each divides the tick rate."""
+    """Rate of each topic in simulated time, published and recorded; 0 is never. Each divides the tick rate."""
 
     bottles: NotNegative = quantity("State of every bottle.", "Hz", default=50.0)
     poses: NotNegative = quantity("Poses of the bottles, and their markers.", "Hz", default=50.0)
@@ -144,16 +144,16 @@ class Outputs(Part):
 
 @dataclass(frozen=True)
 class Origin:
-    """Where a scene was read from; scenes of the same content are equal wherever they come from."""
+    """Source of a scene. Scenes with the same content are equal regardless of their source."""
 
     text: str = field(default="", compare=False)
     name: str = field(default="", compare=False)
     given: str = field(default="", compare=False)
-    """YAML of what was laid over the text."""
+    """Overrides of the text, as YAML."""
     overrides: str = field(default="", compare=False)
-    """The same, and what was read from other files: with the text, it gives the scene again without them."""
+    """Overrides and the content of other files, as YAML. With the text, it gives the scene without these files."""
     streams_by_index: bool = False
-    """Random streams are keyed by places in lists: of recordings from before they were keyed by names."""
+    """True if random streams are keyed by places in lists, as in old recordings, and not by names."""
 
 
 def _bottle_tag(data: Any) -> str:
@@ -169,7 +169,7 @@ def _named(what: str) -> Holds:
 
 
 class Scene(Part):
-    """A line: what is in it, what it is made of, how long and how finely it is simulated."""
+    """A line: its parts and materials, the duration and the accuracy of its simulation."""
 
     TOPICS: ClassVar[tuple[str, ...]] = tuple(Outputs.model_fields)
 
@@ -189,13 +189,14 @@ class Scene(Part):
     accuracy: Annotated[
         Accuracy, Holds('"draft", "standard", "fine", or a mapping with the fields ' + ", ".join(Accuracy.model_fields))
     ] = quantity(
-        "How exactly a tick is integrated: a preset such as `fine`, or a mapping.", default=Accuracy.model_construct()
+        "Accuracy of the integration of a tick: a preset such as `fine`, or a mapping.",
+        default=Accuracy.model_construct(),
     )
     slip_limit: Positive = quantity("Speed v_lim below which friction is regularised (7)-(10).", "m/s", default=0.01)
     friction_curve: Literal["polynomial", "atan"] = quantity(
         "How friction grows below and about v_lim. polynomial: (7)-(10), full at v_lim; "
         "atan: 2/pi x atan(pi x speed / v_lim), of the same slope at rest, full only in the limit. "
-        "A base that is a ring has a curve of its own.",
+        "Ring-shaped bases have a special curve.",
         default="polynomial",
     )
     friction_solver: Literal["explicit", "implicit"] = quantity(
@@ -267,16 +268,16 @@ class Scene(Part):
             ...,
         ],
         Holds("a list of bottles and grids"),
-    ] = quantity("Bottles that are there at the start.", default=())
+    ] = quantity("Bottles at the start.", default=())
     outputs: Outputs = quantity("Rates of the outputs.", default=Outputs.model_construct())
     limits: Annotated[DamageLimits, Holds("a mapping with the fields " + ", ".join(DamageLimits.model_fields))] = (
         quantity(
-            "What bottles should bear at most; what goes beyond is reported as an event.",
+            "Largest loads of bottles; a larger load is reported as an event.",
             default=DamageLimits.model_construct(),
         )
     )
     effects: Annotated[Forced, Holds('a mapping of names of effects to "on" or "off"')] = quantity(
-        "Effects forced on or off, whatever the scene calls for; docs/effects.md lists them.", default={}
+        "Effects forced on or off against the choice by the scene; docs/effects.md lists them.", default={}
     )
 
     _source: Origin = PrivateAttr(default=Origin())
@@ -292,60 +293,60 @@ class Scene(Part):
         return nanoseconds(self.duration) // self.tick_ns
 
     def named(self) -> dict[str, dict[str, Part]]:
-        """All that has a name: by the field that it stands in, then by name."""
+        """Named parts by field, then by name."""
         fields = ((name, getattr(self, name)) for name in type(self).model_fields if name != "effects")
         return {name: value for name, value in fields if isinstance(value, dict)}
 
     def devices(self) -> Iterator[tuple[tuple[str, str], DevicePart]]:
-        """All that becomes a device, with its path, in the order in which devices act."""
+        """Yield the parts that become devices with their paths, in the order in which devices act."""
         for place, parts in self.named().items():
             yield from (((place, name), part) for name, part in parts.items() if isinstance(part, DevicePart))
 
     def entries(self) -> Iterator[tuple[tuple[str, str], Entry]]:
-        """All that bottles come from while it runs, with its path."""
+        """Yield the parts that new bottles come from with their paths."""
         yield from ((path, part) for path, part in self.devices() if isinstance(part, Entry))
 
     def givers(self) -> Iterator[tuple[tuple[str, str], Giver]]:
-        """All that puts bottles onto the line while it runs, new ones or not, with its path."""
+        """Yield the parts that put bottles onto the line, new or not, with their paths."""
         yield from ((path, part) for path, part in self.devices() if isinstance(part, Giver))
 
     def exits(self) -> Iterator[tuple[tuple[str, str], Exit]]:
-        """All by which bottles leave, with its path."""
+        """Yield the parts by which bottles leave with their paths."""
         yield from ((path, part) for path, part in self.devices() if isinstance(part, Exit))
 
     def every(self, topic: str) -> int:
-        """Ticks from one output of a topic to the next, 0 if there is none. KeyError if there is no such topic."""
+        """Return the ticks between two outputs of a topic, 0 without output. Raise KeyError for unknown topics."""
         if topic not in self.TOPICS:
             raise KeyError(topic)
         rate = 0.0 if self._silenced(topic) else getattr(self.outputs, topic)
         return round(1e9 / (rate * self.tick_ns)) if rate else 0
 
     def _silenced(self, topic: str) -> bool:
-        """Whether the effect behind an output is forced off."""
+        """Return True if the effect of an output is forced off."""
         behind: dict[str, EffectName] = {"contacts": "contact_arrays", "ledger": "energy_ledger"}
         return topic in behind and self.effects.get(behind[topic]) == "off"
 
     @property
     def streams_by_index(self) -> bool:
-        """Whether random streams are keyed by places in lists, as before they were keyed by the devices' names."""
+        """True if random streams are keyed by places in lists, as in old recordings, and not by names of devices."""
         return self._source.streams_by_index
 
     @property
     def source_text(self) -> str:
-        """The text that the scene was read from, verbatim."""
+        """Text of the scene, verbatim."""
         return self._source.text
 
     @property
     def source_name(self) -> str:
-        """The file that the scene was read from, as it was named."""
+        """Name of the scene's file, as given."""
         return self._source.name
 
     @property
     def overrides_text(self) -> str:
-        """YAML of what the text does not say: what was changed when the scene was read, and tables from files."""
+        """Overrides and tables from files, as YAML: everything beyond the text."""
         return self._source.overrides
 
     @property
     def given_overrides(self) -> str:
-        """YAML of what was changed when the scene was read, "" if nothing."""
+        """Overrides as YAML, "" without overrides."""
         return self._source.given

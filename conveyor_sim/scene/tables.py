@@ -1,4 +1,4 @@
-"""Reads the tables of contacts that a scene names by the path of a CSV file."""
+"""Tables of contacts in CSV files that a scene names."""
 
 import csv
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from conveyor_sim.support.files import MB, FileError, OutsideError, in_mb, read_
 _MOST_ROWS = 100_000
 _MOST_BYTES = 10 * MB
 _MOST_BYTES_TOGETHER = 100 * MB
-"""Bytes of all tables of a scene, which may name one file again and again."""
+"""Largest size of all tables of a scene, bytes. A scene may name one file many times."""
 _ROWS = "expected two numbers a line, overlap and force (m, N)"
 
 OUTSIDE = "the option --outside-tables, or the parameter outside_tables of the node, allows others"
@@ -20,18 +20,18 @@ OUTSIDE = "the option --outside-tables, or the parameter outside_tables of the n
 
 @dataclass(frozen=True)
 class Beside:
-    """Where the files lie that a scene names."""
+    """Place of the files that a scene names."""
 
     folder: FilePath
-    """Of the scene: paths start there."""
+    """Folder of the scene, where paths start."""
     outside: bool = False
-    """Whether they may lead out of it."""
+    """True if paths may lead out of the folder."""
 
 
 def with_tables(data: Any, beside: Beside | None) -> tuple[Any, list[Problem]]:
-    """The data of a scene with points in place of paths, and what is wrong with the files.
+    """Return the data of a scene with points instead of paths, and problems of the files.
 
-    The very same object comes back if no contact names a file. beside: where they lie; None: none can be read.
+    Without paths the same object is returned. beside: place of the files; None: no file can be read.
     """
     contacts = data.get("contacts") if isinstance(data, dict) else None
     if not isinstance(contacts, list):
@@ -77,7 +77,7 @@ def _points(content: bytes, is_inside: bool) -> list[list[float]]:
         except ValueError:
             if rows.line_num == 1 and not any(map(_is_number, cells)):
                 continue  # the names of the columns
-            # What lies elsewhere may be no table but somebody's secret.
+            # A file elsewhere may hold a secret instead of a table.
             wrong = f"is {shown(','.join(row))}" if is_inside else "is something else"
             raise ValueError(f"{_ROWS}: line {rows.line_num} of it {wrong}") from None
         points.append([overlap, force])
@@ -89,7 +89,7 @@ def _points(content: bytes, is_inside: bool) -> list[list[float]]:
 
 
 def _next(rows: Any) -> list[str] | None:
-    """The next row of a CSV reader; None after the last. ValueError for what is no CSV."""
+    """Return the next row of a CSV reader; None after the last. Raise ValueError for text that is no CSV."""
     try:
         row: list[str] | None = next(rows, None)
     except csv.Error as error:

@@ -1,4 +1,4 @@
-"""The kinds of value that a scene is made of, each with the words that tell a user what is expected."""
+"""Types of values in a scene, each with the words for what is expected."""
 
 import math
 import re
@@ -28,20 +28,20 @@ LEAST, MOST = 1e-20, 1e20  # in SI units; products and quotients of several quan
 XY = tuple[float, float]
 
 _LONGEST_ANGLE = 100
-"""Characters; the expression below takes a time that grows with the square of their number."""
+"""Characters. The time of the expression below grows with the square of their number."""
 _ANGLE = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(deg|rad)\s*")
 
 
 @dataclass(frozen=True)
 class Holds:
-    """Marks a container with what is expected in its place; what is wrong inside speaks for itself."""
+    """Expectation for a container. Problems inside are reported in their own words."""
 
     text: str
 
 
 @dataclass(frozen=True)
 class Says(Holds):
-    """Marks a type with what is expected of its values; whatever is wrong inside is reported in these words."""
+    """Expectation for the values of a type. All problems inside are reported in these words."""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         def in_words(value: Any, validate: core_schema.ValidatorFunctionWrapHandler) -> Any:
@@ -54,7 +54,7 @@ class Says(Holds):
 
 
 def parse_angle(value: Any) -> Any:
-    """Angle in rad from a number (rad) or a text such as "90 deg" or "0.5 rad"; anything else is returned as it is."""
+    """Return the angle in rad from a number (rad) or a text such as "90 deg" or "0.5 rad"; other values unchanged."""
     match = _ANGLE.fullmatch(value) if isinstance(value, str) and len(value) <= _LONGEST_ANGLE else None
     if match is None:
         return value
@@ -63,7 +63,7 @@ def parse_angle(value: Any) -> Any:
 
 
 def parse_start_time(value: Any) -> str:
-    """A date and time as text in UTC, from such a text or what YAML makes of one. Raises ValueError."""
+    """Return a date and time as text in UTC, from such a text or a YAML value. Raise ValueError."""
     if isinstance(value, str):
         value = datetime.fromisoformat(re.sub(r"[zZ]\Z", "+00:00", value.strip()))
     if not isinstance(value, datetime) or value.tzinfo is None:
@@ -75,14 +75,14 @@ def parse_start_time(value: Any) -> str:
 
 
 def _sized(value: float) -> float:
-    """A quantity that others are divided by."""
+    """Return a quantity that other quantities are divided by. Raise an error beyond LEAST and MOST."""
     if value != 0.0 and not LEAST <= abs(value) <= MOST:
         raise PydanticCustomError("size", "{text}", {"text": f"a size from {LEAST:g} to {MOST:g}"})
     return value
 
 
 def _not_huge(value: Any) -> Any:
-    """A quantity, or several, that may be as small as they like."""
+    """Return one or several quantities that may be arbitrarily small. Raise an error beyond MOST."""
     if any(abs(number) > MOST for number in (value if isinstance(value, tuple) else (value,))):
         raise PydanticCustomError("size", "{text}", {"text": f"a size of at most {MOST:g}"})
     return value
@@ -108,7 +108,7 @@ Text = Annotated[str, Says("a text")]
 _angle_words = 'an angle, a number or a text like "90 deg"'
 _span_words = 'an angle greater than 0 and at most a full turn, a number or a text like "90 deg"'
 Unchecked = Annotated[float, AllowInfNan(True)]
-"""That need not be finite: of what a snapshot keeps, not of a scene."""
+"""A number that may be non-finite, in snapshots."""
 
 Angle = Annotated[float, Strict(), AllowInfNan(False), BeforeValidator(parse_angle), Says(_angle_words), _small]
 Span = Annotated[
@@ -152,15 +152,15 @@ PolygonList = Annotated[tuple[Point, ...], Len(3), Holds("a list of three or mor
 
 
 def quantity(description: str, unit: str = "", **more: Any) -> Any:
-    """A schema field with its description and SI unit ("1" if it has no dimension, "" if it is not a quantity)."""
+    """Return a schema field with its description and SI unit ("1" without dimension, "" if it is no quantity)."""
     return Field(description=description, json_schema_extra={"unit": unit}, **more)
 
 
 def nanoseconds(seconds: float) -> int:
-    """Seconds as nanoseconds, rounded."""
+    """Return seconds as nanoseconds, rounded."""
     return round(seconds * 1e9)
 
 
 def is_whole_nanoseconds(seconds: float) -> bool:
-    """Whether a time is a whole number of nanoseconds, within the rounding of a double."""
+    """Return True if a time is a whole number of nanoseconds, within the rounding of a double."""
     return math.isclose(seconds * 1e9, nanoseconds(seconds), rel_tol=4e-15, abs_tol=0.0)

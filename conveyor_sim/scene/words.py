@@ -1,4 +1,4 @@
-"""Turns what pydantic finds wrong into sentences: what was given, what was expected, in which unit."""
+"""Sentences for pydantic's errors: value, expectation, unit."""
 
 import difflib
 import math
@@ -16,9 +16,9 @@ from conveyor_sim.scene.types import Holds
 
 _LONGEST_VALUE = 60
 _LONGEST_NAME = 100
-"""Characters of an unknown name for which a similar one is looked up; the time grows with its length."""
+"""Longest unknown name for which a similar one is looked up. The time grows with its length."""
 _LISTED = 20
-"""Names of the scene that a sentence lists."""
+"""Largest number of names that a sentence lists."""
 
 
 def shown(value: Any) -> str:
@@ -32,12 +32,12 @@ def shown(value: Any) -> str:
 
 
 def cut(text: str) -> str:
-    """A text for an error, cut short when it is long."""
+    """Return a text for an error, cut if it is long."""
     return text if len(text) <= _LONGEST_VALUE else text[: _LONGEST_VALUE - 4] + " ..."
 
 
 def in_yaml(value: Any) -> str:
-    """The value as YAML would show it, on one line."""
+    """Return a value as one line of YAML."""
     return "".join(_pieces(value))
 
 
@@ -75,12 +75,12 @@ def some_of(names: Collection[str]) -> str:
 
 
 def listed(words: list[str]) -> str:
-    """`a, b or c`."""
+    """Return words as `a, b or c`."""
     return words[0] if len(words) == 1 else ", ".join(words[:-1]) + " or " + words[-1]
 
 
 def expectation(field: FieldInfo) -> str:
-    """What a field takes, with its unit: `a number greater than 0 (m)`."""
+    """Return the expectation of a field with its unit: `a number greater than 0 (m)`."""
     says = [m.text for m in field.metadata if isinstance(m, Holds)]
     text = says[-1] if says else _expectation_of(field.annotation)
     unit = unit_of(field)
@@ -88,7 +88,7 @@ def expectation(field: FieldInfo) -> str:
 
 
 def unit_of(field: FieldInfo) -> str:
-    """SI unit of a field: "1" if it has no dimension, "" if it is not a quantity."""
+    """Return the SI unit of a field: "1" without dimension, "" if it is no quantity."""
     extra = field.json_schema_extra
     return str(extra.get("unit", "")) if isinstance(extra, dict) else ""
 
@@ -109,12 +109,12 @@ def _expectation_of(annotation: Any) -> str:
 
 
 def field_names(model: type[BaseModel]) -> dict[str, FieldInfo]:
-    """The fields of a model by the name that a scene file uses."""
+    """Return the fields of a model by the name in a scene file."""
     return {field.alias or name: field for name, field in model.model_fields.items()}
 
 
 def fields_of(model: type[BaseModel]) -> str:
-    """`a mapping with the fields a, b and c`, shortened to the required ones if there are many."""
+    """Return `a mapping with the fields a, b and c`; only the required fields if there are many."""
     names = field_names(model)
     needed = [name for name, field in names.items() if field.is_required()]
     if needed and len(names) > 6:

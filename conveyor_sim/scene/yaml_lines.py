@@ -37,12 +37,12 @@ _PLAIN = re.compile(
     r"|(?P<int>[-+][0-9_]+|[0-9][0-9_]*|[-+]?(?:0o[0-7_]+|0x[0-9a-fA-F_]+|0b[01_]+))"
     r"|(?P<merge><<)"
 )
-"""Values without quotes that are no texts."""
+"""Values without quotes of kinds other than text."""
 
 
 class _Node(NamedTuple):
     kind: str
-    """Of a scalar: `null`, `bool`, `float`, `int`, `str`, `merge`, or any other tag; else `map` or `seq`."""
+    """Kind of a scalar: `null`, `bool`, `float`, `int`, `str`, `merge`, or any other tag; else `map` or `seq`."""
     value: Any
     line: int
 
@@ -109,18 +109,18 @@ class Document:
         if isinstance(event, yaml.ScalarEvent):
             plain = _kind(event.value) if event.implicit[0] else "str"
             tag = plain if event.tag in (None, "!") else event.tag.removeprefix(_STANDARD)
-            return self._keep(event, _Node(tag, event.value, line))
+            return self._named_node(event, _Node(tag, event.value, line))
         if isinstance(event, yaml.SequenceStartEvent):
-            node = self._keep(event, _Node("seq", [], line))
+            node = self._named_node(event, _Node("seq", [], line))
             while not isinstance(event := self._events.get_event(), yaml.SequenceEndEvent):
                 node.value.append(self._node(event))
             return node
-        node = self._keep(event, _Node("map", [], line))
+        node = self._named_node(event, _Node("map", [], line))
         while not isinstance(event := self._events.get_event(), yaml.MappingEndEvent):
             node.value.append((self._node(event), self._node(self._events.get_event())))
         return node
 
-    def _keep(self, event: Any, node: _Node) -> _Node:
+    def _named_node(self, event: Any, node: _Node) -> _Node:
         """Store a node by its anchor before its content is parsed, because an alias in the content may name it."""
         if event.anchor is not None:
             self._named[event.anchor] = node

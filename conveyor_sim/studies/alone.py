@@ -9,7 +9,7 @@ from typing import Any
 from conveyor_sim.errors import SceneError, StudyError
 from conveyor_sim.scene import parse_overrides
 from conveyor_sim.scene.words import listed
-from conveyor_sim.studies.row import Job, Row
+from conveyor_sim.studies.row import Job, RunRow
 from conveyor_sim.studies.run import Work, simulate, warm_start
 from conveyor_sim.studies.setup import Setup
 
@@ -32,7 +32,7 @@ def job_of(setup: Setup, given: Sequence[str], seed: int) -> Job:
     return Job(0, {name: values[name] for name in wanted}, seed)
 
 
-def run_alone(setup: Setup, job: Job, bag: Path | None) -> Row:
+def run_alone(setup: Setup, job: Job, bag: Path | None) -> RunRow:
     """Repeat one run of a study, with the same bits, in this process.
 
     bag: folder to record to. Raise any exception of the run.

@@ -9,7 +9,7 @@ from rich.console import Console, Group
 from rich.live import Live
 from rich.text import Text
 
-from conveyor_sim.studies.row import Row
+from conveyor_sim.studies.row import RunRow
 from conveyor_sim.studies.setup import Setup
 from conveyor_sim.studies.table import points_table
 from conveyor_sim.support.progress import ProgressBar
@@ -26,7 +26,7 @@ class Display(AbstractContextManager["Display"]):
     def __init__(self, setup: Setup) -> None:
         self._setup = setup
         self._console = Console(stderr=True, markup=False, highlight=False)
-        self._rows: list[Row] = []
+        self._rows: list[RunRow] = []
         self._drawn = 0.0
         with ExitStack() as stack:
             self._live = self._bar = None
@@ -36,7 +36,7 @@ class Display(AbstractContextManager["Display"]):
                 self._bar = stack.enter_context(ProgressBar(setup.study.name, 0.0, self._console, "runs"))
             self._stack = stack.pop_all()
 
-    def update(self, done: int, total: int, left: float | None, row: Row | None) -> None:
+    def update(self, done: int, total: int, left: float | None, row: RunRow | None) -> None:
         """Update the display; called by `Runs.run`."""
         if row is not None:
             self._rows.append(row)

@@ -16,7 +16,7 @@ from conveyor_sim.statistics.intervals import mean_interval
 from conveyor_sim.studies.design import salib_problem
 from conveyor_sim.studies.figures.response_data import Indices, Map, Response, level_text
 from conveyor_sim.studies.results import Results
-from conveyor_sim.studies.row import Row
+from conveyor_sim.studies.row import RunRow
 from conveyor_sim.studies.table import with_unit
 
 MOST_LEVELS = 40
@@ -54,7 +54,7 @@ def maps(results: Results) -> dict[str, Map]:
     return found
 
 
-def response(results: Results, parameter: str, metric: str, rows: Sequence[Row] | None = None) -> Response:
+def response(results: Results, parameter: str, metric: str, rows: Sequence[RunRow] | None = None) -> Response:
     """Return a metric over the levels of a parameter.
 
     All points have the same seeds, so runs are grouped by seed: the mean over the points at a level is one value per
@@ -100,7 +100,7 @@ def indices(results: Results) -> list[Indices]:
     points = int(study["points"]) * (len(names) + 2)
     found = []
     for metric in results.units:
-        by_point: dict[int, list[Row]] = {}
+        by_point: dict[int, list[RunRow]] = {}
         for row in results.rows:
             by_point.setdefault(row.point, []).append(row)
         outcome = np.array([_mean(_values(by_point.get(point, []), metric)) for point in range(points)])
@@ -119,7 +119,7 @@ def titled(results: Results, name: str) -> str:
     return with_unit(name, {**results.parameters, **results.units}[name])
 
 
-def levels_of(rows: Iterable[Row], parameter: str) -> list[Any]:
+def levels_of(rows: Iterable[RunRow], parameter: str) -> list[Any]:
     """Numbers in rising order; with texts among them in the order of the points."""
     found = list(dict.fromkeys(row.parameters[parameter] for row in sorted(rows, key=lambda row: row.point)))
     numbers = all(isinstance(level, (int, float)) and not isinstance(level, bool) for level in found)
@@ -148,15 +148,15 @@ def _lines(results: Results, metric: str, across: str, other: str) -> list[Respo
     return lines
 
 
-def _at(rows: Iterable[Row], parameter: str, level: Any) -> list[Row]:
+def _at(rows: Iterable[RunRow], parameter: str, level: Any) -> list[RunRow]:
     return [row for row in rows if row.parameters[parameter] == level]
 
 
-def _values(rows: Iterable[Row], metric: str) -> list[float]:
+def _values(rows: Iterable[RunRow], metric: str) -> list[float]:
     return [row.metrics[metric] for row in rows if row.status == "finished"]
 
 
-def _of_one_run(rows: Sequence[Row], metric: str) -> float:
+def _of_one_run(rows: Sequence[RunRow], metric: str) -> float:
     """Half width by batch means, of a level with a single run; NaN: it has none."""
     half = rows[0].half_widths.get(metric) if len(rows) == 1 else None
     return math.nan if half is None else half

@@ -12,8 +12,8 @@ from typing import Any
 
 from conveyor_sim.errors import SceneError, StudyError
 from conveyor_sim.scene import parse_overrides
-from conveyor_sim.studies.origin import ORIGIN, WARM_UP, Origin, deciding, origin_of, read_origin, read_study_json
-from conveyor_sim.studies.row import BAGS, Job, Pilot, Row
+from conveyor_sim.studies.origin import ORIGIN, WARM_UP, StudyOrigin, deciding, origin_of, read_origin, read_study_json
+from conveyor_sim.studies.row import BAGS, Job, Pilot, RunRow
 from conveyor_sim.studies.run_file import (
     MADE_WITH,
     RUNS,
@@ -58,7 +58,7 @@ class Journal(AbstractContextManager["Journal"]):
         self._setup, self._asked, self._say, self._aside = setup, setup.asked, say, 0
         self.warm_up: float | None = None
         """s, as pilot runs have found it; None: they have not yet, or need not."""
-        self.rows: dict[tuple[int, int], Row] = {}
+        self.rows: dict[tuple[int, int], RunRow] = {}
         """Finished runs, including runs added since the start."""
         try:
             (folder / RUNS).mkdir(parents=True, exist_ok=True)
@@ -80,7 +80,7 @@ class Journal(AbstractContextManager["Journal"]):
     def __exit__(self, *_: object) -> None:
         self._lock.close()
 
-    def row_of(self, job: Job) -> Row | None:
+    def row_of(self, job: Job) -> RunRow | None:
         """Return the stored row of a run; None if it has to run. Raise StudyError if it ran with other values."""
         row = self.rows.get(job.key)
         if row is not None and dict(row.parameters) != dict(job.parameters):
@@ -93,7 +93,7 @@ class Journal(AbstractContextManager["Journal"]):
             return row if has_all else None
         return row
 
-    def add(self, row: Row) -> None:
+    def add(self, row: RunRow) -> None:
         """Keep a run; when this returns, it is on the disk. Raises StudyError if it can't be written."""
         self._write(Path(name_of(row)), content_of(row, self._made_with))
         self.rows[row.key] = row
@@ -185,7 +185,7 @@ class Journal(AbstractContextManager["Journal"]):
 
     def _write_origin(self) -> None:
         """Write the origin of the runs, and the present text of the study, because its FREE fields may have changed."""
-        origin = Origin(origin_of(self._setup), self.warm_up, self._setup.source, True)
+        origin = StudyOrigin(origin_of(self._setup), self.warm_up, self._setup.source, True)
         file = self.folder / ORIGIN
         with suppress(FileError):
             if read_file(file, 2 * len(origin.content())) == origin.content():
@@ -220,7 +220,7 @@ class Journal(AbstractContextManager["Journal"]):
         origin, wanted = self.folder / ORIGIN, origin_of(self._setup)
         if (self.folder / ACCURACY).exists():
             raise StudyError(f"{self.folder}: has a study of conveyor-sim accuracy, expected another folder")
-        found: Origin | None = None
+        found: StudyOrigin | None = None
         try:
             found = read_origin(self.folder)
             if found.fields != wanted:
@@ -238,7 +238,7 @@ class Journal(AbstractContextManager["Journal"]):
                 self._say(f"{origin}: {reason}; it is restored from the origin that the runs state")
         if reason:
             self._set_aside(origin, reason)
-        own = Origin(wanted, self.warm_up, self._setup.source, True)
+        own = StudyOrigin(wanted, self.warm_up, self._setup.source, True)
         for file, run in runs:
             problem = str(run) if isinstance(run, FileError) else objection(*run, own)
             if problem:
@@ -290,10 +290,10 @@ def _pilot(job: Job) -> Path:
     return Path(PILOTS) / f"point_{job.point}_seed_{job.seed}.json"
 
 
-_Runs = list[tuple[Path, "tuple[Row, CheckedJson] | FileError"]]
+_Runs = list[tuple[Path, "tuple[RunRow, CheckedJson] | FileError"]]
 
 
-def _runs_in(folder: Path) -> Iterator[tuple[Path, tuple[Row, CheckedJson] | FileError]]:
+def _runs_in(folder: Path) -> Iterator[tuple[Path, tuple[RunRow, CheckedJson] | FileError]]:
     """Yield the files of runs, each with its content or the reason why it is unusable. Raises OSError."""
     for file in run_files(folder):
         try:
@@ -302,7 +302,7 @@ def _runs_in(folder: Path) -> Iterator[tuple[Path, tuple[Row, CheckedJson] | Fil
             yield file, error
 
 
-def read_rows(folder: Path, origin: Origin | None = None) -> list[Row]:
+def read_rows(folder: Path, origin: StudyOrigin | None = None) -> list[RunRow]:
     """Return the finished runs in a folder, in the order of their keys. origin: of the folder; None: it is read.
 
     Raises StudyError for a folder without a study, and for a run that is damaged or of another study.

@@ -31,7 +31,7 @@ _FIELDS = ("study", "scene", "code", "engine", VERSION)
 
 
 @dataclass(frozen=True)
-class Origin:
+class StudyOrigin:
     """Content of a `study.json`."""
 
     fields: Mapping[str, str]
@@ -70,7 +70,7 @@ def fingerprint(setup: Setup) -> str:
     return _hash(*origin_of(setup).values())[:8]
 
 
-def read_origin(folder: Path) -> Origin:
+def read_origin(folder: Path) -> StudyOrigin:
     """Return the content of a folder's `study.json`. Raises FileError; StudyError for a file of another kind."""
     kept = read_study_json(folder / ORIGIN)
     data = dict(kept.data)
@@ -84,7 +84,7 @@ def read_origin(folder: Path) -> Origin:
                 "the same name), expected the folder of a study"
             )
         raise FileError("has other fields than conveyor-sim sweep writes")
-    return Origin(data, warm_up, text, kept.has_checksum)
+    return StudyOrigin(data, warm_up, text, kept.has_checksum)
 
 
 def read_study_json(path: Path, finite: bool = True) -> CheckedJson:

@@ -12,7 +12,7 @@ from conveyor_sim.statistics.warm_up import warm_up
 from conveyor_sim.studies.engine import Engine
 from conveyor_sim.studies.journal import Journal
 from conveyor_sim.studies.line_of import controller_of, scene_of
-from conveyor_sim.studies.row import Pilot, Row, Status, point_text
+from conveyor_sim.studies.row import Pilot, RunRow, Status, point_text
 from conveyor_sim.studies.run import Work, begun, failure_of, load_kernels, make_tick, reset_counters
 from conveyor_sim.support.worker_pool import DiedError
 
@@ -28,7 +28,7 @@ def find_warm_up(
     engine: Engine,
     journal: Journal,
     say: Callable[[str], object],
-    progress: Callable[[int, int, float | None, Row | None], None],
+    progress: Callable[[int, int, float | None, RunRow | None], None],
 ) -> float:
     """s: that of the point and metric that take longest, one for all runs, so that they stay pairs.
 

@@ -19,7 +19,7 @@ from conveyor_sim.errors import SceneError, StudyError
 from conveyor_sim.scene import parse_overrides
 from conveyor_sim.studies.journal import SOURCE, read_rows, unusable
 from conveyor_sim.studies.origin import ORIGIN, VERSION, WARM_UP, read_origin
-from conveyor_sim.studies.row import Row
+from conveyor_sim.studies.row import RunRow
 from conveyor_sim.studies.run_file import row_of
 from conveyor_sim.studies.study import HALF_WIDTH, Seeds, Until
 from conveyor_sim.studies.units_file import UNITS, read_units
@@ -47,7 +47,7 @@ class Results:
     parameters: Mapping[str, str]
     """Their units, "" where it is not known, or there is none."""
     versions: Mapping[str, str]
-    rows: Sequence[Row]
+    rows: Sequence[RunRow]
     warm_up: float | None = None
     """s, where pilot runs have found it; None: as the study says."""
     verified: bool = True
@@ -68,7 +68,7 @@ class Results:
         """Return a metric's unit as written behind a number: "" if dimensionless."""
         return "" if self.units[metric] == "1" else self.units[metric]
 
-    def command(self, row: Row) -> str:
+    def command(self, row: RunRow) -> str:
         """Return the shell command that repeats one run."""
         return run_command(self.path, row, self.warm_up)
 
@@ -78,7 +78,7 @@ class Results:
         return len({row.point for row in self.rows}) == len(self.rows)
 
 
-def run_command(path: str, row: Row, warm_up: float | None = None) -> str:
+def run_command(path: str, row: RunRow, warm_up: float | None = None) -> str:
     """Return the shell command that repeats one run of a study file. warm_up: s, if it comes from pilot runs."""
     given = [f"--set {name}={shlex.quote(text_of(value))}" for name, value in row.parameters.items()]
     found = [] if warm_up is None else [f"--warm-up {warm_up!r}"]
@@ -126,7 +126,7 @@ def _fitting(results: Results) -> Results:
     return results
 
 
-def _as_asked(row: Row, asked: Mapping[str, str]) -> Row:
+def _as_asked(row: RunRow, asked: Mapping[str, str]) -> RunRow:
     """With the metrics of today; NaN: the run was made before it was asked for this one."""
     if row.status != "finished":
         return row
@@ -229,7 +229,7 @@ def _digest(about: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def _row(values: Mapping[str, Any], about: Mapping[str, Any]) -> Row:
+def _row(values: Mapping[str, Any], about: Mapping[str, Any]) -> RunRow:
     """Return the run of one table row. Raises ValueError or KeyError for values of other types."""
     kept = ("point", "seed", "status", "error", *FIXED_UNITS, "bag")
     finished = values["status"] == "finished"

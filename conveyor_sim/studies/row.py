@@ -42,7 +42,7 @@ class Pilot:
 
 
 @dataclass(frozen=True)
-class Row:
+class RunRow:
     """Result of a run."""
 
     point: int

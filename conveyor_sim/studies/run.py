@@ -23,7 +23,7 @@ from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.studies.gauges import Averaged, Gauge, half_width
 from conveyor_sim.studies.line_of import controller_of, scene_of
-from conveyor_sim.studies.row import BAGS, Job, Row, Status
+from conveyor_sim.studies.row import BAGS, Job, RunRow, Status
 from conveyor_sim.studies.setup import Setup
 from conveyor_sim.support.printable import SENTENCE, printable
 
@@ -43,10 +43,10 @@ class Work:
     """Folder of the study, for recordings; None: no recordings."""
 
 
-def make_row(work: Work) -> Row:
+def make_row(work: Work) -> RunRow:
     """Make a run and return its row; a failure is recorded in the row."""
     job, clock = work.job, _Clock()
-    row = Row(job.point, job.seed, dict(job.parameters), "failed", asked=work.setup.asked)
+    row = RunRow(job.point, job.seed, dict(job.parameters), "failed", asked=work.setup.asked)
     try:
         work.setup.require_same_versions()
     except StudyError as error:  # of this process, not of the run
@@ -102,7 +102,7 @@ def warm_start(work: Work) -> bytes:
         return path.read_bytes()
 
 
-def simulate(work: Work, bag: Path | None, clock: _Clock | None = None) -> Row:
+def simulate(work: Work, bag: Path | None, clock: _Clock | None = None) -> RunRow:
     """Simulate one run, recorded to `bag` unless None. Raise any exception of the run, after closing the recording."""
     study, job = work.setup.study, work.job
     scene = scene_of(work.setup, job.parameters, job.seed)
@@ -143,7 +143,7 @@ def simulate(work: Work, bag: Path | None, clock: _Clock | None = None) -> Row:
     finally:
         if recorder is not None:
             recorder.close()
-    return Row(
+    return RunRow(
         job.point,
         job.seed,
         dict(job.parameters),

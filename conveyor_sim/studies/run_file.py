@@ -10,8 +10,8 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, Field, FiniteFloat, ValidationError
 
-from conveyor_sim.studies.origin import WARM_UP, Origin, read_study_json
-from conveyor_sim.studies.row import Job, Row, Status
+from conveyor_sim.studies.origin import WARM_UP, StudyOrigin, read_study_json
+from conveyor_sim.studies.row import Job, RunRow, Status
 from conveyor_sim.support.checked_json import CheckedJson, with_checksum
 from conveyor_sim.support.files import FileError
 
@@ -23,7 +23,7 @@ _Seconds = Annotated[FiniteFloat, Field(ge=0.0)]
 
 
 class _Row(BaseModel, strict=True, extra="forbid"):
-    """The types of a `Row` in a file; metrics may be NaN or infinite."""
+    """The types of a `RunRow` in a file; metrics may be NaN or infinite."""
 
     point: Annotated[int, Field(ge=0, lt=2**63)]
     seed: Annotated[int, Field(ge=0, lt=2**64)]
@@ -40,12 +40,12 @@ class _Row(BaseModel, strict=True, extra="forbid"):
     bag: str
 
 
-def name_of(job: Job | Row) -> str:
+def name_of(job: Job | RunRow) -> str:
     """Return the name of the file of a run, below the folder of the study."""
     return f"{RUNS}/point_{job.point}_seed_{job.seed}.json"
 
 
-def content_of(row: Row, made_with: Mapping[str, Any]) -> bytes:
+def content_of(row: RunRow, made_with: Mapping[str, Any]) -> bytes:
     """Return the content of the file of a run. made_with: as `made_with` returns it."""
     return with_checksum({**json.loads(json.dumps(asdict(row), default=str)), MADE_WITH: dict(made_with)})
 
@@ -55,12 +55,12 @@ def made_with(fields: Mapping[str, str], warm_up: float | None) -> dict[str, Any
     return {**fields, **({} if warm_up is None else {WARM_UP: warm_up})}
 
 
-def row_of(data: Mapping[str, Any]) -> Row:
+def row_of(data: Mapping[str, Any]) -> RunRow:
     """Return a row from plain data. Raises ValueError (pydantic's) for data of other types."""
-    return Row(**dict(_Row.model_validate(dict(data))))
+    return RunRow(**dict(_Row.model_validate(dict(data))))
 
 
-def read_row(folder: Path, file: Path) -> tuple[Row, CheckedJson]:
+def read_row(folder: Path, file: Path) -> tuple[RunRow, CheckedJson]:
     """Return a run and the content of its file, with its field MADE_WITH.
 
     Raises FileError for a file that is damaged, or has the name of another run.
@@ -81,7 +81,7 @@ def read_row(folder: Path, file: Path) -> tuple[Row, CheckedJson]:
     return row, kept
 
 
-def objection(row: Row, kept: CheckedJson, origin: Origin) -> str:
+def objection(row: RunRow, kept: CheckedJson, origin: StudyOrigin) -> str:
     """Return why a run is not one of a folder, in words that follow its file, "" if it is one."""
     if kept.has_checksum is not origin.has_checksum:
         return "has no checksum" if origin.has_checksum else "has a checksum, which study.json has not"

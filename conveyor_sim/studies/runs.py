@@ -15,13 +15,13 @@ from conveyor_sim.studies.engine import Engine
 from conveyor_sim.studies.journal import Journal
 from conveyor_sim.studies.line_of import scene_of
 from conveyor_sim.studies.pilots import find_warm_up
-from conveyor_sim.studies.row import Job, Row, Status
+from conveyor_sim.studies.row import Job, RunRow, Status
 from conveyor_sim.studies.run import Work, kernels_of, make_row, warm_start
 from conveyor_sim.studies.setup import Setup
 from conveyor_sim.studies.study import MSER
 from conveyor_sim.support.worker_pool import DiedError, WorkerPool
 
-Progress = Callable[[int, int, float | None, Row | None], None]
+Progress = Callable[[int, int, float | None, RunRow | None], None]
 """Called with the runs finished, the runs wanted, an estimate of the time left (s; None: nothing to go by), and the run
 that has just been finished.
 """
@@ -53,7 +53,7 @@ class Runs(AbstractContextManager["Runs"]):
     def __exit__(self, *error: object) -> None:
         self._stack.__exit__(*error)  # type: ignore[arg-type]
 
-    def run(self, jobs: Sequence[Job], progress: Progress = lambda *_: None) -> list[Row]:
+    def run(self, jobs: Sequence[Job], progress: Progress = lambda *_: None) -> list[RunRow]:
         """Make those that are not there yet; all of them, in the order of the jobs.
 
         Raises StudyError if one can't be kept. A run that fails is a Row with its error.
@@ -97,10 +97,10 @@ class Runs(AbstractContextManager["Runs"]):
             start = start if self._engine.is_here else start.read_bytes()
         return Work(self._setup, job, start, self.folder.resolve())
 
-    def _unmade(self, job: Job, status: Status, error: str) -> Row:
-        return Row(job.point, job.seed, dict(job.parameters), status, error, asked=self._setup.asked)
+    def _unmade(self, job: Job, status: Status, error: str) -> RunRow:
+        return RunRow(job.point, job.seed, dict(job.parameters), status, error, asked=self._setup.asked)
 
-    def _keep(self, row: Row) -> Row:
+    def _keep(self, row: RunRow) -> RunRow:
         self.journal.add(row)
         return row
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from conveyor_sim.statistics.intervals import mean_interval
 from conveyor_sim.studies.design import Point, points_of
 from conveyor_sim.studies.origin import fingerprint
-from conveyor_sim.studies.row import Job, Row
+from conveyor_sim.studies.row import Job, RunRow
 from conveyor_sim.studies.runs import Progress, Runs
 from conveyor_sim.studies.setup import Setup
 from conveyor_sim.studies.study import Seeds, Until
@@ -20,14 +20,14 @@ def study_folder(setup: Setup) -> Path:
     return Path("runs") / f"study_{setup.study.name}_{fingerprint(setup)}"
 
 
-def sweep(runs: Runs, setup: Setup, progress: Progress = lambda *_: None) -> list[Row]:
+def sweep(runs: Runs, setup: Setup, progress: Progress = lambda *_: None) -> list[RunRow]:
     """All runs of a study, point by point, those of a point in the order of their seeds.
 
     Decisions fall between batches, by the runs of each point in the order of their seeds: never by which was finished
     first. Raises StudyError as `Runs.run`.
     """
     points, seeds = points_of(setup.study), setup.study.seeds
-    rows: dict[int, list[Row]] = {number: [] for number in range(len(points))}
+    rows: dict[int, list[RunRow]] = {number: [] for number in range(len(points))}
     for batch in _batches(seeds):
         open_points = [number for number, found in rows.items() if not _enough(found, seeds.until)]
         # By seed first, so that what there is of an unfinished batch is of all points.
@@ -52,7 +52,7 @@ def _batches(seeds: Seeds) -> Iterator[range]:
         yield range(seeds.first + done, seeds.first + min(done + seeds.batch, seeds.most))
 
 
-def _enough(rows: Sequence[Row], until: Until | None) -> bool:
+def _enough(rows: Sequence[RunRow], until: Until | None) -> bool:
     """Return True if the interval of the mean is narrow enough."""
     if until is None or not rows:
         return False

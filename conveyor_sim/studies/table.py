@@ -8,17 +8,17 @@ from collections.abc import Iterable, Mapping, Sequence
 from rich.table import Table
 
 from conveyor_sim.statistics.intervals import mean_interval
-from conveyor_sim.studies.row import Row, number
+from conveyor_sim.studies.row import RunRow, number
 
 LONGEST = 40
 """Points that a table on a terminal shows; the file has all."""
 
 
 def points_table(
-    rows: Iterable[Row], units: Mapping[str, str], of_parameters: Mapping[str, str], longest: int = LONGEST
+    rows: Iterable[RunRow], units: Mapping[str, str], of_parameters: Mapping[str, str], longest: int = LONGEST
 ) -> Table:
     """Rows of any order; those of failed runs are counted apart. units: of metrics."""
-    by_point: dict[int, list[Row]] = {}
+    by_point: dict[int, list[RunRow]] = {}
     for row in rows:
         by_point.setdefault(row.point, []).append(row)
     first = next(iter(by_point.values()), [])
@@ -46,7 +46,7 @@ def with_unit(name: str, unit: str) -> str:
     return name if unit in ("", "1") else f"{name} ({unit})"
 
 
-def _mean(rows: Sequence[Row], metric: str) -> str:
+def _mean(rows: Sequence[RunRow], metric: str) -> str:
     """Return the mean over the runs of a point with the half-width of its interval.
 
     The interval is over the seeds, or by batch means for a single run.

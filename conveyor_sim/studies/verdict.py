@@ -12,7 +12,7 @@ from conveyor_sim.statistics.intervals import mean_interval
 from conveyor_sim.statistics.sample_size import runs_for
 from conveyor_sim.statistics.words import plus_minus, rounded
 from conveyor_sim.studies.results import Results
-from conveyor_sim.studies.row import Row, point_text
+from conveyor_sim.studies.row import RunRow, point_text
 
 MOST = 100
 """Most points that are compared pairwise."""
@@ -90,16 +90,16 @@ def _of_single_runs(results: Results) -> Iterator[str]:
             )
 
 
-def _by_point(results: Results) -> dict[int, dict[int, Row]]:
+def _by_point(results: Results) -> dict[int, dict[int, RunRow]]:
     """Finished runs, by point and seed."""
-    found: dict[int, dict[int, Row]] = {}
+    found: dict[int, dict[int, RunRow]] = {}
     for row in results.rows:
         if row.status == "finished":
             found.setdefault(row.point, {})[row.seed] = row
     return found
 
 
-def _points(rows: Sequence[Row]) -> str:
+def _points(rows: Sequence[RunRow]) -> str:
     """Return the names of some points, and the number of further ones."""
     more = f" and {len(rows) - LISTED} more points" if len(rows) > LISTED else ""
     return "; ".join(point_text(row.parameters) for row in rows[:LISTED]) + more

@@ -12,8 +12,8 @@ from conveyor_sim.control.scan import ALARMS
 from conveyor_sim.page.one_file import FailedCondition, write_page
 from conveyor_sim.page.watch import Watch
 from conveyor_sim.report.figures import style
-from conveyor_sim.report.figures.data import Frame, Plant
-from conveyor_sim.report.figures.moment import Event, Trace, moment_figure
+from conveyor_sim.report.figures.data import PlantFrame, StaticGeometry
+from conveyor_sim.report.figures.moment import MarkedEvent, Trace, moment_figure
 from conveyor_sim.report.figures.recording import contact_lines
 from conveyor_sim.testing.history import HistoryMark, ScenarioHistory
 from conveyor_sim.testing.scenario import Scenario
@@ -43,14 +43,14 @@ def draw_moment(scenario: Scenario, path: Path) -> Path:
         Trace(name, history.unit(name), history.kind(name), history[name][shown], name in forced)
         for name in traced(scenario)
     ]
-    events = [Event(mark.time, _words(mark)) for mark in history.marks][-_MOST_EVENTS:]
+    events = [MarkedEvent(mark.time, _words(mark)) for mark in history.marks][-_MOST_EVENTS:]
     if failed is not None and failed.since < scenario.time:
-        events.append(Event(failed.since, f"{failed.word} asserted"))
+        events.append(MarkedEvent(failed.since, f"{failed.word} asserted"))
     eyes = [name for name in history.names if name.startswith(EYES) and name.endswith("/blocked")]
     blocked = {name.split("/")[1] for name in eyes if history[name][-1]}
     with style.look():
         figure = moment_figure(
-            Plant.of(scenario.scene),
+            StaticGeometry.of(scenario.scene),
             _frame(scenario),
             scenario.scene.name,
             scenario.failure,
@@ -108,10 +108,10 @@ def _words(mark: HistoryMark) -> str:
     return mark.name if np.isnan(mark.value) else f"{mark.name} = {mark.value:g}"
 
 
-def _frame(scenario: Scenario) -> Frame:
+def _frame(scenario: Scenario) -> PlantFrame:
     simulation = scenario.simulation
     bottles = simulation.bottles()
-    return Frame(
+    return PlantFrame(
         time=simulation.time,
         x=bottles.x,
         y=bottles.y,

@@ -60,7 +60,7 @@ class ModbusFaces(_Servers, AbstractContextManager["ModbusFaces"]):
         from conveyor_sim.protocols.modbus.server import ModbusServer
 
         source = line.source()
-        server = ModbusServer(source, modbus_map(source.about.tags) if rows is None else rows, role)
+        server = ModbusServer(source, modbus_map(source.info.tags) if rows is None else rows, role)
         self._start(server)
         return server
 

@@ -121,7 +121,7 @@ def modbus(rows: Sequence[Row] | None, port: int) -> Callable[[TagProvider, Path
     from conveyor_sim.protocols.modbus.server import ModbusServer
 
     return lambda source, _: ModbusServer(
-        source, modbus_map(source.about.tags) if rows is None else rows, "controller", port=port
+        source, modbus_map(source.info.tags) if rows is None else rows, "controller", port=port
     )
 
 

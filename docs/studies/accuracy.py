@@ -28,7 +28,7 @@ with while_importing():
     from conveyor_sim.accuracy.report.forecast import foretold
     from conveyor_sim.accuracy.report.lines import three_lines
     from conveyor_sim.accuracy.report.tables import markdown
-    from conveyor_sim.accuracy.results import Study
+    from conveyor_sim.accuracy.results import AccuracyStudy
     from conveyor_sim.physics.timestep.presets import table
     from conveyor_sim.scene import load_scene
 
@@ -109,7 +109,7 @@ def studied() -> list[str]:
     return [name for name in SCENES if (FOLDER / name / STUDY).exists()]
 
 
-def of_today(name: str) -> Study:
+def of_today(name: str) -> AccuracyStudy:
     """Return a study with present predictions and the resulting answer, which are computed, not measured."""
     study, scene = read_study(FOLDER / name / STUDY, print), load_scene(ROOT / scene_file(name))
     points = tuple(foretold(scene, point) for point in study.points)
@@ -117,7 +117,7 @@ def of_today(name: str) -> Study:
     return replace(study, points=points, answer=answer)
 
 
-def answers(studies: dict[str, Study]) -> str:
+def answers(studies: dict[str, AccuracyStudy]) -> str:
     """Return the first three lines of each scene's answer, and the setting."""
     parts = []
     for name, study in studies.items():

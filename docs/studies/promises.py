@@ -31,6 +31,7 @@ with while_importing():
     from conveyor_sim.accuracy.setting import Setting
     from conveyor_sim.errors import ConveyorError
     from conveyor_sim.physics.model.step_choice import choose_steps
+    from conveyor_sim.physics.plant import Plant
     from conveyor_sim.physics.timestep.presets import PRESETS
     from conveyor_sim.scene import Scene, load_scene
     from conveyor_sim.scene.accuracy import Preset, explicit
@@ -130,7 +131,7 @@ def preset_settings(scene: Scene) -> dict[tuple[str, Preset], Setting]:
         if integrator in compared(scene):
             for preset in PRESETS:
                 accuracy = {**explicit(integrator, 1), "per_tick": None, "preset": preset}
-                steps = choose_steps(_with(scene, accuracy)).steps
+                steps = choose_steps(Plant.of(_with(scene, accuracy))).steps
                 settings[integrator, preset] = Setting(integrator, steps)
     return settings
 

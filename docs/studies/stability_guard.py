@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from conveyor_sim.physics.stepping.guard import Guard
+from conveyor_sim.physics.stepping.guard.guard import Guard
 from conveyor_sim.physics.stepping.tick import Integration
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation

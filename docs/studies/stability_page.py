@@ -288,7 +288,7 @@ def _draw(axes: Axes, moment: _Moment, bottles: BottleColumns) -> None:
     radius = moment.model.type_radius[bottles.type]
     circles = [Circle((x, y), r) for x, y, r in zip(bottles.x, bottles.y, radius, strict=True)]
     axes.add_collection(PatchCollection(circles, facecolor="#cfe3f5cc", edgecolor=style.BOTTLE_EDGE, linewidth=0.8))
-    rails = [rail.outline() for rail in moment.model.rail_shapes if not rail.name.startswith("annex")]
+    rails = [rail.outline() for rail in moment.model.plant.rails if not rail.name.startswith("annex")]
     axes.add_collection(LineCollection(rails, colors=style.RAIL, linewidths=1.5))
     axes.plot(*moment.place, marker="o", color=style.FORCE, markersize=5)
     # Some bottles about the contact: where there are hundreds, none could be seen.

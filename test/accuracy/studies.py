@@ -6,6 +6,7 @@ import math
 import zlib
 
 from conveyor_sim.accuracy.results import (
+    AccuracyStudy,
     Answer,
     Comparison,
     Cost,
@@ -17,7 +18,6 @@ from conveyor_sim.accuracy.results import (
     Rest,
     Sample,
     StiffnessRow,
-    Study,
 )
 from conveyor_sim.accuracy.setting import Setting
 
@@ -161,12 +161,12 @@ def stiffness_row(factor: float) -> StiffnessRow:
     )
 
 
-def study() -> Study:
+def study() -> AccuracyStudy:
     tolerance = 0.01
     compared = (OWN, CHOSEN, Setting("linearly_implicit", 50), Setting("semi_implicit_euler", 50, 0.25))
     chosen = point(CHOSEN.integrator, CHOSEN.per_tick)
     assert chosen.cost is not None and chosen.errors is not None
-    return Study(
+    return AccuracyStudy(
         scene="paper_plant",
         source="config/paper_plant.yaml",
         machine="Intel(R) Xeon(R) Processor @ 2.60GHz (family 6, avx512f), 2 cores, Linux 6.1.0, CPython 3.11.7, "

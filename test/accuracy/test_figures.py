@@ -22,7 +22,7 @@ from conveyor_sim.accuracy.figures.logarithmic import logarithmic_x
 from conveyor_sim.accuracy.figures.notes import Note, place_notes
 from conveyor_sim.accuracy.figures.pareto import pareto_figure
 from conveyor_sim.accuracy.report.pareto import front
-from conveyor_sim.accuracy.results import Point, Study
+from conveyor_sim.accuracy.results import AccuracyStudy, Point
 from conveyor_sim.report.figures import style
 
 VERDICTS = ("equivalent", "different", "undecided")
@@ -84,13 +84,13 @@ def shown_texts(figure: Figure) -> list[Text]:
     return [text for text in texts if text not in hidden]
 
 
-def bare() -> Study:
+def bare() -> AccuracyStudy:
     """Nothing but failures."""
     points = tuple(failed(name, 20, BLOWN) for name in RULES)
     return replace(study(), points=points, orders=(), comparisons=(), stiffness=(), samples=(), answer=None)
 
 
-def single() -> Study:
+def single() -> AccuracyStudy:
     """One row of everything."""
     of = study()
     return replace(
@@ -115,7 +115,7 @@ def test_what_has_no_rows_has_no_picture() -> None:
 
 
 @pytest.mark.parametrize("of", [study(), bare(), single()], ids=["whole", "bare", "single"])
-def test_no_text_is_cut_off_and_none_lies_on_another(of: Study) -> None:
+def test_no_text_is_cut_off_and_none_lies_on_another(of: AccuracyStudy) -> None:
     named = "a line of bottles of glass with a funnel, an accumulation table, two loops and a turn-table, at 100 MN/m"
     for figure in accuracy_figures(replace(of, scene=named)).values():
         figure.draw_without_rendering()

@@ -19,12 +19,12 @@ from facts import stating
 
 from conveyor_sim.accuracy.report.files import STUDY, read_study, write_study
 from conveyor_sim.accuracy.report.pareto import front
-from conveyor_sim.accuracy.results import Cost, Study
+from conveyor_sim.accuracy.results import AccuracyStudy, Cost
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.support.checked_json import with_checksum
 
 
-def bare() -> Study:
+def bare() -> AccuracyStudy:
     """A study that found nothing."""
     return replace(
         study(),

@@ -10,13 +10,13 @@ from accuracy.studies import CHOSEN, study
 from facts import missing
 
 from conveyor_sim.accuracy.report.lines import summary, three_lines
-from conveyor_sim.accuracy.results import Comparison, Study
+from conveyor_sim.accuracy.results import AccuracyStudy, Comparison
 
 FORCES_ONLY = ("impacts and resting forces only",)
 JARGON = ("integrator", "euler", "verlet", "rk4", "step", "rms", "dt", "order", "convergence")
 
 
-def with_runs(*rows: Comparison, accepted: bool = False) -> Study:
+def with_runs(*rows: Comparison, accepted: bool = False) -> AccuracyStudy:
     of = study()
     assert of.answer is not None
     return replace(of, comparisons=rows, answer=replace(of.answer, accepted=accepted))

@@ -23,7 +23,7 @@ from conveyor_sim.accuracy.measure.sample_file import SAMPLES
 from conveyor_sim.accuracy.report.files import read_study
 from conveyor_sim.accuracy.report.interim import MEASURED, PREDICTED, PRELIMINARY, UNFINISHED
 from conveyor_sim.accuracy.report.lines import summary
-from conveyor_sim.accuracy.results import Study
+from conveyor_sim.accuracy.results import AccuracyStudy
 from conveyor_sim.accuracy.session import ANSWER, Session
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.cli import main
@@ -54,7 +54,7 @@ class Made:
     predicted: list[str]
     """Answers before anything ran."""
     answers: list[str]
-    study: Study
+    study: AccuracyStudy
 
 
 @pytest.fixture(scope="module")

@@ -19,7 +19,7 @@ from conveyor_sim.accuracy.measure.sample_file import SAMPLES
 from conveyor_sim.accuracy.measured import MEASURED, first_settings
 from conveyor_sim.accuracy.report.files import read_study
 from conveyor_sim.accuracy.report.forecast import forecast
-from conveyor_sim.accuracy.results import Study
+from conveyor_sim.accuracy.results import AccuracyStudy
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.accuracy.study import FIRST_RUNS, affordable, run_study, study_folder
 from conveyor_sim.errors import ConveyorError
@@ -63,7 +63,7 @@ def main(file: str, folder: str, chunk: float) -> None:
     run_study(load_scene(file), Path(folder), 0.01, ONE_RUN, silent)
 
 
-def without_times(study: Study) -> Study:
+def without_times(study: AccuracyStudy) -> AccuracyStudy:
     """All of it but the processor time that it took."""
     return replace(study, cpu=None, samples=tuple(replace(sample, cpu=0.0) for sample in study.samples))
 

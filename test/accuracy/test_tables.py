@@ -15,17 +15,17 @@ from conveyor_sim.accuracy.report.block import Block, Column
 from conveyor_sim.accuracy.report.lines import three_lines
 from conveyor_sim.accuracy.report.tables import blocks, markdown, terminal
 from conveyor_sim.accuracy.report.words import digits, duration, percent, setting_name, spread
-from conveyor_sim.accuracy.results import Study
+from conveyor_sim.accuracy.results import AccuracyStudy
 from conveyor_sim.accuracy.setting import Setting
 
 
-def printed(of: Study, width: int = 80) -> str:
+def printed(of: AccuracyStudy, width: int = 80) -> str:
     file = io.StringIO()
     Console(file=file, width=width).print(terminal(of))
     return file.getvalue()
 
 
-def block(of: Study, title: str) -> Block:
+def block(of: AccuracyStudy, title: str) -> Block:
     (found,) = [block for block in blocks(of) if block.title.startswith(title)]
     return found
 
@@ -35,7 +35,7 @@ def column(of: Block, heading: str) -> list[str]:
     return [row[index] for _, rows in of.groups for row in rows]
 
 
-def nothing() -> Study:
+def nothing() -> AccuracyStudy:
     return replace(
         study(),
         orders=(),

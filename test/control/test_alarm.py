@@ -14,7 +14,7 @@ from conveyor_sim.scene.parts.alarm import AlarmFields
 
 
 class Declares:
-    """Two alarms."""
+    """Controller with two alarms."""
 
     def __init__(self, *alarms: Any) -> None:
         self.declared_alarms = alarms

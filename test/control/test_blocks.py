@@ -1,4 +1,4 @@
-"""Function blocks as IEC 61131-3 draws them, in scans of 0.1 s."""
+"""Function blocks by the timing diagrams of IEC 61131-3, in scans of 0.1 s."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from conveyor_sim.control.blocks import COVERED, CTU, F_TRIG, HYSTERESIS, R_TRIG
 
 
 def timed(block: Callable[[bool, float], bool], drawn: str) -> str:
-    """Q over scans, drawn as IN is: # on, . off."""
+    """Return Q over scans, drawn as IN is: # on, . off."""
     return "".join(".#"[block(mark == "#", 0.1 * scan)] for scan, mark in enumerate(drawn))
 
 

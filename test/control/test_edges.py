@@ -1,4 +1,4 @@
-"""What is known of a photo-eye's edges between two scans."""
+"""Edges of a photo-eye between two scans."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Seen = tuple[int, int, float | None]
 
 
 def seen(*scans: tuple[float, ...]) -> list[Seen]:
-    """Edges, rises and the fall before the last rise, after scans with edges at these times."""
+    """Return edges, rises and the fall before the last rise, after scans with edges at these times."""
     beam, edges, results = Beam("e"), EyeEdges("e"), []
     for tick, times in enumerate(((), *scans)):
         for time in times:

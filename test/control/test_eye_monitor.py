@@ -1,4 +1,4 @@
-"""Plausibility of a photo-eye: bottles on a belt by kinematics, and what can go wrong with the eye."""
+"""Plausibility checks of a photo-eye: bottles on a belt by kinematics, and faults of the eye."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Fault = Callable[[dict[str, float]], None]
 
 
 class Row:
-    """Bottles with a pitch (m) go by two eyes, 0.5 m apart."""
+    """Bottles with a pitch (m) that pass two eyes, 0.5 m apart."""
 
     def __init__(self, pitch: float, **parameters: object) -> None:
         given = {"hold": {HOLD: 0.0}, "next_eye": "next", "next_after": APART, **parameters}
@@ -30,14 +30,14 @@ class Row:
         self._edges = (edges_of(fronts, DIAMETER), edges_of([front + APART for front in fronts], DIAMETER))
 
     def run(self, seconds: float, speed: float = SPEED, works: tuple[bool, bool] = (True, True)) -> dict[str, float]:
-        """The last answer; an eye that does not work keeps its signals."""
+        """Return the last answer. A faulty eye keeps its signals."""
         answer: dict[str, float] = {}
         for _ in range(round(seconds / LENGTH)):
             answer = self._scan(speed, works)
         return answer
 
     def until(self, alarm: str, seconds: float, works: tuple[bool, bool] = (True, True)) -> float:
-        """s until the alarm, alone, and the line is held."""
+        """Return the time until the alarm stands alone and the line is held, s."""
         for number in range(round(seconds / LENGTH)):
             answer = self._scan(SPEED, works)
             if HOLD in answer:

@@ -1,4 +1,4 @@
-"""Gap control: bottles that come out of a metering belt onto a faster one, by kinematics."""
+"""Gap control: bottles from a metering belt onto a faster one, by kinematics."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def control(gain: float, **others: float) -> GapControl:
 
 
 def gaps(controller: GapControl, pitches: list[float]) -> list[float]:
-    """The gaps that bottles have behind the transfer which arrive at it with these pitches (m)."""
+    """Return the gaps behind the transfer of bottles that arrive with these pitches (m)."""
     scans, beam = Scans(controller), Beam("eye")
     due, fronts, metered = 0.0, list[float](), 0.0
     for tick in range(1, 100_000):

@@ -1,4 +1,4 @@
-"""Gap control on a line: bottles that come nose to tail leave with the gap that was asked for."""
+"""Gap control on a line: bottles that arrive nose to tail leave with the set gap."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ DIAMETER, GAP, SPEED = 0.08, 0.1, 0.6
 
 
 def metered() -> Scenario:
-    """A metering belt, a discharge belt at 0.6 m/s, and an eye behind the transfer."""
+    """Return a metering belt, a discharge belt at 0.6 m/s, and an eye behind the transfer."""
     return Scenario(
         scene(
             duration=60.0,
@@ -46,7 +46,7 @@ def test_the_gaps_are_as_asked_for() -> None:
 
 
 def test_without_metering_there_is_another_gap() -> None:
-    """At half the speed of the discharge belt a diameter is left, 20 % less than asked for."""
+    """At half the speed of the discharge belt, the gap is one diameter, 20 % less than the set gap."""
     line = metered()
     control = GapControl("metering", "discharge", "behind", GAP, DIAMETER, lowest=0.5 * SPEED, highest=0.5 * SPEED)
     line.attach(control)

@@ -53,7 +53,7 @@ def clearing() -> Scans:
 
 
 def trace(scans: Scans, seconds: float, count: float) -> list[tuple[float, float | None]]:
-    """Scans with no passage: how long, and at what speed of the belt."""
+    """Scan without a passage, and return the phases as durations and belt speeds."""
     runs: list[tuple[float, float | None]] = []
     for _ in range(round(seconds / 0.01)):
         speed = scans.scan({COUNT: count}).get(COMMAND)

@@ -33,7 +33,7 @@ def test_from_a_count_the_feeder_is_held_between_the_marks_and_the_table_runs_fa
 
 
 def test_the_controller_of_the_papers_plant_counts_the_bottles_on_its_table() -> None:
-    """By name, as a node runs it; other belts, marks and speeds are parameters."""
+    """It is loaded by name, as a node does. Other belts, marks and speeds are parameters."""
     scans = Scans(load("conveyor_sim.control.level:table_level"))
     for bottles, feeder, table in ((44, 1.0, 0.2), (45, 0.0, 0.2), (36, 0.0, 0.2), (35, 1.0, 0.3)):
         answer = scans.scan({"belts/table/bottles": bottles})

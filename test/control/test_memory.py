@@ -1,4 +1,4 @@
-"""Controllers in checkpoints: a line saved with its controller goes on as one that never stopped, to the bit."""
+"""Controllers in checkpoints: a line saved with its controller continues with the same bits."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_without_a_controller_in_it_nothing_is_resumed(tmp_path: Path) -> None:
 
 
 class Odd:
-    """Remembers things of many kinds."""
+    """Controller that stores values of many kinds."""
 
     def __init__(self, thing: object) -> None:
         self.thing = thing

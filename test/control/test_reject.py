@@ -22,17 +22,17 @@ Speed = Callable[[float], float]
 
 
 def up_and_down(time: float) -> float:
-    """m/s, between 0.25 and 1 in 1.5 s."""
+    """Return a speed between 0.25 and 1 m/s, up and down in 1.5 s."""
     return 0.625 + 0.375 * math.cos(2.0 * math.pi * time / 3.0)
 
 
 def stop_and_go(time: float) -> float:
-    """m/s."""
+    """Return a speed that stops and goes, m/s."""
     return 0.5 if time % 2.0 < 1.2 else 0.0
 
 
 def fired_at(fronts: list[float], bad: set[int], speed: Speed, late: int) -> list[tuple[float, float, float]]:
-    """From travel (m) to travel, and the speed (m/s) at first, of each time that it fires.
+    """Return start and end travel (m) and initial speed (m/s) of each stroke.
 
     late: scans from a bottle's rise to the inspection's verdict.
     """

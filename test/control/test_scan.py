@@ -1,4 +1,4 @@
-"""Controllers put together."""
+"""Combined controllers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Alarms on measured values: limits and the deadband."""
+"""Alarms on measured values: limits and deadband."""
 
 import math
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ NOW: Any = None  # these devices don't look
 
 
 class Shown(Device):
-    """Shows what it is told to, and counts how often somebody looks."""
+    """Provider with settable values that counts how often it is read."""
 
     def __init__(self, signal: str) -> None:
         other = count(f"{signal}_before", "counter", "Comes before it.")
@@ -29,7 +29,7 @@ class Shown(Device):
 
 
 def seen(fields: dict[str, Any], values: Sequence[float]) -> list[bool]:
-    """Whether the alarm is active after each value, a tick each."""
+    """Return whether the alarm is active after each value, one tick per value."""
     board, device = Board(it={"tag": SIGNALS[0], **fields}), Shown(SIGNALS[0])
     measured, found = MeasuredConditions(board.alarms, [device, Shown(SIGNALS[1])]), []
     for device.value in values:

@@ -1,4 +1,4 @@
-"""Every part of a scene that becomes a device has one, is drawn, and counts by the roles of its signals."""
+"""Every part of a scene has a device class, is drawn, and is counted by the roles of its signals."""
 
 from collections.abc import Iterator
 
@@ -14,7 +14,7 @@ from conveyor_sim.support.resources import scene_path
 BY_SHAPE = {"belt", "gate", "pusher", "diverter"}
 """Kinds that are drawn as belts and rails."""
 PLACELESS = {"indicator"}
-"""Kinds that have no place of their own: an indicator rests on a counter and a zone, which are drawn."""
+"""Kinds without a place. An indicator uses a counter and a zone, which are drawn."""
 
 
 def kinds(part: type[DevicePart] = DevicePart) -> Iterator[str]:
@@ -39,7 +39,7 @@ def test_every_kind_of_device_is_drawn() -> None:
 
 
 def every_part() -> Iterator[DevicePart]:
-    """One of each kind, without its fields."""
+    """Yield one part of each kind, without its fields."""
     todo: list[type[DevicePart]] = [DevicePart]
     for part in todo:
         todo += part.__subclasses__()
@@ -59,7 +59,7 @@ def test_devices_act_in_the_order_of_the_scenes_fields(scene: Scene) -> None:
 
 
 def test_what_bottles_come_from_and_leave_by_counts_them(scene: Scene) -> None:
-    """Sums go by what signals add to, so an entry or exit without such a one would be missing in them."""
+    """Sums depend on `adds_to` of signals. They would miss an entry or exit without such a signal."""
     devices = {device.name: device for device in build_devices(scene, build_model(scene))}
     for (field, name), part in scene.devices():
         adds = {signal.adds_to for signal in devices[f"{field}/{name}"].signals} - {"", "state"}

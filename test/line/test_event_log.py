@@ -1,4 +1,4 @@
-"""What happens on a line is noted at its tick, in order, once."""
+"""Events of a line are recorded at their ticks, in order, once."""
 
 from pathlib import Path
 
@@ -23,7 +23,7 @@ def setting(name: str, value: float) -> Input:
 
 
 def run(sim: Simulation, ticks: int) -> list[Event]:
-    """All that happens in so many ticks."""
+    """Return all events within a number of ticks."""
     events = []
     for _ in range(ticks):
         sim.advance()
@@ -133,7 +133,7 @@ def test_an_alarm_is_zero_or_one(given: float) -> None:
     ("name", "shown"), [("alarms/a\nb", r"a\nb"), (f"alarms/{'a' * 300}", f"{'a' * 192}…"), ("alarms/voll ü", "voll ü")]
 )
 def test_an_alarm_is_kept_as_it_can_be_shown(name: str, shown: str) -> None:
-    """So that a recording, which holds that name, replays to the same one."""
+    """So a recording, which holds that name, replays to the same one."""
     sim = Simulation(REJECT)
     for _ in range(2):
         sim.command((name,), (1.0,))

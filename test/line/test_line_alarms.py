@@ -1,4 +1,4 @@
-"""The alarms of a line: its own, its scene's, its controllers', and what operators do with them."""
+"""Alarms of a line, its scene and its controllers, and operations on them."""
 
 import json
 from pathlib import Path
@@ -18,12 +18,12 @@ FEEDER = "belts/feeder/cmd_speed"
 
 
 def line(**changes: Any) -> Simulation:
-    """The table of the scenarios' tests."""
+    """Return the table of the scenarios' tests."""
     return Simulation(load_scene(TABLE, changes))
 
 
 def alarm_events(sim: Simulation, ticks: int) -> list[tuple[int, str, str]]:
-    """Tick, kind and id of what happens to alarms."""
+    """Return tick, kind and id of alarm events."""
     found = []
     for _ in range(ticks):
         sim.advance()
@@ -92,7 +92,7 @@ def test_the_scene_s_alarms_are_on_signals() -> None:
 
 
 def test_an_alarm_on_a_mode_says_that_a_device_is_in_other_hands(tmp_path: Path) -> None:
-    """Of the scene, and of a controller; from a checkpoint too."""
+    """For alarms of the scene and of a controller; also from a checkpoint."""
     belt = "belts/feeder"
     sim = line(alarms={"by_hand": {"tag": f"{belt}/mode", "high": 1.5, "alarm_class": "message"}})
     declare(sim, automatic={"tag": f"{belt}/mode", "low": 1.5})
@@ -111,7 +111,10 @@ def test_an_alarm_on_a_mode_says_that_a_device_is_in_other_hands(tmp_path: Path)
 
 
 def test_an_alarm_with_a_limit_goes_by_what_is_read_the_line_s_own_by_what_is() -> None:
-    """Of the scene, and of a controller: a forced value is judged as controllers read it, until it is unforced."""
+    """A forced value counts as controllers read it, until it is unforced.
+
+    This holds for alarms of the scene and of a controller.
+    """
     sim = line(alarms={"full": {"tag": ON_TABLE, "high": 40}}, belts={"feeder": {"drive": {"acceleration": 1.0}}})
     declare(sim, empty={"tag": ON_TABLE, "low": -1.0})
     sim.advance()
@@ -243,7 +246,7 @@ def test_a_scene_s_alarm_that_can_not_be(alarm: dict[str, Any], problem: str) ->
 
 
 def busy(sim: Simulation) -> None:
-    """Something of everything."""
+    """Return a line after events of all kinds."""
     declare(sim, full={"latching": True, "group": "table", "on_delay": 0.1}, late={"on_delay": 3.0, "group": "table"})
     sim.command(("alarms/full", "alarms/late", "alarms/other"), (1.0, 1.0, 1.0))
     sim.operate("shelve", ["other"], [2.0], writer="anna")

@@ -1,4 +1,4 @@
-"""The tables of docs/line.md have every device."""
+"""The tables of docs/line.md contain every device."""
 
 from conveyor_sim.line.device_kinds import DEVICES
 from conveyor_sim.line.line import image_of

@@ -1,4 +1,4 @@
-"""Tags: of no value of a shipped line anything is left empty, and what is said of it holds."""
+"""Tags of shipped lines have no empty fields, and their statements are true."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -34,7 +34,7 @@ def test_nothing_is_left_empty_of_any_shipped_line(path: Path) -> None:
 
 
 def test_codes_of_units_are_those_of_unece_recommendation_20() -> None:
-    """As the OPC Foundation lists them (UNECE_to_OPCUA.csv)."""
+    """The list is that of the OPC Foundation (UNECE_to_OPCUA.csv)."""
     assert {unit: entry.code for unit, entry in UNITS.items()} == {
         "1": "C62", "m": "MTR", "m/s": "MTS", "s": "SEC", "Hz": "HTZ", "1/s": "C97", "1/min": "C94", "1/h": "H10",
         "1/m^2": "C93", "N": "NEW", "J": "JOU", "%": "P1",
@@ -43,12 +43,12 @@ def test_codes_of_units_are_those_of_unece_recommendation_20() -> None:
 
 
 def test_roles_say_what_is_read_written_and_injected() -> None:
-    """In the order in which a device lists them, however they are mixed."""
+    """The order is that of the device, for any mixture of roles."""
     texts = {0: "stopped", 4: "idle", 6: "execute"}
     tags = (
         switch("m/run", "command", "Runs.", 1.0),
         choice("m/state", "status", "What it does.", texts, 4),
-        number("m/rate", "setpoint", "Bottles a second.", "1/s", 0.0, 2.0, 1.5, nominal=1.5),
+        number("m/rate", "setpoint", "Bottles per second.", "1/s", 0.0, 2.0, 1.5, nominal=1.5),
         count("m/made", "counter", "Bottles."),
         switch("m/stop", "fault", "Stops."),
         seconds("m/time", "actual", "When."),
@@ -65,7 +65,7 @@ def test_roles_say_what_is_read_written_and_injected() -> None:
 
 
 def test_initial_values_are_those_of_a_line_without_bottles() -> None:
-    """Of signals those that they show at the start, of commands what is in force then."""
+    """Initial values of signals are those at the start, of commands those in force then."""
     source = {"kind": "source", "bottle": "bottle", "position": [0.2, 0.5], "direction": 0.0, "speed": 0.0, "rate": 0.5}
     gate = {
         "from": [1.0, 0.0], "to": [1.0, 1.0], "kind": "slide", "direction": 1.5, "stroke": 0.5, "max_speed": 1.0,
@@ -96,7 +96,7 @@ def test_initial_values_are_those_of_a_line_without_bottles() -> None:
 
 
 class Lamp(Device):
-    """Of which one signal is an attribute, and one is computed."""
+    """Device with one signal that is an attribute, and one that is computed."""
 
     def __init__(self, name: str, *more: Tag) -> None:
         super().__init__(
@@ -109,7 +109,7 @@ class Lamp(Device):
 
 
 def test_a_tag_that_is_an_attribute_costs_one_line() -> None:
-    """It stands after the signals that the device gives by itself, whatever its place in the list."""
+    """It follows the signals that the device computes, at any place in the list."""
     now = simulation().line.now
     plain, one = Lamp("lamps/a"), Lamp("lamps/a", count("lamps/a/hours", "counter", "Hours.").of("hours"))
     assert (names(plain), list(plain.read(now))) == (["lamps/a/on"], [True])

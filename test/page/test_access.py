@@ -149,7 +149,7 @@ def test_a_line_that_runs_is_commanded_by_keys_alone(open_page: Callable[[str], 
     for value, now in (("on", 1.0), ("off", 0.0)):
         page.focus(f"[aria-label='Inject photo_eyes/exit/stuck_on {value}']")
         page.keyboard.press("Enter")
-        soon(page, lambda now=now: live.source.shown.values["photo_eyes/exit/blocked"] == now, value)
+        soon(page, lambda now=now: live.source.snapshot.values["photo_eyes/exit/blocked"] == now, value)
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])

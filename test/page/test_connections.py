@@ -208,9 +208,9 @@ def test_requests_that_make_no_sense_are_refused(live: Live) -> None:
                 replies.append(reply["refused"])
             return replies
 
-    tick = live.source.shown.tick
+    tick = live.source.snapshot.tick
     assert all(run(work()))
-    assert live.source.shown.tick > tick and live.source.shown.values[SETPOINT] == 0.5
+    assert live.source.snapshot.tick > tick and live.source.snapshot.values[SETPOINT] == 0.5
 
 
 def test_a_flood_of_requests_is_cut_off_and_holds_up_nobody(live: Live) -> None:
@@ -228,7 +228,7 @@ def test_a_flood_of_requests_is_cut_off_and_holds_up_nobody(live: Live) -> None:
             return flood.close_code
 
     assert run(work()) == WSCloseCode.POLICY_VIOLATION
-    assert live.source.shown.values[SETPOINT] == 0.5
+    assert live.source.snapshot.values[SETPOINT] == 0.5
 
 
 @pytest.mark.parametrize("kind", [WSMsgType.PING, WSMsgType.PONG], ids=["pings", "pongs"])

@@ -53,16 +53,18 @@ def test_the_picture_follows_the_line_and_says_how_late_it_is(page: Any, live: L
     soon(page, lambda: page.inner_text("#latency").endswith(" ms behind"), "how late it is")
     assert page.inner_text("#scene") == "small_packaging" and page.inner_text("#who") == "read only"
     drawn = clock(page)
-    assert live.source.shown.tick * 0.01 >= drawn - 0.005
+    assert live.source.snapshot.tick * 0.01 >= drawn - 0.005
 
 
 def test_bottles_are_drawn_where_the_source_has_them_to_a_pixel(page: Any, live: Live) -> None:
     signed_in(page, "tess")
-    until(lambda: live.source.shown.tick > 1000, "bottles behind the capper")
+    until(lambda: live.source.snapshot.tick > 1000, "bottles behind the capper")
     page.click("text=Pause run")
     page.wait_for_selector("text=Resume run")
-    until(lambda: live.source.picture.drawn["bottles"]().tick == live.source.shown.tick, "a picture of where it stands")
-    drawn = live.source.picture.drawn["bottles"]()
+    until(
+        lambda: live.source.frame.drawn["bottles"]().tick == live.source.snapshot.tick, "a picture of where it stands"
+    )
+    drawn = live.source.frame.drawn["bottles"]()
     soon(
         page, lambda: float(page.get_attribute("#plan", "data-frame")) == pytest.approx(drawn.tick * 0.01), "its frame"
     )
@@ -131,7 +133,7 @@ def test_everything_fits_and_has_a_name_for_those_who_hear_it(page: Any, size: t
 def test_who_has_not_signed_in_is_refused_with_the_reason(page: Any, live: Live) -> None:
     set_speed(page, "0.3")
     told(page, "Refused: not signed in")
-    assert live.source.shown.values[SETPOINT] == 0.5
+    assert live.source.snapshot.values[SETPOINT] == 0.5
 
 
 def test_a_viewer_is_refused_with_the_reason(page: Any, live: Live) -> None:
@@ -140,7 +142,7 @@ def test_a_viewer_is_refused_with_the_reason(page: Any, live: Live) -> None:
     told(page, "Refused: vic is a viewer, who only reads")
     page.click("text=Pause run")
     told(page, "vic is a viewer")
-    assert live.source.shown.values[SETPOINT] == 0.5 and live.source.shown.run.text == "running"
+    assert live.source.snapshot.values[SETPOINT] == 0.5 and live.source.snapshot.run.text == "running"
     page.click("#sign")
     page.wait_for_selector("body[data-person='']")
 
@@ -178,7 +180,7 @@ def test_what_one_does_another_sees_and_may_not_undo(open_page: Callable[[str], 
     told(viewer, "Refused: vic is a viewer")
     assert viewer.locator("#panel_device tr", has_text="mode").first.locator("td").inner_text() == "Manual"
     put_into_mode(tester, "1")
-    soon(tester, lambda: live.source.shown.values["belts/line/mode"] == 1.0, "automatic again")
+    soon(tester, lambda: live.source.snapshot.values["belts/line/mode"] == 1.0, "automatic again")
 
 
 def test_what_a_tester_does_is_shown(page: Any, live: Live) -> None:
@@ -257,7 +259,7 @@ def test_a_command_given_on_the_page_is_in_the_recording_which_replays(
             mode = page.locator("#panel_device tr", has_text="mode").first.locator("td")
             soon(page, lambda: mode.inner_text() == "Manual", "the mode")
             set_speed(page, "0.2")
-            soon(page, lambda: source.shown.values[SPEED] == 0.2, "the belt is slow")
+            soon(page, lambda: source.snapshot.values[SPEED] == 0.2, "the belt is slow")
             row = page.locator("#panel_device tr", has_text="cmd_speed").first
             soon(page, lambda: "by web jo since" in row.inner_text(), "who did it")
             page.locator("#panel_device tr", has_text="by scene since 0.00 s").first.wait_for()

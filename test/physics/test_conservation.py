@@ -74,7 +74,7 @@ def test_momentum_and_angular_momentum_of_a_closed_system(integrator: str) -> No
 
 
 def test_the_papers_lever_arm_does_not_conserve_angular_momentum() -> None:
-    """The same cloud with R for both arms: momentum stays, angular momentum does not."""
+    """With R for both arms, momentum is conserved and angular momentum is not."""
     sim = cloud("semi_implicit_euler", "radius")
     momentum, angular, size = momenta(sim)
     sim.advance(80)

@@ -39,7 +39,7 @@ DURATION = 2.0 * math.sqrt(math.pi) * float(gamma(1.4) / gamma(0.9))
 
 
 def hertz_stiffness(contact_time: float, speed: float, reduced_mass: float) -> float:
-    """k (N/m^1.5) of a contact that lasts so long."""
+    """Return k (N/m^1.5) of a contact with a duration."""
     deepest = contact_time * speed / DURATION
     return 1.25 * reduced_mass * speed**2 / deepest**2.5
 
@@ -148,7 +148,7 @@ LINE = [[0.0, 0.0], [0.01, 0.01 * K]]
 
 @pytest.mark.parametrize("elastic", ["linear", "hertz", "table"])
 def test_onset_damping_has_its_restitution_at_its_speed(elastic: str) -> None:
-    """At the reference speed whatever the elastic law; else a (1 + e) = ln((1 + a) / (1 - e a)), a = lambda v."""
+    """At the reference speed for every elastic law; else a (1 + e) = ln((1 + a) / (1 - e a)), a = lambda v."""
     e, reference = 0.7, 1.0
     law: dict[str, Any] = {
         "linear": {"stiffness": K},
@@ -175,7 +175,7 @@ def _reduced(e: float) -> float:
 
 
 def test_a_table_that_is_a_line_is_the_linear_contact() -> None:
-    """The same path to rounding, damping and friction included."""
+    """Both paths are equal to rounding, including damping and friction."""
     rest: dict[str, Any] = {"damping": {"law": "normal", "coefficient": 5.0}, "friction": 0.3}
     found = []
     for elastic in ({"stiffness": K}, {"table": LINE}):

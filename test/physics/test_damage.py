@@ -1,4 +1,4 @@
-"""What bottles and rails bear, against what can be computed by hand; and that to look changes nothing."""
+"""Loads on bottles and rails against values computed by hand. Their evaluation changes no bit."""
 
 import math
 from dataclasses import dataclass
@@ -207,7 +207,7 @@ def filling(**fields: Any) -> dict[str, Any]:
 
 
 def assert_same(one: Simulation, other: Simulation) -> None:
-    """The same bits in all that is borne."""
+    """Assert equal bits of all loads."""
     for mine, theirs in ((damage_of(one), damage_of(other)), (wear_of(one), wear_of(other))):
         for name in type(mine).__dataclass_fields__:
             np.testing.assert_array_equal(getattr(mine, name), getattr(theirs, name))

@@ -1,4 +1,4 @@
-"""How long a step may be for a drag, that is for friction at rest: gamma dt = 2, 1 and 2.785 for the explicit methods,
+"""Longest stable step for a drag, that is for friction at rest: gamma dt = 2, 1 and 2.785 for the explicit methods,
 and any length where friction is implicit.
 
 Bounds on the time step scale with it (`Method.drag_limit`), so that each integrator keeps the same margin.
@@ -98,7 +98,7 @@ def test_a_hexagonal_packing_under_pressure(integrator: str) -> None:
 
 @pytest.mark.parametrize("integrator", LIMITS)
 def test_bounds_keep_the_same_share_of_the_limit(integrator: str) -> None:
-    """Of friction half, of a dashpot a quarter: in a packing, gamma is three times that of two bottles."""
+    """Bounds are half of the limit of friction, and a quarter of that of a dashpot: in a packing gamma triples."""
     assert METHODS[integrator].drag_limit == pytest.approx(0.5 * LIMITS[integrator], rel=2e-3)
     model = build_model(
         scene(

@@ -159,7 +159,7 @@ def test_damping_takes_what_a_dashpot_takes() -> None:
 def test_friction_takes_its_impulse_times_the_mean_slip() -> None:
     """Glass slides along steel, mu = 0.1: slip falls in proportion to the impulse, so that of both ends counts."""
     v_t, v_n = 1.0, 0.2
-    # One more, at rest: a bottle alone would have kernels of its own.
+    # One more, at rest: a single bottle would need other kernels.
     first, other = bottle(50.0, RADIUS + 1e-5, v_t, -v_n), bottle(60.0, 0.0)
     sim = apart(
         first, other, rails={"wall": segment((49.0, 0.0), (52.0, 0.0)), "bend": arc((60.0, 2.0), 1.0, 0.0, 1.0)}
@@ -233,7 +233,7 @@ def test_a_turntable_does_its_speed_times_the_angular_momentum_it_gives() -> Non
 
 
 def angular_momentum(sim: Simulation) -> float:
-    """Of the only bottle, about (3, 0)."""
+    """Return the angular momentum of the only bottle about (3, 0)."""
     state = sim.bottles()
     orbital = (state.x[0] - 3.0) * state.vy[0] - state.y[0] * state.vx[0]
     return float(MASS * orbital + MASS * RADIUS**2 * state.omega[0])
@@ -266,7 +266,7 @@ def test_a_spring_that_holds_has_stored_its_force_squared() -> None:
 
 
 def test_without_the_effect_there_is_nothing_to_keep() -> None:
-    """One that nobody asks for has no arrays; an output calls for it."""
+    """Without an output the ledger has no arrays."""
     absent, there = (State(build_model(scene(**line(**more)))).world for more in ({}, {"outputs": {"ledger": 10}}))
     assert absent.ledger is None and absent.pairs is not None and absent.pairs.parts is None
     assert there.ledger is not None and there.pairs is not None and there.pairs.parts is not None

@@ -117,7 +117,7 @@ def test_a_diverter_gives_its_torque(integrator: str) -> None:
 
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_a_rail_that_is_struck_goes_back_and_comes_again(integrator: str) -> None:
-    """As a body without a drive would, whose force is next to nothing here: u = 2 m v / (M + m)."""
+    """The rail moves like a body without a drive, because the drive force is negligible: u = 2 m v / (M + m)."""
     weak = {"kind": "slide", "from": [0.0, -0.2], "to": [0.0, 0.2], "material": "ice", "direction": 0.0, "stroke": 0.3,
             "max_speed": 0.5, "acceleration": 0.1, "force_limit": 0.1, "open": True}  # fmt: skip
     sim = plant(bottle(0.3 + RADIUS + 0.005, 0.0, -1.0), gates={"g": weak}, **with_integrator(integrator))
@@ -149,7 +149,7 @@ def test_it_goes_on_when_the_bottle_is_gone() -> None:
     assert (signal(sim, "pushers/p/extended"), motion(sim, 1)) == (1.0, 0.0)
 
 
-def test_a_jam_holds_it_against_whatever_presses() -> None:
+def test_a_jam_holds_it_against_any_force() -> None:
     """It stands to the bit where it was, as without a limit, and is not blocked; free again it goes on."""
     sim = press()
     sim.command(["pushers/p/push"], [1])
@@ -215,7 +215,7 @@ def crowd(threads: int | None = None) -> Simulation:
         contacts=laws(20.0),
         threads=threads,
     )
-    sim.integration._listening = 0
+    sim.integration._chatter_ticks = 0
     sim.command(["pushers/p/push"], [1])
     sim.advance(48)
     return sim
@@ -240,7 +240,7 @@ def test_held_up_it_has_the_same_bits_however_the_run_is_divided(stalled: Path) 
         (crowd(2), 40, 0),
         (Simulation.load(stalled), 40, 3),
     ):
-        sim.integration._listening = listening
+        sim.integration._chatter_ticks = listening
         blocked = []
         for _ in range(pieces):
             sim.advance(40 // pieces)

@@ -19,7 +19,7 @@ SPEED = 0.7
 """m/s, of approach."""
 PAIRS = 64
 INTEGRATORS = ["semi_implicit_euler", "velocity_verlet", "rk4"]
-"""Of fixed steps; what `dormand_prince` does in such impacts is in test/engine/test_dormand_prince.py."""
+"""Integrators with fixed steps; test/engine/test_dormand_prince.py has such impacts with `dormand_prince`."""
 
 
 @dataclass(frozen=True)

@@ -71,7 +71,7 @@ def staggered(tangential: dict[str, Any]) -> Simulation:
 
 
 def force_on_stop(sim: Simulation, seconds: float) -> float:
-    """N, so long after the belt was brought to twice the slip limit, so slowly that nothing rings."""
+    """Return the force on the stop, N, a time after the belt slowly reached twice the slip limit, without oscillation."""
     ticks = 200
     for tick in range(ticks):
         sim.command(["belts/belt/cmd_speed"], [2.0 * SLIP_LIMIT * (tick + 1) / ticks])

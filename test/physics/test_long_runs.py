@@ -20,7 +20,7 @@ FLIGHT = 1500
 
 
 def energies(steps: float, integrator: str) -> np.ndarray:
-    """Energy of a bottle in each lane after BOUNCES, over that at the start, in contacts of so many steps.
+    """Energy of a bottle in each lane after BOUNCES, over that at the start, in contacts of `steps` steps.
 
     The walls are bottles as heavy as hills: so the kernels are those of all tests of one law.
     """
@@ -53,7 +53,7 @@ def energies(steps: float, integrator: str) -> np.ndarray:
 
 @pytest.mark.parametrize("integrator", ["semi_implicit_euler", "velocity_verlet"])
 def test_energy_walks_at_random_by_the_places_of_contacts_in_steps(integrator: str) -> None:
-    """As wide as the formula says at n + 1/2 steps a contact; at whole steps psi mirrors phi and nothing changes."""
+    """The spread is that of the formula at n + 1/2 steps per contact. At whole steps psi mirrors phi: no spread."""
     steps = 20.5
     angle = 2.0 * math.sin(math.pi / (2.0 * steps))
     expected = angle**2 * math.sqrt(BOUNCES / 48.0)

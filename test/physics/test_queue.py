@@ -29,7 +29,7 @@ def queue(damping: float, step: int = 200) -> Simulation:
 
 
 def impulse_of_stop(sim: Simulation) -> float:
-    """What the stop gave so far, N s: each bottle's impulse is that of the contacts ahead of and behind it."""
+    """Return the impulse of the stop so far, N s. A bottle's impulse is that of the contacts ahead of and behind it."""
     return float(np.sum(sim.bottles().impulse * (-1.0) ** np.arange(N)))
 
 

@@ -48,7 +48,7 @@ def turning(**accuracy: Any) -> Scene:
         }  # fmt: skip
         at = outer - RADIUS - GAP
         bottles.append(bottle(centre[0] + at, 0.0, 0.0, omega * at))
-    # Nobody is there: with them it has the kernels of other tests.
+    # No bottle uses them: with them the scene has the kernels of other tests.
     belts["straight"] = belt(0.0, (-1.0, 3.0), 0.5, 0.2)
     rails["straight"] = segment((-1.0, 3.0), (-0.5, 3.0))
     return scene(
@@ -155,7 +155,7 @@ def across_a_joint(**accuracy: Any) -> dict[str, Any]:
 @pytest.mark.parametrize("preset", ["standard", "fine"])
 @pytest.mark.parametrize("integrator", INTEGRATOR_NAMES)
 def test_a_queue_across_a_joint_of_belts(integrator: str, preset: Any) -> None:
-    """Each bottle drags with mu m g of its belt, whatever the belts' speeds: those behind press with the sum of theirs.
+    """Each bottle drags with mu m g of its belt at any belt speed. The bottles behind press with the sum of drags.
 
     Straight belts take nothing from resting load at any step; rounding is left.
     """

@@ -191,7 +191,7 @@ def test_a_belt_that_only_the_rim_reaches_drags_it(gap: float) -> None:
 
 @pytest.mark.parametrize("fields", [{}, {"friction_curve": "atan"}, {"friction_solver": "implicit"}])
 def test_a_point_stays_a_point_beside_rings(fields: dict[str, Any]) -> None:
-    """The same bits as alone, on and off the belt's edge."""
+    """Bits are the same as without rings, on and off the belt's edge."""
     points = [bottle(-1.0, -0.01, 0.3, 0.02), bottle(1.0, 0.2, 0.1, 0.0)]
     belts = {"belt": belt(0.5, (-5.0, 0.0), 10.0, 0.5)}
     # They never meet.

@@ -21,7 +21,7 @@ BEND = {
     "kind": "curved", "centre": [50.0, 50.0], "inner_radius": 0.3, "width": 0.2, "start_angle": 0.0, "span": 1.0,
     "material": "chain", "speed": 0.5,
 }  # fmt: skip
-"""Where no bottle is: with it the kernels are those of test_turntable.py."""
+"""A belt without bottles, so that the kernels are those of test_turntable.py."""
 
 
 def set_down(

@@ -115,7 +115,7 @@ def test_stick_and_slip_on_a_rail(integrator: str, expected: float) -> None:
 
 
 def _off(integrator: str, speeds: list[float], per_tick: int) -> list[float]:
-    """Of each speed that a bottle set off at: largest difference to the closed form in three ticks, over that speed."""
+    """Return the largest difference to the closed form in three ticks over the initial speed, for each speed."""
     sim, worst = squeezed(integrator, dict(zip(PLACES, speeds, strict=True)), per_tick), [0.0] * len(speeds)
     for _ in range(3):
         sim.advance()

@@ -83,7 +83,7 @@ def place(sim: Simulation) -> np.ndarray:
 
 
 def turned(sim: Simulation, omega: float) -> np.ndarray:
-    """Where the bottle is in the frame of the table, m."""
+    """Return the position of the bottle in the frame of the table, m."""
     c, s = math.cos(omega * sim.time), math.sin(omega * sim.time)
     return np.array([[c, s], [-s, c]]) @ place(sim)
 
@@ -145,7 +145,7 @@ def test_it_slides_at_mu_g_beyond(integrator: str) -> None:
 
 
 def slip_and_way(t: float, speed: float) -> tuple[float, float]:
-    """Of a bottle set down on a belt: full friction until the slip is 0, then back on its spring, critically damped."""
+    """Return slip and path of a bottle set down on a belt: full friction until the slip is 0, then a damped spring."""
     end = speed / (MU * G)
     if t <= end:
         return speed - MU * G * t, speed * t - 0.5 * MU * G * t**2

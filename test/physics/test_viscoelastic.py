@@ -98,7 +98,7 @@ def test_loss_goes_with_the_fifth_root_of_the_speed() -> None:
 
 
 def test_the_ledger_closes() -> None:
-    """What is lost is in the account of damping, and nothing anywhere else."""
+    """All lost energy is booked as damping."""
     e = 0.6
     sim = simulation(
         contacts=[{"between": ["glass", "glass"], **law(e)}],

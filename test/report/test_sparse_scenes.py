@@ -11,7 +11,7 @@ from facts import missing
 
 from conveyor_sim.cli import main
 from conveyor_sim.report.figures import style
-from conveyor_sim.report.figures.data import Frame, Plant
+from conveyor_sim.report.figures.data import PlantFrame, StaticGeometry
 from conveyor_sim.report.figures.views import plant_figure, scene_figure, table_figure
 from conveyor_sim.scene import parse_scene
 
@@ -60,7 +60,7 @@ def test_every_command_takes_it(name: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", SCENES)
 def test_what_there_is_is_drawn(name: str) -> None:
     scene = parse_scene(SCENES[name], "sparse.yaml")
-    plant, frame = Plant.of(scene), Frame.start_of(scene)
+    plant, frame = StaticGeometry.of(scene), PlantFrame.start_of(scene)
     with style.look():
         figures = [
             scene_figure(plant, frame, "sparse"),

@@ -9,7 +9,7 @@ from click.testing import CliRunner
 from scenes import SHIPPED, shipped_name
 
 from conveyor_sim.cli import main
-from conveyor_sim.report.tags import NONE, Row, tag_csv, tag_rows
+from conveyor_sim.report.tags import NONE, TagRow, tag_csv, tag_rows
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 
@@ -31,7 +31,7 @@ def test_rows_are_the_process_image_in_its_order() -> None:
     assert {*image.signal_names, *image.command_names, *image.fault_names} <= {row.tag for row in rows}
     assert all(row.path == f"packaging/line_1/{row.tag}" for row in rows)
     assert [row.tag for row in rows if row.role == "run"] == ["run/state"]
-    assert list(csv.reader(io.StringIO(tag_csv(scene)))) == [list(Row._fields), *map(list, rows)]
+    assert list(csv.reader(io.StringIO(tag_csv(scene)))) == [list(TagRow._fields), *map(list, rows)]
 
 
 def test_the_command() -> None:

@@ -35,35 +35,35 @@ def setpoint(value: float) -> Input:
 def test_a_line_is_shown_and_worked_and_all_is_on_record(
     start_node: Callable[..., Child], client: LineClient, source: NodeSource, tmp_path: Path
 ) -> None:
-    assert source.give(setpoint(0.1)) == source.shown.lost == "no data of the line have arrived yet"
+    assert source.give(setpoint(0.1)) == source.snapshot.lost == "no data of the line have arrived yet"
     node = start_node(scene=ZONED, real_time_factor=1.0, start_paused=False, duration=600.0, record=tmp_path / "bag")
-    until(lambda: not source.shown.lost and source.shown.run.state == RUNNING, "the line")
+    until(lambda: not source.snapshot.lost and source.snapshot.run.state == RUNNING, "the line")
     image = image_of(load_scene(ZONED))
-    assert [tag.name for tag in source.about.tags] == [tag.name for tag in image.tags]
-    assert source.shown.values.keys() == {*image.signal_names, *image.command_names}
-    until(lambda: {"bottles", "belts"} <= source.picture.drawn.keys(), "what a page draws")
-    assert len(source.picture.drawn["belts"]().actual) == len(source.picture.line.belts)
+    assert [tag.name for tag in source.info.tags] == [tag.name for tag in image.tags]
+    assert source.snapshot.values.keys() == {*image.signal_names, *image.command_names}
+    until(lambda: {"bottles", "belts"} <= source.frame.drawn.keys(), "what a page draws")
+    assert len(source.frame.drawn["belts"]().actual) == len(source.frame.line.belts)
     assert source.give(setpoint(0.25)) == ""
-    until(lambda: source.shown.values[SPEED] == 0.25, "the speed")
-    read_back = source.shown.read_back
+    until(lambda: source.snapshot.values[SPEED] == 0.25, "the speed")
+    read_back = source.snapshot.read_back
     assert read_back is not None and "modbus 127.0.0.1:4711" in read_back.writers
     assert source.give(Input(OPERATE, "Jo", "operator", MODE, ("belts/zone1",), (3.0,))) == ""
-    until(lambda: source.shown.values["belts/zone1/mode"] == 3.0, "the mode")
+    until(lambda: source.snapshot.values["belts/zone1/mode"] == 3.0, "the mode")
     assert source.give(Input(OPERATE, "Jo", "operator", FORCE, ("photo_eyes/full1/blocked",), (1.0,))) == ""
-    until(lambda: source.shown.forced == {"photo_eyes/full1/blocked"}, "the force")
+    until(lambda: source.snapshot.forced == {"photo_eyes/full1/blocked"}, "the force")
     assert source.give(setpoint(0.3)) == ""  # in other hands: the node says so, at once
     until(
         lambda: any(e.kind == "command_refused" and "is in Manual" in e.text for e in source.events(0)[1]), "a refusal"
     )
     assert source.control("pause", 0, "a test") == ""
-    until(lambda: source.shown.run.state == PAUSED, "the pause")
-    tick = source.shown.tick
+    until(lambda: source.snapshot.run.state == PAUSED, "the pause")
+    tick = source.snapshot.tick
     assert source.control("step", 100, "a test") == ""
-    until(lambda: source.shown.tick > tick + 50, "the step")
-    run = source.shown.run_id
+    until(lambda: source.snapshot.tick > tick + 50, "the step")
+    run = source.snapshot.run_id
     assert source.control("reset", 0, "a test") == ""
-    until(lambda: source.shown.run_id != run and source.shown.tick == 0, "the reset")
-    assert source.shown.values[SETPOINT] == 0.5
+    until(lambda: source.snapshot.run_id != run and source.snapshot.tick == 0, "the reset")
+    assert source.snapshot.values[SETPOINT] == 0.5
     node.stop()
     report = replay(tmp_path / "bag")
     assert report.difference is None and report.compared["outcomes"] >= 3
@@ -74,18 +74,18 @@ def test_a_node_may_hang_and_die_and_come_back(
 ) -> None:
     given = {"scene": ZONED, "real_time_factor": 1.0, "start_paused": False, "duration": 600.0}
     node = start_node(**given)
-    until(lambda: not source.shown.lost, "the line")
+    until(lambda: not source.snapshot.lost, "the line")
     with halted(node):
-        until(lambda: source.shown.lost, "silence")
-        assert source.shown.lost == "nothing was heard of the node for 5 s" == source.give(setpoint(0.1))
-    until(lambda: not source.shown.lost, "a sign of life")
-    run = source.shown.run_id
+        until(lambda: source.snapshot.lost, "silence")
+        assert source.snapshot.lost == "nothing was heard of the node for 5 s" == source.give(setpoint(0.1))
+    until(lambda: not source.snapshot.lost, "a sign of life")
+    run = source.snapshot.run_id
     os.kill(node.pid, signal.SIGKILL)
-    until(lambda: source.shown.lost, "its death")
+    until(lambda: source.snapshot.lost, "its death")
     another = start_node(**given)
-    until(lambda: not source.shown.lost and source.shown.run_id != run, "another one")
+    until(lambda: not source.snapshot.lost and source.snapshot.run_id != run, "another one")
     assert source.give(setpoint(0.25)) == ""
-    until(lambda: source.shown.values[SPEED] == 0.25, "the speed")
+    until(lambda: source.snapshot.values[SPEED] == 0.25, "the speed")
     another.stop()
 
 
@@ -93,12 +93,12 @@ def test_another_line_is_not_taken_for_this_one(
     start_node: Callable[..., Child], client: LineClient, source: NodeSource
 ) -> None:
     first = start_node(scene=ZONED, real_time_factor=1.0, start_paused=False, duration=600.0)
-    until(lambda: not source.shown.lost, "the line")
+    until(lambda: not source.snapshot.lost, "the line")
     first.stop()
-    until(lambda: source.shown.lost, "its end")
+    until(lambda: source.snapshot.lost, "its end")
     second = start_node(real_time_factor=1.0, start_paused=False, duration=600.0)
-    until(lambda: "another line than before" in source.shown.lost, "the other line")
+    until(lambda: "another line than before" in source.snapshot.lost, "the other line")
     second.stop()
     third = start_node(scene=ZONED, real_time_factor=1.0, start_paused=False, duration=600.0)
-    until(lambda: not source.shown.lost, "the line")
+    until(lambda: not source.snapshot.lost, "the line")
     third.stop()

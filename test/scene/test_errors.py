@@ -1,4 +1,4 @@
-"""Every way a scene can be wrong is answered with one line that names file, line, field, value and expectation."""
+"""Every error in a scene is reported in one line with file, line, field, value and expectation."""
 
 import os
 from pathlib import Path

@@ -135,7 +135,7 @@ def test_stations_that_share_a_region_are_refused_once() -> None:
 @pytest.mark.parametrize("rows", [1, 2, 5])
 @pytest.mark.parametrize("columns", [1, 4, 30])
 def test_no_region_is_said_to_hold_less_than_it_does(rows: int, columns: int) -> None:
-    """Bottles side by side in rows shifted by a radius: as many as there are fit, whatever the shape."""
+    """Bottles side by side in rows shifted by a radius: all of them fit, in every shape."""
     width, height = (columns - 1 + 0.5 * (rows > 1)) * 2 * RADIUS, (rows - 1) * math.sqrt(3.0) * RADIUS
     edge = 1e-6
     region = [(-edge, -edge), (width + edge, -edge), (width + edge, height + edge), (-edge, height + edge)]

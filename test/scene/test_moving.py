@@ -1,4 +1,4 @@
-"""Where rails that move are, and the box that they sweep, against closed forms."""
+"""Positions of moving rails, and the boxes that they sweep, against closed forms."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""What is found through cells and boxes is what comparing all with all finds."""
+"""The search by cells and boxes finds the same as a comparison of all with all."""
 
 import numpy as np
 import pytest

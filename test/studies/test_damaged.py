@@ -17,13 +17,13 @@ from conveyor_sim.accuracy.report.files import read_study, write_study
 from conveyor_sim.cli import main
 from conveyor_sim.errors import ConveyorError, StudyError
 from conveyor_sim.studies.results import read_results, write_parquet
-from conveyor_sim.studies.row import Row
+from conveyor_sim.studies.row import RunRow
 from conveyor_sim.studies.runs import Runs
 from conveyor_sim.studies.setup import Setup
 from conveyor_sim.studies.sweep import sweep
 
 FIRST = Path("runs") / "point_0_seed_1.json"
-Made = tuple[Setup, Path, list[Row]]
+Made = tuple[Setup, Path, list[RunRow]]
 
 
 def made_in(folder: Path, **changes: Any) -> Made:
@@ -45,14 +45,14 @@ def other(tmp_path_factory: pytest.TempPathFactory) -> Made:
     return made_in(tmp_path_factory.mktemp("studies") / "other", overrides={"gravity": 9.7})
 
 
-def again(made: Made, folder: Path) -> tuple[list[Row], list[str], int]:
+def again(made: Made, folder: Path) -> tuple[list[RunRow], list[str], int]:
     """Continue a study in a folder. Return its rows, its messages, and the number of new runs."""
     setup, said, engine = made[0], list[str](), Here()
     with Runs(setup, folder, engine, said.append) as runs:
         return sweep(runs, setup), said, engine.made
 
 
-def same(rows: list[Row], others: list[Row]) -> bool:
+def same(rows: list[RunRow], others: list[RunRow]) -> bool:
     return [(row.key, row.status, row.metrics) for row in rows] == [
         (row.key, row.status, row.metrics) for row in others
     ]

@@ -24,7 +24,7 @@ from conveyor_sim.studies import dask_engine
 from conveyor_sim.studies.alone import run_alone
 from conveyor_sim.studies.dask_engine import DaskEngine
 from conveyor_sim.studies.results import read_results
-from conveyor_sim.studies.row import Job, Row
+from conveyor_sim.studies.row import Job, RunRow
 from conveyor_sim.studies.runs import Runs
 from conveyor_sim.studies.setup import Setup
 from conveyor_sim.studies.sweep import sweep
@@ -110,9 +110,9 @@ def running(folder: Path) -> set[int]:
 
 
 @contextmanager
-def swept(setup: Setup, folder: Path, address: str) -> Iterator[list[Row]]:
+def swept(setup: Setup, folder: Path, address: str) -> Iterator[list[RunRow]]:
     """A study under way in a thread; its rows are there as the context ends."""
-    rows: list[Row] = []
+    rows: list[RunRow] = []
     failed: list[BaseException] = []
 
     def work() -> None:

@@ -18,14 +18,14 @@ from conveyor_sim.errors import StudyError
 from conveyor_sim.studies.design import saltelli
 from conveyor_sim.studies.effects import indices, interactions, main_effects, maps
 from conveyor_sim.studies.results import Results
-from conveyor_sim.studies.row import Row
+from conveyor_sim.studies.row import RunRow
 from conveyor_sim.studies.verdict import verdicts, wider_than_wanted
 
 
 def results_of(points: list[dict[str, Any]], seeds: int, made: Callable[[Mapping[str, Any], int], float]) -> Results:
     """A study of one metric, as if it had been run."""
     rows = [
-        Row(number, seed, point, "finished", metrics={"y": made(point, seed)})
+        RunRow(number, seed, point, "finished", metrics={"y": made(point, seed)})
         for number, point in enumerate(points)
         for seed in range(seeds)
     ]
@@ -53,7 +53,7 @@ def test_main_effects_are_means_over_all_else_with_intervals_over_seeds() -> Non
 def test_a_seed_that_a_point_lacks_shifts_no_mean() -> None:
     """One point may have more runs than others; its additional seeds alone do not show the level."""
     found = results_of(GRID, 3, noisy)
-    often = [Row(1, seed, GRID[1], "finished", metrics={"y": 3.0 + (-1.0) ** seed}) for seed in range(3, 23)]
+    often = [RunRow(1, seed, GRID[1], "finished", metrics={"y": 3.0 + (-1.0) ** seed}) for seed in range(3, 23)]
     ((x,), _) = main_effects(replace(found, rows=[*found.rows, *often]))[0]
     assert x.mean == pytest.approx([2.5, 4.5, 6.5])
     assert x.half_width == pytest.approx([4.3027 / math.sqrt(3.0)] * 3, rel=1e-4)

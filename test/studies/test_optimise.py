@@ -15,7 +15,7 @@ from conveyor_sim.studies.optimisation.answer import answer, trials_data
 from conveyor_sim.studies.optimisation.objective import parse_objective
 from conveyor_sim.studies.optimisation.optimise import Optimum, optimise
 from conveyor_sim.studies.optimisation.trials import Trial
-from conveyor_sim.studies.row import Row
+from conveyor_sim.studies.row import RunRow
 from conveyor_sim.studies.runs import Runs
 from conveyor_sim.studies.sweep import sweep
 from conveyor_sim.support.worker_pool import WorkerPool
@@ -39,9 +39,9 @@ class Study:
         path = self.folder / "study.yaml"
         path.write_text((HERE / "optimised.py").read_text().split('STUDY = """')[1].split('"""')[0].format(
             objective=objective, trials=trials))  # fmt: skip
-        self.made: list[Row] = []
+        self.made: list[RunRow] = []
 
-        def watch(_done: int, _whole: int, _left: float | None, row: Row | None) -> None:
+        def watch(_done: int, _whole: int, _left: float | None, row: RunRow | None) -> None:
             if row is not None:
                 self.made.append(row)
                 if len(self.made) == stop_after:
@@ -104,8 +104,8 @@ def test_the_best_point_is_near_the_bound_and_better_than_the_start(bounded: Opt
 )
 def test_whether_a_bound_is_kept_is_said_with_what_is_not_known(values: list[float], said: str) -> None:
     """The bound is on the mean, of which runs tell where it lies."""
-    rows = [Row(0, seed, {}, "finished", metrics={"y": value, "loss": value}) for seed, value in enumerate(values)]
-    kept = Trial(0, {}, (Row(0, 9, {}, "finished", metrics={"y": 1.0, "loss": 1.0}),))
+    rows = [RunRow(0, seed, {}, "finished", metrics={"y": value, "loss": value}) for seed, value in enumerate(values)]
+    kept = Trial(0, {}, (RunRow(0, 9, {}, "finished", metrics={"y": 1.0, "loss": 1.0}),))
     objective = parse_objective("minimise y subject to loss < 1.35", ["y", "loss"])
     found = Optimum(objective, (kept,), (kept,), (kept,), False, (Trial(0, {}, tuple(rows)),))
     assert f"  loss < 1.35 {said}" in answer(found, {"y": "1", "loss": "J"})

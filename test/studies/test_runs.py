@@ -23,7 +23,7 @@ from conveyor_sim.studies.alone import job_of, run_alone
 from conveyor_sim.studies.journal import read_rows
 from conveyor_sim.studies.load import load_study
 from conveyor_sim.studies.results import read_results, run_command, write_parquet
-from conveyor_sim.studies.row import Job, Row
+from conveyor_sim.studies.row import Job, RunRow
 from conveyor_sim.studies.run import Work, make_row, warm_start
 from conveyor_sim.studies.runs import Runs
 from conveyor_sim.studies.setup import Setup
@@ -46,7 +46,7 @@ METRICS = [
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Setup, Path, list[Row]]:
+def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Setup, Path, list[RunRow]]:
     """A study that two processes have made."""
     folder = tmp_path_factory.mktemp("study")
     setup = setup_of(folder, metrics=METRICS, warm_up=0.4, duration=2.0, seeds=3)
@@ -57,7 +57,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Setup, Path, list[Ro
     return setup, folder / "out", rows
 
 
-def test_there_is_a_row_for_each_point_and_seed(made: tuple[Setup, Path, list[Row]]) -> None:
+def test_there_is_a_row_for_each_point_and_seed(made: tuple[Setup, Path, list[RunRow]]) -> None:
     _, folder, rows = made
     assert [(row.point, row.seed, row.parameters["rate"]) for row in rows] == [
         (point, seed, rate) for point, rate in enumerate((4.0, 6.0)) for seed in (1, 2, 3)
@@ -72,14 +72,14 @@ def test_there_is_a_row_for_each_point_and_seed(made: tuple[Setup, Path, list[Ro
         assert found["fed"] <= found["mine"] and found["stops"] >= 1.0
 
 
-def test_the_engine_and_the_order_change_no_bit(made: tuple[Setup, Path, list[Row]], tmp_path: Path) -> None:
+def test_the_engine_and_the_order_change_no_bit(made: tuple[Setup, Path, list[RunRow]], tmp_path: Path) -> None:
     setup, _, rows = made
     with Runs(setup, tmp_path, Here(backwards=True)) as runs:
         again = sweep(runs, setup)
     assert [(row.key, row.metrics) for row in again] == [(row.key, row.metrics) for row in rows]
 
 
-def test_a_run_is_made_again_by_its_command(made: tuple[Setup, Path, list[Row]], tmp_path: Path) -> None:
+def test_a_run_is_made_again_by_its_command(made: tuple[Setup, Path, list[RunRow]], tmp_path: Path) -> None:
     setup, _, rows = made
     command = run_command(setup.path, rows[4])
     assert command == f"conveyor-sim sweep {setup.path} --set rate=6.0 --seed 2"
@@ -92,7 +92,7 @@ def test_a_run_is_made_again_by_its_command(made: tuple[Setup, Path, list[Row]],
             job_of(setup, given, 2)
 
 
-def test_finished_runs_are_not_made_again(made: tuple[Setup, Path, list[Row]]) -> None:
+def test_finished_runs_are_not_made_again(made: tuple[Setup, Path, list[RunRow]]) -> None:
     setup, folder, rows = made
     engine = Here()
     with Runs(setup, folder, engine) as runs:
@@ -108,7 +108,7 @@ def test_finished_runs_are_not_made_again(made: tuple[Setup, Path, list[Row]]) -
     (folder / "runs" / "point_5_seed_1.json").unlink()
 
 
-def test_runs_of_another_study_are_left_alone(made: tuple[Setup, Path, list[Row]], tmp_path: Path) -> None:
+def test_runs_of_another_study_are_left_alone(made: tuple[Setup, Path, list[RunRow]], tmp_path: Path) -> None:
     _, folder, rows = made
     for other, what in (
         (setup_of(tmp_path, metrics=METRICS, warm_up=0.2, duration=2.0), r"with another study \(warm_up\), so they"),
@@ -175,7 +175,7 @@ def test_a_function_of_metrics_may_be_mended(tmp_path: Path) -> None:
         Runs(load_study(tmp_path / "study.yaml"), tmp_path / "out", Here())
 
 
-def test_the_table_is_a_parquet_file(made: tuple[Setup, Path, list[Row]], tmp_path: Path) -> None:
+def test_the_table_is_a_parquet_file(made: tuple[Setup, Path, list[RunRow]], tmp_path: Path) -> None:
     pytest.importorskip("pyarrow")
     pandas, polars = pytest.importorskip("pandas"), pytest.importorskip("polars")
     if find_spec("duckdb") is None:

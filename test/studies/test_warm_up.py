@@ -15,7 +15,7 @@ from conveyor_sim.cli import main
 from conveyor_sim.errors import StudyError
 from conveyor_sim.studies.alone import job_of, run_alone
 from conveyor_sim.studies.results import read_results, write_parquet
-from conveyor_sim.studies.row import Row
+from conveyor_sim.studies.row import RunRow
 from conveyor_sim.studies.runs import Runs
 from conveyor_sim.studies.setup import Setup
 from conveyor_sim.studies.sweep import sweep
@@ -28,7 +28,7 @@ FILLING: dict[str, Any] = {
 }
 """A line that begins empty: the belt takes 6.2 s to the sink, and is full from then on."""
 
-Made = tuple[Setup, Path, list[Row], list[str]]
+Made = tuple[Setup, Path, list[RunRow], list[str]]
 
 
 @pytest.fixture(scope="module")
@@ -82,7 +82,7 @@ def test_it_is_the_same_from_where_it_was_interrupted(made: Made, tmp_path: Path
     _, _, rows, said = made
     setup, finished = setup_of(tmp_path, **FILLING), 0
 
-    def stop(done: int, _total: int, _left: float | None, row: Row | None) -> None:
+    def stop(done: int, _total: int, _left: float | None, row: RunRow | None) -> None:
         nonlocal finished
         finished += done > 0
         if finished == stop_after:

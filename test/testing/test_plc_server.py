@@ -249,7 +249,7 @@ class FreeRunning:
         self.said: list[str] = []
         self.observed: list[Mapping[str, float]] = []
         self.source = plant.source()
-        tags = read_tag_map(plc.tags, self.source.about.tags)
+        tags = read_tag_map(plc.tags, self.source.info.tags)
         way = partial(plc_link, plc.url, tags.all)
         self.face = FreeRunningPlc(self.source, plc.url, tags, way, 0.005, self.said.append, self.observed.append)
         thread.run(self.face.start())

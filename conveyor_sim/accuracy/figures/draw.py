@@ -10,11 +10,11 @@ from conveyor_sim.accuracy.figures.ensembles import ensembles_figure
 from conveyor_sim.accuracy.figures.orders import orders_figure
 from conveyor_sim.accuracy.figures.pareto import pareto_figure
 from conveyor_sim.accuracy.figures.stiffness import stiffness_figure
-from conveyor_sim.accuracy.results import Study
+from conveyor_sim.accuracy.results import AccuracyStudy
 from conveyor_sim.report.figures import style
 
 
-def accuracy_figures(study: Study) -> dict[str, Figure]:
+def accuracy_figures(study: AccuracyStudy) -> dict[str, Figure]:
     """`pareto` always; `orders`, `ensembles` and `stiffness` if the study has rows for them."""
     figures = {"pareto": pareto_figure(study)}
     if study.orders:
@@ -26,7 +26,7 @@ def accuracy_figures(study: Study) -> dict[str, Figure]:
     return figures
 
 
-def plot_accuracy(study: Study, out_dir: str | Path) -> list[Path]:
+def plot_accuracy(study: AccuracyStudy, out_dir: str | Path) -> list[Path]:
     """Draw an accuracy study and return the files written.
 
     `pareto` shows error against cost of every setting, `orders` the errors in closed forms, `ensembles` the long runs,

@@ -13,7 +13,7 @@ from matplotlib.patches import Patch
 
 from conveyor_sim.accuracy.figures.integrators import setting_text
 from conveyor_sim.accuracy.report.words import percent, spread, with_unit
-from conveyor_sim.accuracy.results import Comparison, Study
+from conveyor_sim.accuracy.results import AccuracyStudy, Comparison
 from conveyor_sim.report.figures import style
 from conveyor_sim.report.figures.heading import heading
 
@@ -29,7 +29,7 @@ _VERDICTS: Final = {
 }
 
 
-def ensembles_figure(study: Study) -> Figure:
+def ensembles_figure(study: AccuracyStudy) -> Figure:
     """Draw a panel per observable and a row per setting: difference from the reference (%) with its interval."""
     rows = study.comparisons
     settings = list(dict.fromkeys(row.setting for row in rows))

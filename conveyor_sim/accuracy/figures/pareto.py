@@ -19,7 +19,7 @@ from conveyor_sim.accuracy.figures.logarithmic import logarithmic_x, logarithmic
 from conveyor_sim.accuracy.figures.notes import Note, place_notes
 from conveyor_sim.accuracy.report.pareto import front, place_of
 from conveyor_sim.accuracy.report.words import digits, percent
-from conveyor_sim.accuracy.results import Point, Study
+from conveyor_sim.accuracy.results import AccuracyStudy, Point
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.report.figures import style
 from conveyor_sim.report.figures.data import Floats
@@ -34,7 +34,7 @@ _OWN: Final = style.INK
 _BEST: Final = "#9b2226"
 
 
-def pareto_figure(study: Study) -> Figure:
+def pareto_figure(study: AccuracyStudy) -> Figure:
     """Relative errors in impacts and in resting load (%) against processor time per simulated second, logarithmic."""
     figure = style.new_figure(12.0, 7.2)
     ax, side = figure.subplots(1, 2, width_ratios=(3.3, 1.0))
@@ -60,13 +60,13 @@ def pareto_figure(study: Study) -> Figure:
     return figure
 
 
-def _subtitle(study: Study) -> str:
+def _subtitle(study: AccuracyStudy) -> str:
     if study.answer is None:
         return f"No setting that was tried keeps {percent(study.tolerance)}."
     return "\n".join(textwrap.wrap(f"Recommended: {study.answer.sentence}".replace(" us", " µs"), 118))
 
 
-def _limits(ax: Axes, study: Study, placed: Sequence[Point]) -> None:
+def _limits(ax: Axes, study: AccuracyStudy, placed: Sequence[Point]) -> None:
     costs = [point.cost.median for point in placed if point.cost]
     errors = [100.0 * point.errors.peak_force for point in placed if point.errors and point.errors.peak_force > 0.0]
     errors += [100.0 * point.resting for point in placed if point.resting and point.resting > _LEAST_RESTING]
@@ -170,7 +170,7 @@ def _resting(ax: Axes, placed: Sequence[Point]) -> list[tuple[float, float]]:
     return drawn
 
 
-def _marks(ax: Axes, study: Study) -> list[Floats]:
+def _marks(ax: Axes, study: AccuracyStudy) -> list[Floats]:
     """Tolerance, real time and the reference's own doubt."""
     (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
     tolerance, doubt = 100.0 * study.tolerance, 100.0 * study.reference.doubt.peak_force
@@ -196,7 +196,7 @@ def _along(ax: Axes, x: float, y: float, text: str, ha: Literal["left", "right"]
     ax.annotate(text, (x, y), (shift, 3.0), textcoords="offset points", ha=ha, va="bottom", fontsize=8.5)
 
 
-def _rings(ax: Axes, study: Study, placed: Sequence[Point]) -> None:
+def _rings(ax: Axes, study: AccuracyStudy, placed: Sequence[Point]) -> None:
     """Around the recommended setting and the scene's own."""
     for setting, colour, size, gid in (
         (study.own, _OWN, 13.0, "own"),
@@ -216,7 +216,7 @@ def _rings(ax: Axes, study: Study, placed: Sequence[Point]) -> None:
                 )
 
 
-def _notes(study: Study, placed: Sequence[Point]) -> list[Note]:
+def _notes(study: AccuracyStudy, placed: Sequence[Point]) -> list[Note]:
     """Names of the settings that matter, then the time step or factor beside every point where there is room."""
     notes = []
     named: list[tuple[Setting | None, str, str]] = [(study.own, "the scene's own", _OWN)]
@@ -274,7 +274,7 @@ def _legend(side: Axes, placed: Sequence[Point]) -> None:
     legend.set_alignment("left")
 
 
-def _failures(side: Axes, study: Study) -> None:
+def _failures(side: Axes, study: AccuracyStudy) -> None:
     """List the settings outside the diagram, below the legend."""
     failed = [point for point in study.points if place_of(point) is None]
     if not failed:

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.accuracy.trajectory import Frame, Trajectory
+from conveyor_sim.accuracy.trajectory import TickRecord, Trajectory
 from conveyor_sim.columns.bottles import BottleColumns
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.physics.model import Model
@@ -30,7 +30,7 @@ def place(bottles: BottleColumns, index: int) -> str:
     return f"bottle {bottles.id[index]} at ({bottles.x[index]:.2f}, {bottles.y[index]:.2f}) m"
 
 
-def _too_fast(frame: Frame, reference: Trajectory) -> str:
+def _too_fast(frame: TickRecord, reference: Trajectory) -> str:
     if frame.energies.sum() <= BLOWN_UP * max(float(true.energies.sum()) for true in reference.frames):
         return ""
     bottles = frame.bottles
@@ -43,7 +43,7 @@ def _too_fast(frame: Frame, reference: Trajectory) -> str:
     )
 
 
-def _too_deep(frame: Frame, model: Model) -> str:
+def _too_deep(frame: TickRecord, model: Model) -> str:
     contacts, bottles = frame.contacts, frame.bottles
     if not contacts.a.size:
         return ""
@@ -63,7 +63,7 @@ def _too_deep(frame: Frame, model: Model) -> str:
     )
 
 
-def _astray(frame: Frame, true: Frame, model: Model) -> str:
+def _astray(frame: TickRecord, true: TickRecord, model: Model) -> str:
     a, b = frame.bottles, true.bottles
     _, here, there = np.intersect1d(a.id, b.id, assume_unique=True, return_indices=True)
     away = np.hypot(a.x[here] - b.x[there], a.y[here] - b.y[there])

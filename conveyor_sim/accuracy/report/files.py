@@ -14,7 +14,7 @@ from typing import cast
 
 from conveyor_sim.accuracy.report.pareto import front
 from conveyor_sim.accuracy.report.plain import Unlike, plain, typed
-from conveyor_sim.accuracy.results import Study
+from conveyor_sim.accuracy.results import AccuracyStudy
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.support.checked_json import read_checked, with_checksum
@@ -25,7 +25,7 @@ STUDY = "study.json"
 Table = list[dict[str, object]]
 
 
-def write_study(study: Study, out_dir: str | Path) -> list[Path]:
+def write_study(study: AccuracyStudy, out_dir: str | Path) -> list[Path]:
     """Write study.json and a CSV file for each kind of row that the study has, each whole or not at all.
 
     Headings of the CSV files end in the unit, relative numbers have none. The finished runs are not among them: a
@@ -39,7 +39,7 @@ def write_study(study: Study, out_dir: str | Path) -> list[Path]:
     return [out / name for name in contents]
 
 
-def read_study(path: str | Path, say: Callable[[str], object] = lambda _: None) -> Study:
+def read_study(path: str | Path, say: Callable[[str], object] = lambda _: None) -> AccuracyStudy:
     """Read a study from study.json; it equals the one that was written.
 
     say: called with one sentence for a file of an older version, which has no checksum and can't be verified.
@@ -52,10 +52,10 @@ def read_study(path: str | Path, say: Callable[[str], object] = lambda _: None) 
             f"{path}: {error}, expected an intact {STUDY} of a study of conveyor-sim accuracy"
         ) from None
     try:
-        study = typed(Study, kept.data)
+        study = typed(AccuracyStudy, kept.data)
     except Unlike as unlike:
         raise ConveyorError(f"{path}: {unlike}") from None
-    assert isinstance(study, Study)
+    assert isinstance(study, AccuracyStudy)
     if not kept.has_checksum:
         say(f"{path}: was made by an older version without checksums, so it can't be verified")
     return study
@@ -71,7 +71,7 @@ def write(file: Path, content: bytes) -> None:
         raise ConveyorError(f"{file}: {reason}, expected a folder to write to") from None
 
 
-def _tables(study: Study) -> dict[str, Table]:
+def _tables(study: AccuracyStudy) -> dict[str, Table]:
     """Rows of each CSV file, by its name: a dict a row, all of a table with the same headings."""
     best = {point.setting for point in front(study.points)}
     recommended = None if study.answer is None else study.answer.setting

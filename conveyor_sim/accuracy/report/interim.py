@@ -8,7 +8,7 @@ from conveyor_sim.accuracy.report.apply import line
 from conveyor_sim.accuracy.report.forecast import Forecast
 from conveyor_sim.accuracy.report.lines import three_lines
 from conveyor_sim.accuracy.report.words import digits, percent
-from conveyor_sim.accuracy.results import Study
+from conveyor_sim.accuracy.results import AccuracyStudy
 
 PREDICTED = "Predicted, not measured:"
 PRELIMINARY = "Preliminary, measured in part:"
@@ -59,7 +59,7 @@ def predicted(known: Forecast) -> Interim:
     )
 
 
-def preliminary(study: Study) -> Interim:
+def preliminary(study: AccuracyStudy) -> Interim:
     """Return the answer from impacts of the first measured settings."""
     return Interim(
         PRELIMINARY,
@@ -71,23 +71,23 @@ def preliminary(study: Study) -> Interim:
     )
 
 
-def after_measuring(study: Study) -> Interim:
+def after_measuring(study: AccuracyStudy) -> Interim:
     """Return the answer from all settings, before long runs."""
     lines = (*_without_throughput(study), "Not known yet: throughput, and whether long runs agree with it.")
     return Interim(MEASURED, lines)
 
 
-def unfinished(study: Study) -> Interim:
+def unfinished(study: AccuracyStudy) -> Interim:
     """With some of the long runs."""
     runs = sum(not sample.failure for sample in study.samples)
     more = f"Not known yet: whether more long runs agree; {runs} were finished, the same command makes the others."
     return Interim(UNFINISHED, (*three_lines(study), *_setting(study), more))
 
 
-def _without_throughput(study: Study) -> tuple[str, ...]:
+def _without_throughput(study: AccuracyStudy) -> tuple[str, ...]:
     forces, _, cost = three_lines(study)
     return forces, "Throughput: not known, no long run was made.", cost, *_setting(study)
 
 
-def _setting(study: Study) -> list[str]:
+def _setting(study: AccuracyStudy) -> list[str]:
     return [] if study.answer is None else [f"Setting: {line(study.answer.setting)}"]

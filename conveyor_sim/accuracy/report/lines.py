@@ -7,13 +7,13 @@ import math
 from conveyor_sim.accuracy.report.answer import eligible, largest_error
 from conveyor_sim.accuracy.report.apply import line
 from conveyor_sim.accuracy.report.words import digits, duration, percent
-from conveyor_sim.accuracy.results import Answer, Comparison, Study
+from conveyor_sim.accuracy.results import AccuracyStudy, Answer, Comparison
 
 FEW = 2
 """Runs of a setting, fewer of which compare nothing."""
 
 
-def three_lines(study: Study) -> tuple[str, str, str]:
+def three_lines(study: AccuracyStudy) -> tuple[str, str, str]:
     """Return three lines on the recommended setting: accuracy of forces and throughput, cost of more accuracy."""
     if study.answer is None:
         return (
@@ -24,7 +24,7 @@ def three_lines(study: Study) -> tuple[str, str, str]:
     return _forces(study, study.answer), _throughput(study, study.answer), _cost(study.answer)
 
 
-def summary(study: Study) -> list[str]:
+def summary(study: AccuracyStudy) -> list[str]:
     """Return the command's output: the three lines, both settings, moving rails, and the cost of the study."""
     lines = list(three_lines(study))
     if study.answer is not None:
@@ -39,7 +39,7 @@ def summary(study: Study) -> list[str]:
     return lines
 
 
-def _own(study: Study) -> str:
+def _own(study: AccuracyStudy) -> str:
     """Return a line on the scene's setting, if another is recommended."""
     point = next((point for point in study.points if point.setting == study.own), None)
     if point is None or (study.answer is not None and study.answer.setting == study.own):
@@ -52,7 +52,7 @@ def _own(study: Study) -> str:
     return f"The scene's own setting is off by {percent(point.errors.peak_force)} in impacts{resting}{shaky}."
 
 
-def _forces(study: Study, answer: Answer) -> str:
+def _forces(study: AccuracyStudy, answer: Answer) -> str:
     impacts = f"Forces: good to {percent(answer.error)} when bottles hit something"
     if answer.resting is not None:
         return f"{impacts}, and to {percent(answer.resting)} where they press for long (asked: {_asked(study)})."
@@ -62,11 +62,11 @@ def _forces(study: Study, answer: Answer) -> str:
     return f"{impacts} (asked: {_asked(study)}); what presses for long {why}{likely}."
 
 
-def _asked(study: Study) -> str:
+def _asked(study: AccuracyStudy) -> str:
     return percent(study.tolerance)
 
 
-def _throughput(study: Study, answer: Answer) -> str:
+def _throughput(study: AccuracyStudy, answer: Answer) -> str:
     rows = [row for row in study.comparisons if row.setting == answer.setting]
     runs = max((row.runs for row in rows), default=0)
     only = "rely on this setting for impacts and resting forces only"
@@ -105,7 +105,7 @@ def _cost(answer: Answer) -> str:
     return f"{speed}; ten times better takes {digits(answer.exacter_cost)} times as long."
 
 
-def _best(study: Study) -> str:
+def _best(study: AccuracyStudy) -> str:
     """Return a line on the least error within the stability bounds, if any setting ran there."""
     found = min((largest_error(point) for point in eligible(study.points, math.inf)), default=math.inf)
     return f"; the best is good to {percent(found)}" if math.isfinite(found) else ""

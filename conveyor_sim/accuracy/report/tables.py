@@ -16,6 +16,7 @@ from conveyor_sim.accuracy.report.pareto import front, place_of
 from conveyor_sim.accuracy.report.words import digits, percent, setting_name, spread, with_unit
 from conveyor_sim.accuracy.results import (
     DEEP,
+    AccuracyStudy,
     Comparison,
     Cost,
     Errors,
@@ -24,7 +25,6 @@ from conveyor_sim.accuracy.results import (
     Point,
     Sample,
     StiffnessRow,
-    Study,
 )
 from conveyor_sim.accuracy.setting import Setting
 
@@ -33,17 +33,17 @@ Placed = tuple[Point, Errors, Cost]
 Quantity = tuple[str, Callable[[StiffnessRow], str]]
 
 
-def terminal(study: Study) -> Group:
+def terminal(study: AccuracyStudy) -> Group:
     """All tables of the study for a rich console of 80 columns or more, the answer last."""
     return Group(*blocks(study))
 
 
-def markdown(study: Study) -> str:
+def markdown(study: AccuracyStudy) -> str:
     """Return the tables as Markdown, each below a third-level heading."""
     return "\n".join(block.markdown() for block in blocks(study))
 
 
-def blocks(study: Study) -> list[Block]:
+def blocks(study: AccuracyStudy) -> list[Block]:
     """Return the tables for which the study has rows, and the answer."""
     parts = [
         _orders(study.orders),
@@ -75,7 +75,7 @@ def _orders(orders: Sequence[Order]) -> Block:
     )
 
 
-def _horizons(study: Study) -> Block:
+def _horizons(study: AccuracyStudy) -> Block:
     doubt = study.reference.doubt
     return Block.of(
         "How long trajectories can be compared",
@@ -96,7 +96,7 @@ def _horizons(study: Study) -> Block:
     )
 
 
-def _work(study: Study) -> list[Block]:
+def _work(study: AccuracyStudy) -> list[Block]:
     """Return the settings that did not fail: cost and error, and the other errors."""
     best = {point.setting for point in front(study.points)}
     recommended = None if study.answer is None else study.answer.setting
@@ -161,7 +161,7 @@ def _work(study: Study) -> list[Block]:
     ]
 
 
-def _rested(study: Study) -> str:
+def _rested(study: AccuracyStudy) -> str:
     """Return a sentence about the reference of errors in resting load."""
     rest = study.rest
     if rest is None or rest.setting is None or rest.contacts == 0:
@@ -187,7 +187,7 @@ def _failures(points: Sequence[Point]) -> Block:
     )
 
 
-def _ensembles(study: Study) -> Block:
+def _ensembles(study: AccuracyStudy) -> Block:
     notes = []
     if study.ensemble_reference is not None:
         notes = [
@@ -214,7 +214,7 @@ def _ensembles(study: Study) -> Block:
     )
 
 
-def _lost_runs(study: Study) -> Block:
+def _lost_runs(study: AccuracyStudy) -> Block:
     return Block.of(
         "Long runs that ended early",
         [
@@ -253,7 +253,7 @@ def _factor(row: StiffnessRow) -> Column[Quantity]:
     return Column(digits(row.factor), lambda quantity: quantity[1](row))
 
 
-def _answer(study: Study) -> Block:
+def _answer(study: AccuracyStudy) -> Block:
     answer = study.answer
     moving = [study.moving] if study.moving else []
     if answer is None:

@@ -204,7 +204,7 @@ class Declarations:
         require_small(kind.size, kind.characters, at)
         self._levels[kind.python] = levels = 1 + max(map(self._levels_of, own), default=0)
         if levels > MOST_LEVELS:
-            raise SourceError(at, f"found {levels} nested types, expected at most {MOST_LEVELS}")
+            raise SourceError(at, f"found {levels} types nested in each other, expected at most {MOST_LEVELS}")
 
     def _levels_of(self, kind: Type) -> int:
         """Return the depth of nested structures and blocks."""

@@ -131,7 +131,7 @@ class _Tree(Transformer[Any]):
     def _deep(self, node: _N, *parts: object) -> _N:
         depth = 1 + max((self.depths[id(part)][1] for part in parts if id(part) in self.depths), default=0)
         if depth > DEEPEST:
-            raise SourceError(node.at, f"found {depth} nested levels, expected at most {DEEPEST}")
+            raise SourceError(node.at, f"found {depth} levels of nesting, expected at most {DEEPEST}")
         self.depths[id(node)] = node, depth
         return node
 

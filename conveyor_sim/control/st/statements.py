@@ -273,7 +273,7 @@ class Statements:
         """
         self._loops += 1
         if self._loops > MOST_LOOPS:
-            raise SourceError(at, f"found {self._loops} nested loops, expected at most {MOST_LOOPS}")
+            raise SourceError(at, f"found {self._loops} loops nested in each other, expected at most {MOST_LOOPS}")
         self.block(body, at, 1 + statements(work))
         self._loops -= 1
 

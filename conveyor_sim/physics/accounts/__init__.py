@@ -1,1 +1,1 @@
-"""Books on a run: the energy ledger, damage, the elastic energy of contacts."""
+"""Ledgers of a run: energy, damage, clogging, elastic energy of contacts."""

@@ -1,4 +1,4 @@
-"""Watches outfeeds for clogging: bottles wait on running belts, and none has left for the scene's time limit."""
+"""Detection of clogged outfeeds: bottles wait on running belts, and none has left for the scene's time limit."""
 
 from collections.abc import Mapping
 from dataclasses import astuple
@@ -13,7 +13,7 @@ from conveyor_sim.scene import Scene
 from conveyor_sim.scene.types import Unchecked
 
 SLOW = 0.1
-"""Of the speed of the belt under it: what is slower is held up."""
+"""Speed of a bottle over that of its belt below which it counts as waiting."""
 
 
 def clogging_of(state: State, scene: Scene) -> "Clogging | None":
@@ -25,15 +25,15 @@ def clogging_of(state: State, scene: Scene) -> "Clogging | None":
 
 
 class Clogging:
-    """The outfeeds of a scene, looked at after every tick. Public attributes are remembered in checkpoints."""
+    """Outfeeds of a scene, checked after every tick. Checkpoints hold the public attributes."""
 
     passages: dict[str, tuple[int, int, int]]
-    """By outfeed: bottles removed, tick of the last passage or of nobody waiting, whether that was reported."""
+    """By outfeed: bottles removed, last tick with a passage or without waiting bottles, 1 if reported since."""
     events: list[tuple[int, str, int, Unchecked, Unchecked, Unchecked, Unchecked, str]]
-    """Those that nobody has taken."""
+    """Events that were not taken yet."""
 
     def __init__(self, state: State, limit: float, exits: Mapping[str, F8]) -> None:
-        """limit: s without a passage. exits: corners (n, 2) m of each outfeed, by name."""
+        """Start the watch. limit: s without a passage. exits: corners (n, 2) m of each outfeed, by name."""
         self._state = state
         self._limit = limit
         self._exits = exits
@@ -41,18 +41,18 @@ class Clogging:
         self.events = []
 
     def end(self, tick: int, removed: Mapping[str, int]) -> list[DamageEvent]:
-        """A tick has ended; the outfeeds that clogged in it. removed: bottles so far, by device."""
+        """Return the events of outfeeds that clogged in a tick, at its end. removed: bottles so far, by device."""
         before = len(self.events)
         for name, corners in self._exits.items():
             self._look_at(tick, name, corners, removed[f"outfeeds/{name}"])
         return [DamageEvent(*event) for event in self.events[before:]]
 
     def clogged(self) -> dict[str, bool]:
-        """Whether each outfeed is."""
+        """Return True for each outfeed that is clogged, by name."""
         return {name: bool(reported) for name, (_, _, reported) in self.passages.items()}
 
     def take_events(self) -> list[DamageEvent]:
-        """Outfeeds that clogged since the last call, in order."""
+        """Return the events of clogged outfeeds since the last call, in order."""
         events, self.events = self.events, []
         return [DamageEvent(*event) for event in events]
 
@@ -77,7 +77,7 @@ class Clogging:
         self.events.append(astuple(DamageEvent(tick, "clogging_time", bottle, x, y, idle, self._limit, text)))
 
     def _held_up(self) -> NDArray[np.int64]:
-        """Slots of the bottles that a running belt does not take along."""
+        """Return the slots of bottles that wait on a running belt."""
         world, bottles = self._state.world, self._state.world.bottles
         if world.footing is None:
             return np.zeros(0, np.int64)

@@ -1,4 +1,4 @@
-"""Keeps what bottles and rails bear beside what the engine notes in every step: outputs, limits, events."""
+"""Damage account: outputs, limits and events of the loads that the engine records in every step."""
 
 from collections.abc import Iterator
 from dataclasses import astuple
@@ -29,16 +29,16 @@ PLACES = {
     "impact_force": ("impacts", "force"),
     "tipping": ("tipping", "ratio"),
 }
-"""Group and column of the engine."""
+"""Group and column of the engine's arrays, by limit."""
 
 
 class DamageAccount:
-    """What the bottles of a State bear. Public attributes are remembered in checkpoints."""
+    """Loads on the bottles of a State. Checkpoints hold the public attributes."""
 
     beyond: dict[str, list[int]]
-    """By limit, ids of the bottles that were beyond it at the end of the last tick."""
+    """Ids of the bottles beyond each limit at the end of the last tick, by limit."""
     events: list[tuple[int, str, int, Unchecked, Unchecked, Unchecked, Unchecked, str]]
-    """Those that nobody has taken."""
+    """Events that were not taken yet."""
 
     def __init__(self, state: State, limits: Limits) -> None:
         self._state = state
@@ -50,14 +50,14 @@ class DamageAccount:
         self.events = []
 
     def begin(self, was_output: bool) -> None:
-        """A tick begins; was_output: the largest of everything were output at its beginning."""
+        """Begin a tick. was_output: True if loads were output at its beginning, so that their maxima restart."""
         for worst in self._worst():
             worst.tick[:] = 0.0
             if was_output:
                 worst.output[:] = 0.0
 
     def end(self, tick: int) -> list[DamageEvent]:
-        """A tick has ended: what went beyond a limit in it becomes an event."""
+        """End a tick, and return an event per load that exceeded a limit."""
         before = len(self.events)
         for worst in self._worst():
             np.maximum(worst.output, worst.tick, out=worst.output)
@@ -68,12 +68,12 @@ class DamageAccount:
         return [DamageEvent(*event) for event in self.events[before:]]
 
     def take_events(self) -> list[DamageEvent]:
-        """What went beyond a limit since the last call, in order."""
+        """Return the events since the last call, in order."""
         events, self.events = self.events, []
         return [DamageEvent(*event) for event in events]
 
     def columns(self, slots: np.ndarray) -> DamageColumns:
-        """What the bottles in some slots bear."""
+        """Return the loads on the bottles in some slots."""
         world, damage = self._state.world, self._state.world.damage
         heights = self._state.model.type_heights[world.bottles.type[slots], 0]
 
@@ -95,7 +95,7 @@ class DamageAccount:
         )
 
     def rail_wear(self) -> RailWearColumns:
-        """Loads on the rails; no bin where they are disabled."""
+        """Return the loads on the rails; no bins where they are disabled."""
         damage, places = self._state.world.damage, self._places
         if damage is None or damage.scuffing is None or damage.scuffing.bins is None:
             none = np.zeros(0)
@@ -116,7 +116,7 @@ class DamageAccount:
         away = [bottle for bottle in before if bottle in self._state.held]
         self.beyond[kind] = [*bottles.id[slots].tolist(), *away]
         for slot in slots.tolist():
-            # A load that lasts is reported once; each blow is one of its own.
+            # A lasting load is reported once, an impact each time.
             if kind == "impact_speed" or int(bottles.id[slot]) not in before:
                 what, unit = WORDS[kind]
                 self._report(tick, kind, slot, float(column[slot]), limit, what.format(column[slot]), unit)
@@ -132,7 +132,7 @@ class DamageAccount:
 
 
 def _column(damage: DamageArrays, kind: str, output: bool = False) -> F8 | None:
-    """What a limit holds for, by slot, in the tick or since the last output; None where it is not looked at."""
+    """Return the loads of a limit by slot, in the tick or since the last output; None where they are absent."""
     if kind == "scuffing_work":
         return None if damage.scuffing is None else damage.scuffing.work
     if kind not in PLACES:

@@ -1,4 +1,4 @@
-"""Energy that contacts have taken up by their elastic laws, and how deep they are."""
+"""Elastic energy and depth of contacts."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from conveyor_sim.physics.model import Model
 
 
 def elastic_energy(model: Model, law: ContactLaw | None, entries: NDArray[np.int64], overlap: F8) -> F8:
-    """Work (J) that the elastic law of each contact has taken up: k d^2 / 2, 2/5 k d^2.5, the area under a table.
+    """Return the elastic energy (J) of each contact: k d^2 / 2, 2/5 k d^2.5, or the area under a table.
 
     law: one of the Model's tables; entries: (n,), in it; overlap: (n,), m.
     """
@@ -30,7 +30,7 @@ def elastic_energy(model: Model, law: ContactLaw | None, entries: NDArray[np.int
 
 
 def deepest_overlap(world: World, found: RailContacts) -> float:
-    """The deepest overlap of all contacts of the present state over the (smaller) radius. found: scratch."""
+    """Return the deepest overlap of the present contacts over the (smaller) radius. found: scratch."""
     kind, (a, b), values = closed_contacts(world, found)
     pairs = kind == BOTTLE_BOTTLE
     smaller = world.bottles.radius[a]
@@ -39,7 +39,7 @@ def deepest_overlap(world: World, found: RailContacts) -> float:
 
 
 def rail_entries(model: Model, types: NDArray[np.int64], rails: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Entries in `Model.rail_law` of contacts of bottle types with rails, (n,)."""
+    """Return the entries in `Model.rail_law` of contacts of bottle types with rails, (n,)."""
     materials = model.plant.rail_materials
     material_of = np.array([materials.index(rail.material) for rail in model.plant.rails], dtype=np.int64)
     return types * len(materials) + material_of[rails]

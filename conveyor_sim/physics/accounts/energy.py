@@ -1,4 +1,4 @@
-"""Keeps the energy ledger of a State: what bottles bring and take beside what the engine books in every step."""
+"""Energy ledger of a State: energy of fed and removed bottles, beside the engine's entries of every step."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,28 +14,28 @@ from conveyor_sim.physics.state import State
 
 
 class EnergyAccount:
-    """The energy ledger of a State whose world has one."""
+    """Energy ledger of a State whose World has one."""
 
     def __init__(self, state: State) -> None:
-        """Open the books with the energy of the bottles that are there; the neighbour lists must hold."""
+        """Open the ledger with the energy of the present bottles. The neighbour lists must be valid."""
         self._state = state
         self._found = workers(1)[0].rail_contacts
         self.fed = self.removed = self.springs = self.base_springs = 0.0
         self.restart()
 
     def restart(self) -> None:
-        """Open the books anew with the present state."""
+        """Reopen the ledger with the present state."""
         stored = self._stored()
         self._work()[:] = 0.0
         self.fed, self.removed = float(stored.sum()), 0.0
         self.springs = float(stored[SPRINGS])
-        """J, in tangential springs that came less those that went with bottles: not dissipated."""
+        """J in tangential springs of fed minus removed bottles, which is not dissipated."""
         self.base_springs = float(stored[BASE_SPRINGS])
-        """J, likewise in springs under the bottles."""
+        """J in springs under fed minus removed bottles."""
 
     @contextmanager
     def feeding(self) -> Iterator[None]:
-        """What the state gains inside was brought."""
+        """Book energy gained inside this context as brought by fed bottles."""
         before = self._stored()
         yield
         gained = self._gained(before)
@@ -43,17 +43,17 @@ class EnergyAccount:
 
     @contextmanager
     def removing(self) -> Iterator[None]:
-        """What the state loses inside was taken along."""
+        """Book energy lost inside this context as carried away by removed bottles."""
         before = self._stored()
         yield
         gained = self._gained(before)
         self.removed -= float(gained.sum())
 
     def ledger(self) -> Ledger:
-        """The ledger now."""
+        """Return the ledger at present."""
         stored, work = self._stored(), self._work().sum(axis=0)
         surfaces = len(self._state.model.belts) + 1
-        # Springs hold a part of what friction took: it is dissipated when they are let go.
+        # Springs store a part of the friction work, which is dissipated when they are released.
         held = float(stored[SPRINGS]) - self.springs
         held_by_base = float(stored[BASE_SPRINGS]) - self.base_springs
         return balance(

@@ -1,4 +1,4 @@
-"""Effects of what bottles stand on: friction, belts, and the ring that a base is."""
+"""Effects of the support under bottles: friction, belts, and ring-shaped bases."""
 
 from collections.abc import Callable, Collection
 
@@ -13,7 +13,7 @@ from conveyor_sim.scene.belts import CurvedBelt
 from conveyor_sim.scene.schema import Scene
 
 MEETING = 0.2
-"""Of the fastest speed in a scene: at which most bottles meet, on the scenes of docs/accuracy.md."""
+"""Typical over fastest speed at which bottles meet, measured on the scenes of docs/accuracy.md."""
 
 
 def _friction(plant: Plant, on: Collection[str]) -> Cause | None:
@@ -36,7 +36,7 @@ def _friction_bounds(terms: Terms) -> list[Bound]:
         bounds.append(
             Bound("base friction", *drag_bound(terms, base_friction_bound(mu, g, limit), reason), stability=True)
         )
-    # On a belt that turns, what rests is off by one part in these steps, implicit or not: at most by the tolerance.
+    # On a turning belt a resting bottle is off by one part in these steps, with explicit and implicit friction.
     turning = terms.method.slip_steps(terms.tolerance) if "curved_belts" in terms.on else 0.0
     if (steps := max(0.0 if implicit else _slip_steps(terms), turning)) > 0.0:
         reason = f"{steps:.3g} steps in v_lim / (mu g) at mu = {mu:g}"
@@ -45,15 +45,15 @@ def _friction_bounds(terms: Terms) -> list[Bound]:
 
 
 def _slip_steps(terms: Terms) -> float:
-    """Steps in v_lim / (mu g) by which a method of first order is off by one part in `least_steps`."""
+    """Return the steps in v_lim / (mu g) at which a first-order method is off by one part in `least_steps`."""
     return terms.method.slip_steps(1.0 / terms.steps) if terms.method.second_order else terms.steps
 
 
 def _lag(quantity: str, part: Callable[[float], float], terms: Terms, dt: float) -> list[Term]:
-    """Of a bottle held on its circle by friction, part(steps) at so many steps in v_lim / (mu g).
+    """Return the error of a bottle that friction holds on its circle: part(steps) at `steps` in v_lim / (mu g).
 
-    The velocity of semi-implicit Euler is half a step older than the position at which it asks the belt for its own;
-    leapfrog asks where the bottle was at mid-step (test/physics/test_turntable.py).
+    Semi-implicit Euler combines a belt velocity at the present position with a bottle velocity that is half a step
+    older. Leapfrog takes the belt velocity at the mid-step position (test/physics/test_turntable.py).
     """
     if terms.laws.base_friction is None or "curved_belts" not in terms.on:
         return []
@@ -71,9 +71,10 @@ def _creep(terms: Terms, dt: float) -> list[Term]:
 
 
 def _resting(terms: Terms, dt: float) -> list[Term]:
-    """What presses against the rim of a turn-table is what friction does not hold, m Omega^2 r: off by the same part.
+    """Return the errors of loads on turning belts.
 
-    The lag is a slip of Omega^2 r dt / 2 outward, which friction answers with m mu g Omega^2 r dt / v_lim.
+    The force against the rim of a turntable is the part of m Omega^2 r that friction does not hold; it has the relative
+    error of the creep. The lag is an outward slip of Omega^2 r dt / 2: a friction of m mu g Omega^2 r dt / v_lim.
     """
     turns = terms.laws.base_friction is not None and "curved_belts" in terms.on
     behind = terms.method.turned * _turning(terms.scene) * dt if turns else 0.0
@@ -82,13 +83,13 @@ def _resting(terms: Terms, dt: float) -> list[Term]:
 
 
 def _turning(scene: Scene) -> float:
-    """rad/s, of the belt that turns fastest as the scene begins; 0 without any."""
+    """Return the largest initial angular velocity of a curved belt, rad/s; 0 without curved belts."""
     curved = (belt for belt in scene.belts.values() if isinstance(belt, CurvedBelt))
     return max((abs(belt.speed) / (belt.inner_radius + 0.5 * belt.width) for belt in curved), default=0.0)
 
 
 def _braked(meeting: Meeting, terms: Terms) -> list[Share]:
-    """First order: the base brakes by half a step too much or too little; speeds of impact are off by mu g dt / 2."""
+    """Return the error of first-order methods: half a step of braking, mu g dt / 2 of the impact speed."""
     if terms.laws.base_friction is None or terms.method.second_order:
         return []
     braking = float(terms.laws.base_friction.max()) * terms.scene.gravity
@@ -96,12 +97,12 @@ def _braked(meeting: Meeting, terms: Terms) -> list[Share]:
 
 
 def _implicit_point(terms: Terms) -> bool:
-    """Whether friction under bottles is solved implicitly: that of a point is, that of a ring has no closed form."""
+    """Return True if friction under bottles is implicit. It is explicit under rings, which have no closed form."""
     return "implicit_friction" in terms.on and "ring_base" not in terms.on
 
 
 def _ring(plant: Plant, on: Collection[str]) -> Cause | None:
-    # Rotation is decided later, for a ring calls for it; where it is forced off, the ring has nothing to turn.
+    # A ring calls for rotation, which is decided later. Where rotation is forced off, the ring turns nothing.
     if "base_friction" in on and plant.scene.effects.get("rotation") != "off":
         for name, kind in plant.scene.bottle_types.items():
             if kind.base_radius is not None:
@@ -110,7 +111,7 @@ def _ring(plant: Plant, on: Collection[str]) -> Cause | None:
 
 
 def _ring_bounds(terms: Terms) -> list[Bound]:
-    """The slope of the spinning ring's moment at rest is that of the sliding point's force, for J / (m R_b^2)."""
+    """Return the bounds of a spinning ring: those of a sliding point, scaled by J / (m R_b^2)."""
     if terms.laws.base_friction is None:
         return []
     mu = float(terms.laws.base_friction.max())
@@ -161,7 +162,7 @@ BASE_FRICTION = Effect(
 RING_BASE = Effect(
     name="ring_base",
     law="the base is a ring: sliding and spinning share its friction, and it may straddle two belts; v / sqrt(v^2 + "
-    "(v_lim / 2)^2) of each part of it drags in place of p(s); always explicit, whatever the friction_solver; types "
+    "(v_lim / 2)^2) of each part of it drags in place of p(s); explicit with every friction_solver; types "
     "without base_radius beside it stand on points",
     source="added",
     called_for=_ring,

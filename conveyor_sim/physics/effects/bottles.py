@@ -35,9 +35,9 @@ def _riding(plant: Plant, on: Collection[str]) -> Cause | None:
 
 
 def _prevented(plant: Plant, on: Collection[str]) -> str:
-    """Why no bottle of a plant can ride, "" if one may."""
+    """Return why no bottle of a plant can ride, "" if one may."""
     if plant.scene.accuracy.integrator not in RIDES:
-        return f"with {plant.scene.accuracy.integrator} a step leaves nobody out"
+        return f"{plant.scene.accuracy.integrator} can't leave bottles out of a step"
     return "springs under the bottles pull anew at every step" if "static_friction" in on else ""
 
 

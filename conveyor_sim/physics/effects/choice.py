@@ -60,11 +60,11 @@ EFFECTS: tuple[Effect, ...] = (
     TIPPING,
     RIDING,
 )
-"""In the order in which they are decided: what is on may call for those after it."""
+"""All effects in the order of decision. An effect that is on may call for later ones."""
 
 
 def choose_effects(plant: Plant) -> tuple[EffectChoice, ...]:
-    """Decide every effect for a plant, in the order of EFFECTS. SceneError if one can't be forced as the scene says."""
+    """Decide every effect for a plant, in the order of EFFECTS. Raise SceneError if one can't be forced."""
     choices: list[EffectChoice] = []
     refused: dict[EffectName, str] = {}
     on: set[str] = set()
@@ -82,18 +82,18 @@ def choose_effects(plant: Plant) -> tuple[EffectChoice, ...]:
 
 
 def impacts_of(terms: Terms) -> tuple[Impact, ...]:
-    """The impacts that are expected, with what the effects that are on add to their error."""
+    """Return the expected impacts with the errors that the present effects contribute."""
     return impacts(terms, EFFECTS)
 
 
 def bounds_of(terms: Terms, expected: Sequence[Impact]) -> tuple[Bound, ...]:
-    """The bounds on dt of all effects that are on and of the impacts, each the tightest over types and materials."""
-    found = [effect.bounds(terms) for effect in EFFECTS if effect.bounds is not None and effect.name in terms.on]
-    return (*impact_bounds(expected, terms.tolerance), *(bound for bounds in found for bound in bounds))
+    """Return the bounds on dt by effects and impacts, each the tightest over bottle types and materials."""
+    by_effect = [effect.bounds(terms) for effect in EFFECTS if effect.bounds is not None and effect.name in terms.on]
+    return (*impact_bounds(expected, terms.tolerance), *(bound for bounds in by_effect for bound in bounds))
 
 
 def prediction_of(terms: Terms, expected: Sequence[Impact], dt: float) -> Prediction:
-    """The errors to expect at a time step in s."""
+    """Return the errors to expect at a time step in s."""
     on = [effect for effect in EFFECTS if effect.name in terms.on]
     sides = [term for effect in on if effect.side is not None for term in effect.side(terms, dt)]
     resting = [term for effect in on if effect.resting is not None for term in effect.resting(terms, dt)]
@@ -101,7 +101,7 @@ def prediction_of(terms: Terms, expected: Sequence[Impact], dt: float) -> Predic
 
 
 def _choose(effect: Effect, plant: Plant, on: set[str]) -> EffectChoice | None:
-    """The choice; None if the scene forces what can't be."""
+    """Return the choice; None if the scene forces the effect on or off where that is impossible."""
     cause = effect.called_for(plant, on)
     forced = plant.scene.effects.get(effect.name)
     if forced is None:
@@ -120,7 +120,7 @@ def _absent(effect: Effect, plant: Plant, on: set[str]) -> str:
 
 
 def _refusals(scene: Scene, absent: Mapping[EffectName, str]) -> list[str]:
-    """A line for each effect that can't be forced, in the order of the scene's lines. absent: what it lacks."""
+    """Return a line per effect that can't be forced, in the order of the file. absent: reasons by name."""
     places = Places(scene)
     lines = []
     for name in sorted(absent, key=lambda name: places.line_of(("effects", name)) or 0):

@@ -1,4 +1,4 @@
-"""Effects of contact: that bottles touch bottles, and the elastic laws."""
+"""Effects of contact between bottles, and the elastic laws."""
 
 import math
 from collections.abc import Callable, Collection, Iterator
@@ -21,7 +21,7 @@ from conveyor_sim.scene.contacts import Contact
 
 
 def contacts_in_use(plant: Plant, on: Collection[str]) -> Iterator[tuple[int, Contact]]:
-    """The contacts between materials that can meet here: bottles if there are several, bottles and rails."""
+    """Yield the contacts of materials that can meet: bottles if there are several, and bottles with rails."""
     bottles = {kind.material for kind in plant.scene.bottle_types.values()}
     with_rails = "segment_rails" in on or "arc_rails" in on
     rails = {rail.material for rail in plant.rails_at_rest} if with_rails else set()
@@ -55,7 +55,7 @@ def _elastic(field: str, unit: str) -> Callable[[Plant, Collection[str]], Cause 
 
 
 def _stable(name: str, stiffness: Callable[[Meeting, Terms], tuple[float, str]]) -> Callable[[Terms], list[Bound]]:
-    """Bounds from a function that gives a meeting's largest stiffness, in N/m (0: none), and how it is said."""
+    """Return stability bounds from a function that gives the largest stiffness (N/m, 0: none) and its description."""
 
     def bounds(terms: Terms) -> list[Bound]:
         if not terms.method.explicit:
@@ -78,21 +78,21 @@ def _stable(name: str, stiffness: Callable[[Meeting, Terms], tuple[float, str]])
 
 
 def _mover_bounds(meeting: Meeting, stiffness: float, terms: Terms) -> list[tuple[float, str]]:
-    """Bounds (s) with their reasons: bottles of a type, as many as find room, against each rail of the material.
+    """Return bounds (s) and reasons: the largest number of bottles with room, against each rail of the material.
 
-    meeting: of a bottle type and a rail material; stiffness: N/m.
+    meeting: bottle type and rail material. stiffness: N/m.
     """
     materials = terms.plant.rail_materials
-    found = []
+    bounds = []
     for shape in terms.plant.moving:
         if shape.limit is None or shape.material != materials[meeting.entry % len(materials)]:
             continue
         most = 2 * (1 + math.floor(shape.length / (2.0 * meeting.first.radius)))
-        # What presses at the end of an arm moves it as easily as a mass of J / L^2.
+        # A force at the end of an arm accelerates it like a mass of J / L^2.
         mass = shape.mass / shape.fastest_point**2
         reason = f"{most} bottles at {shape.name}, a body of {mass:.3g} kg when held up, at k = {stiffness:.3g} N/m"
-        found.append((mover_bound(stiffness, meeting.reduced_mass, mass, most), reason))
-    return found
+        bounds.append((mover_bound(stiffness, meeting.reduced_mass, mass, most), reason))
+    return bounds
 
 
 def _linear(meeting: Meeting, terms: Terms) -> tuple[float, str]:
@@ -101,7 +101,7 @@ def _linear(meeting: Meeting, terms: Terms) -> tuple[float, str]:
 
 
 def _hertz(meeting: Meeting, terms: Terms) -> tuple[float, str]:
-    """The stiffer the harder it is pressed, by an impact or by a queue."""
+    """Return the stiffness at the deepest overlap of an impact or a queue; it grows with the load."""
     law, k = meeting.elastic
     if law is not hertz.HERTZ:
         return 0.0, ""
@@ -119,7 +119,7 @@ def _table(meeting: Meeting, terms: Terms) -> tuple[float, str]:
 
 
 def _peak(stiffness: Callable[[Meeting, Terms], tuple[float, str]]) -> Callable[[Meeting, Terms], list[Share]]:
-    """The share of an elastic law, where a meeting has it: its peak falls between two steps."""
+    """Return the share of an elastic law in the error of a meeting: its peak falls between two steps."""
 
     def shares(meeting: Meeting, terms: Terms) -> list[Share]:
         if stiffness(meeting, terms)[0] == 0.0:

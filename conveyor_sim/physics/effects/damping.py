@@ -27,7 +27,7 @@ def _called_for(law: DampingLaw) -> Callable[[Plant, Collection[str]], Cause | N
 
 
 def _dashpot(law: DampingLaw, meeting: Meeting, terms: Terms) -> float:
-    """What it is as a dashpot at the deepest of an impact, kg/s: its force at 1 m/s; 0 where a meeting has another."""
+    """Return the force per speed (kg/s) at the deepest point of an impact; 0 if the meeting has another law."""
     coefficient = meeting.coefficient(law)
     if coefficient == 0.0:
         return 0.0
@@ -39,7 +39,7 @@ def _bounds(law: DampingLaw) -> Callable[[Terms], list[Bound]]:
     def bounds(terms: Terms) -> list[Bound]:
         if not terms.method.explicit:
             return []
-        found = []
+        candidates = []
         for meeting in meetings(terms):
             c = _dashpot(law, meeting, terms)
             if c > 0.0:
@@ -47,8 +47,8 @@ def _bounds(law: DampingLaw) -> Callable[[Terms], list[Bound]]:
                 if law.exponent > 0.0:
                     speed = terms.plant.impact_speed
                     said = f"m_r / (2 {law.rate}), {c:.3g} kg/s at the deepest of an impact at {speed:g} m/s"
-                found.append(drag_bound(terms, damping_bound(c, meeting.reduced_mass), said))
-        return tightest(law.label, found, stability=True)
+                candidates.append(drag_bound(terms, damping_bound(c, meeting.reduced_mass), said))
+        return tightest(law.label, candidates, stability=True)
 
     return bounds
 
@@ -61,7 +61,7 @@ def _shares(law: DampingLaw) -> Callable[[Meeting, Terms], list[Share]]:
         rate = c / meeting.reduced_mass
         if law.exponent > 0.0:
             return [method.growing(law.exponent, rate, frequency(meeting, terms, terms.plant.impact_speed))]
-        # How fast the force falls behind its jump is known where the spring is linear from there on.
+        # The decay after the jump is known only for a linear spring.
         return method.first_touch(rate, meeting.value(meeting.law.stiffness) / c)
 
     return shares
@@ -92,4 +92,4 @@ def _effect(law: DampingLaw) -> Effect:
 
 DAMPING_EFFECTS: tuple[Effect, ...] = tuple(_effect(law) for law in DAMPING)
 TURNING = tuple(effect for effect, law in zip(DAMPING_EFFECTS, DAMPING, strict=True) if law.isotropic)
-"""Those that act along the tangent as well."""
+"""Damping effects that also act along the tangent."""

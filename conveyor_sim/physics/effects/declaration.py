@@ -1,4 +1,4 @@
-"""What an effect's declaration says, and what is decided about it."""
+"""Declaration of an effect, and the decision about it."""
 
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from conveyor_sim.scene.problems import Path, dotted
 
 @dataclass(frozen=True)
 class Cause:
-    """What in a scene calls for an effect: a field, and what is in it."""
+    """A field of a scene that calls for an effect, and its content."""
 
     path: Path
     what: str = ""
@@ -25,45 +25,45 @@ class Cause:
 
 @dataclass(frozen=True)
 class Effect:
-    """One effect, declared once."""
+    """Declaration of one effect."""
 
     name: EffectName
     law: str
     source: str
     """Number of the paper's equation, a reference, or "added"."""
     called_for: Callable[[Plant, Collection[str]], Cause | None]
-    """What in a scene calls for it, given the effects before it in EFFECTS that are on; None: nothing does."""
+    """Returns the cause in a scene, given the earlier effects in EFFECTS that are on; None without a cause."""
     absent: str
-    """What is missing when nothing calls for it."""
+    """Reason for its absence where nothing calls for it."""
     needs: str
-    """State and parameters that it brings, in words."""
+    """State and parameters that it adds, in words."""
     absent_here: Callable[[Plant, Collection[str]], str] | None = None
-    """What is missing in a scene, given the effects before it that are on; "" or None: as in `absent`."""
+    """Returns the reason for its absence from one scene, given the earlier effects; "" or None: as in `absent`."""
     bounds: Callable[[Terms], list[Bound]] | None = None
-    """The bounds on dt that it brings when it is on; None: it brings none."""
+    """Returns its bounds on dt; None without bounds."""
     bound: str = ""
-    """The same in words."""
+    """Its bounds in words."""
     shares: Callable[[Meeting, Terms], list[Share]] | None = None
-    """What it adds to the error in the peak force of an impact; None: nothing."""
+    """Returns its parts of the error in the peak force of an impact; None without such."""
     share: str = ""
-    """The same in words, without the integrator's coefficient."""
+    """These errors in words, without the integrator's coefficient."""
     resting: Callable[[Terms, float], list[Term]] | None = None
-    """Errors that it makes in resting load, at a time step in s; None: none."""
+    """Returns its errors in resting load at a time step in s; None without such."""
     rest: str = ""
-    """The same in words."""
+    """These errors in words."""
     side: Callable[[Terms, float], list[Term]] | None = None
-    """Errors that it makes in something else than contact force, at a time step in s; None: none."""
+    """Returns its errors in quantities other than contact force, at a time step in s; None without such."""
     beside: str = ""
-    """The same in words."""
+    """These errors in words."""
     can_force_on: bool = False
-    """Whether it needs no parameters but those that every scene has."""
+    """True if it needs only parameters that every scene has."""
     can_force_off: bool = True
-    """Whether a scene that calls for it makes sense without."""
+    """True if a scene that calls for it is also valid without it."""
 
 
 @dataclass(frozen=True)
 class EffectChoice:
-    """Whether an effect is on for a scene, and why."""
+    """Decision about one effect for a scene, and the reason."""
 
     name: EffectName
     on: bool

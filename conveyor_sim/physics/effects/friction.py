@@ -30,7 +30,7 @@ def _contact_friction(plant: Plant, on: Collection[str]) -> Cause | None:
 
 
 def _contact_friction_bounds(terms: Terms) -> list[Bound]:
-    """At the load that belts can put on a contact."""
+    """Return the stability bound of explicit friction at the largest load of belts on a contact."""
     load = terms.load
     if load.force == 0.0 or "implicit_friction" in terms.on or not terms.method.explicit:
         return []
@@ -47,9 +47,9 @@ def _contact_friction_bounds(terms: Terms) -> list[Bound]:
 
 
 def _kick(terms: Terms, dt: float) -> list[Term]:
-    """The slip that the last step of an impact leaves where it is too long for friction, over the speed of impact.
+    """Return the slip after the last step of an impact, over the impact speed, where dt is too long for friction.
 
-    It is used up before the end where mu (w dt)^2 is small beside v_lim / v.
+    Friction stops the slip earlier if mu (w dt)^2 is small compared with v_lim / v.
     """
     if "implicit_friction" in terms.on or terms.method.slip == 0.0:
         return []
@@ -58,7 +58,7 @@ def _kick(terms: Terms, dt: float) -> list[Term]:
     for meeting in meetings(terms):
         mu = _curve_friction(meeting)
         w = frequency(meeting, terms, speed)
-        # Explicit friction is stable at the peak of the impact in so many steps a contact: 2 pi mu v / v_lim for hoops.
+        # Steps per contact for stable explicit friction at the peak of the impact: 2 pi mu v / v_lim for hoops.
         mobility = _rim_mobility(meeting.first) + _rim_mobility(meeting.second)
         resolved = math.pi * mu * meeting.reduced_mass * mobility * speed / terms.scene.slip_limit
         steps = math.pi / (w * dt)
@@ -72,7 +72,7 @@ def _kick(terms: Terms, dt: float) -> list[Term]:
 
 
 def _curve_friction(meeting: Meeting) -> float:
-    """mu of a contact that has friction by its curve, 0 by a tangential spring."""
+    """Return mu of a contact with a friction curve, 0 for a tangential spring."""
     return 0.0 if meeting.has_spring else meeting.value(meeting.law.friction)
 
 
@@ -102,12 +102,12 @@ def _spring(plant: Plant, on: Collection[str]) -> Cause | None:
 
 
 def _rim_mobility(kind: BottleType | None) -> float:
-    """1/m + R^2/J, how easily the rim of a bottle moves along itself, 1/kg; 0 for a rail."""
+    """Return the tangential mobility of the rim, 1/m + R^2/J, in 1/kg; 0 for a rail."""
     return 0.0 if kind is None else 1.0 / kind.mass + kind.radius**2 / kind.moment_of_inertia
 
 
 def _largest_stiffness(meeting: Meeting, terms: Terms) -> float:
-    """N/m, of the tangential spring; Mindlin's at the deepest overlap of an impact or a queue."""
+    """Return the stiffness of the tangential spring, N/m; Mindlin's at the deepest overlap of an impact or a queue."""
     if (mindlin := meeting.value(meeting.law.tangential_mindlin)) > 0.0:
         pressed = overlap_at(meeting, terms, terms.load.force)
         return mindlin * math.sqrt(max(deepest(meeting, terms, terms.plant.impact_speed)[0], pressed))

@@ -1,4 +1,4 @@
-"""Effects of what there is to touch: rails at rest and moving ones, and bottles of several sizes."""
+"""Effects of geometry: rails at rest, moving rails, and bottles of several sizes."""
 
 from collections.abc import Collection
 

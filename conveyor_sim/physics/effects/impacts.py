@@ -1,4 +1,4 @@
-"""The impacts that are expected in a scene, with what each effect adds to the error in their peak force."""
+"""Expected impacts of a scene, with the contribution of each effect to the error in their peak force."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -10,7 +10,7 @@ from conveyor_sim.physics.timestep.prediction import Impact
 
 
 def impacts(terms: Terms, effects: Sequence[Effect]) -> tuple[Impact, ...]:
-    """One for every pair of types that can touch, and every type and rail material."""
+    """Return one impact per pair of bottle types that can touch, and per bottle type and rail material."""
     adding = [effect.shares for effect in effects if effect.shares is not None and effect.name in terms.on]
     speed = terms.plant.impact_speed
     return tuple(
@@ -28,10 +28,10 @@ def impacts(terms: Terms, effects: Sequence[Effect]) -> tuple[Impact, ...]:
     )
 
 
-def impact_bounds(found: Sequence[Impact], tolerance: float) -> list[Bound]:
-    """The tightest bound of impacts between bottles, and that of impacts on rails."""
+def impact_bounds(expected: Sequence[Impact], tolerance: float) -> list[Bound]:
+    """Return the tightest bound of impacts between bottles, and that of impacts on rails."""
     tightest: dict[str, Bound] = {}
-    for impact in found:
+    for impact in expected:
         bound = impact.bound(tolerance)
         if impact.what not in tightest or bound.dt < tightest[impact.what].dt:
             tightest[impact.what] = bound

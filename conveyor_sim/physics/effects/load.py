@@ -1,12 +1,12 @@
-"""The load that belts can put on a contact of two bottles: what explicit friction has to be stable at.
+"""Largest load of belts on a contact of two bottles. Explicit friction must be stable at this load.
 
-A belt drags a bottle with at most mu m g, so those that press in one direction are those along its running length:
-beside each other they press on different contacts. In a pile the load is shared unevenly, and a bottle is loaded from
-several sides. The factors below are measured: the load at which two bottles alone need the same time step as all the
+A belt drags a bottle with at most mu m g. Only the bottles along its running length press on one contact; bottles
+beside each other press on different ones. In a pile the load is shared unevenly, and a bottle is loaded from several
+sides. The factors below are measured. They are the load at which two bottles alone need the same time step as all
 contacts of the pile together (the largest eigenvalue of their friction at rest), over mu m g and the bottles that fit
 in a file along the pile. Hoppers of 400 to 1 000 bottles with walls at 20 to 90 degrees: 1.9 to 3.2; files between
 rails 1.05 to 1.2 diameters apart: 1.0 to 1.2; zigzags in lanes of 1.35 to 2.5 diameters: 1.7 to 3.3, and up to 2.6 over
-the number of bottles (test/physics/effects/test_load.py). Impacts are not in it, nor those of a queue that runs up.
+the number of bottles (test/physics/effects/test_load.py). Impacts are not included.
 """
 
 import math
@@ -17,24 +17,24 @@ from conveyor_sim.physics.plant import Plant
 from conveyor_sim.scene.geometry import BeltShape
 
 NARROW = 1.25
-"""Diameters: on a belt up to so wide bottles stand in single file."""
+"""Largest width, in diameters, of a belt on which bottles stand in single file."""
 
 FILE = 1.25
-"""Load in single file, over mu m g and the bottles behind each other."""
+"""Load in single file, over mu m g and the number of bottles in the file."""
 
 PILE = 3.5
-"""The same in a pile."""
+"""Load in a pile, over mu m g and the number of bottles in a file along the pile."""
 
 WEDGED = 3.0
 """Load of a few bottles between rails, over mu m g and their number."""
 
 ENDLESS_QUEUE = 100
-"""Bottles assumed to press on each other where there is no belt, and no end of them."""
+"""Bottles assumed to press on each other without belts, where an infeed has no end."""
 
 
 @dataclass(frozen=True)
 class Load:
-    """What presses on a contact for long."""
+    """Resting load on a contact."""
 
     force: float
     """N; 0 without friction under the bottles."""
@@ -42,17 +42,16 @@ class Load:
 
 
 def contact_load(plant: Plant, laws: Laws) -> Load:
-    """The largest that is expected of the bottles and belts of a scene.
+    """Return the largest load that is expected from the bottles and belts of a scene.
 
-    The lesser of what full belts press with, one behind the other, and of what all bottles that there can be do.
-    What a mover's drive can press with beyond that (`MovingShape.limit`, hundreds of newtons) is not in it: it would
-    rule every scene with a gate, for the sake of a bottle that is stuck. The end of a run reports it
-    (`force_check.Pressed`).
+    It is the smaller of two loads: that of full belts one behind the other, and that of all bottles of a run. The force
+    of a mover's drive (`MovingShape.limit`, hundreds of newtons) is not included: it would set the steps of every scene
+    with a gate, although only a stuck bottle bears it. The end of a run reports such loads (`force_check.Pressed`).
     """
     friction, most = laws.friction_under_bottles, plant.supply
     if friction is None or not most:
         return Load(0.0, "no friction under the bottles")
-    drags = [  # of one bottle on each belt, the floor last, N
+    drags = [  # N per bottle on each belt, the floor last
         (friction[:, index] * kind.mass * plant.scene.gravity, kind, most[name])
         for index, (name, kind) in enumerate(plant.scene.bottle_types.items())
         if name in most
@@ -75,5 +74,5 @@ def contact_load(plant: Plant, laws: Laws) -> Load:
 
 
 def _running_length(shape: BeltShape) -> float:
-    """Along its middle, m."""
+    """Return the length along the middle of a belt, m."""
     return shape.length if shape.kind == "straight" else shape.span * shape.centre_radius

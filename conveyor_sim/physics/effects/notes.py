@@ -1,4 +1,4 @@
-"""What a reader of the results should know of how a scene was set up, in sentences."""
+"""Notes on the setup of a scene for readers of its results."""
 
 from collections.abc import Collection
 

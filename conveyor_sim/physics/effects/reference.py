@@ -19,7 +19,7 @@ what bounds the time step; `conveyor-sim explain SCENE --price` measures what ea
 
     effects: {rotation: off, peaks: on}
 
-An effect that needs parameters of its own is called for by giving them and can't be forced on without. Off can't be
+An effect with parameters is called for by giving them, and can't be forced on without. Off can't be
 forced where a scene makes no sense without. What an effect calls for goes with it: without contact friction nothing may
 be left that turns a bottle.
 
@@ -45,7 +45,7 @@ belts:
   fast: {kind: straight, start: [0, 0.15], angle: 0 deg, length: 2, width: 0.15, speed: 0.3, material: chain}
 infeeds:
   filler: {bottle: half_litre, position: [0.05, 0.15], direction: 0 deg, speed: 0.2, count: 20, rate: 3}
-effects: {contact_arrays: off, peaks: off}                          # nobody reads them
+effects: {contact_arrays: off, peaks: off}                          # without a reader
 ```
 
 - `hertz_stiffness` in place of `stiffness`: the deeper a contact, the stiffer it is. `table` takes a measured curve.
@@ -55,7 +55,7 @@ effects: {contact_arrays: off, peaks: off}                          # nobody rea
   them creep.
 - `base_radius`: a bottle that straddles two belts turns, and its base brakes its spin. A type without it stands on a
   point, the paper's base; [base.md](base.md) says what that changes, and when to give `tangential` in `base`.
-- `effects`: what the scene calls for and nobody needs is off; here, the outputs of contacts and of peaks.
+- `effects`: turns off what no reader needs; here, the outputs of contacts and of peaks.
 
 ## Tangential springs
 
@@ -91,7 +91,7 @@ dt = 2 / gamma. Velocity Verlet, unstable at 1 / gamma, takes half of them; rk4,
 
 
 def reference() -> str:
-    """The text of docs/effects.md."""
+    """Return the text of docs/effects.md."""
     damping = "\n".join(f"- `{law.chosen_as}` (`{law.effect}`): {law.when}" for law in DAMPING)
     return "\n".join([INTRODUCTION.replace("LAWS OF DAMPING", damping), *(_section(effect) for effect in EFFECTS)])
 

@@ -1,4 +1,4 @@
-"""The effect of static friction with memory under the bottles: a spring between base and belt."""
+"""Effect of static friction with memory under the bottles: a spring between base and belt."""
 
 from collections.abc import Collection
 
@@ -40,7 +40,7 @@ def _bounds(terms: Terms) -> list[Bound]:
 
 
 def _braked(meeting: Meeting, terms: Terms) -> list[Share]:
-    """As under the friction curve: a method of first order brakes what slides by half a step too much or too little."""
+    """Return the error of first-order methods: half a step of braking, as with the friction curve."""
     table = terms.laws.base_spring
     if table is None or terms.method.second_order:
         return []
@@ -52,7 +52,7 @@ STATIC_FRICTION = Effect(
     name="static_friction",
     law="in place of the curve of base_friction a spring from the base to a point of its belt, k e + c v, its force at "
     "most mu m g; the point goes with the belt, turns with it where it turns, and is dragged along by a base that "
-    "slides; on another belt the spring begins anew. Explicit, whatever the friction_solver; for bottles on points",
+    "slides; on another belt the spring begins anew. Explicit with every friction_solver; for bottles on points",
     source="Cundall and Strack 1979",
     called_for=_springs,
     absent="no base with tangential, or no friction under the bottles",

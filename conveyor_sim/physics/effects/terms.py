@@ -1,4 +1,4 @@
-"""What bounds on the time step and predicted errors are computed from, and what those of several effects share."""
+"""Input of bounds on the time step and of predicted errors, and functions that several effects use."""
 
 import math
 from collections.abc import Collection, Iterator, Sequence
@@ -19,13 +19,13 @@ from conveyor_sim.scene.schema import BottleType, Scene
 
 @dataclass(frozen=True, eq=False)
 class Terms:
-    """A plant, its coefficients, which effects are on, and how exact it shall be."""
+    """A plant with its coefficients, the effects that are on, and the tolerance."""
 
     plant: Plant
     laws: Laws
     on: Collection[str]
     tolerance: float
-    """Relative error in contact force to stay below."""
+    """Largest relative error in contact force."""
 
     @property
     def scene(self) -> Scene:
@@ -34,7 +34,7 @@ class Terms:
 
     @property
     def types(self) -> list[BottleType]:
-        """The bottle types, T of them, in the scene's order."""
+        """Bottle types in the scene's order, (T,)."""
         return list(self.scene.bottle_types.values())
 
     @cached_property
@@ -44,18 +44,18 @@ class Terms:
 
     @property
     def method(self) -> Method:
-        """What the integrator misses."""
+        """Error coefficients of the integrator."""
         return METHODS[self.scene.accuracy.integrator]
 
     @property
     def step_error(self) -> float:
-        """m/s, largest error of a step, of an integrator that divides its steps itself."""
-        given = self.scene.accuracy.error
-        return STEP_ERROR if given is None else given
+        """Largest error per step of an integrator that divides its steps itself, m/s."""
+        error = self.scene.accuracy.error
+        return STEP_ERROR if error is None else error
 
     @property
     def steps(self) -> float:
-        """Steps that what is sampled should last at least."""
+        """Smallest number of steps in a time scale that is resolved."""
         return least_steps(self.tolerance)
 
 
@@ -71,36 +71,39 @@ class Meeting:
     """kg"""
     first: BottleType
     second: BottleType | None
-    """None: a rail."""
+    """None for a rail."""
 
     def value(self, column: F8 | None) -> float:
-        """The coefficient of this meeting, 0 if it has none."""
+        """Return the coefficient of this meeting, 0 if it has none."""
         return 0.0 if column is None else float(column[self.entry])
 
     def coefficient(self, law: DampingLaw) -> float:
-        """Its coefficient of a law of damping, 0 if it has another or none."""
+        """Return the coefficient of a damping law, 0 if the meeting has another law or none."""
         return self.value(getattr(self.law, law.column))
 
     @property
     def elastic(self) -> tuple[ElasticLaw, Any]:
-        """Its elastic law, and its coefficient or the number of its table."""
+        """Elastic law, with its coefficient or table number."""
         columns = ((law, getattr(self.law, law.column)) for law in ELASTIC)
-        found = ((law, column[self.entry].item()) for law, column in columns if column is not None)
-        return next((law, k) for law, k in found if k > law.none)
+        laws = ((law, column[self.entry].item()) for law, column in columns if column is not None)
+        return next((law, k) for law, k in laws if k > law.none)
 
     @property
     def damping(self) -> DampingLaw | None:
-        """Its law of damping."""
+        """Damping law; None without damping."""
         return next((law for law in DAMPING if self.coefficient(law)), None)
 
     @property
     def has_spring(self) -> bool:
-        """Whether friction is by a tangential spring in place of the curve."""
+        """True if a tangential spring replaces the friction curve."""
         return self.value(self.law.tangential_stiffness) + self.value(self.law.tangential_mindlin) > 0.0
 
 
 def meetings(terms: Terms) -> Iterator[Meeting]:
-    """Every pair of types that can touch, then every type and rail material; types that no bottle has are left out."""
+    """Yield every pair of bottle types that can touch, then every bottle type and rail material.
+
+    Types without bottles are left out.
+    """
     types = terms.types
     present = [index for index, name in enumerate(terms.scene.bottle_types) if name in terms.plant.supply]
     if terms.laws.pair is not None:
@@ -120,7 +123,7 @@ def meetings(terms: Terms) -> Iterator[Meeting]:
 
 
 def tightest(name: str, candidates: Sequence[tuple[float, str]], stability: bool = False) -> list[Bound]:
-    """The least of some bounds (s, reason) as a list; empty if there are none."""
+    """Return the smallest of some bounds (s, reason) in a list; an empty list without bounds."""
     if not candidates:
         return []
     dt, reason = min(candidates)
@@ -128,31 +131,31 @@ def tightest(name: str, candidates: Sequence[tuple[float, str]], stability: bool
 
 
 def drag_bound(terms: Terms, dt: float, reason: str) -> tuple[float, str]:
-    """Semi-implicit Euler's bound (s) on a drag, a dashpot or friction at rest, as the scene's integrator has it."""
+    """Return a bound (s) on a drag for the scene's integrator, from that of semi-implicit Euler."""
     limit = terms.method.drag_limit
     return limit * dt, reason if limit == 1.0 else f"{limit:g} times {reason}"
 
 
 def deepest(meeting: Meeting, terms: Terms, speed: float) -> tuple[float, float]:
-    """Overlap (m) and force (N) at the turning point of an undamped head-on impact at a speed in m/s."""
+    """Return overlap (m) and force (N) at the turning point of an undamped head-on impact at a speed in m/s."""
     law, k = meeting.elastic
     return law.deepest(k, 0.5 * meeting.reduced_mass * speed * speed, terms.laws.curves)
 
 
 def overlap_at(meeting: Meeting, terms: Terms, force: float) -> float:
-    """Overlap (m) at which the elastic law gives a force (N)."""
+    """Return the overlap (m) at which the elastic law gives a force (N)."""
     law, k = meeting.elastic
     return law.overlap_at(k, force, terms.laws.curves)
 
 
 def duration(meeting: Meeting, terms: Terms, speed: float) -> float:
-    """How long an undamped head-on impact at a speed in m/s lasts, s; on a table: at least."""
+    """Return the duration (s) of an undamped head-on impact at a speed in m/s; a lower bound for tables."""
     law, k = meeting.elastic
     return law.duration(k, meeting.reduced_mass, speed, terms.laws.curves)
 
 
 def frequency(meeting: Meeting, terms: Terms, speed: float) -> float:
-    """sqrt(-N'' / N) at the peak of the force N of an undamped head-on impact at a speed in m/s, rad/s."""
+    """Return sqrt(-N'' / N) in rad/s at the force peak N of an undamped head-on impact at a speed in m/s."""
     law, k = meeting.elastic
     depth, _ = deepest(meeting, terms, speed)
     return math.sqrt(law.stiffest(k, depth, terms.laws.curves) / meeting.reduced_mass)

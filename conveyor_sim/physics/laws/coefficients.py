@@ -1,4 +1,4 @@
-"""The columns of contact and friction coefficients by bottle type, from the scene's pairs of materials."""
+"""Columns of contact and friction coefficients by bottle type, from the scene's pairs of materials."""
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ NO_CURVE = int(TABLE.none)
 
 
 class BaseSprings(NamedTuple):
-    """Springs between belts and bases, (H + 1, T) each, the floor last; all 0 where friction goes by its curve."""
+    """Springs between belts and bases, (H + 1, T) each, the floor last; 0 where a friction curve acts."""
 
     stiffness: F8
     """N/m"""
@@ -29,16 +29,16 @@ class BaseSprings(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Laws:
-    """Coefficients of the laws that are on. T bottle types, M rail materials, H belts."""
+    """Coefficients of the present laws. T bottle types, M rail materials, H belts."""
 
     pair: ContactLaw | None
     """(T * T,), bottle and bottle; None if bottles do not touch bottles."""
     rail: ContactLaw | None
     """(T * M,), bottle and rail; None without rails."""
     curves: Curves | None
-    """The tables of contacts; None without."""
+    """Tables of force against overlap; None without tables."""
     base_friction: F8 | None
-    """(H + 1, T), the floor last, 0 where a spring holds; None without friction by its curve under the bottles."""
+    """(H + 1, T), the floor last, 0 where a spring acts; None without friction curves under the bottles."""
     base_spring: BaseSprings | None
     """None without springs under the bottles."""
     base_radius: F8 | None
@@ -46,19 +46,19 @@ class Laws:
 
     @property
     def friction_under_bottles(self) -> F8 | None:
-        """(H + 1, T), the floor last: coefficients of friction under the bottles, by curve or spring; None without."""
+        """Friction coefficients under bottles, by curve or spring, (H + 1, T), the floor last; None without."""
         if self.base_spring is None or self.base_friction is None:
             return self.base_friction if self.base_spring is None else self.base_spring.friction
         return np.maximum(self.base_friction, self.base_spring.friction)
 
     @property
     def largest_base_friction(self) -> float:
-        """The largest coefficient of friction under any bottle; 0 if there is none."""
+        """Largest friction coefficient under any bottle; 0 without friction."""
         return 0.0 if (table := self.friction_under_bottles) is None else float(table.max())
 
 
 def build_laws(scene: Scene, rail_materials: Sequence[str], on: Collection[str]) -> Laws:
-    """The columns for the effects in `on`."""
+    """Build the columns for the effects in `on`."""
     materials = [kind.material for kind in scene.bottle_types.values()]
     masses = np.array([kind.mass for kind in scene.bottle_types.values()])
     reduced = masses[:, None] * masses / (masses[:, None] + masses)
@@ -76,12 +76,12 @@ def build_laws(scene: Scene, rail_materials: Sequence[str], on: Collection[str])
 
 
 def base_friction(scene: Scene) -> F8:
-    """Coefficient of friction of each belt and, last, the floor on each bottle type, (H + 1, T)."""
-    given = {base.between: base.friction for base in scene.base}
+    """Return the friction coefficients of belts and bottle types, (H + 1, T), the floor last."""
+    friction = {base.between: base.friction for base in scene.base}
     types = list(scene.bottle_types.values())
     table = np.zeros((len(scene.belts) + 1, len(types)))
     for row, belt in enumerate(scene.belts.values()):
-        table[row] = [given[kind.material, belt.material] for kind in types]
+        table[row] = [friction[kind.material, belt.material] for kind in types]
     if isinstance(scene.floor, Floor):
         if scene.floor.friction is not None:
             table[-1] = scene.floor.friction
@@ -91,14 +91,14 @@ def base_friction(scene: Scene) -> F8:
 
 
 def base_springs(scene: Scene) -> BaseSprings | None:
-    """The springs under the bottles; None if no belt or floor of the scene has one."""
-    given = {base.between: base.tangential for base in scene.base}
+    """Return the springs under the bottles; None if no belt or floor has one."""
+    tangential = {base.between: base.tangential for base in scene.base}
     types = list(scene.bottle_types.values())
     friction = base_friction(scene)
     stiffness, damping = np.zeros((2, *friction.shape))
     for row, belt in enumerate(scene.belts.values()):
         for column, kind in enumerate(types):
-            spring = given[kind.material, belt.material]
+            spring = tangential[kind.material, belt.material]
             if spring is not None:
                 stiffness[row, column], damping[row, column] = spring.stiffness, spring.damping
     if isinstance(scene.floor, Floor) and scene.floor.friction is None:
@@ -109,7 +109,7 @@ def base_springs(scene: Scene) -> BaseSprings | None:
 
 
 def _by_curve(friction: F8, springs: BaseSprings | None) -> F8 | None:
-    """Friction where no spring holds; None if springs hold all that there is."""
+    """Return the friction coefficients without springs; None if springs act on all belts and the floor."""
     if springs is None:
         return friction
     rest = np.where(springs.stiffness > 0.0, 0.0, friction)
@@ -117,12 +117,12 @@ def _by_curve(friction: F8, springs: BaseSprings | None) -> F8 | None:
 
 
 def base_radius(scene: Scene) -> F8:
-    """Radius of the ring that each bottle type stands on, (T,), m; 0 for a point."""
+    """Return the radius of the ring that each bottle type stands on, (T,), m; 0 for a point."""
     return np.array([kind.base_radius or 0.0 for kind in scene.bottle_types.values()])
 
 
 def _mindlin(contact: Contact) -> float:
-    """N/m^1.5: times sqrt(delta) it is stiffness_ratio times dN/d delta, 1.5 k_h sqrt(delta)."""
+    """Return Mindlin's tangential coefficient, N/m^1.5: stiffness_ratio times dN/d delta / sqrt(delta), 1.5 k_h."""
     if contact.tangential is None or contact.tangential.stiffness_ratio is None:
         return 0.0
     return contact.tangential.stiffness_ratio * 1.5 * (contact.hertz_stiffness or 0.0)
@@ -131,9 +131,9 @@ def _mindlin(contact: Contact) -> float:
 def _columns(
     scene: Scene, rows: Sequence[str], columns: Sequence[str], reduced_mass: F8, on: Collection[str]
 ) -> ContactLaw:
-    """Flat columns over materials in rows and columns; pairs that never meet get 0. reduced_mass: (rows, columns)."""
-    given = {frozenset(contact.between): index for index, contact in enumerate(scene.contacts)}
-    found = [given.get(frozenset((a, b)), -1) for a in rows for b in columns]
+    """Return flat columns over materials in rows and columns, 0 without contact. reduced_mass: kg, (rows, columns)."""
+    numbers = {frozenset(contact.between): index for index, contact in enumerate(scene.contacts)}
+    contacts = [numbers.get(frozenset((a, b)), -1) for a in rows for b in columns]
     curve_of = {index: curve for curve, index in enumerate(_with_table(scene))}
 
     def column(effect: str, value: Callable[[Contact, float], float | None]) -> F8 | None:
@@ -141,7 +141,7 @@ def _columns(
             return None
         entries = [
             (value(scene.contacts[index], mass) or 0.0) if index >= 0 else 0.0
-            for index, mass in zip(found, reduced_mass.ravel().tolist(), strict=True)
+            for index, mass in zip(contacts, reduced_mass.ravel().tolist(), strict=True)
         ]
         return np.array(entries) if any(entries) else None
 
@@ -156,7 +156,7 @@ def _columns(
 
     laws = {law.column: stiffness(law) for law in ELASTIC if law is not TABLE}
     laws |= {law.column: damping(law) for law in DAMPING}
-    curve = _curve_column([curve_of.get(index, NO_CURVE) for index in found]) if TABLE.name in on else None
+    curve = _curve_column([curve_of.get(index, NO_CURVE) for index in contacts]) if TABLE.name in on else None
     mindlin = column("tangential_spring", lambda contact, _: _mindlin(contact))
     springs = column(
         "tangential_spring", lambda contact, _: contact.tangential.stiffness if contact.tangential else 0.0
@@ -165,7 +165,7 @@ def _columns(
         **laws,
         **{TABLE.column: curve},
         friction=column("contact_friction", lambda contact, _: contact.friction),
-        tangential_stiffness=np.zeros(len(found)) if springs is None and mindlin is not None else springs,
+        tangential_stiffness=np.zeros(len(contacts)) if springs is None and mindlin is not None else springs,
         tangential_mindlin=mindlin,
         tangential_damping=column(
             "tangential_spring", lambda contact, _: contact.tangential.damping if contact.tangential else 0.0

@@ -1,4 +1,4 @@
-"""Which laws along the normal a contact of a scene has, and the coefficient of its damping."""
+"""Elastic law, damping law and damping coefficient of a contact of a scene."""
 
 from collections.abc import Mapping
 
@@ -9,12 +9,12 @@ DAMPING_BY_NAME: Mapping[str, DampingLaw] = {law.name: law for law in DAMPING}
 
 
 def elastic_law(contact: Contact) -> ElasticLaw:
-    """The one whose field is given."""
+    """Return the elastic law whose field is given."""
     return next(law for law in ELASTIC if getattr(contact, law.field) is not None)
 
 
 def damping_law(contact: Contact) -> DampingLaw | None:
-    """None for a contact without damping: none is chosen, a coefficient of 0, or a restitution of 1."""
+    """Return the damping law; None if none is chosen, the coefficient is 0, or the restitution is 1."""
     damping = contact.damping
     if damping.restitution == 1.0 or (damping.restitution is None and damping.coefficient == 0.0):
         return None
@@ -24,10 +24,10 @@ def damping_law(contact: Contact) -> DampingLaw | None:
 
 
 def damping_coefficient(contact: Contact, law: DampingLaw, reduced_mass: float) -> float:
-    """In the unit of its law: as given, or from the restitution. reduced_mass: kg."""
+    """Return the coefficient in the unit of its law: as given, or from the restitution. reduced_mass: kg."""
     damping = contact.damping
     if damping.restitution is None:
         return damping.coefficient
-    given = getattr(contact, elastic_law(contact).field)
-    stiffness = 0.0 if isinstance(given, tuple) else given
+    value = getattr(contact, elastic_law(contact).field)
+    stiffness = 0.0 if isinstance(value, tuple) else value
     return law.coefficient(damping.restitution, damping.speed or 1.0, stiffness, reduced_mass)

@@ -1,4 +1,4 @@
-"""From a scene to constant arrays: effects are chosen, coefficients found, the time step bounded, arrays filled."""
+"""Scene -> Model: choice of effects, coefficients, time step, and constant arrays."""
 
 from conveyor_sim.physics.model.model import Model, build_model
 

@@ -1,4 +1,4 @@
-"""Scene -> Model: the constant arrays, the chosen effects and why, the time step and its reason."""
+"""Scene -> Model: the constant arrays, the chosen effects and the time step, with their reasons."""
 
 import math
 import platform
@@ -35,12 +35,12 @@ from conveyor_sim.scene.places import Places
 from conveyor_sim.scene.schema import BottleType, Scene
 
 SKIN = 0.2
-"""Of the smallest radius: the distance that keeps rebuilds rare and lists short on dense tables."""
+"""Skin of the neighbour lists over the smallest radius: rebuilds stay rare and lists short on dense tables."""
 
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """Everything about a scene that does not change while it runs. T types, H belts, M rail materials."""
+    """Everything about a scene that is constant during a run. T types, H belts, M rail materials."""
 
     name: str
     dt: float
@@ -49,14 +49,14 @@ class Model:
     tick_ns: int
     dt_reason: str
     bounds: tuple[Bound, ...]
-    """For the preset or tolerance of the scene; `standard` where it gives the time step itself."""
+    """Bounds for the preset or tolerance of the scene; for `standard` where it gives the time step."""
     accuracy: str
-    """What the scene chooses, in words."""
+    """Choice of the scene, in words."""
     impacts: tuple[Impact, ...]
-    """The hardest that are expected, of each pair of types and materials."""
+    """Hardest expected impact of each pair of types, and of types and materials."""
     prediction: Prediction
     load: Load
-    """What is expected to press on a contact for long."""
+    """Largest expected resting load on a contact."""
     integrator: str
     effects: tuple[EffectChoice, ...]
     belts: tuple[str, ...]
@@ -69,9 +69,9 @@ class Model:
     type_inertia: F8
     """(T,), kg m^2"""
     type_base_radius: F8 | None
-    """(T,), m, of the ring that a bottle stands on, 0 for a point; None if all stand on points."""
+    """(T,), m, radius of the ring that a bottle stands on, 0 for a point; None if all stand on points."""
     type_heights: F8
-    """(T, 2), m, of the contact band and of the centre of gravity; NaN where they are not given."""
+    """(T, 2), m, heights of the contact band and of the centre of gravity; NaN where unknown."""
     plant: Plant
     settings: EngineSettings
     pair_law: ContactLaw | None
@@ -79,7 +79,7 @@ class Model:
     rail_law: ContactLaw | None
     """(T * M,), bottle and rail; None without rails."""
     curves: Curves | None
-    """Tables of force against overlap; None where no contact has one."""
+    """Tables of force against overlap; None without tables."""
     friction_curve: str
     """`polynomial` or `atan`."""
     friction_solver: str
@@ -88,23 +88,23 @@ class Model:
     arcs: Arcs | None
     grid: StaticGrid | None
     base_friction: F8 | None
-    """(H + 1, T), the floor last, 0 where a spring holds; None without friction under the bottles."""
+    """(H + 1, T), the floor last, 0 where a spring acts; None without friction under the bottles."""
     base_spring: BaseSprings | None
     """None without springs under the bottles."""
     largest_base_friction: float
-    """Of any bottle on any belt or floor, by curve or spring; 0 without."""
+    """Largest friction coefficient under any bottle, by curve or spring; 0 without friction."""
     gravity: float
     engine_hash: str
     versions: tuple[str, ...]
     machine: str
 
     def has(self, effect: EffectName) -> bool:
-        """Whether an effect is on."""
+        """Return True if an effect is on."""
         return any(choice.on for choice in self.effects if choice.name == effect)
 
 
 def build_model(scene: Scene) -> Model:
-    """Build the Model of a valid scene. Raises SceneError if a tick has more than MOST_STEPS steps."""
+    """Build the Model of a valid scene. Raise SceneError if a tick has more than MOST_STEPS steps."""
     plant = Plant.of(scene)
     choice = choose_steps(plant)
     laws, on, steps = choice.terms.laws, choice.terms.on, choice.steps
@@ -177,7 +177,7 @@ def build_model(scene: Scene) -> Model:
 
 @cache
 def versions_here() -> tuple[str, ...]:
-    """ "package=version" of what can change a bit, beside the engine (`ENGINE_HASH`)."""
+    """Return "package=version" of all packages that can change bits, except the engine (`ENGINE_HASH`)."""
     packages = (f"{package}={version(package)}" for package in ("numba", "llvmlite", "numpy"))
     return f"conveyor_sim={__version__}+{sources_hash()}", *packages
 
@@ -188,27 +188,27 @@ def _given_words(scene: Scene) -> str:
 
 
 def _friction_table(laws: Laws) -> F8 | None:
-    """Friction by its curve, a table of 0 if springs hold all that there is."""
+    """Return the friction coefficients without springs, zeros if springs act everywhere; None without friction."""
     if laws.base_friction is None and laws.base_spring is not None:
         return np.zeros_like(laws.base_spring.friction)
     return laws.base_friction
 
 
 def _heights(kind: BottleType) -> tuple[float, float]:
-    """Of the contact band and of the centre of gravity, m; NaN where they are not given."""
+    """Return the heights of the contact band and of the centre of gravity, m; NaN where unknown."""
     if kind.contact_height is None or kind.gravity_height is None:
         return math.nan, math.nan
     return kind.contact_height, kind.gravity_height
 
 
 def _largest(radii: F8 | None) -> float:
-    """The largest of some radii, m; 0 if there are none."""
+    """Return the largest of some radii, m; 0 without radii."""
     return 0.0 if radii is None else float(radii.max())
 
 
 @cache
 def _machine() -> str:
-    """CPU architecture and the features that change compiled code."""
+    """Return CPU architecture and the features that change compiled code."""
     features = llvm.get_host_cpu_features()
     present = ",".join(sorted(name for name, has in features.items() if has))
     return f"{platform.machine()} {llvm.get_host_cpu_name()} {present}"

@@ -1,4 +1,4 @@
-"""The arrays of the rails that move at the beginning of a run, and how fast they are in a tick."""
+"""Initial arrays of moving rails, and their largest speed in a tick."""
 
 from collections.abc import Sequence
 
@@ -14,10 +14,10 @@ from conveyor_sim.scene.moving import MovingShape
 def moving_arrays(
     shapes: Sequence[MovingShape], materials: Sequence[str], rail: int, surface: int, slots: int, ledger: bool
 ) -> MovingRails:
-    """Rails that rest where they are at first, each a surface of its own.
+    """Return the arrays of rails at rest in their initial positions. Each rail is a separate surface.
 
-    materials: of all rails, by number. rail, surface: the number of the first one as a rail and as a surface. slots:
-    of bottles. ledger: whether the energy ledger is kept.
+    materials: of all rails, by number. rail, surface: numbers of the first rail and its surface. slots: bottle slots.
+    ledger: True if the energy ledger is on.
     """
     count = len(shapes)
     start = np.array([shape.at(shape.first).p1 for shape in shapes])
@@ -83,7 +83,7 @@ def _actuators(shapes: Sequence[MovingShape], slots: int, ledger: bool) -> Actua
 
 
 def fastest_rail(moving: MovingRails | None) -> float:
-    """Speed (m/s) that no point of a moving rail exceeds but by what bottles do to it, 0 if none moves."""
+    """Return the largest speed (m/s) of any point of the moving rails without bottles; 0 if no rail moves."""
     if moving is None:
         return 0.0
     reach = np.where(moving.turning != 0.0, moving.length, 1.0)

@@ -1,4 +1,4 @@
-"""The plant as constant arrays for the engine: rail pieces with their joints, belts, the static grid."""
+"""Constant arrays of the plant for the engine: rail pieces with their joints, belts, the static grid."""
 
 import math
 from collections.abc import Sequence
@@ -20,14 +20,14 @@ STRAIGHT = -1
 
 
 def reach_code(span: float) -> int:
-    """How the engine finds whether an angle is inside a span (engine/support/sector.py)."""
+    """Return the code by which the engine tests if an angle is inside a span (engine/support/sector.py)."""
     if is_full_turn(span):
         return FULL_CIRCLE
     return UP_TO_HALF if span <= math.pi else BEYOND_HALF
 
 
 def rail_arrays(rails: Sequence[RailShape], materials: Sequence[str]) -> tuple[Segments | None, Arcs | None]:
-    """Straight and arc pieces of all rails, joined into surfaces; None for the kind that is absent."""
+    """Return straight and arc pieces of all rails, joined into surfaces; None for an absent kind."""
     pieces = [(piece, index) for index, rail in enumerate(rails) for piece in rail.pieces]
     pieces.sort(key=lambda entry: isinstance(entry[0], ArcPiece))
     if not pieces:
@@ -77,7 +77,7 @@ def rail_arrays(rails: Sequence[RailShape], materials: Sequence[str]) -> tuple[S
 
 
 def belt_arrays(shapes: Sequence[BeltShape], slots: int, candidates: int) -> Belts | None:
-    """Where belts lie, with room for what each of `slots` bottles stands on; None without belts."""
+    """Return the areas of the belts, with room for the belt under each of `slots` bottles; None without belts."""
     if not shapes:
         return None
     angle = np.array([shape.angle for shape in shapes])
@@ -98,7 +98,7 @@ def belt_arrays(shapes: Sequence[BeltShape], slots: int, candidates: int) -> Bel
 
 
 def listed(slots: int) -> BottleList:
-    """Room for a list of bottles by unit, empty."""
+    """Return an empty list of bottles by unit."""
     return BottleList(np.zeros(slots, np.uint32), np.zeros(slots // UNIT + 2, np.uint32))
 
 
@@ -109,7 +109,7 @@ def plant_grid(
     largest_base_radius: float,
     skin: float,
 ) -> StaticGrid | None:
-    """The static grid over all rails and belts; None if there are none."""
+    """Build the static grid over all rails and belts; return None without any."""
     if not rails and not belts:
         return None
     pieces = [piece for rail in rails for piece in rail.pieces]
@@ -153,7 +153,7 @@ def _ends(start: F8, end: F8, joints: Joints, part: slice) -> Ends:
 
 
 def _inward(piece: Piece) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Unit vectors from each end into the piece."""
+    """Return the unit vectors from each end into the piece."""
     if isinstance(piece, SegmentPiece):
         dx, dy = piece.p2[0] - piece.p1[0], piece.p2[1] - piece.p1[1]
         length = math.hypot(dx, dy)
@@ -163,7 +163,7 @@ def _inward(piece: Piece) -> tuple[tuple[float, float], tuple[float, float]]:
 
 
 def _arc_extremes(piece: ArcPiece) -> F8:
-    """Points whose box holds the arc: its ends and where it crosses the axes through its centre."""
+    """Return points whose bounding box holds the arc: its ends and its crossings with the axes through its centre."""
     first = math.ceil(piece.start_angle / (math.pi / 2))
     last = math.floor((piece.start_angle + piece.span) / (math.pi / 2))
     crossings = np.arange(first, last + 1) * (math.pi / 2)

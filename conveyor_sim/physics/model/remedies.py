@@ -1,7 +1,7 @@
-"""What sets the number of steps of a scene, how far it stands out, and which changes of the scene lower it.
+"""Tightest bound on the steps of a scene, and changes of the scene that lower the number of steps.
 
-A remedy is a change of the scene file. It is tried: the steps of the changed scene are chosen anew, and only a change
-that lowers them by enough is named, with the number that it came to.
+A remedy is a change of the scene file. Each candidate is tried: the steps of the changed scene are chosen, and only
+changes that lower them by enough are reported, with the resulting number.
 """
 
 from collections.abc import Iterator, Mapping
@@ -19,13 +19,13 @@ from conveyor_sim.scene.load import parse_overrides, parse_scene
 from conveyor_sim.scene.schema import Scene
 
 WORTH = 0.8
-"""Of the steps and of the cost of a tick: a remedy that leaves more is not worth a sentence."""
+"""Largest share of the steps and of the cost of a tick that a reported remedy leaves."""
 
 NAMED = 2
-"""Remedies at most, the one that costs least first."""
+"""Largest number of reported remedies, the cheapest first."""
 
 NEAR = 2.0
-"""Times the cost of the first remedy, up to which the second is named."""
+"""Largest cost of the second remedy over that of the first."""
 
 STEP_COST: Mapping[str, int] = {
     "leapfrog": 1,
@@ -35,16 +35,16 @@ STEP_COST: Mapping[str, int] = {
     "dormand_prince": 12,
     "linearly_implicit": 6,
 }
-"""Of a step, in evaluations of all forces and what is like them."""
+"""Cost of a step in evaluations of all forces or equal work."""
 
 OTHERS = ("leapfrog", "velocity_verlet")
 """Integrators that a remedy may choose."""
 
 BOTTLE_STEP = 3e-8
-"""s, of one bottle in one step on one core of 2020s make, in round numbers."""
+"""s per bottle and step on one core of the 2020s, rounded."""
 
 BESIDE = 10
-"""Bottles that cost as much as the rest of a step."""
+"""Cost of the rest of a step, in bottles."""
 
 COARSER = {"fine": "standard", "standard": "draft"}
 
@@ -54,55 +54,55 @@ class Remedy:
     """A change of a scene that lowers its number of steps."""
 
     words: str
-    """As in a scene file, and what else it changes."""
+    """The change as in a scene file, and its side effects."""
     overrides: Mapping[str, Any]
-    """To be laid over the scene."""
+    """Overrides of the scene."""
     steps: int
-    """In a tick of the scene with it."""
+    """Steps per tick with the remedy."""
     cost: float
-    """Of a step, over that of a step without it."""
+    """Cost of a step with the remedy over that without it."""
 
     @property
     def price(self) -> float:
-        """Of a tick with it, in steps of the scene without it."""
+        """Cost of a tick with the remedy, in steps of the scene without it."""
         return self.steps * self.cost
 
     def sentence(self, before: int) -> str:
-        """In words; before: steps without it."""
+        """Return the remedy in words. before: steps without it."""
         return f"{self.words}: {_steps(self.steps)}, {_times(before / self.steps)} fewer"
 
 
 @dataclass(frozen=True)
 class StepLimit:
-    """What sets the steps in a tick of a scene."""
+    """Limit on the time step of a scene, and remedies."""
 
     steps: int
     given: bool
-    """By the scene itself, not by the bounds."""
+    """True if the scene gives the steps, False if the bounds set them."""
     bounds: tuple[Bound, ...]
-    """The tightest first."""
+    """All bounds, the tightest first."""
     tick: float
     """s"""
     bottles: int | None
-    """That there can be at most; None without end."""
+    """Largest number of bottles in a run; None without limit."""
     remedies: tuple[Remedy, ...]
 
     @property
     def ratio(self) -> float:
-        """By how much the tightest bound stands out from the next one."""
+        """Next bound over the tightest one."""
         return self.bounds[1].dt / self.bounds[0].dt if len(self.bounds) > 1 else 1.0
 
     @property
     def lines(self) -> list[str]:
-        """For a reader who wants fewer steps: the bound, the remedies, and a warning where a run will be slow."""
-        found = [self.bound, self.change]
+        """Lines of a report: the bound, the remedies, and a warning for slow scenes."""
+        lines = [self.bound, self.change]
         if self.steps >= MANY_STEPS:
-            found.append(self._warning())
-        return [line for line in found if line]
+            lines.append(self._warning())
+        return [line for line in lines if line]
 
     @property
     def bound(self) -> str:
-        """The bound that rules, and by how much; empty where there is none."""
+        """The tightest bound and its distance to the next one; empty without bounds."""
         if not self.bounds:
             return ""
         first, *others = self.bounds
@@ -114,13 +114,13 @@ class StepLimit:
 
     @property
     def change(self) -> str:
-        """The remedies; empty where none is known, unless the steps are many."""
+        """The remedies; empty without remedies unless the steps are many."""
         if not self.remedies:
             return "" if self.steps < MANY_STEPS else "no single change of the scene that is known to help lowers it"
         return "fewer steps: " + "; or ".join(remedy.sentence(self.steps) for remedy in self.remedies)
 
     def seconds(self, bottles: int) -> float:
-        """Of computing on one core for a simulated second of so many bottles, in round numbers."""
+        """Return the estimated computing time (s) on one core for a simulated second of `bottles` bottles."""
         return self.steps / self.tick * (bottles + BESIDE) * BOTTLE_STEP
 
     def _warning(self) -> str:
@@ -131,35 +131,35 @@ class StepLimit:
 
 
 def step_limit(scene: Scene, choice: StepChoice | None = None) -> StepLimit:
-    """What sets the steps of a valid scene, with the remedies that were tried to help. choice: of this scene."""
+    """Return the limit on the steps of a valid scene with remedies. choice: of this scene, if known."""
     choice = choose_steps(Plant.of(scene)) if choice is None else choice
     tried = (_tried(scene, *candidate) for candidate in _candidates(scene, choice))
-    helpful = [one for one in tried if one is not None and max(one.price, one.steps) <= WORTH * choice.steps]
-    helpful.sort(key=lambda one: one.price)
+    helpful = [remedy for remedy in tried if remedy and max(remedy.price, remedy.steps) <= WORTH * choice.steps]
+    helpful.sort(key=lambda remedy: remedy.price)
     return StepLimit(
         steps=choice.steps,
         given=choice.given is not None,
         bounds=tuple(sorted(choice.bounds, key=lambda bound: bound.dt)),
         tick=scene.tick,
         bottles=choice.terms.plant.most_bottles,
-        remedies=tuple(one for one in helpful[:NAMED] if one.price <= NEAR * helpful[0].price),
+        remedies=tuple(remedy for remedy in helpful[:NAMED] if remedy.price <= NEAR * helpful[0].price),
     )
 
 
 def with_remedy(scene: Scene, overrides: Mapping[str, Any]) -> Scene:
-    """The scene with a change laid over it. SceneError if it does not allow that."""
+    """Return the scene with overrides. Raise SceneError if they are not valid for it."""
     return parse_scene(scene.source_text, scene.source_name, {**parse_overrides(scene.overrides_text), **overrides})
 
 
 def too_many(scene: Scene, choice: StepChoice) -> str:
-    """Why a scene of more than MOST_STEPS steps is refused, and what helps."""
+    """Return why a scene of more than MOST_STEPS steps is refused, with a remedy."""
     remedies = step_limit(scene, choice).remedies
     helps = f", as with {remedies[0].sentence(choice.steps)}" if remedies else ""
     return f"{choice.reason}; expected at most {MOST_STEPS} steps a tick{helps}"
 
 
 def _candidates(scene: Scene, choice: StepChoice) -> Iterator[tuple[str, Mapping[str, Any], float]]:
-    """Changes to try: words, overrides, cost of a step."""
+    """Yield candidates: words, overrides, cost of a step."""
     accuracy = scene.accuracy.model_dump()
     if choice.given is not None:
         free = accuracy | {"per_tick": None, "dt": None}
@@ -186,9 +186,9 @@ def _candidates(scene: Scene, choice: StepChoice) -> Iterator[tuple[str, Mapping
 
 
 def _onset(scene: Scene, speed: float) -> list[dict[str, Any]] | None:
-    """The contacts with Hunt and Crossley's damping, which has no jump, in place of dashpots by restitution.
+    """Return the contacts with Hunt and Crossley's damping, which has no jump, instead of dashpots by restitution.
 
-    None if no contact has one.
+    Return None if no contact has such a dashpot.
     """
     contacts: list[dict[str, Any]] = []
     changed = False
@@ -205,7 +205,7 @@ def _onset(scene: Scene, speed: float) -> list[dict[str, Any]] | None:
 
 
 def _tried(scene: Scene, words: str, overrides: Mapping[str, Any], cost: float) -> Remedy | None:
-    """A candidate with the steps that it comes to; None if the scene does not allow it."""
+    """Return a candidate with its steps; None if it is not valid for the scene."""
     try:
         steps = choose_steps(Plant.of(with_remedy(scene, overrides))).steps
     except SceneError:

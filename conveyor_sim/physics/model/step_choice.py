@@ -1,4 +1,4 @@
-"""How many steps a tick of a scene takes, and all that this follows from; without the arrays of the Model."""
+"""Choice of the steps per tick with its reasons; it needs no arrays of the Model."""
 
 from dataclasses import dataclass
 
@@ -15,7 +15,7 @@ from conveyor_sim.scene.schema import Scene
 
 @dataclass(frozen=True, eq=False)
 class StepChoice:
-    """The steps in a tick of a scene, and why."""
+    """Steps in a tick of a scene, and the reasons."""
 
     effects: tuple[EffectChoice, ...]
     aim: Target
@@ -23,7 +23,7 @@ class StepChoice:
     impacts: tuple[Impact, ...]
     bounds: tuple[Bound, ...]
     given: int | None
-    """Steps that the scene itself gives."""
+    """Steps given in the scene; None if the bounds set them."""
     steps: int
     reason: str
 
@@ -42,7 +42,7 @@ def choose_steps(plant: Plant) -> StepChoice:
 
 
 def _given_steps(scene: Scene) -> int | None:
-    """Steps a tick that the scene itself gives."""
+    """Return the steps per tick given in the scene; None without."""
     if scene.accuracy.dt is not None:
         return fewest_steps(scene.tick, scene.accuracy.dt)
     return scene.accuracy.per_tick

@@ -1,4 +1,4 @@
-"""Which rail pieces form one surface: those that meet within JOINT_TOLERANCE at an end, however they were listed."""
+"""Surfaces of rail pieces: pieces that meet within JOINT_TOLERANCE at an end form one surface, in any order."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from conveyor_sim.scene.overlaps import near_pieces, overlapping
 
 @dataclass(frozen=True)
 class Joints:
-    """How the ends of n rail pieces are joined, (n, 2), start and end of each."""
+    """Joints at the ends of n rail pieces, (n, 2), start and end of each."""
 
     code: NDArray[np.int8]
     """FREE, ANSWERS or SILENT."""
@@ -27,9 +27,9 @@ class Joints:
 def find_joints(pieces: Sequence[Piece], inward: NDArray[np.float64]) -> Joints:
     """Join n rail pieces.
 
-    inward: (n, 2, 2), unit vectors from each end into its piece. Where just two ends meet, the first piece answers for
-    the point; where more meet, or an end lies on another piece, ends stay free and the surface's shared push keeps the
-    point from pushing more than once.
+    inward: (n, 2, 2), unit vectors from each end into its piece. Where two ends meet, the first piece handles contacts
+    of the point. Where more meet, or an end lies on another piece, ends stay free, and the shared push of a surface
+    counts the point once.
     """
     ends = np.array([piece.ends for piece in pieces])
     code = np.full((len(pieces), 2), FREE, dtype=np.int8)
@@ -58,16 +58,16 @@ def find_joints(pieces: Sequence[Piece], inward: NDArray[np.float64]) -> Joints:
 
 
 def _ends_on_pieces(pieces: Sequence[Piece], ends: NDArray[np.float64]) -> list[tuple[int, int]]:
-    """Pairs (piece, other) where an end of `other` lies on `piece`, be it at an end or between."""
-    found: list[tuple[int, int]] = []
+    """Return pairs (piece, other) where an end of `other` lies on `piece`."""
+    pairs: list[tuple[int, int]] = []
     for index, near, apart in near_pieces(ends.reshape(-1, 2), pieces, JOINT_TOLERANCE):
         touching = np.unique(near[apart <= JOINT_TOLERANCE] // 2)
-        found.extend((index, other) for other in touching.tolist() if other != index)
-    return found
+        pairs.extend((index, other) for other in touching.tolist() if other != index)
+    return pairs
 
 
 def _meeting_ends(ends: NDArray[np.float64]) -> list[list[tuple[int, int]]]:
-    """Groups of two or more (piece, end) that share a point."""
+    """Return groups of two or more (piece, end) that share a point."""
     points = ends.reshape(-1, 2)
     near: dict[int, list[int]] = {}
     for one, other in zip(*overlapping(points, np.full(len(points), JOINT_TOLERANCE / 2), 0.0), strict=True):

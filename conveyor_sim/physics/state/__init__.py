@@ -1,4 +1,4 @@
-"""All that changes as a scene runs: its arrays, and their checkpoint in a file."""
+"""State of a run: its arrays, and their checkpoint in a file."""
 
 from conveyor_sim.physics.state.state import State
 

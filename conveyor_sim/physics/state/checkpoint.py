@@ -1,7 +1,7 @@
-"""The checkpoint file: a NumPy .npz with the arrays of a run, a JSON header with all else, and a checksum over both.
+"""The checkpoint file: a NumPy .npz with the arrays of a run, a JSON header with everything else, and a checksum.
 
 The checksum is the comment at the end of the archive (`unzip -z`), so the file is an ordinary .npz to other programs.
-It finds damage. It is no signature: what the file says is checked all the same before anything is made of it.
+It detects damage but is no signature, so the content is checked before it is used.
 """
 
 import hashlib
@@ -31,35 +31,35 @@ from conveyor_sim.support.files import MB, FileError, in_mb, read_file, write_fi
 from conveyor_sim.support.printable import printable
 
 FORMAT = 2
-"""Raised by one whenever the layout of the file changes."""
+"""Version of the file layout."""
 
 FREE = frozenset({"description", "duration", "start_time", "where"})
 """Fields of a scene that may differ from those of the checkpoint."""
 
 MOST = 512 * MB
-"""Bytes of a file. A bottle takes 0.5 to 5 kB, by effects and integrator; it is read into memory twice."""
+"""Largest file, bytes. A bottle takes 0.5 to 5 kB by effects and integrator; the file is read into memory twice."""
 
 _HEADER = "header"
 _MAGIC = b"PK\x03\x04"
 _CHECKSUM, _DIGITS = b"sha256:", 64
 _LOCAL, _NAMES = 30, slice(26, 30)
-"""Bytes of the fixed part of a .zip's entry, and where it has the lengths of its name and of its extra field."""
+"""Bytes of the fixed part of a .zip entry, and the place of the lengths of its name and extra field."""
 _BEGINNING = re.compile(rb'\x93NUMPY.{1,400}\n\{"format": \d{1,9}, "versions": \["engine=', re.DOTALL)
-"""The header of every format so far: a NumPy array that holds JSON."""
+"""Beginning of the header in every format so far: a NumPy array that holds JSON."""
 
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """What a file of this version holds."""
+    """Content of a checkpoint of this version."""
 
     path: Path
     scene: Scene
     memory: dict[str, Any]
-    """What the run remembers beside its arrays, as plain data; not checked."""
+    """State of the run beside its arrays, as plain data; not checked."""
     arrays: Arrays
-    """Those that change, by name (`world_arrays.py`); not checked."""
+    """Changing arrays by name (`world_arrays.py`); not checked."""
     controller: dict[str, Any] | None = None
-    """What the line's controller remembered, if that was saved; not checked."""
+    """State of the line's controller, if saved; not checked."""
 
 
 class _Source(BaseModel, strict=True, extra="forbid"):
@@ -87,10 +87,10 @@ def write_checkpoint(
     folder: Path | None = None,
     controller: dict[str, Any] | None = None,
 ) -> None:
-    """Write a file in one go: it is complete, or what was there before is untouched.
+    """Write a checkpoint atomically: after an error the previous file is unchanged.
 
-    memory: as JSON can hold it, as is what the controller remembers. folder: which the path may not leave. Raises
-    CheckpointError, also if the path names a file that is not a checkpoint (of any format, damaged ones included).
+    memory, controller: data that JSON can hold. folder: the path must lie inside. Raise CheckpointError on failure, and
+    if the path names a file that is not a checkpoint (of any format, damaged ones included).
     """
     source = {"text": scene.source_text, "name": scene.source_name, "overrides": scene.overrides_text}
     header = {"format": FORMAT, "versions": versions(), "scene": source, "memory": memory, "controller": controller}
@@ -124,10 +124,10 @@ def to_bytes(header: str, arrays: Arrays) -> bytes:
 
 
 def read_checkpoint(path: Path, scene: Scene | None = None, folder: Path | None = None) -> Checkpoint:
-    """Read a file; where a scene is given, it must be the one of the file but for the FREE fields.
+    """Read a checkpoint. A scene must equal that of the file except for the FREE fields.
 
-    folder: which the path may not leave. Raises CheckpointError, in one sentence, for what is no checkpoint, damaged,
-    of another version, or of another scene. What memory and arrays hold is checked by those who take it.
+    folder: the path must lie inside. Raise CheckpointError, in one sentence, for a file that is no checkpoint, damaged,
+    of another version or of another scene. The receivers check the content of memory and arrays.
     """
     header, arrays = _read(path, folder)
     then, now = header.versions, versions()
@@ -140,27 +140,27 @@ def read_checkpoint(path: Path, scene: Scene | None = None, folder: Path | None 
     saved = _scene(path, header.scene)
     difference = None if scene is None else scene_difference(saved, scene, FREE)
     if difference is not None:
-        field, here, given = difference
+        field, here, there = difference
         raise CheckpointError(
-            f"{path}: saved from a scene with {field}: {here}, which is {given} in the scene given; "
+            f"{path}: saved from a scene with {field}: {here}, which is {there} in the scene given; "
             "expected the same scene"
         )
     return Checkpoint(path, saved if scene is None else scene, header.memory, arrays, header.controller)
 
 
 def damaged(path: Path, reason: object) -> CheckpointError:
-    """The error for a file whose contents do not fit together."""
+    """Return the error for a file with inconsistent content."""
     text = printable(" ".join(str(reason).split())) or type(reason).__name__
     return CheckpointError(f"{path}: is damaged or cut short ({text}), expected a complete checkpoint")
 
 
 def versions() -> list[str]:
-    """All that decides how a run goes on, "what=version"."""
+    """Return the versions that decide how a run continues, as "name=version"."""
     return [f"engine={ENGINE_HASH}", *versions_here()]
 
 
 def _read(path: Path, folder: Path | None) -> tuple[_Header, Arrays]:
-    """Header and arrays of a file of this format."""
+    """Return header and arrays of a file of this format."""
     try:
         content = read_file(path, MOST, folder)
     except FileError as error:
@@ -174,7 +174,7 @@ def _read(path: Path, folder: Path | None) -> tuple[_Header, Arrays]:
         header, arrays = _unpacked(content)
     except CheckpointError as error:
         raise CheckpointError(f"{path}: {error}") from None
-    # Whatever libraries raise for an archive that somebody made up.
+    # Libraries raise various exceptions for forged archives.
     except Exception as error:
         raise damaged(path, error) from error
     number = header.get("format")
@@ -190,7 +190,7 @@ def _read(path: Path, folder: Path | None) -> tuple[_Header, Arrays]:
 
 
 def _unpacked(content: bytes) -> tuple[dict[str, Any], Arrays]:
-    """Header and arrays of an archive, which take no more memory than it has bytes. Raises anything."""
+    """Return header and arrays of an archive; they take no more memory than its bytes. Raise any exception."""
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         entries = archive.infolist()
         if any(entry.compress_type != zipfile.ZIP_STORED for entry in entries):
@@ -209,7 +209,7 @@ def _unpacked(content: bytes) -> tuple[dict[str, Any], Arrays]:
 
 
 def _array(content: bytes) -> NDArray[Any]:
-    """A .npy file of numbers in C order, as NumPy writes it; no more is allocated than it has bytes."""
+    """Return the array of a .npy file of numbers in C order. It takes no more memory than the file has bytes."""
     stream = io.BytesIO(content)
     if npy.read_magic(stream) != (1, 0):
         raise ValueError("an array of another version of .npy")

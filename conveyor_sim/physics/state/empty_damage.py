@@ -1,4 +1,4 @@
-"""The arrays of what bottles and rails bear, empty, as a Model needs them; and where the bins of rails lie."""
+"""Empty arrays of loads on bottles and rails for a Model, and the places of the rails' bins."""
 
 import math
 from collections.abc import Iterator
@@ -23,23 +23,23 @@ from conveyor_sim.physics.model import Model
 from conveyor_sim.scene.geometry import ArcPiece, Piece
 
 BIN = 0.05
-"""m, length of a bin of rail at most."""
+"""Largest length of a bin of rail, m."""
 
 
 @dataclass(frozen=True)
 class RailPlaces:
-    """Where the bins of the rails lie, (B,), in the order of the engine: straight pieces, then arcs."""
+    """Places of the rails' bins, (B,), in the order of the engine: straight pieces, then arcs."""
 
     rail: NDArray[np.uint32]
     x: F8
-    """m, of the middle."""
+    """m, middle of the bin."""
     y: F8
     length: F8
     """m"""
 
 
 def empty_damage(model: Model, slots: int) -> DamageArrays | None:
-    """Room for that many bottles; None where all of it is disabled."""
+    """Return empty arrays for `slots` bottles; None without damage effects."""
 
     def reals() -> F8:
         return np.zeros(slots)
@@ -60,7 +60,7 @@ def empty_damage(model: Model, slots: int) -> DamageArrays | None:
 
 
 def rail_places(model: Model) -> RailPlaces:
-    """The bins of all rails that are there."""
+    """Return the places of the bins of all rails."""
     rail, x, y, length = [], [], [], []
     for index, piece in _pieces(model):
         bins = _bins(piece)
@@ -78,11 +78,11 @@ def rail_places(model: Model) -> RailPlaces:
 
 
 def _pieces(model: Model) -> Iterator[tuple[int, Piece]]:
-    """Rail and piece in the order of `plant.rail_arrays`."""
+    """Yield rail numbers and pieces in the order of `plant_arrays.rail_arrays`."""
     pieces = [(index, piece) for index, rail in enumerate(model.plant.rails) for piece in rail.pieces]
-    for wanted, there in ((False, model.segments), (True, model.arcs)):
-        if there is not None:
-            yield from (entry for entry in pieces if isinstance(entry[1], ArcPiece) is wanted)
+    for arc, arrays in ((False, model.segments), (True, model.arcs)):
+        if arrays is not None:
+            yield from (entry for entry in pieces if isinstance(entry[1], ArcPiece) is arc)
 
 
 def _rail_bins(model: Model, slots: int) -> RailBins | None:
@@ -111,7 +111,7 @@ def _length(piece: Piece) -> float:
 
 
 def _levers(model: Model) -> tuple[F8, F8, F8]:
-    """(T,) each: levers of contacts and base over the radius of the base, and s over which to smooth."""
+    """Return lever of contacts and of base over base radius, and smoothing time (s), (T,) each."""
     contact, gravity = model.type_heights.T
     radius = model.type_radius.copy()
     if model.type_base_radius is not None:

@@ -1,4 +1,4 @@
-"""The arrays of a World without bottles, as a Model needs them: groups that it does not need are None."""
+"""Arrays of a World without bottles for a Model. Groups that the Model does not need are None."""
 
 from collections.abc import Iterator
 
@@ -26,7 +26,7 @@ from conveyor_sim.physics.state.empty_damage import empty_damage
 
 
 def empty_pairs(model: Model, entries: int) -> Pairs | None:
-    """Room for so many pairs; None where bottles do not touch bottles."""
+    """Return empty lists for `entries` pairs; None without contact between bottles."""
     law = model.pair_law
     if law is None:
         return None
@@ -54,14 +54,14 @@ def empty_pairs(model: Model, entries: int) -> Pairs | None:
 
 
 def empty_near(model: Model, slots: int, entries: int) -> Near:
-    """Room for so many entries of rail pieces near bottles."""
+    """Return an empty list for `entries` rail pieces near bottles."""
     law = model.rail_law
     springs = _near_springs(entries) if law is not None and law.tangential_stiffness is not None else None
     return Near(np.zeros(slots + 1, np.uint32), np.zeros(entries, np.uint32), springs)
 
 
 def empty_world(model: Model, slots: int) -> World:
-    """A World with room for so many bottles; its lists are stale."""
+    """Return a World for `slots` bottles; its lists are stale."""
     entries = 4 * slots
     buckets = 1 << max(4, (2 * slots - 1).bit_length())
     peaks = model.has("peaks")
@@ -254,7 +254,7 @@ def _pair_tangent(entries: int) -> PairTangent:
 
 
 def empty_slots(slots: int, entries: int) -> Slots:
-    """Room for so many entries beyond the rows of the bottles."""
+    """Return empty rows of the bottles, with `entries` entries beyond them."""
     return Slots(
         entry=np.zeros(slots * WIDTH, np.uint32),
         filled=np.zeros(slots, np.uint32),

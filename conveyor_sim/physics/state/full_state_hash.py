@@ -1,4 +1,4 @@
-"""One number for everything that decides how a run continues: the content of a checkpoint without observers.
+"""Hash of everything that decides how a run continues: the content of a checkpoint without observers.
 
 The list is that of the checkpoint (`changing_arrays` and the memory beside them), so new state is covered unless it is
 named here. `test/physics/state/test_full_state_hash.py` changes each of its parts.

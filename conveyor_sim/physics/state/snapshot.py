@@ -1,4 +1,4 @@
-"""What the parts of a line remember from tick to tick (infeeds, watchdogs, ...), as plain data and put back."""
+"""State of objects (infeeds, watchdogs, accounts, ...) between ticks as plain data, and its restoration."""
 
 import json
 import math
@@ -11,13 +11,13 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 from conveyor_sim.scene.part import Part
 
 LARGEST = 2**53
-"""Of whole numbers: ticks, counts and ids are far below."""
+"""Largest whole number; ticks, counts and ids are far below."""
 
 
 def snapshot(part: Any) -> Any:
-    """An object by its public attributes, or a dict or sequence of such, as data that JSON can hold.
+    """Return the public attributes of an object, or of a dict or sequence of objects, as data that JSON can hold.
 
-    Pieces of a scene are left out, random generators taken by their state.
+    Parts of a scene are left out. Random generators are represented by their state.
     """
     if isinstance(part, dict):
         return {str(key): snapshot(value) for key, value in part.items() if not isinstance(value, Part)}
@@ -33,40 +33,39 @@ def snapshot(part: Any) -> Any:
 
 
 def restore(part: Any, kept: Any, name: str = "memory") -> None:
-    """Put what `snapshot` returned of an object, or of a dict of objects, back into one that is built alike.
+    """Put a `snapshot` of an object, or of a dict of objects, back into an object that is built alike.
 
-    What is given must be alike: the same attributes, of the types of the class's annotations, or else of the values
-    that they have now; numbers are finite. Raises ValueError, in words, where it is not.
+    The attributes must be the same, with types of the class's annotations or else of the present values; numbers must
+    be finite. Raise ValueError with the reason otherwise.
     """
     now = _public(part)
     entries(kept, now, name)
     kind: Any = type(part)
     hints = {} if isinstance(part, dict) else _hints(kind)
     for key, value in now.items():
-        place, given = f"{name}.{key}", kept[key]
+        place, data = f"{name}.{key}", kept[key]
         if isinstance(value, np.random.Generator):
-            _restore_random(value, given, place)
+            _restore_random(value, data, place)
         elif isinstance(value, np.ndarray):
-            value[...] = _array(value.shape, given, place)
+            value[...] = _array(value.shape, data, place)
         elif hasattr(value, "__dict__"):
-            restore(value, given, place)
+            restore(value, data, place)
         else:
             if isinstance(value, dict):
-                entries(given, value, place)
-            setattr(part, key, typed(hints.get(key, type(value)), given, place))
+                entries(data, value, place)
+            setattr(part, key, typed(hints.get(key, type(value)), data, place))
 
 
 def entries(kept: Any, expected: Any, name: str) -> None:
-    """ValueError unless the plain data are a mapping with the expected keys."""
+    """Raise ValueError unless the plain data are a mapping with the expected keys."""
     if not isinstance(kept, dict) or kept.keys() != set(expected):
         raise ValueError(f"{name} has other entries than {', '.join(map(str, expected)) or 'none'}")
 
 
 def typed(kind: Any, kept: Any, name: str) -> Any:
-    """Plain data as a type such as `tuple[int, ...]`, for JSON has lists only; numbers must be finite, unless the type
-    says that they need not be.
+    """Return plain data as a type such as `tuple[int, ...]`, because JSON has lists only.
 
-    Raises ValueError, in words, for data of another type.
+    Numbers must be finite, unless the type allows others. Raise ValueError with the reason for data of another type.
     """
     if kind is type(None):
         if kept is not None:
@@ -84,13 +83,13 @@ def typed(kind: Any, kept: Any, name: str) -> Any:
 
 
 def wrong(kind: str) -> str:
-    """What is wrong with a value, by pydantic's name of the error."""
+    """Return what is wrong with a value, by pydantic's name of the error."""
     words = {"missing": "is missing", "extra_forbidden": "should not be there", "finite_number": "is not finite"}
     return words.get(kind, "is not of its type, or out of bounds")
 
 
 def _public(part: Any) -> dict[str, Any]:
-    """What is remembered of an object or a dict, by name."""
+    """Return the attributes or entries that a snapshot holds, by name."""
     if isinstance(part, dict):
         return {str(key): value for key, value in part.items() if not isinstance(value, Part)}
     return _public({name: value for name, value in vars(part).items() if not name.startswith("_")})
@@ -110,7 +109,7 @@ def _restore_random(generator: np.random.Generator, kept: Any, name: str) -> Non
     entries(kept, generator.bit_generator.state, name)
     try:
         generator.bit_generator.state = kept
-    except Exception as error:  # NumPy's depend on what is wrong
+    except Exception as error:  # NumPy raises various exceptions
         raise ValueError(f"{name}: not the state of a random generator") from error
 
 

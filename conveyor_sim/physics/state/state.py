@@ -1,4 +1,4 @@
-"""State: the only thing that changes. Slots for bottles, the lists between them, the belts' speeds."""
+"""State of the bottles: slots, lists between bottles, speeds of belts. Nothing else of the physics changes."""
 
 import heapq
 from collections.abc import Iterator
@@ -17,36 +17,36 @@ from conveyor_sim.engine.world_views import lists_of
 from conveyor_sim.physics.model import Model
 from conveyor_sim.physics.state.empty_world import empty_near, empty_pairs, empty_slots, empty_world
 from conveyor_sim.physics.state.world_arrays import Arrays, changing_arrays, state_arrays, tick_arrays, with_arrays
-from conveyor_sim.physics.state.world_checks import require_sound
+from conveyor_sim.physics.state.world_checks import require_valid
 from conveyor_sim.scene.geometry import RailShape
 
 FIRST_SLOTS = 16
 
 Held = tuple[int, float, tuple[float, ...]]
-"""Of a bottle that a machine has: its type, its angle (rad), and the loads that it has borne."""
+"""A bottle held by a machine: type, angle (rad), accumulated loads."""
 
 
 class State:
     """Bottles in slots (free ones are reused, ids never), as the arrays of one `World`."""
 
     def __init__(self, model: Model, room: int = FIRST_SLOTS) -> None:
-        """Make an empty State with room for that many bottles at first."""
+        """Make an empty State with room for `room` bottles."""
         self.model = model
         self.next_id = 0
         self.world = empty_world(self.model, max(1, room))
         self._free = list(range(max(1, room)))
         self._removed: list[int] = []
         self.held: dict[int, Held] = {}
-        """Bottles that machines have taken and will give back, by id: they are not on the line."""
+        """Bottles held by machines, by id. They are not on the line."""
 
     def add(self, kind: int, x: float, y: float, theta: float, vx: float, vy: float, omega: float) -> int:
-        """Put a new bottle of a type at (x, y) m, moving at m/s and rad/s, into the first free slot; return its id."""
+        """Put a new bottle of a type at (x, y) m, moving at m/s and rad/s, into the first free slot. Return its id."""
         self._put(self.next_id, kind, x, y, theta, vx, vy, omega)
         self.next_id += 1
         return self.next_id - 1
 
     def hold(self, slot: int) -> int:
-        """Take the bottle in a slot off the line until it is given back (`give`); return its id."""
+        """Take the bottle in a slot off the line until `give` returns it. Return its id."""
         world = self.world
         bottle, theta = int(world.bottles.id[slot]), 0.0 if world.spin is None else float(world.spin.theta[slot])
         loads = tuple(float(column[slot]) for column in self._loads())
@@ -55,9 +55,9 @@ class State:
         return bottle
 
     def give(self, bottle: int, x: float, y: float, vx: float, vy: float) -> None:
-        """Put a bottle that was held back at (x, y) m, moving at m/s, with its id and what it has borne.
+        """Return a held bottle to the line at (x, y) m, moving at m/s, with its id and loads.
 
-        KeyError if it is not held.
+        Raise KeyError if it is not held.
         """
         kind, theta, loads = self.held.pop(bottle)
         slot = self._put(bottle, kind, x, y, theta, vx, vy, 0.0)
@@ -65,14 +65,14 @@ class State:
             column[slot] = load
 
     def _loads(self) -> Iterator[NDArray[np.float64]]:
-        """What is kept of a bottle while it is held, by slot."""
+        """Yield the arrays by slot that are stored for held bottles."""
         if self.world.peaks is not None:
             yield from self.world.peaks
         if self.world.damage is not None:
             yield from lasting_columns(self.world.damage)
 
     def _put(self, bottle: int, kind: int, x: float, y: float, theta: float, vx: float, vy: float, omega: float) -> int:
-        """Put a bottle of an id into the first free slot; return that."""
+        """Put a bottle with an id into the first free slot. Return the slot."""
         if not self._free:
             slots = self.world.bottles.id.size
             # Free slots cost as much as bottles in every loop.
@@ -93,7 +93,7 @@ class State:
         return slot
 
     def remove(self, slot: int) -> None:
-        """Take the bottle in a slot away for good; the slot is free and at rest."""
+        """Remove the bottle in a slot. The slot is free and at rest afterwards."""
         self._removed.append(int(self.world.bottles.id[slot]))
         self._free_slot(slot)
 
@@ -119,14 +119,14 @@ class State:
         world.neighbourhood.stale[0] = 1
 
     def take_removed(self) -> list[int]:
-        """Ids of the bottles that were taken away since the last call, in order."""
+        """Return the ids of bottles removed since the last call, in order."""
         removed, self._removed = self._removed, []
         return removed
 
     def restore_from(self, other: "State") -> None:
         """Take over the bottles of a State of the same line and bottle types, each in its slot.
 
-        What their bases are tied to comes along; tangential springs of contacts start anew.
+        Springs under the bottles are copied; tangential springs of contacts start anew.
         """
         slots = other.world.bottles.id.size
         self.world, self.next_id = empty_world(self.model, slots), other.next_id
@@ -144,25 +144,25 @@ class State:
         self.make_lists()
 
     def restore(self, arrays: Arrays, next_id: int, held: list[tuple[int, Held]]) -> None:
-        """Take the arrays of another State of the same Model for its own (`changing_arrays`), lists included.
+        """Take over the arrays of another State of the same Model (`changing_arrays`), lists included.
 
-        held: by id. Raises ValueError where they are not those of such a State.
+        held: by id. Raise ValueError if the arrays do not fit such a State.
         """
         world = with_arrays(self.world, arrays)
-        require_sound(world, self.model, next_id)
+        require_valid(world, self.model, next_id)
         self.world, self.next_id, self.held = world, next_id, dict(held)
         loads = sum(1 for _ in self._loads())
-        sound = all(
+        valid = all(
             0 <= bottle < next_id and 0 <= kind < len(self.model.bottle_types) and len(borne) == loads
             for bottle, (kind, _, borne) in held
         )
-        there = set(world.bottles.id.tolist())
-        if not sound or len(self.held) < len(held) or not there.isdisjoint(self.held):
+        present = set(world.bottles.id.tolist())
+        if not valid or len(self.held) < len(held) or not present.isdisjoint(self.held):
             raise ValueError("held has bottles that can't be, or that are on the line too")
         self._free = np.flatnonzero(self.world.bottles.id < 0).tolist()
 
     def _equip(self, slots: "slice | NDArray[np.int64]") -> None:
-        """Give the bottles in some slots what is constant for their types."""
+        """Set the constants of their types for the bottles in some slots."""
         world, model = self.world, self.model
         kind = world.bottles.type[slots]
         mass, radius, inertia = model.type_mass[kind], model.type_radius[kind], model.type_inertia[kind]
@@ -177,13 +177,13 @@ class State:
             world.implicit.mobility[slots] = 1.0 / mass + (radius**2 / inertia if world.spin is not None else 0.0)
 
     def _note_velocities(self, slots: slice) -> None:
-        """What has just been put in has not been looked at before."""
+        """Store the velocities of new bottles as those of the previous step."""
         damage, bottles = self.world.damage, self.world.bottles
         if damage is not None and damage.impacts is not None:
             damage.impacts.vx[slots], damage.impacts.vy[slots] = bottles.vx[slots], bottles.vy[slots]
 
     def springs(self) -> bytes:
-        """All tangential springs that are not slack, with the slots and rail pieces that they tie; no others' bits."""
+        """Return the bytes of all tangential springs that are not slack, with their slots and rail pieces."""
         world = self.world
         parts: list[NDArray[Any]] = []
         if world.pairs is not None and world.pairs.spring is not None:
@@ -204,18 +204,18 @@ class State:
         return b"".join(part.tobytes() for part in parts)
 
     def moving_rails(self) -> tuple[RailShape, ...]:
-        """The rails that move, where they are now."""
+        """Return the moving rails at their present positions."""
         if self.world.moving is None:
             return ()
         places = zip(self.model.plant.moving, self.world.moving.position.tolist(), strict=True)
         return tuple(shape.shape(position) for shape, position in places)
 
     def rails(self) -> tuple[RailShape, ...]:
-        """All rails by number, where they are now."""
+        """Return all rails by number, at their present positions."""
         return (*self.model.plant.rails_at_rest, *self.moving_rails())
 
     def make_lists(self) -> None:
-        """Rebuild the neighbour lists if they are stale, growing those that are too short."""
+        """Rebuild the neighbour lists if they are stale, and lengthen those that are too short."""
         while self.world.neighbourhood.stale[0]:
             needed = rebuild(lists_of(self.world))
             if self.world.neighbourhood.stale[0]:
@@ -224,7 +224,7 @@ class State:
                 self._fill_laws()
 
     def _fill_laws(self) -> None:
-        """The coefficients by pair; one column after the other, so that no combination of laws has to be compiled."""
+        """Fill the coefficients by pair, column by column, so that combinations of laws need no compilation."""
         pairs, tables = self.world.pairs, self.world.pair_law
         if pairs is not None and tables is not None:
             for column, table in zip(pairs.law, tables, strict=True):
@@ -232,12 +232,12 @@ class State:
                     fill_column(column, table, pairs.i, pairs.j, pairs.used, self.world.bottles.type)
 
     def _resize(self, slots: int) -> None:
-        """Room for more bottles; lists stay as they are, for tangential springs are remembered by them."""
+        """Make room for more bottles. Lists stay as they are, because tangential springs belong to their entries."""
         old, new = self.world, empty_world(self.model, slots)
         used, larger = old.bottles.id.size, changing_arrays(new)
         for name, array in state_arrays(old).items():
             larger[name][: len(array)] = array
-        # Higher than all there are, and none is free: still a heap.
+        # No slot is free and the new ones ascend, so the list is a heap.
         self._free += range(used, slots)
         self.world = new._replace(
             pairs=old.pairs,
@@ -246,7 +246,7 @@ class State:
         )
 
     def _lengthen_lists(self, pairs: int, more: int, segments: int, arcs: int, belts: int) -> None:
-        """Room for twice the entries that are needed in lists that are too short; the others hold springs by now."""
+        """Lengthen lists that are too short to twice the needed entries. Other lists may hold springs already."""
         world, slots = self.world, self.world.bottles.id.size
         if world.pairs is not None and pairs > world.pairs.i.size:
             longer = empty_pairs(self.model, 2 * pairs)
@@ -265,21 +265,21 @@ class State:
 
 
 def _carry(before: PairSprings | NearSprings | None, after: PairSprings | NearSprings | None) -> None:
-    """Copy what is kept of tangential springs while their list is lengthened."""
+    """Copy the stored tangential springs of a list that is lengthened."""
     for name in before._fields if before is not None else ():
         if name.startswith("kept"):
             getattr(after, name)[: getattr(before, name).size] = getattr(before, name)
 
 
 def _longer(model: Model, before: Near, slots: int, entries: int) -> Near:
-    """Room for more entries, with what is kept of springs."""
+    """Return a list with more entries, and the stored springs."""
     near = empty_near(model, slots, entries)
     _carry(before.springs, near.springs)
     return near
 
 
 def _for_slots(near: Near | None, slots: int) -> Near | None:
-    """The same list with room for more bottles, which have nothing near."""
+    """Return the list with room for more bottles, which have no rail near."""
     if near is None:
         return None
     start = np.full(slots + 1, near.start[-1], np.uint32)

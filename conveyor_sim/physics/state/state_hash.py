@@ -1,4 +1,4 @@
-"""One number for the visible part of a state at a tick."""
+"""Hash of the visible part of a state at a tick."""
 
 import hashlib
 from collections.abc import Iterable

@@ -123,9 +123,9 @@ def tick_arrays(world: World) -> Arrays:
 
 
 def with_arrays(world: World, arrays: Arrays) -> World:
-    """Return the World with other arrays in place of its own. Their lengths may differ.
+    """Return the World with other arrays. Their lengths may differ.
 
-    Raise ValueError where names, types or numbers of dimensions are not those of the World's own.
+    Raise ValueError where names, types or numbers of dimensions are not those of the World's arrays.
     """
     own = changing_arrays(world)
     for name in sorted(own.keys() | arrays.keys()):

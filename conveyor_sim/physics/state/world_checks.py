@@ -1,4 +1,4 @@
-"""Whether arrays that come from a file can be those of a World: the kernels trust every index and every length."""
+"""Checks of arrays from a file before they become a World: the kernels trust every index and length."""
 
 from typing import Any
 
@@ -13,11 +13,11 @@ from conveyor_sim.physics.state.empty_world import empty_near, empty_pairs, empt
 from conveyor_sim.physics.state.world_arrays import FIXED, UNCHECKED, Arrays, changing_arrays
 
 
-def require_sound(world: World, model: Model, next_id: int) -> None:
-    """ValueError, in words, unless a World with arrays of the right names and types is one of the Model.
+def require_valid(world: World, model: Model, next_id: int) -> None:
+    """Raise ValueError with the reason unless a World is a possible one of the Model.
 
-    Lengths fit together, indices lie in what they point into, what the Model gives is as it gives it, and the state is
-    finite. `with_arrays` has checked names and types.
+    Checked are lengths, ranges of indices, arrays that follow from the Model, and finite numbers. `with_arrays` has
+    checked names and types.
     """
     arrays, expected = changing_arrays(world), changing_arrays(_alike(world, model))
     for name, array in arrays.items():
@@ -41,7 +41,7 @@ def require_sound(world: World, model: Model, next_id: int) -> None:
 
 
 def _alike(world: World, model: Model) -> World:
-    """A World of the Model with room for as many bottles and list entries, and what it gives for good."""
+    """Return an empty World of the Model with equal numbers of slots and list entries."""
     slots = world.bottles.id.size
     alike = empty_world(model, slots)
     if world.pairs is not None:
@@ -59,9 +59,9 @@ def _alike(world: World, model: Model) -> World:
 
 
 def ranges(world: World, model: Model, next_id: int) -> dict[str, tuple[int, int]]:
-    """Least and greatest value of the arrays of whole numbers that index something, or count entries, by name."""
+    """Return the smallest and largest values of arrays of indices and counts, by name."""
     slots, belts = world.bottles.id.size, len(model.belts)
-    given: dict[str, tuple[int, int]] = {
+    limits: dict[str, tuple[int, int]] = {
         "bottles.type": (0, len(model.bottle_types) - 1),
         "bottles.id": (-1, next_id - 1),
         "neighbourhood.stale": (0, 0),
@@ -87,10 +87,10 @@ def ranges(world: World, model: Model, next_id: int) -> dict[str, tuple[int, int
         "riding.progress": (STEPPED, PLANNED),
     }
     if world.belts is not None:
-        given["belts.start"] = (0, world.belts.candidate.size)
+        limits["belts.start"] = (0, world.belts.candidate.size)
     if world.pairs is not None:
         pairs = world.pairs.i.size
-        given |= {
+        limits |= {
             "pairs.i": (0, slots - 1),
             "pairs.j": (0, slots - 1),
             "pairs.used": (0, pairs),
@@ -104,24 +104,24 @@ def ranges(world: World, model: Model, next_id: int) -> dict[str, tuple[int, int
         }
     if world.slots is not None:
         more = world.slots.more_entry.size
-        given |= {"slots.more_start": (0, more), "slots.filled": (0, WIDTH + more)}
+        limits |= {"slots.more_start": (0, more), "slots.filled": (0, WIDTH + more)}
     for name, near, pieces in (
         ("near_segments", world.near_segments, 0 if model.segments is None else model.segments.x.size),
         ("near_arcs", world.near_arcs, 0 if model.arcs is None else model.arcs.x.size),
     ):
         if near is not None:
-            given |= {
+            limits |= {
                 f"{name}.start": (0, near.piece.size),
                 f"{name}.piece": (0, max(0, pieces - 1)),
                 f"{name}.springs.kept_bottle": (0, slots - 1),
                 f"{name}.springs.kept_piece": (0, max(0, pieces - 1)),
                 f"{name}.springs.kept_count": (-1, near.piece.size),
             }
-    return given
+    return limits
 
 
 def indices(arrays: Arrays) -> set[str]:
-    """Names of the arrays of whole numbers that must lie in a range; all but these compare only."""
+    """Return the names of the integer arrays that must lie in a range. Others are only compared."""
     free = ("neighbourhood.cell", "damage.impacts.")
     return {name for name, array in arrays.items() if array.dtype.kind in "iu" and not name.startswith((*FIXED, *free))}
 
@@ -131,17 +131,17 @@ def _curves(model: Model) -> int:
 
 
 def _require_starts(name: str, arrays: Arrays) -> None:
-    """Starts of lists, one behind the other."""
+    """Raise ValueError unless the starts of lists ascend."""
     if name in arrays and (np.diff(arrays[name].astype(np.int64)) < 0).any():
         raise ValueError(f"array {name} goes back")
 
 
 def _require_bottles(world: World, model: Model) -> None:
     bottles = world.bottles
-    there = bottles.id >= 0
-    if np.unique(bottles.id[there]).size != int(there.sum()):
+    present = bottles.id >= 0
+    if np.unique(bottles.id[present]).size != int(present.sum()):
         raise ValueError("array bottles.id holds an id twice")
-    kind = bottles.type[there]
+    kind = bottles.type[present]
     mass = model.type_mass[kind]
     expected: list[tuple[str, Any, Any]] = [
         ("bottles.radius", bottles.radius, model.type_radius[kind]),
@@ -153,5 +153,5 @@ def _require_bottles(world: World, model: Model) -> None:
     if world.ring is not None and model.type_base_radius is not None:
         expected.append(("ring.radius", world.ring.radius, model.type_base_radius[kind]))
     for name, column, values in expected:
-        if not np.array_equal(column[there], values) or column[~there].any():
+        if not np.array_equal(column[present], values) or column[~present].any():
             raise ValueError(f"array {name} does not fit the types of the bottles")

@@ -1,4 +1,4 @@
-"""One tick of the engine: whole steps on a pool of threads, with the guard looking on."""
+"""One tick of the engine: steps on a pool of threads, checked by the guard."""
 
 import os
 import time
@@ -19,14 +19,14 @@ from conveyor_sim.physics.stepping.guard.violation import Violation
 from conveyor_sim.physics.stepping.guard.world_snapshot import WorldSnapshot
 
 SHORTER = (4, 16, 64)
-"""By what factors steps are shortened, one after another, for a tick that the guard objects to."""
+"""Factors by which the steps of a failed tick are shortened, one after the other."""
 
 
 class Integration:
-    """Takes a State through time, tick by tick."""
+    """Time integration of a State, tick by tick."""
 
     def __init__(self, state: State, threads: int | None, shorten: bool) -> None:
-        """threads: to step with, None has them chosen. shorten: do a tick again before the run is stopped."""
+        """Prepare the first tick. threads: None chooses them. shorten: repeat failed ticks before stopping the run."""
         cores = len(os.sched_getaffinity(0))
         self._state = state
         self._model = state.model
@@ -36,17 +36,17 @@ class Integration:
         self._shorter = SHORTER if shorten else ()
         self._guard = Guard(state, self.found)
         self._memory = self._guard.memory
-        self._listening = self._ticks_between_listening()
+        self._chatter_ticks = self._ticks_between_checks()
         self._kernel_seconds = 0.0
 
     @property
     def kernel_seconds(self) -> float:
-        """Wall time that steps have taken, s."""
+        """Wall time of all steps, s."""
         return self._kernel_seconds
 
     @property
     def threads(self) -> int:
-        """Threads that the next tick is to be stepped with."""
+        """Threads of the next tick."""
         return self._pool.most if self._choice is None else self._choice.size
 
     @property
@@ -70,7 +70,7 @@ class Integration:
         return [GuardEvent(*event) for event in events]
 
     def snapshot(self) -> dict[str, Any]:
-        """Return the state between ticks beside the State, as plain data for `restore`."""
+        """Return the memory of the guard as plain data for `restore`."""
         memory: dict[str, Any] = snapshot(self._memory)
         return memory
 
@@ -83,7 +83,10 @@ class Integration:
         self._memory.put_in = True
 
     def take_tick(self, tick: int, surface_speed: float) -> None:
-        """From a tick to the next. surface_speed: m/s, of the fastest belt. SimulationError: back at the beginning."""
+        """Advance by one tick. surface_speed: m/s, of the fastest belt.
+
+        Raise SimulationError if the guard stops the run; the state is that at the beginning of the tick then.
+        """
         seconds = tick * self._model.tick_ns * 1e-9
         wrong = self._guard.begin(tick, surface_speed, fastest_rail(self._state.world.moving))
         if wrong is not None:
@@ -96,11 +99,11 @@ class Integration:
             self._choice.took(took, self._model.steps_per_tick * self._state.world.bottles.id.size)
         wrong = self._guard.end(self._model.dt)
         if wrong is not None:
-            self._do_again(tick, seconds, wrong)
-        self._tell(tick + 1)
+            self._repeat(tick, seconds, wrong)
+        self._report_once(tick + 1)
 
-    def _do_again(self, tick: int, seconds: float, wrong: Violation) -> None:
-        """In shorter steps, from the beginning of the tick, where the guard has put the state back."""
+    def _repeat(self, tick: int, seconds: float, wrong: Violation) -> None:
+        """Repeat the tick in shorter steps. The guard has put back the state at its beginning."""
         tried, first = 1, wrong
         for factor in self._shorter if wrong.curable else ():
             self._take_steps(factor)
@@ -118,7 +121,7 @@ class Integration:
         return SimulationError(text, wrong.kind)
 
     def _take_steps(self, factor: int) -> None:
-        """One tick in steps shortened by a factor; lists that turn out too short are grown in it, without a trace."""
+        """Take the steps of one tick, shortened by a factor. Lengthen lists that are too short; bits stay the same."""
         done, phase, steps, dt = 0, START, factor * self._model.steps_per_tick, self._model.dt / factor
         self._set_clock(0)
         while True:
@@ -129,19 +132,19 @@ class Integration:
             phase = RESUME
 
     def _set_clock(self, steps: int) -> None:
-        """Rails that move are where they are after so many steps of the tick."""
+        """Put moving rails where they are after `steps` steps of the tick."""
         if self._state.world.moving is not None:
             self._state.world.moving.clock[0] = steps
 
-    def _tell(self, tick: int) -> None:
-        """What does not stop a run, reported the first time."""
+    def _report_once(self, tick: int) -> None:
+        """Report soft contacts and chatter the first time they occur. They do not stop a run."""
         if (event := self._guard.soft(tick)) is not None:
             self._memory.report(event)
-        if self._listening and not self._memory.chatters and tick % self._listening == 0:
-            self._listen(tick)
+        if self._chatter_ticks and not self._memory.chatters and tick % self._chatter_ticks == 0:
+            self._check_chatter(tick)
 
-    def _ticks_between_listening(self) -> int:
-        """How often chatter is listened to; 0: there is none to be heard."""
+    def _ticks_between_checks(self) -> int:
+        """Return the ticks between two checks for chatter; 0 without explicit friction."""
         model = self._model
         rubs = model.base_friction is not None or any(
             law is not None and law.friction is not None for law in (model.pair_law, model.rail_law)
@@ -150,11 +153,11 @@ class Integration:
             return 0
         return -(-chatter.EVERY // model.steps_per_tick)
 
-    def _listen(self, tick: int) -> None:
-        """Take some steps on, one by one, and go back."""
+    def _check_chatter(self, tick: int) -> None:
+        """Take single trial steps, measure chatter, and go back."""
         state, model = self._state, self._model
-        memory = WorldSnapshot()
-        memory.take(state.world)
+        copy = WorldSnapshot()
+        copy.take(state.world)
         self._set_clock(model.steps_per_tick)
         meter = chatter.ChatterMeter()
         chatter.note_world(meter, state.world)
@@ -162,7 +165,7 @@ class Integration:
             self._pool.advance(self.threads, self._advance, state.world, 1, model.dt, START)
             state.make_lists()
             chatter.note_world(meter, state.world)
-        memory.restore(state)
+        copy.restore(state)
         self._guard.forget()
         worst, amplitude = meter.worst()
         share = amplitude / model.settings.slip_limit

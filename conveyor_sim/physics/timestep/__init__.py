@@ -1,1 +1,1 @@
-"""How long a time step may be: bounds, what each integrator misses, predicted errors, presets."""
+"""Choice of the time step: bounds, errors of the integrators, predicted errors, presets."""

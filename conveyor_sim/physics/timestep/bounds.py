@@ -1,4 +1,4 @@
-"""What bounds the time step, and the choice of steps a tick. All bounds in s; references are to docs/paper.md."""
+"""Bounds on the time step, and the choice of steps per tick. Bounds in s; references are to docs/paper.md."""
 
 import math
 from collections.abc import Sequence
@@ -7,68 +7,69 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Bound:
-    """One upper bound on the time step."""
+    """An upper bound on the time step."""
 
     name: str
     dt: float
     """s"""
     reason: str
     stability: bool = False
-    """Whether steps beyond it blow up or chatter; else they are only less exact."""
+    """True if longer steps diverge or chatter; False if they are only less accurate."""
 
 
 def least_steps(tolerance: float) -> float:
-    """Steps that a contact, and v_lim / (mu g), last at least: 20 at 1 %, as errors of second order fall.
+    """Return the smallest number of steps in a contact, and in v_lim / (mu g): 20 at 1 %, as second-order errors fall.
 
-    tolerance: relative error in contact force. A peak between two of so many steps is missed by a third of it.
+    tolerance: relative error in contact force. A peak between two such steps is missed by a third of it.
     """
     return 2.0 / math.sqrt(tolerance)
 
 
 def lattice_bound(stiffness: float, mass: float) -> float:
-    """Half of the stability limit of a hexagonal packing, 2 / sqrt(6 k / m), in s."""
+    """Return half of the stability limit of a hexagonal packing, 2 / sqrt(6 k / m), in s."""
     return math.sqrt(mass / stiffness / 6.0)
 
 
 def wedge_bound(stiffness: float, mass: float) -> float:
-    """Half of the stability limit of a bottle between two rails, 2 / sqrt(2 k / m), in s."""
+    """Return half of the stability limit of a bottle between two rails, 2 / sqrt(2 k / m), in s."""
     return math.sqrt(mass / stiffness / 2.0)
 
 
 def mover_bound(stiffness: float, mass: float, mover: float, bottles: int) -> float:
-    """At most half of the stability limit of bottles (kg) between a rail at rest and one that is a body (kg), in s.
+    """Return a bound (s) for bottles (kg) between a rail at rest and a rail that is a body (kg).
 
-    Two rows of the scaled stiffness, 2 k / m and n k / M, and the largest eigenvalue is not above their sum.
+    It is at most half of the stability limit: the largest eigenvalue of the scaled stiffness does not exceed the sum
+    of its two rows, 2 k / m and n k / M.
     """
     return 1.0 / math.sqrt(stiffness * (2.0 / mass + bottles / mover))
 
 
 def damping_bound(coefficient: float, reduced_mass: float) -> float:
-    """Half of m_r / c, the time in which a dashpot alone stops two bottles, s; explicit steps of 2 m_r / c diverge."""
+    """Return half of m_r / c, the time in which a dashpot stops two bottles, s. Explicit steps of 2 m_r / c diverge."""
     return 0.5 * reduced_mass / coefficient
 
 
 def slip_time(friction: float, gravity: float, slip_limit: float) -> float:
-    """v_lim / (mu g), s: explicit friction under a bottle chatters in steps longer than that."""
+    """Return v_lim / (mu g), s. Explicit friction under a bottle chatters in longer steps."""
     return slip_limit / (friction * gravity)
 
 
 def base_friction_bound(friction: float, gravity: float, slip_limit: float) -> float:
-    """Half of v_lim / (mu g), s."""
+    """Return half of v_lim / (mu g), s."""
     return 0.5 * slip_time(friction, gravity, slip_limit)
 
 
 def contact_friction_bound(
     friction: float, normal_force: float, mass: float, inertia: float, radius: float, slip_limit: float
 ) -> float:
-    """Explicit regularised friction in a contact chatters beyond v_lim / [2 mu (1/m + R^2/J) N], in s."""
+    """Return v_lim / [2 mu (1/m + R^2/J) N], s. Explicit regularised friction in a contact chatters beyond it."""
     return slip_limit / (2.0 * friction * (1.0 / mass + radius**2 / inertia) * normal_force)
 
 
 def steps_per_tick(tick: float, bounds: Sequence[Bound], given: int | None, choice: str) -> tuple[int, str]:
-    """Steps in a tick of `tick` s, and why: as given, or the fewest that keep every bound.
+    """Return the steps in a tick of `tick` s and the reason: as given, or the fewest that satisfy every bound.
 
-    choice: what the bounds are for, in words.
+    choice: target of the bounds, in words.
     """
     if not bounds:
         if given is not None:
@@ -82,7 +83,7 @@ def steps_per_tick(tick: float, bounds: Sequence[Bound], given: int | None, choi
 
 
 def fewest_steps(tick: float, dt: float) -> int:
-    """Steps that divide a tick (s) so that none is longer than dt (s)."""
+    """Return the fewest equal steps in a tick (s) that are no longer than dt (s)."""
     return max(1, math.ceil(tick / dt * (1.0 - 1e-12)))
 
 

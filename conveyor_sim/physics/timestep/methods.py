@@ -1,7 +1,7 @@
-"""What each integrator misses of an impact: laws of error in the peak force, with measured coefficients.
+"""Error of each integrator in the peak force of an impact: power laws with measured coefficients.
 
 Measured in head-on impacts, RMS over 64 phases of entry into a step, at 10 to 200 steps a contact (fractions, too) and
-damping ratios from 0 to 1; test/physics/timestep/test_prediction.py holds them to it in the engine.
+damping ratios from 0 to 1. test/physics/timestep/test_prediction.py compares the engine with them.
 """
 
 import math
@@ -9,15 +9,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 HUGE = 1e100
-"""Times the time of a share that a step may be before its power may be more than a double holds."""
+"""Largest step over the time of a share; beyond it the power could exceed the range of a double."""
 
 STEP_ERROR = 1e-6
-"""m/s, default of the largest error of a step, of a method that divides its steps itself."""
+"""Default of the largest error per step of a method that divides its steps itself, m/s."""
 
 
 @dataclass(frozen=True)
 class Share:
-    """One part of the error in the peak force of an impact: coefficient (dt / time)^power."""
+    """A part of the error in the peak force of an impact: coefficient (dt / time)^power."""
 
     name: str
     coefficient: float
@@ -26,53 +26,53 @@ class Share:
     power: float
 
     def at(self, dt: float) -> float:
-        """Relative error at a time step in s."""
+        """Return the relative error at a time step in s."""
         many = dt / self.time
         return self.coefficient * math.pow(many, self.power) if many < HUGE else math.inf
 
 
 @dataclass(frozen=True)
 class Method:
-    """One integrator. w is the frequency of a contact, pi over its duration if it is linear, in rad/s."""
+    """Error coefficients of one integrator. w: frequency of a contact in rad/s, pi / duration if it is linear."""
 
     peak: float
-    """Of (w dt)^2 / 8, by which a peak between two steps is missed."""
+    """Coefficient of (w dt)^2 / 8: a force peak falls between two steps."""
     jump: float
-    """Of c dt / m_r, what a dashpot that jumps at first touch does in a step that began apart."""
+    """Coefficient of c dt / m_r: a dashpot jumps at first touch, inside a step."""
     touch: float
-    """Of the fall of the force in a step, where it is largest at first touch (c^2 > k m_r)."""
+    """Coefficient of the decay in one step, where the force is largest at first touch (c^2 > k m_r)."""
     tsuji: float
-    """Of c dt / m_r for a dashpot that grows as delta^0.25; times (w dt)^0.25 if `second_order`."""
+    """Coefficient of c dt / m_r for a dashpot that grows as delta^0.25; times (w dt)^0.25 if `second_order`."""
     viscoelastic: float
-    """The same as delta^0.5; times (w dt)^0.5 if `second_order`."""
+    """Coefficient for a dashpot that grows as delta^0.5; times (w dt)^0.5 if `second_order`."""
     onset: float
-    """Of c dt / m_r for a dashpot that grows as the force; times w dt if `second_order`."""
+    """Coefficient of c dt / m_r for a dashpot that grows as the force; times w dt if `second_order`."""
     slip: float
-    """Of mu (w dt)^2 / 2, the kick of friction in the last step of an impact, over the speed of impact."""
+    """Coefficient of mu (w dt)^2 / 2: friction in the last step of an impact, over the impact speed."""
     second_order: bool
-    """Whether smooth damping is met at order 2 or more."""
+    """True if smooth damping converges at order 2 or higher."""
     creep: float = 0.0
-    """Of n^-creep_order, the part by which creep on curved belts is off at n steps in v_lim / (mu g)."""
+    """Coefficient of n^-creep_order: relative error of creep on curved belts at n steps in v_lim / (mu g)."""
     creep_order: float = 1.0
     creep_steps: float = 0.0
-    """The fewest such steps for which that holds; in fewer, creep is off by about one part in them."""
+    """Fewest such steps for which the power law holds; below, the error is about 1 / n."""
     turned: float = 0.0
-    """Of Omega dt, by which forces on a belt that turns are behind it, and so is resting load off."""
+    """Coefficient of Omega dt: lag of forces on a turning belt, which is an error in resting load."""
     implicit_creep: float = 0.0
-    """The same under implicit friction, where that is what makes it; of 1 / n."""
+    """Coefficient of 1 / n: error of creep that implicit friction causes."""
     explicit: bool = True
-    """Whether it is unstable or chatters in long steps."""
+    """True if the method is unstable or chatters in long steps."""
     drag_limit: float = 1.0
-    """gamma dt from which it is unstable for a drag v' = -gamma v, over the 2 of semi-implicit Euler: scales bounds."""
+    """Stability limit of gamma dt for a drag v' = -gamma v, over that of semi-implicit Euler (2). Scales bounds."""
     own_error: float = 0.0
-    """Of the error that a step may have, over the speed of impact: what it leaves that divides its steps itself."""
+    """Coefficient of the error per step over the impact speed, of a method that divides its steps itself."""
 
     def between_steps(self, frequency: float) -> Share:
-        """A peak of force between two steps; rad/s."""
+        """Return the share of a force peak between two steps. frequency: rad/s."""
         return Share("peak between steps", self.peak / 8.0, 1.0 / frequency, 2.0)
 
     def first_touch(self, rate: float, stiff_rate: float) -> list[Share]:
-        """A dashpot that jumps at first touch: rate c / m_r and stiff_rate k / c in 1/s, which is 0 if not known.
+        """Return the shares of a dashpot that jumps at first touch. rate: c / m_r; stiff_rate: k / c or 0; 1/s.
 
         Its impulse in a step is missed. Where c^2 > k m_r the peak is the jump itself, which loses k dt / c by that.
         """
@@ -82,23 +82,23 @@ class Method:
         return [Share("dashpot at first touch", lost / rate, 1.0 / rate, 1.0)] if lost > 0.0 else []
 
     def creep_off(self, steps: float) -> float:
-        """Relative error of creep on curved belts at so many steps in v_lim / (mu g)."""
+        """Return the relative error of creep on curved belts at `steps` in v_lim / (mu g)."""
         if self.creep == 0.0 or steps >= self.creep_steps:
             return self.creep * math.pow(steps, -self.creep_order)
         return 1.0 / steps
 
     def implicit_creep_off(self, steps: float) -> float:
-        """The same under implicit friction."""
+        """Return the relative error of creep with implicit friction at `steps` in v_lim / (mu g)."""
         return max(self.creep_off(steps), self.implicit_creep / steps)
 
     def slip_steps(self, creep: float) -> float:
-        """Steps in v_lim / (mu g) by which creep is off by at most so much; 0: it never is."""
+        """Return the steps in v_lim / (mu g) for a relative error of at most `creep`; 0 without error."""
         return max(self.creep_steps, math.pow(self.creep / creep, 1.0 / self.creep_order))
 
     def growing(self, exponent: float, rate: float, frequency: float) -> Share:
-        """A dashpot that grows with the overlap as (w t)^exponent, c / m_r in 1/s at its largest; rad/s.
+        """Return the share of a dashpot that grows as (w t)^exponent. rate: largest c / m_r, 1/s; frequency: w, rad/s.
 
-        Coefficients were measured at exponents of 1/4, 1/2 and 1; between them they are interpolated.
+        Coefficients were measured at exponents of 1/4, 1/2 and 1, and are interpolated between.
         """
         steep = min(max(2.0 * (exponent - 0.5), 0.0), 1.0)
         flat = min(max(4.0 * (0.5 - exponent), 0.0), 1.0)
@@ -110,8 +110,8 @@ class Method:
 
 
 METHODS: Mapping[str, Method] = {
-    # 1/sqrt(3), RMS over phases of the greatest, is 0.58. Forces are those of half a step ago, implicit
-    # friction that of the slip half a step later.
+    # 1/sqrt(3) = 0.58 is the RMS over phases of the largest error. Forces are half a step old; implicit
+    # friction uses the slip half a step later.
     "leapfrog": Method(
         peak=0.6,
         jump=0.6,
@@ -140,7 +140,7 @@ METHODS: Mapping[str, Method] = {
         drag_limit=0.5,
     ),
     # 1 - z + z^2 / 2 - z^3 / 6 + z^4 / 24 = 1 at z = 2.785. A jump within a step is missed by 1/6, RMS over phases, and
-    # by 1/3 at most; a scene of few impacts comes near the most, and so does what is expected.
+    # by 1/3 at most. A scene of few impacts comes near the maximum, and so does the prediction.
     "rk4": Method(
         peak=0.55,
         jump=0.3,

@@ -1,4 +1,4 @@
-"""The presets of `accuracy`: tolerances, and the numbers that follow from them."""
+"""Presets of `accuracy`: tolerances, and the numbers that follow from them."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -11,18 +11,18 @@ from conveyor_sim.physics.timestep.prediction import Impact, percent
 from conveyor_sim.scene.accuracy import Accuracy, Preset
 
 PRESETS: Mapping[Preset, float] = {"draft": 0.05, "standard": 0.01, "fine": 0.001}
-"""Relative error in contact force to stay below; all else follows from it."""
+"""Largest relative error in contact force by preset. All other numbers follow from it."""
 
 DEFAULT: Preset = "standard"
-"""What a scene gets that says nothing, and what the bounds assume where it gives the time step itself."""
+"""Preset of a scene without `accuracy`, and of the bounds where a scene gives the time step."""
 
 RESTITUTIONS = (1.0, 0.9, 0.5)
-"""Of the impacts in the table of steps."""
+"""Restitutions of the impacts in the table of steps."""
 
 
 @dataclass(frozen=True)
 class Target:
-    """What the bounds on the time step are for."""
+    """Target of the bounds on the time step."""
 
     tolerance: float
     """Relative error in contact force."""
@@ -30,7 +30,7 @@ class Target:
 
 
 def target(accuracy: Accuracy) -> Target:
-    """What a scene chooses; the default where it chooses nothing, or gives the time step itself."""
+    """Return the target of a scene; the default where it chooses none, or gives the time step."""
     if accuracy.tolerance is not None:
         return Target(accuracy.tolerance, f"tolerance {percent(accuracy.tolerance)} in contact force")
     preset = accuracy.preset or DEFAULT
@@ -38,12 +38,12 @@ def target(accuracy: Accuracy) -> Target:
 
 
 def table() -> str:
-    """The presets and their numbers, as Markdown: two tables."""
+    """Return two Markdown tables: presets and their numbers."""
     numbers: list[tuple[str, Callable[[float], str]]] = [
         ("relative error in contact force, at most", percent),
         ("steps a contact, at least", lambda tolerance: f"{least_steps(tolerance):.3g}"),
         (
-            "by which a peak between two of so many steps is missed, (π/n)²/8",
+            "by which a peak between two such steps is missed, (π/n)²/8",
             lambda tolerance: percent((math.pi / least_steps(tolerance)) ** 2 / 8.0),
         ),
         ("steps in v_lim/(μ g), leapfrog and semi-implicit Euler", lambda tolerance: f"{least_steps(tolerance):.3g}"),
@@ -67,7 +67,7 @@ def table() -> str:
 
 
 def _impact(method: Method, restitution: float) -> Impact:
-    """A linear contact of unit mass, stiffness and speed with a dashpot that jumps at first touch."""
+    """Return the impact of a linear contact of unit mass, stiffness and speed, with a dashpot that jumps."""
     shares = [method.between_steps(1.0)]
     if restitution < 1.0:
         c = DAMPING_BY_NAME["paper"].coefficient(restitution, 1.0, 1.0, 1.0)

@@ -52,7 +52,7 @@ class FreeRunningPlc:
         self._link: PlcLink | None = None
         self._task: asyncio.Task[None] | None = None
         self._alarms = AlarmChanges()
-        self._commands = {tag.name: tag for tag in source.about.tags if tag.role in COMMANDS}
+        self._commands = {tag.name: tag for tag in source.info.tags if tag.role in COMMANDS}
         self._bad: set[str] = set()  # names of commands out of range
         self._written: LineSnapshot | None = None
         self._passed_on = self._refused = 0
@@ -103,7 +103,7 @@ class FreeRunningPlc:
             await asyncio.sleep(max(0.0, self._period - (time.monotonic() - began)))
 
     async def _scan(self, link: PlcLink) -> None:
-        began, shown, before = time.monotonic(), self._source.shown, self._written
+        began, shown, before = time.monotonic(), self._source.snapshot, self._written
         if shown.lost or (before is not None and shown.tick == before.tick and shown.run_id == before.run_id):
             return
         last = {} if before is None else before.values
@@ -175,7 +175,7 @@ def plc_kind(
     """
 
     def make(source: TagProvider, *_: object) -> ProtocolServer:
-        mapped = read_tag_map(tags, source.about.tags)
+        mapped = read_tag_map(tags, source.info.tags)
         return FreeRunningPlc(
             source, url, mapped, lambda: plc_link(url, mapped.all, user, password), period, say, observe
         )

@@ -80,7 +80,7 @@ class FoxgloveServer:
 
         try:
             self._server = foxglove.start_server(
-                name=self._source.about.name,
+                name=self._source.info.name,
                 host=self._at[0],
                 port=self._at[1],
                 context=self._context,
@@ -163,19 +163,19 @@ class FoxgloveServer:
 
     def _draw(self) -> None:
         """Publish moving objects at their present positions."""
-        picture = self._source.picture
-        decode = picture.drawn.get("bottles")
+        drawable = self._source.frame
+        decode = drawable.drawn.get("bottles")
         if decode is None or decode is self._drawn:
             return
         self._drawn = decode
-        message, line = decode(), picture.line
-        signals = dict(zip(line.signal_names, picture.signals.tolist(), strict=False))
+        message, line = decode(), drawable.line
+        signals = dict(zip(line.signal_names, drawable.signals.tolist(), strict=False))
         shapes = moving_shapes(self._scene())
         moving = [shape.shape(signals[f"{shape.name}/position"] * shape.stroke) for shape in shapes]
         header = Header(int(message.tick), int(message.tick) * int(line.tick_ns), FRAME)
         columns = TOPICS["bottles"].unpack(message)
         self._channels[MARKERS].log(bottles_markers(columns, np.asarray(line.type_radius), moving, header))
-        self._latency = max(self._latency, time.time() - picture.at)
+        self._latency = max(self._latency, time.time() - drawable.at)
 
     def _draw_plant(self) -> None:
         """Publish static objects if a client subscribes to them."""
@@ -185,7 +185,7 @@ class FoxgloveServer:
             self._channels[PLANT].log(plant_markers(*shapes, Header(0, 0, FRAME)))
 
     def _scene(self) -> Any:
-        line = self._source.picture.line
+        line = self._source.frame.line
         if self._parsed[0] is not line:
             scene = parse_scene(line.scene_text, "the scene of the line", parse_overrides(line.overrides))
             self._parsed = line, scene

@@ -99,11 +99,11 @@ class Frames:
             if last is not None and (len(self._waiting) >= MOST_FRAMES or self._bytes > MOST_BYTES):
                 self._bytes -= _size(last)
                 frame = self._waiting[-1] = _merged(last, frame)
-                self.left_out += self.counts and self._tick != self._view.shown.tick
+                self.left_out += self.counts and self._tick != self._view.snapshot.tick
             else:
                 self._waiting.append(frame)
             self._bytes += _size(frame)
-            self._tick = self._view.shown.tick
+            self._tick = self._view.snapshot.tick
             self._wake.notify()
 
     def _renew(self) -> None:
@@ -116,24 +116,24 @@ class Frames:
     def _wants(self, topic: str) -> bool:
         return self._watched or topic not in DRAWING_TOPICS
 
-    def _cut(self, states: dict[str, bytes], shown: int) -> LineFrame:
+    def _cut(self, states: dict[str, bytes], is_new: int) -> LineFrame:
         view, passed, anew = self._view, tuple(self._passed), self._anew
         self._passed.clear()
         self._anew = False
         total, events = view.events(self._total)
-        self._total, now = total, view.shown
+        self._total, now = total, view.snapshot
         return LineFrame(
             anew,
             states,
             passed,
             total,
             events,
-            shown,
+            is_new,
             now.run,
             now.lost,
             now.owner,
             now.released,
-            view.picture.at,
+            view.frame.at,
             (),
         )
 

@@ -13,7 +13,6 @@ import select
 import threading
 import time
 from collections.abc import Callable
-from functools import partial
 from multiprocessing.connection import Connection
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any
@@ -28,7 +27,7 @@ from conveyor_sim.protocols.hosting.server_messages import (
     ServerTask,
 )
 from conveyor_sim.protocols.server.users import User
-from conveyor_sim.protocols.tags.line_mirror import DRAWING_TOPICS, STATE_TOPICS, LineMirror
+from conveyor_sim.protocols.tags.line_mirror import LineMirror
 from conveyor_sim.protocols.tags.tag_provider import Control
 from conveyor_sim.support.printable import SENTENCE, printable
 
@@ -93,12 +92,12 @@ class ParentCalls:
 class RemoteTagProvider(LineMirror):
     """The line by the frames that the parent sends; one thread applies them."""
 
-    def __init__(self, task: ServerTask, calls: ParentCalls, decode: Decode, past: TagHistory | None) -> None:
-        """Start without data. decode: decodes the message of a topic. past: history of the recording that is played
+    def __init__(self, task: ServerTask, calls: ParentCalls, decode: Decode, history: TagHistory | None) -> None:
+        """Start without data. decode: decodes the message of a topic. history: of the recording that is played
         back, if it is one.
         """
         super().__init__()
-        self._task, self._calls, self._decode, self._past = task, calls, decode, past
+        self._task, self._calls, self._decode, self._history = task, calls, decode, history
         self.takes_inputs = task.takes_inputs
 
     @property
@@ -107,9 +106,9 @@ class RemoteTagProvider(LineMirror):
         return self._task.controls
 
     @property
-    def past(self) -> TagHistory | None:
+    def history(self) -> TagHistory | None:
         """History of a recording; None otherwise."""
-        return self._past
+        return self._history
 
     def give(self, request: Input) -> str:
         """Give an input to the line, through the parent. Return the reason for a refusal, "" if it was accepted."""
@@ -139,14 +138,7 @@ class RemoteTagProvider(LineMirror):
     def _apply(self, frame: LineFrame) -> None:
         if frame.anew:
             self.forget()
-        for topic in STATE_TOPICS:
-            if (data := frame.states.get(topic)) is not None:
-                self.take(topic, self._decode(topic, data))
-                self.pass_on(topic, data)
-        for topic in DRAWING_TOPICS:
-            if (data := frame.states.get(topic)) is not None:
-                self.keep(topic, partial(self._decode, topic, data))
-                self.pass_on(topic, data)
+        self.receive(frame.states, self._decode)
         for data in frame.passed:
             self.pass_on("events", data)
         self._events.bring(frame.total, frame.events)
@@ -154,7 +146,7 @@ class RemoteTagProvider(LineMirror):
         self.state_run(frame.run)
         if frame.lost and self._known.is_set():
             self.lose(frame.lost)
-        elif frame.shown or self.shown.lost:
+        elif frame.is_new or self.snapshot.lost:
             self.show(frame.at)
             if frame.lost:
                 self.lose(frame.lost)

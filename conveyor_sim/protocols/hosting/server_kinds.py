@@ -77,7 +77,7 @@ def _modbus(source: TagProvider, port: int, settings: ServerSettings, shared: Sh
     from conveyor_sim.protocols.modbus.address_map import keep_map, modbus_map
     from conveyor_sim.protocols.modbus.server import ModbusServer
 
-    tags = source.about.tags
+    tags = source.info.tags
     rows = modbus_map(tags) if settings.modbus_map is None else keep_map(settings.modbus_map, tags)
     quota, holding = settings.modbus_quota, shared.holding
     return ModbusServer(source, rows, settings.modbus_role, settings.host, port, quota, holding=holding)

@@ -55,7 +55,7 @@ class LineFrame(NamedTuple):
     """Events so far."""
     events: Sequence[Event]
     """The newest of them; the oldest may be missing."""
-    shown: int
+    is_new: int
     """1 if the line has a new state to show; 0: a sign of life."""
     run: RunState
     lost: str

@@ -100,9 +100,9 @@ def _source(task: ServerTask, calls: ParentCalls, stack: ExitStack) -> RemoteTag
     from conveyor_sim.bag.reader import open_bag
     from conveyor_sim.protocols.tags.tag_history import TagHistory
 
-    past = TagHistory(task.bag)
-    stack.callback(past.close)
-    return RemoteTagProvider(task, calls, stack.enter_context(open_bag(task.bag)).decode, past)
+    history = TagHistory(task.bag)
+    stack.callback(history.close)
+    return RemoteTagProvider(task, calls, stack.enter_context(open_bag(task.bag)).decode, history)
 
 
 def _or_end(follow: Callable[[], None]) -> None:

@@ -73,8 +73,8 @@ class Serving(AbstractContextManager["Serving"]):
 
     def progress(self) -> str:
         """Return the state of the line and of its servers as one line."""
-        shown = self._source.shown
-        state = f"lost: {shown.lost}" if shown.lost else shown.run.text
+        snapshot = self._source.snapshot
+        state = f"lost: {snapshot.lost}" if snapshot.lost else snapshot.run.text
         parts = [_status(host.kind.name, host.status(), host.health(since_asked=True)) for host in self._hosts]
         return " | ".join([f"{self._time:.1f} s {state}", *parts])
 
@@ -107,7 +107,7 @@ class Serving(AbstractContextManager["Serving"]):
 
     @property
     def _time(self) -> float:
-        return self._source.shown.tick * self._source.about.tick
+        return self._source.snapshot.tick * self._source.info.tick
 
 
 def _status(name: str, status: Status, health: Health) -> str:

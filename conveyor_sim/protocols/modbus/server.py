@@ -290,15 +290,15 @@ class _Image:
         self, source: TagProvider, rows: Sequence[Row], role: WriterKind | None, holding: HoldingService
     ) -> None:
         self._source, self._role, self.holding = source, role, holding
-        self._receipt = Receipt(source.about.tags, source.about.where)
-        self._commands = {tag.name: tag for tag in source.about.tags if tag.role in COMMANDS}
+        self._receipt = Receipt(source.info.tags, source.info.where)
+        self._commands = {tag.name: tag for tag in source.info.tags if tag.role in COMMANDS}
         self._rows: Mapping[tuple[Table, int], Row] = {(row.table, at): row for row in rows for at in row.addresses}
         self.writes = self.refused = 0
 
     async def async_getValues(self, device: int, function: int, address: int, count: int = 1) -> Any:
         """Return words or bits of one tick, (count,)."""
-        table, shown = _TABLE_OF[function], self._source.shown
-        if shown.lost:
+        table, snapshot = _TABLE_OF[function], self._source.snapshot
+        if snapshot.lost:
             return ExcCodes.GATEWAY_NO_RESPONSE
         values: list[int] = []
         while len(values) < count:
@@ -306,7 +306,7 @@ class _Image:
             row = self._rows.get((table, at))
             if row is None:
                 return ExcCodes.ILLEGAL_ADDRESS
-            value = float(shown.tick) if row.name in (TICK, TARGET) else shown.values.get(_shown_as(row), 0.0)
+            value = float(snapshot.tick) if row.name in (TICK, TARGET) else snapshot.values.get(_shown_as(row), 0.0)
             words = encode(row, value)  # 0 for a tag that the line no longer has
             values += words[at - row.address :]
         values = values[:count]
@@ -321,7 +321,7 @@ class _Image:
     def _write(self, table: Table, address: int, words: list[int]) -> ExcCodes | None:
         if self._role is None:
             return ExcCodes.ILLEGAL_FUNCTION
-        if self._source.shown.lost:
+        if self._source.snapshot.lost:
             return ExcCodes.GATEWAY_NO_RESPONSE
         names: list[str] = []
         numbers: list[float] = []
@@ -340,7 +340,7 @@ class _Image:
         request = Input(MODBUS, writer, self._role, SET, tuple(names), tuple(numbers))
         if names and (refusal := refused_for_good(self._source, self._receipt, request)):
             return _EXCEPTIONS[refusal.cause]
-        if self._role == "controller" and self._source.shown.owner not in ("", writer):
+        if self._role == "controller" and self._source.snapshot.owner not in ("", writer):
             claimant = self.holding.judged_as(writer)
         commands = [self._commands[name] for name in names]
         if any(

@@ -57,9 +57,9 @@ class Broker:
         """True if the broker is on this machine."""
         return self.host in ("localhost", "::1") or self.host.startswith("127.")
 
-    def named(self, about: LineInfo) -> tuple[str, str]:
+    def named(self, info: LineInfo) -> tuple[str, str]:
         """Return the group and edge node of a line."""
-        return self.group or about.where.replace("/", ":") or about.name, self.node or about.name
+        return self.group or info.where.replace("/", ":") or info.name, self.node or info.name
 
     def context(self) -> ssl.SSLContext:
         """Return the context for TLS. Raises ServerError."""

@@ -47,11 +47,11 @@ class HostCommands:
         """
         self._source, self._role, self._silence = source, role, silence
         self._writer = f"{MQTT} {broker}"
-        self._receipt = Receipt(source.about.tags, source.about.where)
+        self._receipt = Receipt(source.info.tags, source.info.where)
         self._holding = holding or Holding(source, MQTT)
         self._last = 0.0  # wall time of the latest accepted command, s
-        self._commands: Mapping[str, Tag] = {tag.name: tag for tag in source.about.tags if tag.role in COMMANDS}
-        self._modes: Mapping[str, Tag] = {tag.name: tag for tag in source.about.tags if is_mode(tag)}
+        self._commands: Mapping[str, Tag] = {tag.name: tag for tag in source.info.tags if tag.role in COMMANDS}
+        self._modes: Mapping[str, Tag] = {tag.name: tag for tag in source.info.tags if is_mode(tag)}
         self.before = (0, 0)
         """Commands that were passed on, and commands that were refused, before the edge node was restarted."""
         self.writes = self.refused = 0
@@ -108,11 +108,11 @@ class HostCommands:
 
     def _give(self, metrics: Any) -> str:
         """Pass a command to the line on. Return the reason for a refusal, "" if it was queued."""
-        role, shown = self._role, self._source.shown
+        role, snapshot = self._role, self._source.snapshot
         if role is None:
             return "a command given, expected none: the line is served read-only"
-        if shown.lost or shown.run.state in TAKES_NO_INPUT:
-            return f"a command given, expected none: {shown.lost or f'the run is {shown.run.text}'}"
+        if snapshot.lost or snapshot.run.state in TAKES_NO_INPUT:
+            return f"a command given, expected none: {snapshot.lost or f'the run is {snapshot.run.text}'}"
         known = {**self._commands, **self._modes}
         names: list[str] = []
         numbers: list[float] = []

@@ -70,10 +70,10 @@ class EdgeNode:
         were refused, before a restart.
         """
         self._source, self._broker = source, broker
-        self._names = SparkplugTopics(*broker.named(source.about))
+        self._names = SparkplugTopics(*broker.named(source.info))
         self._commands = HostCommands(source, role, f"{broker.host}:{broker.port}", silence, holding)
         self._commands.before = before
-        self._line = LineMetrics(source.about, TickClock(source.about, stamps), writes=role is not None)
+        self._line = LineMetrics(source.info, TickClock(source.info, stamps), writes=role is not None)
         self._numbers = BirthNumbers(broker.address, self._names.group, self._names.node)
         self._births = 0  # number of the present connection
         self._version = NEWEST
@@ -230,15 +230,15 @@ class EdgeNode:
             if link.full:
                 return again
             self._waiting.clear()
-            session.bear(self._source.shown, datetime.now(timezone.utc))
+            session.bear(self._source.snapshot, datetime.now(timezone.utc))
         while self._waiting and not link.full:
-            shown, heard = self._waiting.popleft()
-            session.bring(shown, heard)
+            snapshot, heard = self._waiting.popleft()
+            session.bring(snapshot, heard)
             self._longest = max(self._longest, (datetime.now(timezone.utc) - heard).total_seconds())
             await asyncio.sleep(0)
         if not link.full:
             session.catch_up()
-            session.tell(self._source.shown)
+            session.tell(self._source.snapshot)
         if session.behind:
             self._loop.call_later(BETWEEN, self._wake.set)
         return 0
@@ -266,7 +266,7 @@ class EdgeNode:
             with suppress(IndexError):
                 self._waiting.pop()
                 self._left_out += 1
-        self._waiting.append((self._source.shown, datetime.now(timezone.utc)))
+        self._waiting.append((self._source.snapshot, datetime.now(timezone.utc)))
         self._notice()
 
     def _notice(self) -> None:

@@ -46,9 +46,9 @@ class _Reading(NamedTuple):
     forced: bool
 
 
-def is_there(shown: LineSnapshot) -> bool:
+def is_there(snapshot: LineSnapshot) -> bool:
     """Return True if the values of a line are current or paused; otherwise the device is dead."""
-    return not shown.lost and shown.run.state not in (ENDED, STOPPED)
+    return not snapshot.lost and snapshot.run.state not in (ENDED, STOPPED)
 
 
 def milliseconds(date: datetime) -> int:
@@ -74,33 +74,33 @@ def number_of(tag: Tag, metric: Any) -> float | None:
 class LineMetrics:
     """Metrics of one line, and the values that hosts have received."""
 
-    def __init__(self, about: LineInfo, clock: TickClock, writes: bool) -> None:
+    def __init__(self, info: LineInfo, clock: TickClock, writes: bool) -> None:
         """Prepare the metrics. writes: True if hosts may command."""
-        self._tick, self._clock, self._writes = about.tick, clock, writes
-        shown = [tag for tag in about.tags if tag.role in (*SIGNALS, *COMMANDS)]
+        self._tick, self._clock, self._writes = info.tick, clock, writes
+        served = [tag for tag in info.tags if tag.role in (*SIGNALS, *COMMANDS)]
         run = [count(TICK, "run", "Ticks since the start."), seconds(TIME, "run", "Simulated time.")]
-        self._tags = [*run, *shown]
-        self._clocks = {TICK, TIME, *(tag.name for tag in shown if tag.role == "counter" and tag.unit == "s")}
+        self._tags = [*run, *served]
+        self._clocks = {TICK, TIME, *(tag.name for tag in served if tag.role == "counter" and tag.unit == "s")}
         self._sent: dict[str, _Reading] = {}
 
-    def birth(self, shown: LineSnapshot, heard: datetime) -> Any:
+    def birth(self, snapshot: LineSnapshot, heard: datetime) -> Any:
         """Return all metrics with their constant properties, as a payload."""
-        payload, stamp = Payload(), milliseconds(self._clock.stamp(shown.tick, heard))
+        payload, stamp = Payload(), milliseconds(self._clock.stamp(snapshot.tick, heard))
         self._sent.clear()
-        for tag, reading in self._readings(shown):
+        for tag, reading in self._readings(snapshot):
             metric = self._add(payload, tag, reading, stamp)
             self._describe(metric, tag)
             self._sent[tag.name] = reading
         return payload
 
-    def changes(self, shown: LineSnapshot, heard: datetime, passing: bool = True) -> Any:
+    def changes(self, snapshot: LineSnapshot, heard: datetime, passing: bool = True) -> Any:
         """Return the metrics that have changed, as a payload.
 
         passing: False: return an empty payload if only clocks have changed.
         """
-        payload, stamp = Payload(), milliseconds(self._clock.stamp(shown.tick, heard))
+        payload, stamp = Payload(), milliseconds(self._clock.stamp(snapshot.tick, heard))
         changed: list[tuple[Tag, _Reading]] = []
-        for tag, reading in self._readings(shown):
+        for tag, reading in self._readings(snapshot):
             if reading != self._sent.get(tag.name):
                 changed.append((tag, reading))
         if not passing and all(tag.name in self._clocks for tag, _ in changed):
@@ -110,13 +110,13 @@ class LineMetrics:
             self._sent[tag.name] = reading
         return payload
 
-    def _readings(self, shown: LineSnapshot) -> Iterator[tuple[Tag, _Reading]]:
-        values = {**shown.values, TICK: float(shown.tick), TIME: shown.tick * self._tick}
-        quality = STALE if shown.run.state == PAUSED else GOOD
+    def _readings(self, snapshot: LineSnapshot) -> Iterator[tuple[Tag, _Reading]]:
+        values = {**snapshot.values, TICK: float(snapshot.tick), TIME: snapshot.tick * self._tick}
+        quality = STALE if snapshot.run.state == PAUSED else GOOD
         for tag in self._tags:
             value = values.get(tag.name)
             known = value is not None and not math.isnan(value)
-            yield tag, _Reading(value if known else None, quality, tag.name in shown.forced)
+            yield tag, _Reading(value if known else None, quality, tag.name in snapshot.forced)
 
     def _add(self, payload: Any, tag: Tag, reading: _Reading, stamp: int) -> Any:
         metric = add_metric(payload, tag.name, _KINDS[tag.kind], reading.value, stamp)

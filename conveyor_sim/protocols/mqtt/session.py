@@ -64,32 +64,32 @@ class SparkplugSession:
         self.born_at: float | None = None
         """Wall time of the latest births, s; None: there were none yet."""
 
-    def bear(self, shown: LineSnapshot, heard: datetime) -> None:
+    def bear(self, snapshot: LineSnapshot, heard: datetime) -> None:
         """Send all births, from sequence number 0."""
         self._next, self.born_at = 0, time.monotonic()
         payload, stamp = Payload(), _now()
         add_metric(payload, "bdSeq", INT64, self._number, stamp)
         add_metric(payload, REBIRTH, BOOLEAN, False, stamp)
-        self._node = self._of_node(shown)
+        self._node = self._of_node(snapshot)
         for name, (kind, value) in self._node.items():
             metric = add_metric(payload, name, kind, value, stamp)
             if kind == INT32:
                 add_property(metric, "texts", STRING, ", ".join(f"{number} {text}" for number, text in STATES.items()))
         self._send("NBIRTH", payload)
-        self._last, self._alive = shown, is_there(shown)
+        self._last, self._alive = snapshot, is_there(snapshot)
         if self._alive:
-            self._bear_line(shown, heard)
+            self._bear_line(snapshot, heard)
 
-    def bring(self, shown: LineSnapshot, heard: datetime) -> None:
+    def bring(self, snapshot: LineSnapshot, heard: datetime) -> None:
         """Send the changes of a line, its death, or its new birth. Call it after `bear`."""
-        last, self._last = self._last, shown
-        back = last is not None and (shown.tick < last.tick or shown.run_id != last.run_id)
-        there = is_there(shown)
+        last, self._last = self._last, snapshot
+        back = last is not None and (snapshot.tick < last.tick or snapshot.run_id != last.run_id)
+        there = is_there(snapshot)
         if there and (back or not self._alive):
             # After a step back in time, unchanged values would have time stamps in the future.
-            self._bear_line(shown, heard)
-        elif self._alive and not shown.lost:
-            self._say(shown, heard, passing=not there or time.monotonic() >= self._line_at + BETWEEN)
+            self._bear_line(snapshot, heard)
+        elif self._alive and not snapshot.lost:
+            self._say(snapshot, heard, passing=not there or time.monotonic() >= self._line_at + BETWEEN)
         if self._alive and not there:
             self._send("DDEATH", Payload())
         self._alive = there
@@ -104,16 +104,16 @@ class SparkplugSession:
         if self.behind and self._put_off is not None and time.monotonic() >= self._line_at + BETWEEN:
             self._say(*self._put_off, passing=True)
 
-    def _say(self, shown: LineSnapshot, heard: datetime, passing: bool) -> None:
-        changed = self._line.changes(shown, heard, passing)
-        self._put_off = None if changed.metrics or passing else (shown, heard)
+    def _say(self, snapshot: LineSnapshot, heard: datetime, passing: bool) -> None:
+        changed = self._line.changes(snapshot, heard, passing)
+        self._put_off = None if changed.metrics or passing else (snapshot, heard)
         if changed.metrics:
             self._line_at = time.monotonic()
             self._send("DDATA", changed)
 
-    def tell(self, shown: LineSnapshot) -> None:
+    def tell(self, snapshot: LineSnapshot) -> None:
         """Send changes of the edge node itself, unless some were sent within BETWEEN. Call it after `bear`."""
-        now, metrics = time.monotonic(), self._of_node(shown)
+        now, metrics = time.monotonic(), self._of_node(snapshot)
         if metrics == self._node or now < self._node_at + BETWEEN:
             return
         payload, stamp = Payload(), _now()
@@ -123,18 +123,18 @@ class SparkplugSession:
         self._node, self._node_at = metrics, now
         self._send("NDATA", payload)
 
-    def _bear_line(self, shown: LineSnapshot, heard: datetime) -> None:
+    def _bear_line(self, snapshot: LineSnapshot, heard: datetime) -> None:
         self._put_off, self._line_at = None, time.monotonic()
-        self._send("DBIRTH", self._line.birth(shown, heard))
+        self._send("DBIRTH", self._line.birth(snapshot, heard))
 
-    def _of_node(self, shown: LineSnapshot) -> dict[str, tuple[int, float | str]]:
+    def _of_node(self, snapshot: LineSnapshot) -> dict[str, tuple[int, float | str]]:
         """Return the metrics of the edge node. They are always good, because they report the state of the others."""
         commands = self._commands
         written, refused = commands.before
         return {
-            f"{RUN}/state": (INT32, shown.run.state),
-            f"{RUN}/reason": (STRING, shown.run.reason),
-            f"{RUN}/lost": (STRING, shown.lost),
+            f"{RUN}/state": (INT32, snapshot.run.state),
+            f"{RUN}/reason": (STRING, snapshot.run.reason),
+            f"{RUN}/lost": (STRING, snapshot.lost),
             "commands/written": (INT64, written + commands.writes),
             "commands/refused": (INT64, refused + commands.refused),
             "commands/refusal": (STRING, commands.refusal),

@@ -87,15 +87,15 @@ class AlarmStates:
         """Return True if an ID is that of the last event of an alarm."""
         return self._event_ids.get(alarm) == event_id
 
-    async def follow(self, shown: LineSnapshot, heard: datetime, back: bool) -> None:
+    async def follow(self, snapshot: LineSnapshot, heard: datetime, back: bool) -> None:
         """Write the variables that have changed, and emit events."""
-        status = status_of(shown)
+        status = status_of(snapshot)
         every = back or status != self._status
-        if shown.alarms is None or (shown.alarms is self._columns and not every):
+        if snapshot.alarms is None or (snapshot.alarms is self._columns and not every):
             return
-        first, self._columns, self._status = self._columns is None, shown.alarms, status
-        rows = _rows(shown.alarms)
-        stamp = self._clock.stamp(shown.tick, heard)
+        first, self._columns, self._status = self._columns is None, snapshot.alarms, status
+        rows = _rows(snapshot.alarms)
+        stamp = self._clock.stamp(snapshot.tick, heard)
         for id in self._rows.keys() - rows.keys():
             await self._write(id, self._rows.pop(id), stamp, ua.StatusCodes.BadNoData)
             self._emitter.forget(_object(id))

@@ -48,14 +48,14 @@ class OpcUaHistory(HistoryStorageInterface):
         """Start to store values. patterns: of names of tags, such as `belts/*/speed`."""
         super().__init__(MOST_VALUES)
         self._source, self._clock = source, clock
-        self._past = source.past if clock.is_simulated else None
+        self._history = source.history if clock.is_simulated else None
         self._tags = {
             tag.name: tag
-            for tag in source.about.tags
+            for tag in source.info.tags
             if any(fnmatchcase(tag.name, pattern) for pattern in patterns) and is_shown(tag)
         }
         self._kept: dict[str, deque[ua.DataValue]] = {}
-        if self._past is None:
+        if self._history is None:
             self._kept = {name: deque(maxlen=MOST_VALUES) for name in self._tags}
 
     def __contains__(self, name: str) -> bool:
@@ -81,10 +81,10 @@ class OpcUaHistory(HistoryStorageInterface):
         first, last = (None if time in (None, NEVER) else time for time in (start, end))
         back = first is None or (last is not None and first > last)
         low, high = (last, first) if back and first is not None else (first, last)
-        if self._past is not None:
+        if self._history is not None:
             tag = self._tags.get(name_of(node_id))
             most = min(nb_values or MOST_VALUES, MOST_VALUES)
-            return ([], None) if tag is None else await self._read_past(self._past, tag, low, high, most, back)
+            return ([], None) if tag is None else await self._read_past(self._history, tag, low, high, most, back)
         kept = self._kept.get(name_of(node_id), ())
         values = [
             value
@@ -95,14 +95,14 @@ class OpcUaHistory(HistoryStorageInterface):
         return values[:most], values[most].SourceTimestamp if len(values) > most else None
 
     async def _read_past(
-        self, past: TagHistory, tag: Tag, low: datetime | None, high: datetime | None, most: int, back: bool
+        self, history: TagHistory, tag: Tag, low: datetime | None, high: datetime | None, most: int, back: bool
     ) -> tuple[list[ua.DataValue], datetime | None]:
         """Return values from the files of a recording. A separate thread reads them."""
-        present = self._source.shown.tick
+        present = self._source.snapshot.tick
         first = 0 if low is None else math.ceil(round(self._clock.tick_at(low), 3))
         last = present if high is None else min(present, math.floor(round(self._clock.tick_at(high), 3)))
         try:
-            samples, rest = await asyncio.to_thread(past.read, tag.name, first, last, most, back)
+            samples, rest = await asyncio.to_thread(history.read, tag.name, first, last, most, back)
         except BagError as error:
             raise ServiceError(ua.StatusCodes.BadHistoryOperationInvalid) from error
         now = datetime.now(timezone.utc)

@@ -52,7 +52,7 @@ class LineEvents:
         self._template: Any = None
         self._seen, _ = source.events(0)
 
-    async def follow(self, shown: LineSnapshot, heard: datetime, back: bool) -> None:
+    async def follow(self, snapshot: LineSnapshot, heard: datetime, back: bool) -> None:
         """Send new events."""
         total, new = self._source.events(self._seen)
         self._seen = total

@@ -177,7 +177,7 @@ class Methods:
     def __init__(self, source: TagProvider, requests: Requests, is_last_event: Callable[[str, bytes], bool]) -> None:
         """Prepare the calls. is_last_event: returns True if an ID is that of the last event of an alarm."""
         self._source, self._requests, self._is_last_event = source, requests, is_last_event
-        tags = source.about.tags
+        tags = source.info.tags
         self._tags = {tag.name: tag for tag in tags}
         self._devices = {tag.device for tag in tags}
         self._known: dict[str, Callable[[str], bool]] = {
@@ -190,7 +190,7 @@ class Methods:
 
     def knows_alarm(self, id: str) -> bool:
         """Return True if there is such an alarm."""
-        alarms = self._source.shown.alarms
+        alarms = self._source.snapshot.alarms
         return alarms is not None and id in alarms.id
 
     def call(self, client: User, request: ua.CallMethodRequest) -> ua.CallMethodResult | None:
@@ -239,7 +239,7 @@ class Methods:
         inputs = request.InputArguments or []
         if not inputs or not isinstance(inputs[0].Value, bytes) or not self._is_last_event(alarm, inputs[0].Value):
             return _result(Codes.BadEventIdUnknown)
-        alarms = self._source.shown.alarms
+        alarms = self._source.snapshot.alarms
         if alarms is None or alarms.state[list(alarms.id).index(alarm)] not in WAITING:
             return _result(Codes.BadConditionBranchAlreadyAcked)
         return _result(self._requests.operate(client, "acknowledge", (alarm,)))

@@ -58,24 +58,24 @@ class Nodes:
         """Return True if there is a node of this name."""
         return node_id(name) in self._server.aspace
 
-    def folder(self, name: str, shown: str, parent: ua.NodeId) -> ua.NodeId:
+    def folder(self, name: str, label: str, parent: ua.NodeId) -> ua.NodeId:
         """Add a folder."""
-        attributes = ua.ObjectAttributes(DisplayName=ua.LocalizedText(shown), Description=ua.LocalizedText(shown))
+        attributes = ua.ObjectAttributes(DisplayName=ua.LocalizedText(label), Description=ua.LocalizedText(label))
         return self._add(
-            name, shown, parent, ua.ObjectIds.Organizes, ua.NodeClass.Object, ua.ObjectIds.FolderType, attributes
+            name, label, parent, ua.ObjectIds.Organizes, ua.NodeClass.Object, ua.ObjectIds.FolderType, attributes
         )
 
-    def object(self, name: str, shown: str, parent: ua.NodeId, description: str) -> ua.NodeId:
+    def object(self, name: str, label: str, parent: ua.NodeId, description: str) -> ua.NodeId:
         """Add an object that can have variables and methods."""
-        attributes = ua.ObjectAttributes(DisplayName=ua.LocalizedText(shown), Description=ua.LocalizedText(description))
+        attributes = ua.ObjectAttributes(DisplayName=ua.LocalizedText(label), Description=ua.LocalizedText(description))
         return self._add(
-            name, shown, parent, ua.ObjectIds.HasComponent, ua.NodeClass.Object, ua.ObjectIds.BaseObjectType, attributes
+            name, label, parent, ua.ObjectIds.HasComponent, ua.NodeClass.Object, ua.ObjectIds.BaseObjectType, attributes
         )
 
     def variable(
         self,
         name: str,
-        shown: str,
+        label: str,
         parent: ua.NodeId,
         value: ua.Variant,
         description: str,
@@ -83,11 +83,11 @@ class Nodes:
         access: int = READ,
     ) -> ua.NodeId:
         """Add a variable with its initial value."""
-        attributes = _variable(shown, description, value, ua.NodeId(value.VariantType.value), access)
+        attributes = _variable(label, description, value, ua.NodeId(value.VariantType.value), access)
         if name in self._history:
             attributes.Historizing = True
             attributes.AccessLevel = attributes.UserAccessLevel = access | READ_HISTORY
-        return self._add(name, shown, parent, ua.ObjectIds.HasComponent, ua.NodeClass.Variable, type_id, attributes)
+        return self._add(name, label, parent, ua.ObjectIds.HasComponent, ua.NodeClass.Variable, type_id, attributes)
 
     def property(
         self, name: str, parent: ua.NodeId, value: Any, data_type: int, kind: ua.VariantType, index: int = 0
@@ -109,15 +109,15 @@ class Nodes:
 
     def method(self, name: str, parent: ua.NodeId, description: str, arguments: Sequence[ua.Argument]) -> ua.NodeId:
         """Add a method. The session handles its calls."""
-        shown = name.rpartition("/")[2]
+        label = name.rpartition("/")[2]
         attributes = ua.MethodAttributes(
-            DisplayName=ua.LocalizedText(shown),
+            DisplayName=ua.LocalizedText(label),
             Description=ua.LocalizedText(description),
             Executable=True,
             UserExecutable=True,
         )
         method = self._add(
-            name, shown, parent, ua.ObjectIds.HasComponent, ua.NodeClass.Method, ua.ObjectIds.Null, attributes
+            name, label, parent, ua.ObjectIds.HasComponent, ua.NodeClass.Method, ua.ObjectIds.Null, attributes
         )
         if arguments:
             self.property(
@@ -129,12 +129,12 @@ class Nodes:
             )
         return method
 
-    def event_type(self, name: str, shown: str, base: int, fields: Sequence[tuple[str, ua.VariantType]]) -> ua.NodeId:
+    def event_type(self, name: str, label: str, base: int, fields: Sequence[tuple[str, ua.VariantType]]) -> ua.NodeId:
         """Add a type of events, with properties beside those of its base type."""
-        attributes = ua.ObjectTypeAttributes(DisplayName=ua.LocalizedText(shown), Description=ua.LocalizedText(shown))
+        attributes = ua.ObjectTypeAttributes(DisplayName=ua.LocalizedText(label), Description=ua.LocalizedText(label))
         made = self._add(
             name,
-            shown,
+            label,
             ua.NodeId(base),
             ua.ObjectIds.HasSubtype,
             ua.NodeClass.ObjectType,
@@ -160,7 +160,7 @@ class Nodes:
     def _add(
         self,
         name: str,
-        shown: str,
+        label: str,
         parent: ua.NodeId,
         reference: int,
         node_class: ua.NodeClass,
@@ -172,7 +172,7 @@ class Nodes:
             ParentNodeId=parent,
             ReferenceTypeId=ua.NodeId(reference),
             RequestedNewNodeId=node_id(name),
-            BrowseName=ua.QualifiedName(shown, index),
+            BrowseName=ua.QualifiedName(label, index),
             NodeClass=node_class,
             NodeAttributes=attributes,
             TypeDefinition=ua.NodeId(type_id),
@@ -190,10 +190,10 @@ def nothing(kind: ua.VariantType) -> Any:
 
 
 def _variable(
-    shown: str, description: str, value: ua.Variant, data_type: ua.NodeId, access: int
+    label: str, description: str, value: ua.Variant, data_type: ua.NodeId, access: int
 ) -> ua.VariableAttributes:
     return ua.VariableAttributes(
-        DisplayName=ua.LocalizedText(shown),
+        DisplayName=ua.LocalizedText(label),
         Description=ua.LocalizedText(description),
         Value=value,
         DataType=data_type,

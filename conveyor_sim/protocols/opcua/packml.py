@@ -111,8 +111,8 @@ class PackMl:
 
     def __init__(self, source: TagProvider, requests: Requests, clock: TickClock) -> None:
         self._source, self._requests, self._clock = source, requests, clock
-        self._tags: Mapping[str, Tag] = {tag.name: tag for tag in source.about.tags}
-        self._machines = [tag.device for tag in source.about.tags if tag.name == f"{tag.device}/cntrl_cmd"]
+        self._tags: Mapping[str, Tag] = {tag.name: tag for tag in source.info.tags}
+        self._machines = [tag.device for tag in source.info.tags if tag.name == f"{tag.device}/cntrl_cmd"]
         self._admins = {machine: Admin(machine, self._tags, clock) for machine in self._machines}
         self._nodes: Nodes | None = None
         self._index = 0
@@ -160,17 +160,17 @@ class PackMl:
                 result[f"{state_machine}.{name}"] = ua.Variant(ids, ua.VariantType.NodeId, is_array=True)
         return result
 
-    async def follow(self, shown: LineSnapshot, heard: datetime, back: bool) -> None:
+    async def follow(self, snapshot: LineSnapshot, heard: datetime, back: bool) -> None:
         """Write the variables that have changed."""
         if self._nodes is None:
             return
-        status, stamp = status_of(shown), self._clock.stamp(shown.tick, heard)
+        status, stamp = status_of(snapshot), self._clock.stamp(snapshot.tick, heard)
         if status != self._status or back:
             self._status = status
             self._written.clear()
         for machine in self._machines:
-            admin = {f"{ADMIN}.{name}": value for name, value in self._admins[machine].values(shown).items()}
-            for name, value in {**self._values(machine, shown.values), **admin}.items():
+            admin = {f"{ADMIN}.{name}": value for name, value in self._admins[machine].values(snapshot).items()}
+            for name, value in {**self._values(machine, snapshot.values), **admin}.items():
                 if self._written.get((machine, name)) != value:
                     self._written[machine, name] = value
                     inactive = value.Value in _NONE and status == Codes.Good
@@ -207,12 +207,12 @@ class PackMl:
         return _result(self._requests.operate(client, MODE, (machine,), (value,)))
 
     def _command(self, client: User, machine: str, command: Command) -> int:
-        name, shown = f"{machine}/cntrl_cmd", self._source.shown.values
+        name, snapshot = f"{machine}/cntrl_cmd", self._source.snapshot.values
         if not self._requests.may(client, SET):
             return int(Codes.BadUserAccessDenied)
-        if objection(command, int(shown[f"{machine}/state"])):
+        if objection(command, int(snapshot[f"{machine}/state"])):
             return int(Codes.BadInvalidState)
-        if shown.get(name) == command:  # a command acts when its value changes
+        if snapshot.get(name) == command:  # a command acts when its value changes
             code = self._requests.write_together(client, [name], [0.0])
             if code != Codes.GoodCompletesAsynchronously:
                 return code

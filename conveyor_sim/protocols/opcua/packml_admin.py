@@ -94,25 +94,25 @@ class Admin:
                 # Unlike the public function, it keeps the type of reference: HasAlarm and others.
                 await copy_node(session, parent, each, node_id(f"{root}.{NAME}.{each.BrowseName.Name}"), False)
 
-    def values(self, shown: LineSnapshot) -> dict[str, ua.Variant]:
+    def values(self, snapshot: LineSnapshot) -> dict[str, ua.Variant]:
         """Return the values of the variables by name."""
-        variables = {name: self._count(tag, shown.values) for name, tag in self._counts.items()}
+        variables = {name: self._count(tag, snapshot.values) for name, tag in self._counts.items()}
         if self._design is not None:
             variables["MachDesignSpeed"] = ua.Variant(self._design * A_MINUTE, ua.VariantType.Float)
-        variables["StopReason"] = self._stop_reason(shown)
-        if shown.alarms is not self._alarms and shown.alarms is not None:
-            self._alarms, self._rows = shown.alarms, self._standing(shown.alarms)
+        variables["StopReason"] = self._stop_reason(snapshot)
+        if snapshot.alarms is not self._alarms and snapshot.alarms is not None:
+            self._alarms, self._rows = snapshot.alarms, self._standing(snapshot.alarms)
         return variables | self._rows
 
     def _count(self, tag: Tag, values: Mapping[str, float]) -> ua.Variant:
         count = min(_MOST, int(values.get(tag.name, 0.0)))
         return _array([PackMLCountDataType(0, "bottles", unit_of(tag), count, count)])
 
-    def _stop_reason(self, shown: LineSnapshot) -> ua.Variant:
-        reason = int(shown.values[f"{self._machine}/stop_reason"])
+    def _stop_reason(self, snapshot: LineSnapshot) -> ua.Variant:
+        reason = int(snapshot.values[f"{self._machine}/stop_reason"])
         if reason != self._reason:
-            self._reason, self._since = reason, self._clock.simulated(shown.tick) if reason else NEVER
-        category = int(shown.values[f"{self._machine}/category"])
+            self._reason, self._since = reason, self._clock.simulated(snapshot.tick) if reason else NEVER
+        category = int(snapshot.values[f"{self._machine}/category"])
         text, on = self._reasons.get(reason, ""), category != 0
         made = PackMLAlarmDataType(reason, reason, text, category, self._since, NEVER, on)
         return ua.Variant(made, ua.VariantType.ExtensionObject)

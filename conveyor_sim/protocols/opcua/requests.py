@@ -64,9 +64,9 @@ class Requests:
 
     def __init__(self, source: TagProvider) -> None:
         self._source = source
-        self._receipt = Receipt(source.about.tags, source.about.where)
-        self._commands: Mapping[str, Tag] = {tag.name: tag for tag in source.about.tags if tag.role in COMMANDS}
-        self._modes: Mapping[str, Tag] = {tag.name: tag for tag in source.about.tags if is_mode(tag)}
+        self._receipt = Receipt(source.info.tags, source.info.where)
+        self._commands: Mapping[str, Tag] = {tag.name: tag for tag in source.info.tags if tag.role in COMMANDS}
+        self._modes: Mapping[str, Tag] = {tag.name: tag for tag in source.info.tags if is_mode(tag)}
         self.writes = self.refused = 0
         """Requests that were passed on to the line, and requests that were refused."""
 
@@ -197,8 +197,8 @@ class Requests:
         request = Input(OPCUA, _writer(client), kind, operation, names, values, texts)
         if refusal := refused_for_good(self._source, self._receipt, request):
             return CODES[refusal.cause]
-        shown = self._source.shown
-        if shown.lost or shown.run.state in TAKES_NO_INPUT:
+        snapshot = self._source.snapshot
+        if snapshot.lost or snapshot.run.state in TAKES_NO_INPUT:
             return Codes.BadInvalidState
         return Codes.BadTooManyOperations if self._source.give(request) else Codes.GoodCompletesAsynchronously
 

@@ -71,7 +71,7 @@ class OpcUaServer:
 
         Raises ServerError for a pattern that matches no tag.
         """
-        require_tags(history, source.about.tags)
+        require_tags(history, source.info.tags)
         self._source, self._anonymous, self._stamps = source, anonymous, stamps
         self._logins = logins or Logins(users or {})
         self._certificates, self._history = certificates, history
@@ -158,11 +158,11 @@ class OpcUaServer:
         await publish(internal, self._limits, self._quota)
         if await server.register_namespace(NAMESPACE) != INDEX:
             raise ServerError(f"opcua: namespace {NAMESPACE} has another index than {INDEX}")
-        clock = TickClock(source.about, self._stamps)
+        clock = TickClock(source.info, self._stamps)
         history = OpcUaHistory(self._history, source, clock)
         internal.history_manager.set_storage(history)
         nodes, emitter = Nodes(internal, history), Emitter(internal)
-        add_line(nodes, source.about)
+        add_line(nodes, source.info)
         add_methods(nodes, source)
         alarms, events = AlarmStates(nodes, emitter, clock), LineEvents(source, nodes, emitter, clock)
         packml = PackMl(source, requests, clock)

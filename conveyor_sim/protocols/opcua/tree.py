@@ -28,14 +28,14 @@ RUN_VARIABLES: dict[str, tuple[ua.VariantType, str]] = {
 """Variables of the run, beside its state."""
 
 
-def add_line(nodes: Nodes, about: LineInfo) -> None:
+def add_line(nodes: Nodes, info: LineInfo) -> None:
     """Add all variables of a line, with the objects that hold them."""
     parent = ua.NodeId(ua.ObjectIds.ObjectsFolder)
-    parts = [part for part in about.where.split("/") if part]
+    parts = [part for part in info.where.split("/") if part]
     for depth, part in enumerate(parts[:-1], start=1):
         parent = nodes.folder(f"where/{'/'.join(parts[:depth])}", part, parent)
-    nodes.object(LINE, parts[-1] if parts else about.name, parent, f"The line {about.name}.")
-    for tag in about.tags:
+    nodes.object(LINE, parts[-1] if parts else info.name, parent, f"The line {info.name}.")
+    for tag in info.tags:
         if is_shown(tag):
             _add_tag(nodes, tag)
     run = node_id(RUN) if RUN in nodes else nodes.object(RUN, RUN, node_id(LINE), "The simulation itself.")

@@ -33,9 +33,9 @@ class Updates:
     def __init__(self, source: TagProvider, nodes: Nodes, clock: TickClock, *others: Follower) -> None:
         """Prepare the updates. others: functions to call after each tick."""
         self._source, self._nodes, self._clock, self._others = source, nodes, clock, others
-        self._variables = [_Variable(tag) for tag in source.about.tags if is_shown(tag) and tag.role != "run"]
-        self._run_tag = next((tag for tag in source.about.tags if tag.name == f"{RUN}/state"), None)
-        self._commands = [tag.name for tag in source.about.tags if tag.role in COMMANDS]
+        self._variables = [_Variable(tag) for tag in source.info.tags if is_shown(tag) and tag.role != "run"]
+        self._run_tag = next((tag for tag in source.info.tags if tag.name == f"{RUN}/state"), None)
+        self._commands = [tag.name for tag in source.info.tags if tag.role in COMMANDS]
         self._waiting: deque[tuple[LineSnapshot, datetime]] = deque()
         self._is_woken = False
         self._wake = asyncio.Event()
@@ -50,7 +50,7 @@ class Updates:
 
     async def bring_present(self) -> None:
         """Write the present snapshot."""
-        await self._bring(self._source.shown, datetime.now(timezone.utc))
+        await self._bring(self._source.snapshot, datetime.now(timezone.utc))
 
     async def run(self) -> None:
         """Write all snapshots until this is cancelled."""
@@ -62,8 +62,8 @@ class Updates:
                 self._wake.clear()
                 self._is_woken = False
                 while self._waiting:
-                    shown, heard = self._waiting.popleft()
-                    await self._bring(shown, heard)
+                    snapshot, heard = self._waiting.popleft()
+                    await self._bring(snapshot, heard)
                     self.longest = max(self.longest, (datetime.now(timezone.utc) - heard).total_seconds())
                     await asyncio.sleep(0)  # let clients' requests run
         finally:
@@ -75,25 +75,25 @@ class Updates:
             with suppress(IndexError):
                 self._waiting.pop()
                 self.left_out += 1
-        self._waiting.append((self._source.shown, datetime.now(timezone.utc)))
+        self._waiting.append((self._source.snapshot, datetime.now(timezone.utc)))
         if not self._is_woken:
             self._is_woken = True
             with suppress(RuntimeError):  # the loop is closed
                 self._loop.call_soon_threadsafe(self._wake.set)
 
-    async def _bring(self, shown: LineSnapshot, heard: datetime) -> None:
-        last, self._last = self._last, shown
-        status = status_of(shown)
-        back = last is not None and shown.tick < last.tick
+    async def _bring(self, snapshot: LineSnapshot, heard: datetime) -> None:
+        last, self._last = self._last, snapshot
+        status = status_of(snapshot)
+        back = last is not None and snapshot.tick < last.tick
         # After a step back in time, unchanged values would have time stamps in the future.
         every = last is None or back or status != status_of(last)
-        stamp = self._clock.stamp(shown.tick, heard)
+        stamp = self._clock.stamp(snapshot.tick, heard)
         good = status == ua.StatusCodes.Good
         for variable in self._variables:
-            value = shown.values.get(variable.tag.name)
+            value = snapshot.values.get(variable.tag.name)
             if value is None:
                 continue
-            forced = good and variable.tag.name in shown.forced
+            forced = good and variable.tag.name in snapshot.forced
             if every or value != variable.value or forced != variable.forced:
                 variable.value, variable.forced = value, forced
                 code = ua.StatusCodes.GoodLocalOverride if forced else status
@@ -101,37 +101,38 @@ class Updates:
                 if variable.text is not None:
                     text = ua.Variant(ua.LocalizedText(variable.tag.texts.get(int(value), "")))
                     await self._nodes.write(variable.text, text, stamp, code)
-        if shown.read_back is not None and (every or shown.read_back is not self._read_back):
-            self._read_back = shown.read_back
+        if snapshot.read_back is not None and (every or snapshot.read_back is not self._read_back):
+            self._read_back = snapshot.read_back
             if every:
                 self._written.clear()
-            await self._bring_read_back(shown.read_back, stamp, status)
+            await self._bring_read_back(snapshot.read_back, stamp, status)
         for follow in self._others:
-            await follow(shown, heard, back)
-        await self._bring_run(shown, last, stamp, every)  # last, so that clients that see the tick find all its values
+            await follow(snapshot, heard, back)
+        # Last, so that clients that see the tick find all its values.
+        await self._bring_run(snapshot, last, stamp, every)
 
-    async def _bring_run(self, shown: LineSnapshot, last: LineSnapshot | None, stamp: datetime, every: bool) -> None:
+    async def _bring_run(self, snapshot: LineSnapshot, last: LineSnapshot | None, stamp: datetime, every: bool) -> None:
         """Write the variables of the run. Their status stays Good when the run stops; it is BadNoCommunication only if
         the line is lost.
         """
-        tick = shown.tick
-        code = ua.StatusCodes.BadNoCommunication if shown.lost else ua.StatusCodes.Good
-        if self._run_tag is not None and (last is None or every or last.run.state != shown.run.state):
-            tag, state = self._run_tag, float(shown.run.state)
+        tick = snapshot.tick
+        code = ua.StatusCodes.BadNoCommunication if snapshot.lost else ua.StatusCodes.Good
+        if self._run_tag is not None and (last is None or every or last.run.state != snapshot.run.state):
+            tag, state = self._run_tag, float(snapshot.run.state)
             await self._nodes.write(tag.name, as_variant(tag, state), stamp, code)
             if has_text(tag):
-                text = ua.Variant(ua.LocalizedText(shown.run.text))
+                text = ua.Variant(ua.LocalizedText(snapshot.run.text))
                 await self._nodes.write(f"{tag.name}/{VALUE_AS_TEXT}", text, stamp, code)
-        if last is None or every or last.run.reason != shown.run.reason:
-            reason = ua.Variant(shown.run.reason, ua.VariantType.String)
+        if last is None or every or last.run.reason != snapshot.run.reason:
+            reason = ua.Variant(snapshot.run.reason, ua.VariantType.String)
             await self._nodes.write(f"{RUN}/reason", reason, stamp, code)
-        if last is None or every or last.lost != shown.lost:
-            await self._nodes.write(f"{RUN}/lost", ua.Variant(shown.lost, ua.VariantType.String), stamp)
+        if last is None or every or last.lost != snapshot.lost:
+            await self._nodes.write(f"{RUN}/lost", ua.Variant(snapshot.lost, ua.VariantType.String), stamp)
         if last is None or every or last.tick != tick:
             now = self._clock.simulated(tick)
             for name in (TICK, TARGET):
                 await self._nodes.write(name, ua.Variant(tick, ua.VariantType.Int64), stamp, code)
-            seconds = tick * self._source.about.tick
+            seconds = tick * self._source.info.tick
             await self._nodes.write(f"{RUN}/time", ua.Variant(seconds, ua.VariantType.Double), stamp, code)
             await self._nodes.write(f"{RUN}/date_time", ua.Variant(now, ua.VariantType.DateTime), stamp, code)
 

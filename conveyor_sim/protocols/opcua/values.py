@@ -45,16 +45,16 @@ def range_of(tag: Tag) -> ua.Range:
 def unit_of(tag: Tag) -> ua.EUInformation:
     """Return the EngineeringUnits: the characters of the UNECE code, base 256 (OPC 10000-8, 5.6.4.4)."""
     number = int.from_bytes(tag.unece.code.encode("ascii"), "big")
-    shown = "" if tag.unit == "1" else tag.unit
-    return ua.EUInformation(_UNITS_URI, number, ua.LocalizedText(shown), ua.LocalizedText(tag.unece.name))
+    text = "" if tag.unit == "1" else tag.unit
+    return ua.EUInformation(_UNITS_URI, number, ua.LocalizedText(text), ua.LocalizedText(tag.unece.name))
 
 
-def status_of(shown: LineSnapshot) -> int:
+def status_of(snapshot: LineSnapshot) -> int:
     """Return the status code of all values of a line. Forced signals have GoodLocalOverride where it is Good."""
-    if shown.lost:
+    if snapshot.lost:
         return ua.StatusCodes.BadNoCommunication
-    if shown.run.state in (ENDED, STOPPED):
+    if snapshot.run.state in (ENDED, STOPPED):
         return ua.StatusCodes.BadOutOfService
-    if shown.run.state == PAUSED:
+    if snapshot.run.state == PAUSED:
         return ua.StatusCodes.UncertainLastUsableValue
     return ua.StatusCodes.Good

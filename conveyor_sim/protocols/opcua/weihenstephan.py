@@ -27,11 +27,11 @@ class Weihenstephan:
     def __init__(self, source: TagProvider, nodes: Nodes, clock: TickClock) -> None:
         """Add an object for each machine that has data points."""
         self._nodes, self._clock = nodes, clock
-        self._tags: Mapping[str, Tag] = {tag.name: tag for tag in source.about.tags}
-        self._machines = list(dict.fromkeys(tag.device for tag in source.about.tags if names_of(tag)))
+        self._tags: Mapping[str, Tag] = {tag.name: tag for tag in source.info.tags}
+        self._machines = list(dict.fromkeys(tag.device for tag in source.info.tags if names_of(tag)))
         self._status = int(ua.StatusCodes.Good)
         self._written: dict[str, float] = {}
-        initial = {tag.name: tag.initial for tag in source.about.tags}
+        initial = {tag.name: tag.initial for tag in source.info.tags}
         for machine in self._machines:
             root = f"{machine}/{NAME}"
             nodes.object(root, NAME, node_id(machine), "Data points of the Weihenstephan Standards.")
@@ -40,14 +40,14 @@ class Weihenstephan:
                 what = f"{point.what} Data point {point.number}."
                 nodes.variable(f"{root}/{name}", name, node_id(root), _variant(name, value), what)
 
-    async def follow(self, shown: LineSnapshot, heard: datetime, back: bool) -> None:
+    async def follow(self, snapshot: LineSnapshot, heard: datetime, back: bool) -> None:
         """Write the data points that have changed."""
-        status, stamp = status_of(shown), self._clock.stamp(shown.tick, heard)
+        status, stamp = status_of(snapshot), self._clock.stamp(snapshot.tick, heard)
         if status != self._status or back:
             self._status = status
             self._written.clear()
         for machine in self._machines:
-            for name, value in data_points(machine, self._tags, shown.values).items():
+            for name, value in data_points(machine, self._tags, snapshot.values).items():
                 path = f"{machine}/{NAME}/{name}"
                 if self._written.get(path) != value:
                     self._written[path] = value

@@ -47,7 +47,7 @@ class BagTagProvider(LineMirror, AbstractContextManager["BagTagProvider"]):
         self._shown_at = 0.0  # s of wall time
         self._calls = CallQueue()
         self._bag = open_bag(path)
-        self._past = TagHistory(path)
+        self._history = TagHistory(path)
         try:
             if not self._bag.counts.get("signals"):
                 raise BagError(f"{path}: holds no message of topic signals, expected some: tags are read from them")
@@ -57,15 +57,15 @@ class BagTagProvider(LineMirror, AbstractContextManager["BagTagProvider"]):
             self._bring()
         except BaseException:
             self._bag.close()
-            self._past.close()
+            self._history.close()
             raise
         self._thread = threading.Thread(target=self._play, name="bag", daemon=True)
         self._thread.start()
 
     @property
-    def past(self) -> TagHistory:
+    def history(self) -> TagHistory:
         """History of the recording."""
-        return self._past
+        return self._history
 
     def give(self, request: Input) -> str:
         """Refuse."""
@@ -88,7 +88,7 @@ class BagTagProvider(LineMirror, AbstractContextManager["BagTagProvider"]):
         self._calls.end()
         self._thread.join()
         self._bag.close()
-        self._past.close()
+        self._history.close()
 
     def __exit__(self, *_: object) -> None:
         self.close()
@@ -157,20 +157,13 @@ class BagTagProvider(LineMirror, AbstractContextManager["BagTagProvider"]):
         """Publish everything that was played since the last call, and the state of the playback."""
         state = ENDED if self._player.ended else PAUSED if self._player.paused else REPLAYING
         run = RunState(state, "" if state == ENDED else printable(self._path))
-        if not self._states and not self._new_events and run == self.shown.run:
+        if not self._states and not self._new_events and run == self.snapshot.run:
             return
         states, self._states = self._states, {}
         events, self._new_events = self._new_events, []
-        for topic in STATE_TOPICS:
-            if topic in states and topic != "run_state":  # the playback has its own state
-                self.take(topic, self._bag.decode(topic, states[topic]))
-                self.pass_on(topic, states[topic])
-        for topic in states.keys() & set(DRAWING_TOPICS):
-            self.keep(topic, partial(self._bag.decode, topic, states[topic]))
-            self.pass_on(topic, states[topic])
-        for data in events:
-            self.take("events", self._bag.decode("events", data))
-            self.pass_on("events", data)
+        states.pop("run_state", None)  # the playback has its own state
+        self.receive(states, self._bag.decode)
+        self.receive_events(events, self._bag.decode)
         self.state_run(run)
         self.show()
 

@@ -30,17 +30,17 @@ def is_mode(tag: Tag) -> bool:
 
 def objection(source: TagProvider, command: Tag, value: float, kind: WriterKind, writer: str) -> str:
     """Return why a command of a writer would be refused in the latest state of the line; "" if it would not."""
-    shown, device = source.shown, command.device
+    snapshot, device = source.snapshot, command.device
     if kind in PEOPLE and stops(command.name, value):
         return ""
-    mode = int(shown.values.get(f"{device}/mode", AUTOMATIC))
+    mode = int(snapshot.values.get(f"{device}/mode", AUTOMATIC))
     if kind not in IN_CONTROL[mode]:
         return f"{device}: is in {MODES[mode]}"
-    if kind != "controller" or shown.owner in ("", writer):
+    if kind != "controller" or snapshot.owner in ("", writer):
         return ""
-    if any(covers(pattern, device, source.about.where) for pattern in shown.released):
+    if any(covers(pattern, device, source.info.where) for pattern in snapshot.released):
         return ""
-    return f"{device}: the line is owned by controller {shown.owner}"
+    return f"{device}: the line is owned by controller {snapshot.owner}"
 
 
 def refused_for_good(source: TagProvider, receipt: Receipt, request: Input) -> Refusal | None:

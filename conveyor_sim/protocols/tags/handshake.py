@@ -58,7 +58,7 @@ class HandshakeTagProvider(SteppedTagProvider):
 
     def control(self, what: Control, value: float, by: str) -> str:
         """Set the target. A target that was reached or set before has no effect."""
-        if reason := problem(what, value, self._shown.tick):
+        if reason := problem(what, value, self._snapshot.tick):
             return reason
         with self._written:
             if value > self._target:

@@ -51,25 +51,25 @@ class Holding:
     @property
     def holder(self) -> str:
         """Writer that holds the line; empty: none."""
-        return self._holder if self._run_id == self._source.shown.run_id else ""  # another run has no holder
+        return self._holder if self._run_id == self._source.snapshot.run_id else ""  # another run has no holder
 
     def take(self, writer: str) -> str:
         """Give a writer the line from the next tick on. Return the reason for a refusal, "" if there is none."""
-        holder, shown = self.holder, self._source.shown
+        holder, snapshot = self.holder, self._source.snapshot
         if holder == writer:
             self._leaving, self._away_until = False, 0.0
             return ""
         if holder and self.judged_as(writer) == holder:
-            if self._is_owner(shown) and (reason := self._give(holder, DISOWN)):
+            if self._is_owner(snapshot) and (reason := self._give(holder, DISOWN)):
                 return reason
             self._holder, self._away_until = "", 0.0
         elif holder:
             return f"the line is owned by controller {holder}"
-        if shown.owner == writer:
+        if snapshot.owner == writer:
             return ""
         if reason := self._give(writer, OWN):
             return reason
-        self._holder, self._run_id, self._leaving, self._away_until = writer, shown.run_id, False, 0.0
+        self._holder, self._run_id, self._leaving, self._away_until = writer, snapshot.run_id, False, 0.0
         return ""
 
     def judged_as(self, writer: str) -> str:
@@ -100,14 +100,14 @@ class Holding:
         """Release the line if the holder leaves, as soon as there is room among the inputs."""
         if self._away_until and time.monotonic() > self._away_until:
             self._leaving, self._away_until = True, 0.0
-        if self._leaving and not (self.holder and self._is_owner(self._source.shown)):
+        if self._leaving and not (self.holder and self._is_owner(self._source.snapshot)):
             self._leaving, self._holder = False, ""
         if self._leaving and not self._give(self._holder, DISOWN):
             self._leaving, self._holder = False, ""
 
-    def _is_owner(self, shown: LineSnapshot) -> bool:
+    def _is_owner(self, snapshot: LineSnapshot) -> bool:
         """Return True if the holder owns the line, or will own it after a tick unless another client was faster."""
-        return shown.owner in ("", self._holder)
+        return snapshot.owner in ("", self._holder)
 
     def _give(self, writer: str, operation: str) -> str:
         return self._source.give(Input(self._protocol, writer, "controller", operation, (), ()))

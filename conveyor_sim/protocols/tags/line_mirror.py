@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -66,7 +67,7 @@ class DrawableProvider(TagProvider, Protocol):
     takes_inputs: bool
 
     @property
-    def picture(self) -> DrawableFrame:
+    def frame(self) -> DrawableFrame:
         """Latest data for drawing the line."""
 
     @property
@@ -115,7 +116,7 @@ class LineMirror:
 
     def __init__(self) -> None:
         """Start empty."""
-        self._about: LineInfo | None = None
+        self._info: LineInfo | None = None
         self._signal_names: Sequence[str] = ()
         self._command_names: Sequence[str] = ()
         self._initial: list[float] = []
@@ -123,8 +124,8 @@ class LineMirror:
         self._events = RecentEvents()
         self._known = threading.Event()
         self._strange = False  # True if the topics describe another line now
-        self._shown = LineSnapshot(0, {}, lost=NOTHING)
-        self._picture: DrawableFrame | None = None
+        self._snapshot = LineSnapshot(0, {}, lost=NOTHING)
+        self._frame: DrawableFrame | None = None
         self._watchers = 0
         self._watching = threading.Lock()
         self._hearers = Listeners()
@@ -135,23 +136,23 @@ class LineMirror:
         self._forget("")
 
     @property
-    def about(self) -> LineInfo:
+    def info(self) -> LineInfo:
         """Constant properties. Raises RuntimeError before they are known."""
-        if self._about is None:
+        if self._info is None:
             raise RuntimeError("the line is not known yet")
-        return self._about
+        return self._info
 
     @property
-    def shown(self) -> LineSnapshot:
+    def snapshot(self) -> LineSnapshot:
         """Latest snapshot of the line."""
-        return self._shown
+        return self._snapshot
 
     @property
-    def picture(self) -> DrawableFrame:
+    def frame(self) -> DrawableFrame:
         """Latest data for drawing. Raises RuntimeError before there are any."""
-        if self._picture is None:
+        if self._frame is None:
             raise RuntimeError("there is no snapshot yet")
-        return self._picture
+        return self._frame
 
     @property
     def newest(self) -> Mapping[str, bytes]:
@@ -169,7 +170,7 @@ class LineMirror:
         return lambda: self._count_watchers(-1)
 
     @property
-    def past(self) -> TagHistory | None:
+    def history(self) -> TagHistory | None:
         """No history is available."""
         return None
 
@@ -182,7 +183,7 @@ class LineMirror:
         return self._events.after(after)
 
     def listen(self, heard: Callable[[], None]) -> Callable[[], None]:
-        """Call `heard` after each change of `shown`. Return a function that ends this."""
+        """Call `heard` after each change of `snapshot`. Return a function that ends this."""
         return self._listeners.add(heard)
 
     def wait(self, seconds: float) -> bool:
@@ -191,11 +192,11 @@ class LineMirror:
 
     def _objection(self, request: Input) -> str:
         """Return the reason why an input can't be passed on to the line, "" if it can."""
-        shown = self.shown
-        if shown.lost:
-            return shown.lost
-        if shown.run.state in (ENDED, STOPPED):
-            return f"the run has {shown.run.text}, expected a reset"
+        snapshot = self.snapshot
+        if snapshot.lost:
+            return snapshot.lost
+        if snapshot.run.state in (ENDED, STOPPED):
+            return f"the run has {snapshot.run.text}, expected a reset"
         return TOO_LARGE if size_of(request) > MESSAGE_BYTES else ""
 
     # Called by the thread that receives messages
@@ -221,6 +222,22 @@ class LineMirror:
             case "events":
                 self._take_events(TOPICS[topic].unpack(message))
 
+    def receive(self, states: Mapping[str, bytes], decode: Callable[[str, bytes], Any]) -> None:
+        """Take the serialized newest messages by topic, in the order of STATE_TOPICS and DRAWING_TOPICS."""
+        for topic in (*STATE_TOPICS, *DRAWING_TOPICS):
+            if (data := states.get(topic)) is not None:
+                if topic in STATE_TOPICS:
+                    self.take(topic, decode(topic, data))
+                else:
+                    self.keep(topic, partial(decode, topic, data))
+                self.pass_on(topic, data)
+
+    def receive_events(self, messages: Iterable[bytes], decode: Callable[[str, bytes], Any]) -> None:
+        """Take serialized messages of topic `events`."""
+        for data in messages:
+            self.take("events", decode("events", data))
+            self.pass_on("events", data)
+
     def pass_on(self, topic: str, data: bytes) -> None:
         """Notify listeners of a serialized message of one of STATE_TOPICS and DRAWING_TOPICS."""
         self._newest[topic] = data
@@ -243,18 +260,18 @@ class LineMirror:
 
         at: wall time of its tick, s since 1970; None: now.
         """
-        if self._about is None or self._image is None:
+        if self._info is None or self._image is None:
             return
         names, values = self._signal_names, self._image.values
-        shown = dict(zip(names, values.tolist(), strict=False))
-        shown |= zip(self._command_names, self._commands(), strict=False)
+        tags = dict(zip(names, values.tolist(), strict=False))
+        tags |= zip(self._command_names, self._commands(), strict=False)
         now = time.time() if at is None else at
-        self._picture = DrawableFrame(
+        self._frame = DrawableFrame(
             self._line, self._tick, now, self._image.values, self._image.forced, dict(self._drawn)
         )
-        self._shown = LineSnapshot(
+        self._snapshot = LineSnapshot(
             self._tick,
-            shown,
+            tags,
             frozenset(names[place] for place in self._image.forced if place < len(names)),
             self._run,
             self._read_back,
@@ -268,8 +285,8 @@ class LineMirror:
 
     def lose(self, reason: str) -> None:
         """Mark the line as lost, for a reason. The latest snapshot stays."""
-        if self._shown.lost != reason:
-            self._shown = replace(self._shown, lost=reason)
+        if self._snapshot.lost != reason:
+            self._snapshot = replace(self._snapshot, lost=reason)
             self._listeners.tell()
 
     def add(self, event: Event) -> None:
@@ -298,18 +315,18 @@ class LineMirror:
         self._released = ()
 
     def _take_line(self, message: Any) -> None:
-        about = line_info(message)
-        self._strange = self._about is not None and self._about != about
-        if self._about is not None and self._strange:
+        info = line_info(message)
+        self._strange = self._info is not None and self._info != info
+        if self._info is not None and self._strange:
             self._forget(message.run_id)
             raise LineMirrorError(
-                f"{about.name}: another line than before, or with other tags; expected {self._about.name} as it was: "
+                f"{info.name}: another line than before, or with other tags; expected {self._info.name} as it was: "
                 "restart serving"
             )
-        if message.run_id != self._run_id or self._about is None:
+        if message.run_id != self._run_id or self._info is None:
             self._forget(message.run_id)
-        self._about, self._line = about, message
-        initial = {tag.name: tag.initial for tag in about.tags}
+        self._info, self._line = info, message
+        initial = {tag.name: tag.initial for tag in info.tags}
         self._initial = [initial.get(name, 0.0) for name in message.command_names]
         self._signal_names, self._command_names = tuple(message.signal_names), tuple(message.command_names)
 

@@ -53,7 +53,7 @@ SHORTEST = 0.005
 LIFE_SIGN = 0.5
 """Wall time after which a copy is sent without news, s, while the stepping thread is alive."""
 
-PICTURES = 0.02
+FRAME_INTERVAL = 0.02
 """Shortest wall time between two frames for drawing, s."""
 
 SHARE = 0.05
@@ -188,8 +188,8 @@ class _Process:
         self._handed = 0
         self._goals: deque[TargetRequest] = deque()
         self._goal: TargetRequest | None = None  # target that the line is advancing to
-        self._shown = self._pictured = ("", -1)  # run and tick of the latest copied signals and frame
-        self._next_picture = 0.0  # s of wall time
+        self._copied = self._framed = ("", -1)  # run and tick of the latest copied signals and frame
+        self._next_frame = 0.0  # s of wall time
 
     def run(self) -> None:
         """Run until the end is requested."""
@@ -234,26 +234,26 @@ class _Process:
         if self._goal is not None and simulation.tick < self._goal.target and not stepper.run.standstill:
             self._copies.live()  # ticks before the target are not shown
             return
-        if self._shown != (now := (stepper.run_id, simulation.tick)):
-            self._shown = now
+        if self._copied != (now := (stepper.run_id, simulation.tick)):
+            self._copied = now
             header = Header(simulation.tick, simulation.stamp_ns, FRAME)
             self._copies.write("signals", TOPICS["signals"].pack(simulation.line.signals(), header), header.stamp_ns)
-        if self._copies.watched and self._pictured != now and self._copies.sent:
-            self._take_picture(simulation, now)
+        if self._copies.watched and self._framed != now and self._copies.sent:
+            self._write_frame(simulation, now)
         self._copies.cut(self._handed, stepper.run.inbox.counts.waiting)
 
-    def _take_picture(self, simulation: Simulation, now: tuple[str, int]) -> None:
+    def _write_frame(self, simulation: Simulation, now: tuple[str, int]) -> None:
         """Write a frame for drawing as messages of topics, if the time for one has come."""
         began = time.monotonic()
-        if began < self._next_picture:
+        if began < self._next_frame:
             return
-        self._pictured = now
+        self._framed = now
         contacts = simulation.contacts()
         bottles = with_forces(simulation.bottles(), contacts)
         header = Header(simulation.tick, simulation.stamp_ns, FRAME)
         for topic, columns in (("bottles", bottles), ("contacts", contacts), ("belts", simulation.belts())):
             self._copies.write(topic, TOPICS[topic].pack(columns, header), header.stamp_ns)
-        self._next_picture = began + max(PICTURES, (time.monotonic() - began) / SHARE)
+        self._next_frame = began + max(FRAME_INTERVAL, (time.monotonic() - began) / SHARE)
 
     def _fail(self, error: Exception) -> None:
         text = str(error) if isinstance(error, ConveyorError) else f"{type(error).__name__}: {error}"
@@ -272,7 +272,7 @@ class _Process:
 
     def _do(self, request: InputRequest | TargetRequest | ControlRequest | VariablesRequest | DrawingRequest) -> None:
         if isinstance(request, DrawingRequest):
-            self._pictured = ("", -1)
+            self._framed = ("", -1)
             self._copies.watched = request.on
             return
         stepper = self._stepper

@@ -8,7 +8,6 @@ import time
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, suppress
 from dataclasses import replace
-from functools import partial
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -20,7 +19,7 @@ from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.commands.inputs import Input
 from conveyor_sim.line.run_state import ENDED, PAUSED, STOPPED
 from conveyor_sim.protocols.tags.handshake import TARGET, problem
-from conveyor_sim.protocols.tags.line_mirror import DRAWING_TOPICS, STATE_TOPICS, LineMirror, decoded
+from conveyor_sim.protocols.tags.line_mirror import LineMirror, decoded
 from conveyor_sim.protocols.tags.scene_messages import (
     PATIENCE,
     ControlRequest,
@@ -125,17 +124,17 @@ class SceneTagProvider(LineMirror, AbstractContextManager["SceneTagProvider"]):
 
     def control(self, what: Control, value: float, by: str) -> str:
         """Control the run in the name of `by`. Return the reason for a refusal, "" if the request was accepted."""
-        shown = self.shown
+        snapshot = self.snapshot
         if self._task.lockstep:
             return self._go(what, value)
         if what not in self.controls:
             return f"{what}: expected one of {', '.join(sorted(self.controls))} of a scene that is simulated"
-        if shown.lost:
-            return shown.lost
-        if what != "reset" and shown.run.state in (ENDED, STOPPED):
-            return f"the run has {shown.run.text}, expected a reset"
-        if what == "step" and shown.run.state != PAUSED:
-            return f"step: the run is {shown.run.text}, expected it to be paused"
+        if snapshot.lost:
+            return snapshot.lost
+        if what != "reset" and snapshot.run.state in (ENDED, STOPPED):
+            return f"the run has {snapshot.run.text}, expected a reset"
+        if what == "step" and snapshot.run.state != PAUSED:
+            return f"step: the run is {snapshot.run.text}, expected it to be paused"
         if what == "step" and not (value >= 1.0 and float(value).is_integer()):
             return f"step: {value:g} given, expected a whole number of ticks of at least 1"
         if what == "speed" and not 0.0 <= value <= 1e6:
@@ -150,12 +149,12 @@ class SceneTagProvider(LineMirror, AbstractContextManager["SceneTagProvider"]):
 
     def _go(self, what: Control, value: float) -> str:
         """Set the target together with the inputs before it. A target that was set before has no effect."""
-        shown, last = self.shown, self._task.scene.duration_ticks
-        if reason := problem(what, value, shown.tick) or shown.lost:
+        snapshot, last = self.snapshot, self._task.scene.duration_ticks
+        if reason := problem(what, value, snapshot.tick) or snapshot.lost:
             return reason
         if value > last:
             return f"{TARGET}: {value:g} given, expected at most {last}, the end of the run"
-        if shown.run.state == STOPPED:
+        if snapshot.run.state == STOPPED:
             return "the run has stopped, expected a reset"
         with self._lock:
             if value > self._target:
@@ -174,7 +173,7 @@ class SceneTagProvider(LineMirror, AbstractContextManager["SceneTagProvider"]):
 
     def discard(self) -> None:
         """Delete the recording of a line that has not passed a tick. Call it after close()."""
-        for folder in self.recordings if self.shown.tick == 0 else ():
+        for folder in self.recordings if self.snapshot.tick == 0 else ():
             for file in folder.iterdir():
                 file.unlink()
             folder.rmdir()
@@ -221,7 +220,7 @@ class SceneTagProvider(LineMirror, AbstractContextManager["SceneTagProvider"]):
             self.lose(reason)
             if self._closing or not self._begun:
                 self._failure = reason
-                if self._about is not None and not self._closing:  # otherwise `wait_for_line` raises it
+                if self._info is not None and not self._closing:  # otherwise `wait_for_line` raises it
                     self._say(f"{reason}; the scene is not restarted again")
                 return
             self._say(f"{reason}; the scene is restarted")
@@ -272,21 +271,12 @@ class SceneTagProvider(LineMirror, AbstractContextManager["SceneTagProvider"]):
                     return message.reason
 
     def _take_copy(self, copy: LineUpdate) -> None:
-        for topic in STATE_TOPICS:
-            if (data := copy.states.get(topic)) is not None:
-                self.take(topic, decoded(topic, data))
-                self.pass_on(topic, data)
-        for topic in DRAWING_TOPICS:
-            if (data := copy.states.get(topic)) is not None:
-                self.keep(topic, partial(decoded, topic, data))
-                self.pass_on(topic, data)
-        for data in copy.events:
-            self.take("events", decoded("events", data))
-            self.pass_on("events", data)
+        self.receive(copy.states, decoded)
+        self.receive_events(copy.events, decoded)
         with self._lock:
             self._handed, self._waiting = copy.handed, copy.waiting
         self._begun = self._begun or bool(copy.states)
-        if copy.states or copy.events or self.shown.lost:
+        if copy.states or copy.events or self.snapshot.lost:
             self.show(copy.at)
 
 

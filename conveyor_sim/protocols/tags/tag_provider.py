@@ -93,11 +93,11 @@ class TagProvider(Protocol):
     """Tags with their values, and an entry for inputs. Its methods may be called from any thread."""
 
     @property
-    def about(self) -> LineInfo:
+    def info(self) -> LineInfo:
         """Constant properties of the line."""
 
     @property
-    def shown(self) -> LineSnapshot:
+    def snapshot(self) -> LineSnapshot:
         """Latest snapshot of the line."""
 
     @property
@@ -105,14 +105,14 @@ class TagProvider(Protocol):
         """Requests that `control` accepts."""
 
     @property
-    def past(self) -> TagHistory | None:
+    def history(self) -> TagHistory | None:
         """History of the tags; None: no history is available."""
 
     def events(self, after: int) -> tuple[int, Sequence[Event]]:
         """Return the number of events so far, and the events after the first `after`, unless they are too old."""
 
     def listen(self, heard: Callable[[], None]) -> Callable[[], None]:
-        """Call `heard` after each change of `shown`, from any thread. Return a function that ends this.
+        """Call `heard` after each change of `snapshot`, from any thread. Return a function that ends this.
 
         `heard` must not block and must not raise.
         """
@@ -193,22 +193,22 @@ class SteppedTagProvider:
         image, scene = simulation.process_image, simulation.scene
         self._names = (*image.signal_names, *image.command_names)
         self._signal_names = image.signal_names
-        self._about = LineInfo(scene.name, scene.where, scene.tick, scene.start_time, image.tags)
+        self._info = LineInfo(scene.name, scene.where, scene.tick, scene.start_time, image.tags)
         self._alarms, self._read_back = simulation.line.alarms.columns(), simulation.line.read_back.columns()
         self._show()
 
     @property
-    def about(self) -> LineInfo:
+    def info(self) -> LineInfo:
         """Constant properties of the line."""
-        return self._about
+        return self._info
 
     @property
-    def shown(self) -> LineSnapshot:
+    def snapshot(self) -> LineSnapshot:
         """Snapshot at the end of the last tick."""
-        return self._shown
+        return self._snapshot
 
     @property
-    def past(self) -> TagHistory | None:
+    def history(self) -> TagHistory | None:
         """No history is available."""
         return None
 
@@ -257,7 +257,7 @@ class SteppedTagProvider:
         simulation = self._simulation
         signals = simulation.line.signals()
         values = [*signals.values.tolist(), *simulation.line.read_back.values]
-        self._shown = LineSnapshot(
+        self._snapshot = LineSnapshot(
             simulation.tick,
             dict(zip(self._names, values, strict=True)),
             frozenset(self._signal_names[place] for place in signals.forced),

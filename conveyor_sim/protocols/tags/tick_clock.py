@@ -11,10 +11,10 @@ from conveyor_sim.protocols.tags.tag_provider import LineInfo
 class TickClock:
     """Dates and times of ticks."""
 
-    def __init__(self, about: LineInfo, stamps: Stamps) -> None:
+    def __init__(self, info: LineInfo, stamps: Stamps) -> None:
         """Read the start time. stamps: kind of time for the time stamps of values."""
-        self._start = datetime.fromisoformat(about.start_time.replace("Z", "+00:00")).astimezone(timezone.utc)
-        self._tick = about.tick
+        self._start = datetime.fromisoformat(info.start_time.replace("Z", "+00:00")).astimezone(timezone.utc)
+        self._tick = info.tick
         self.is_simulated = stamps == "simulated"
 
     def simulated(self, tick: float) -> datetime:

@@ -50,9 +50,9 @@ class PageCommands:
 
     def __init__(self, source: DrawableProvider) -> None:
         self._source = source
-        tags = source.about.tags
+        tags = source.info.tags
         self._commands: Mapping[str, Tag] = {tag.name: tag for tag in tags if tag.role in COMMANDS}
-        self._receipt = Receipt(tags, source.about.where)
+        self._receipt = Receipt(tags, source.info.where)
         self.controls = source.controls - {"target"}  # the controller sets the target of a line in lockstep
         """Requests to control the run that pages may make."""
         self.writes = self.refused = 0
@@ -95,11 +95,11 @@ class PageCommands:
             return reason
         if refusal := refused_for_good(self._source, self._receipt, request):
             return refusal.reason
-        shown = self._source.shown
-        if shown.lost:
-            return shown.lost
-        if shown.run.state in TAKES_NO_INPUT:
-            return f"the run is {shown.run.text}, expected one that goes on"
+        snapshot = self._source.snapshot
+        if snapshot.lost:
+            return snapshot.lost
+        if snapshot.run.state in TAKES_NO_INPUT:
+            return f"the run is {snapshot.run.text}, expected one that goes on"
         if request.operation == SET and (reason := self._objection(request)):
             return reason
         return self._source.give(request)

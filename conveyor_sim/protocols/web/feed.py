@@ -48,7 +48,7 @@ class Feed:
         self._changed = asyncio.Event()
         self._ends: list[Any] = []
         self._task: asyncio.Task[None] | None = None
-        self._picture, self._shown = source.picture, source.shown
+        self._drawable, self._snapshot = source.frame, source.snapshot
         self._story = self._new_story()
         self._sent_at = 0.0
         self._due = False  # True if a message of events is scheduled
@@ -75,7 +75,7 @@ class Feed:
                     loop.call_soon_threadsafe(self._changed.set)
 
             self._ends = [self._source.watch(), self._source.listen(heard)]
-            self._picture, self._shown = self._source.picture, self._source.shown
+            self._drawable, self._snapshot = self._source.frame, self._source.snapshot
             self._story, (self._heard, _) = self._new_story(), self._source.events(0)
             self._status = {}
             self._task = asyncio.create_task(self._run())
@@ -111,8 +111,9 @@ class Feed:
             await asyncio.sleep(SHORTEST)
 
     def _follow(self) -> None:
-        before, self._picture, self._shown = self._shown, self._source.picture, self._source.shown
-        if self._shown.run_id != before.run_id or self._shown.tick < before.tick:  # another run, or a step back in time
+        before, self._drawable, self._snapshot = self._snapshot, self._source.frame, self._source.snapshot
+        present = self._snapshot
+        if present.run_id != before.run_id or present.tick < before.tick:  # another run, or a step back in time
             self._story, (self._heard, _) = self._new_story(), self._source.events(0)
             for viewer in self._viewers:
                 viewer.began = False
@@ -130,26 +131,26 @@ class Feed:
             if viewer.ready and not viewer.lagging and viewer.seen != (key := self._key()):
                 viewer.seen = key
                 viewer.show(self._frame_of(key))
-                self.longest = max(self.longest, time.time() - self._picture.at)
+                self.longest = max(self.longest, time.time() - self._drawable.at)
 
     def _begin(self, viewer: Viewer) -> None:
         """Send the complete present state of the line to a page."""
-        picture, line = self._picture, self._picture.line
+        drawable, line = self._drawable, self._drawable.line
         if self._head[0] is not line:
             scene = parse_scene(line.scene_text, "the scene of the line", parse_overrides(line.overrides))
             self._head = line, head(line, scene)
         times = {
-            "first": picture.tick,
-            "last": picture.tick,
+            "first": drawable.tick,
+            "last": drawable.tick,
             "block": block_ticks(int(line.tick_ns), BLOCK),
             "blocks": 1,
             "stories": 1,
         }
-        about = {**self._head[1], "times": times, "forced": picture.forced.tolist()}
+        about = {**self._head[1], "times": times, "forced": drawable.forced.tolist()}
         story = self._new_story()
         total, events = self._source.events(max(0, self._heard - MOST_PAST_EVENTS))
         story.look(
-            self._shown, picture, events[: len(events) - (total - self._heard)]
+            self._snapshot, drawable, events[: len(events) - (total - self._heard)]
         )  # later events follow in messages
         viewer.begin(text_message("begin", head=about, story=story.take(), status=self._status_now(), **self._about))
         viewer.began, viewer.seen = True, None
@@ -162,7 +163,7 @@ class Feed:
     def _look(self) -> None:
         """Collect new events with their ticks."""
         self._heard, events = self._source.events(self._heard)
-        self._story.look(self._shown, self._picture, events)
+        self._story.look(self._snapshot, self._drawable, events)
 
     def _send_all(self) -> None:
         """Send new events and status to the pages that have begun."""
@@ -180,40 +181,40 @@ class Feed:
                     viewer.tell(message)
 
     def _status_now(self) -> dict[str, Any]:
-        shown = self._shown
+        snapshot = self._snapshot
         return {
-            "lost": shown.lost or self._failure,
-            "run": shown.run.text,
-            "reason": shown.run.reason,
-            "owner": shown.owner,
+            "lost": snapshot.lost or self._failure,
+            "run": snapshot.run.text,
+            "reason": snapshot.run.reason,
+            "owner": snapshot.owner,
             "viewers": len(self._viewers),
             "servers": [{**health._asdict(), "text": health.text} for health in self._source.servers],
         }
 
     def _new_story(self) -> LineStory:
-        return LineStory(int(self._picture.line.tick_ns))
+        return LineStory(int(self._drawable.line.tick_ns))
 
     def _key(self) -> Any:
         """Return the key of the present frame, which changes with the frame."""
-        picture = self._picture
-        return self._shown.run_id, picture.tick, *picture.drawn.values()
+        drawable = self._drawable
+        return self._snapshot.run_id, drawable.tick, *drawable.drawn.values()
 
     def _frame_of(self, key: Any) -> bytes:
         if self._frame[0] != key:
-            self._frame = key, _packed(self._picture)
+            self._frame = key, _packed(self._drawable)
         return self._frame[1]
 
 
-def _packed(picture: DrawableFrame) -> bytes:
-    content = BlockContent(signals=[(picture.tick, picture.signals)])
-    drawn = {topic: decode() for topic, decode in picture.drawn.items() if topic in ("bottles", "contacts", "belts")}
+def _packed(drawable: DrawableFrame) -> bytes:
+    content = BlockContent(signals=[(drawable.tick, drawable.signals)])
+    drawn = {topic: decode() for topic, decode in drawable.drawn.items() if topic in ("bottles", "contacts", "belts")}
     if (message := drawn.get("bottles")) is not None:
         content.bottles.append((int(message.tick), TOPICS["bottles"].unpack(message)))
     if (message := drawn.get("contacts")) is not None:
         content.contacts.append((int(message.tick), TOPICS["contacts"].unpack(message)))
     if (message := drawn.get("belts")) is not None:
         content.belts.append((int(message.tick), message.actual))
-    return struct.pack("<Bdd", FRAME, picture.tick, picture.at) + pack(content, picture.tick)
+    return struct.pack("<Bdd", FRAME, drawable.tick, drawable.at) + pack(content, drawable.tick)
 
 
 def text_message(kind: str, **fields: Any) -> bytes:

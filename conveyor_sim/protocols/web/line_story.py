@@ -21,20 +21,20 @@ class LineStory(Story):
         super().__init__(lambda tick: tick * tick_ns * 1e-9, COUNTERS)
         self._seen: dict[str, Any] = {}
 
-    def look(self, shown: LineSnapshot, picture: DrawableFrame, events: Sequence[Event]) -> None:
+    def look(self, snapshot: LineSnapshot, drawable: DrawableFrame, events: Sequence[Event]) -> None:
         """Add events, and what has changed since the last call."""
-        latest: dict[str, Any] = {"alarm_states": shown.alarms, "readback": shown.read_back}
-        latest |= {topic: picture.drawn.get(topic) for topic in ("counters", "rail_wear")}
+        latest: dict[str, Any] = {"alarm_states": snapshot.alarms, "readback": snapshot.read_back}
+        latest |= {topic: drawable.drawn.get(topic) for topic in ("counters", "rail_wear")}
         new = {topic: what for topic, what in latest.items() if what is not None and what is not self._seen.get(topic)}
         self._seen |= new
         if (columns := event_columns(events, len(events))) is not None:
-            self.add("events", columns, shown.tick)
+            self.add("events", columns, snapshot.tick)
         for topic, what in new.items():
             if callable(what):
                 what = what()
                 self.add(topic, what, int(what.tick))
             else:
-                self.add(topic, what, shown.tick)
+                self.add(topic, what, snapshot.tick)
 
     def _readback(self, message: Any, time: float) -> None:
         """Add the commands with the ticks of their last changes, which may be before the first call."""

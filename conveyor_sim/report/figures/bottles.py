@@ -15,7 +15,7 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 
 from conveyor_sim.report.figures import style
-from conveyor_sim.report.figures.data import Floats, Frame
+from conveyor_sim.report.figures.data import Floats, PlantFrame
 
 Z_BOTTLE: Final = 3.0
 Z_MARK: Final = 3.2
@@ -32,7 +32,7 @@ class ForceScale:
     examples: tuple[float, ...]
 
     @classmethod
-    def covering(cls, frames: Sequence[Frame], widest: float, peak: float = 0.0) -> ForceScale | None:
+    def covering(cls, frames: Sequence[PlantFrame], widest: float, peak: float = 0.0) -> ForceScale | None:
         """Return the scale at which the largest force of `frames` is `widest` points wide; None without forces.
 
         `peak` (N) is the largest force of the complete run: if all forces are far below it, their lines are narrower.
@@ -60,7 +60,7 @@ class ForceScale:
         )
 
 
-def speed_scale(frames: Sequence[Frame]) -> Normalize:
+def speed_scale(frames: Sequence[PlantFrame]) -> Normalize:
     """Colours from rest to the fastest belt of `frames`, or to what few bottles exceed if that is more.
 
     The few that were shot off in a collision would otherwise make all others look slow.
@@ -71,7 +71,7 @@ def speed_scale(frames: Sequence[Frame]) -> Normalize:
     return Normalize(0.0, 1.05 * top if top > 0.0 else 1.0)
 
 
-def draw_bottles(ax: Axes, frame: Frame, norm: Normalize, edge: float) -> list[EllipseCollection]:
+def draw_bottles(ax: Axes, frame: PlantFrame, norm: Normalize, edge: float) -> list[EllipseCollection]:
     """Circles to scale, one collection a radius; `edge` is the width of their outline in points."""
     drawn = []
     for radius in np.unique(frame.radius):
@@ -95,7 +95,7 @@ def draw_bottles(ax: Axes, frame: Frame, norm: Normalize, edge: float) -> list[E
     return drawn
 
 
-def draw_orientation(ax: Axes, frame: Frame, norm: Normalize, width: float) -> LineCollection:
+def draw_orientation(ax: Axes, frame: PlantFrame, norm: Normalize, width: float) -> LineCollection:
     """Draw a tick from half the radius to the rim at each bottle's angle, light on dark; `width` in points."""
     ray = np.stack([np.cos(frame.theta), np.sin(frame.theta)], axis=1)
     axis = np.stack([frame.x, frame.y], axis=1)
@@ -111,7 +111,7 @@ def draw_orientation(ax: Axes, frame: Frame, norm: Normalize, width: float) -> L
     return ticks
 
 
-def draw_forces(ax: Axes, frame: Frame, scale: ForceScale) -> LineCollection:
+def draw_forces(ax: Axes, frame: PlantFrame, scale: ForceScale) -> LineCollection:
     """Lines between what touches, as wide as the normal force; those too thin to see are left out."""
     contacts = frame.contacts
     lines: Floats = np.empty((0, 2, 2)) if contacts is None else contacts.lines

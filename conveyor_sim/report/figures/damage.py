@@ -16,7 +16,7 @@ from matplotlib.ticker import MaxNLocator
 
 from conveyor_sim.columns.damage import RailWearColumns
 from conveyor_sim.report.figures import style
-from conveyor_sim.report.figures.data import Damage, Floats, Plant
+from conveyor_sim.report.figures.data import Damage, Floats, StaticGeometry
 from conveyor_sim.report.figures.heading import heading
 from conveyor_sim.report.figures.marks import draw_entries, draw_exits
 from conveyor_sim.report.figures.plant import Z_RAIL, draw_belts, draw_rails, draw_travel
@@ -37,7 +37,7 @@ _POINTS_A_BIN: Final = 5
 _BARS: Final = 30
 
 
-def rails_figure(plant: Plant, damage: Damage, title: str) -> Figure:
+def rails_figure(plant: StaticGeometry, damage: Damage, title: str) -> Figure:
     """Two maps of the plant: mean pressure on the rails (N/m) since the start, and sliding work a metre (J/m)."""
     x0, y0, x1, y1 = plant.bounds()
     margin = 0.06 * max(x1 - x0, y1 - y0)
@@ -85,7 +85,7 @@ def bottles_figure(damage: Damage, title: str) -> Figure:
     return figure
 
 
-def bin_lines(plant: Plant, wear: RailWearColumns) -> list[Floats]:
+def bin_lines(plant: StaticGeometry, wear: RailWearColumns) -> list[Floats]:
     """Return the polyline (k, 2) of each bin, m, in the order of the columns."""
     lines = []
     for rail in dict.fromkeys(wear.rail.tolist()):
@@ -114,7 +114,7 @@ def _draw_heat(ax: Axes, lines: list[Floats], values: Floats, gid: str, unit: st
     bar.outline.set_visible(False)
 
 
-def _most(plant: Plant, wear: RailWearColumns, values: Floats, unit: str) -> str:
+def _most(plant: StaticGeometry, wear: RailWearColumns, values: Floats, unit: str) -> str:
     if not values.any():
         return "none"
     index = int(np.argmax(values))

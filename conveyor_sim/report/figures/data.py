@@ -24,7 +24,7 @@ _OUTLINE_POINTS = 96
 
 
 @dataclass(frozen=True)
-class Plant:
+class StaticGeometry:
     """Static geometry: belts with initial speeds (m/s), rails in listing order, device markers."""
 
     belts: tuple[BeltShape, ...]
@@ -33,7 +33,7 @@ class Plant:
     marks: tuple[Mark, ...] = ()
 
     @classmethod
-    def of(cls, scene: Scene) -> Plant:
+    def of(cls, scene: Scene) -> StaticGeometry:
         """Return the static geometry of `scene`."""
         return cls(
             belts=tuple(belt_shapes(scene)),
@@ -46,7 +46,7 @@ class Plant:
         """Return the markers of one look."""
         return [mark for mark in self.marks if mark.look == look]
 
-    def with_moving(self, moving: Sequence[RailShape]) -> Plant:
+    def with_moving(self, moving: Sequence[RailShape]) -> StaticGeometry:
         """Return a copy with the moving rails, which come last, at other positions."""
         return replace(self, rails=(*self.rails[: len(self.rails) - len(moving)], *moving))
 
@@ -78,7 +78,7 @@ class Contacts:
 
 
 @dataclass(frozen=True)
-class Frame:
+class PlantFrame:
     """The line at one instant: `time` in s; columns (n,) of bottles in m, rad, m/s; the belts' speeds in m/s.
 
     `contacts` is None if none were recorded, which is not the same as none being closed.
@@ -96,7 +96,7 @@ class Frame:
     """Gates, pushers and diverters; none: they are as at first."""
 
     @classmethod
-    def start_of(cls, scene: Scene) -> Frame:
+    def start_of(cls, scene: Scene) -> PlantFrame:
         """Return the initial bottles of `scene`, with all belts at their initial speeds."""
         born = list(initial_bottles(scene))
         state = np.array([row[1:] for row in born], dtype=np.float64).reshape(len(born), 6)
@@ -110,7 +110,7 @@ class Frame:
             belt_speeds=np.array([belt.speed for belt in scene.belts.values()], dtype=np.float64),
         )
 
-    def within(self, box: tuple[float, float, float, float]) -> Frame:
+    def within(self, box: tuple[float, float, float, float]) -> PlantFrame:
         """Return the frame restricted to a box.
 
         The result has the bottles that reach into `box` (x0, y0, x1, y1) and the contacts that start in it.
@@ -127,7 +127,7 @@ class Frame:
             start = contacts.lines[:, 0]
             inside = (start[:, 0] >= x0) & (start[:, 0] <= x1) & (start[:, 1] >= y0) & (start[:, 1] <= y1)
             contacts = Contacts(contacts.lines[inside], contacts.force[inside])
-        return Frame(
+        return PlantFrame(
             self.time,
             self.x[keep],
             self.y[keep],
@@ -170,7 +170,7 @@ class Flow:
 
 
 @dataclass(frozen=True)
-class PeakForce:
+class PeakForceSeries:
     """Peak contact force (N) over the bottles, of the interval that ends at `time` (n,) s: largest and 99th percentile.
 
     `bottle` (n,) is the id of the bottle with the largest, -1 where there is no bottle.
@@ -183,7 +183,7 @@ class PeakForce:
 
 
 @dataclass(frozen=True)
-class Energy:
+class EnergySeries:
     """The energy ledger over time (s), J, each (n,): as in conveyor_msgs/Ledger; `belts` (n, belts) is their work."""
 
     time: Floats

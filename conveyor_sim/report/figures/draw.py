@@ -7,7 +7,7 @@ from pathlib import Path
 
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.report.figures import style
-from conveyor_sim.report.figures.data import Frame, Plant
+from conveyor_sim.report.figures.data import PlantFrame, StaticGeometry
 from conveyor_sim.report.figures.files import write
 from conveyor_sim.report.figures.heading import note_forced
 from conveyor_sim.report.figures.line_efficiency import efficiency_figure
@@ -66,4 +66,4 @@ def plot_scene(scene: Scene, path: str | Path) -> Path:
     path = Path(path)
     stem = path.with_suffix("") if path.suffix in (".png", ".svg") else path
     with style.look():
-        return style.save(scene_figure(Plant.of(scene), Frame.start_of(scene), scene.name), stem)[0]
+        return style.save(scene_figure(StaticGeometry.of(scene), PlantFrame.start_of(scene), scene.name), stem)[0]

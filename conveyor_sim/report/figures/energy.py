@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from conveyor_sim.report.figures import style
-from conveyor_sim.report.figures.data import Energy, Floats
+from conveyor_sim.report.figures.data import EnergySeries, Floats
 from conveyor_sim.report.figures.heading import heading
 
 _BELTS: Final = len(style.SERIES) - 2  # that have a curve of their own, beside bottles and the other belts
@@ -18,7 +18,7 @@ _BELTS: Final = len(style.SERIES) - 2  # that have a curve of their own, beside 
 Curve = tuple[str, Floats]
 
 
-def energy_figure(energy: Energy, belts: Sequence[str]) -> Figure:
+def energy_figure(energy: EnergySeries, belts: Sequence[str]) -> Figure:
     """Work of the belts that do most and of moving rails, what bottles brought; what is held; what went; the residual.
 
     Accounts in which nothing ever was are left out.

@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from conveyor_sim.report.figures import style
-from conveyor_sim.report.figures.data import Floats, Flow, PeakForce
+from conveyor_sim.report.figures.data import Floats, Flow, PeakForceSeries
 
 _WINDOWS: Final = 10  # in a run: a rate is counted over this part of it
 
@@ -59,7 +59,7 @@ def flow_figure(flow: Flow, belts: Sequence[str]) -> Figure:
     return figure
 
 
-def force_figure(force: PeakForce) -> Figure:
+def force_figure(force: PeakForceSeries) -> Figure:
     """Largest and 99th percentile of the bottles' peak contact forces in each interval of output, N."""
     figure = style.new_figure(11.0, 3.9)
     ax = figure.subplots()

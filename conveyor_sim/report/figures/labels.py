@@ -13,7 +13,7 @@ from matplotlib.path import Path as Outline
 from numpy.typing import NDArray
 
 from conveyor_sim.report.figures import style
-from conveyor_sim.report.figures.data import Floats, Plant
+from conveyor_sim.report.figures.data import Floats, StaticGeometry
 from conveyor_sim.report.figures.marks import COLOURS
 from conveyor_sim.scene.geometry import BeltShape
 
@@ -40,7 +40,7 @@ class Label:
     on_belt: float = 1.0
 
 
-def belt_labels(plant: Plant, speeds: Floats) -> list[Label]:
+def belt_labels(plant: StaticGeometry, speeds: Floats) -> list[Label]:
     """Name and speed of every belt, beside it."""
     labels = []
     for shape, speed in zip(plant.belts, speeds, strict=True):
@@ -49,7 +49,7 @@ def belt_labels(plant: Plant, speeds: Floats) -> list[Label]:
     return labels
 
 
-def rail_labels(plant: Plant) -> list[Label]:
+def rail_labels(plant: StaticGeometry) -> list[Label]:
     """Names of the rails that the scene lists; those of curved belts carry their belt's name already."""
     derived = {f"{belt.name}_{side}" for belt in plant.belts for side in ("inner", "outer")}
     labels = []
@@ -67,7 +67,7 @@ def rail_labels(plant: Plant) -> list[Label]:
     return labels
 
 
-def mark_labels(plant: Plant) -> list[Label]:
+def mark_labels(plant: StaticGeometry) -> list[Label]:
     """Names of where bottles enter and leave."""
     labels = [
         Label(f"{mark.word} {mark.name}", COLOURS["entry"], 9.0, np.repeat(mark.points, 8, axis=0), _AROUND)
@@ -79,7 +79,7 @@ def mark_labels(plant: Plant) -> list[Label]:
     return labels
 
 
-def sensor_labels(plant: Plant) -> list[Label]:
+def sensor_labels(plant: StaticGeometry) -> list[Label]:
     """Names of all other marks: off the ends of a line, on the sides of a region."""
     labels = []
     for mark in plant.marks:
@@ -103,7 +103,7 @@ def _beyond(ends: Floats) -> tuple[Floats, Floats]:
     return ends[::-1], away / np.hypot(*away.T).clip(1e-12)[:, None]
 
 
-def place(ax: Axes, labels: Sequence[Label], plant: Plant, circles: Floats | None = None) -> None:
+def place(ax: Axes, labels: Sequence[Label], plant: StaticGeometry, circles: Floats | None = None) -> None:
     """Put each label at the anchor where it covers the least, in the given order; `circles` (n, 2) in m are bottles.
 
     The axes must have their final limits; the figure is laid out here.
@@ -168,7 +168,7 @@ def _sides(shape: BeltShape) -> tuple[Floats, Floats]:
 
 
 def _taken(
-    ax: Axes, plant: Plant, circles: Floats | None, columns: int, rows: int, x0: float, y0: float
+    ax: Axes, plant: StaticGeometry, circles: Floats | None, columns: int, rows: int, x0: float, y0: float
 ) -> tuple[Floats, Floats]:
     """Two maps (rows, columns) of cells of the axes: 1 where a line, a mark or a bottle is, and 1 where a belt is."""
     x, y = np.meshgrid(x0 + (np.arange(columns) + 0.5) * _CELL, y0 + (np.arange(rows) + 0.5) * _CELL)

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 
 from conveyor_sim.report.figures import style
-from conveyor_sim.report.figures.data import Floats, Plant
+from conveyor_sim.report.figures.data import Floats, StaticGeometry
 from conveyor_sim.scene.parts.device_part import Look
 
 Z_ZONE: Final = 1.3
@@ -27,7 +27,7 @@ COLOURS: Final[Mapping[Look, str]] = {
 }
 
 
-def draw_sensors(ax: Axes, plant: Plant, size: float) -> None:
+def draw_sensors(ax: Axes, plant: StaticGeometry, size: float) -> None:
     """Beams dashed between two squares; passages full, with an arrow of `size` m forward; checks full between two
     diamonds; regions dotted around.
     """
@@ -66,7 +66,7 @@ def draw_sensors(ax: Axes, plant: Plant, size: float) -> None:
         ax.add_collection(outlines)
 
 
-def draw_exits(ax: Axes, plant: Plant) -> None:
+def draw_exits(ax: Axes, plant: StaticGeometry) -> None:
     """One hatched region an exit."""
     regions = [mark.points for mark in plant.drawn_as("exit")]
     if regions:
@@ -84,7 +84,7 @@ def draw_exits(ax: Axes, plant: Plant) -> None:
         )
 
 
-def draw_entries(ax: Axes, plant: Plant, size: float) -> None:
+def draw_entries(ax: Axes, plant: StaticGeometry, size: float) -> None:
     """One full triangle of height `size` m an entry: its tip is where bottles appear, and points where they go."""
     triangles = []
     for mark in plant.drawn_as("entry"):

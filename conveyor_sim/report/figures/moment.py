@@ -17,7 +17,7 @@ from matplotlib.ticker import MaxNLocator
 from conveyor_sim.line.tag import Kind
 from conveyor_sim.report.figures import style
 from conveyor_sim.report.figures.bottles import speed_scale
-from conveyor_sim.report.figures.data import Floats, Frame, Plant
+from conveyor_sim.report.figures.data import Floats, PlantFrame, StaticGeometry
 from conveyor_sim.report.figures.heading import heading, note_forced
 from conveyor_sim.report.figures.labels import belt_labels, mark_labels, place, sensor_labels
 from conveyor_sim.report.figures.marks import Z_LINE
@@ -43,7 +43,7 @@ class Trace:
 
 
 @dataclass(frozen=True)
-class Event:
+class MarkedEvent:
     """A time (s) to mark in the traces, in words."""
 
     time: float
@@ -51,14 +51,14 @@ class Event:
 
 
 def moment_figure(
-    plant: Plant,
-    frame: Frame,
+    plant: StaticGeometry,
+    frame: PlantFrame,
     title: str,
     text: str,
     blocked: Collection[str],
     time: Floats,
     traces: Sequence[Trace],
-    events: Sequence[Event] = (),
+    events: Sequence[MarkedEvent] = (),
     forced: Sequence[str] = (),
 ) -> Figure:
     """Draw the plant at the time of `frame`, with one trace per row below it, over `time` (n,) s up to that time.
@@ -98,14 +98,14 @@ def moment_figure(
     return figure
 
 
-def _speeds(plant: Plant, frame: Frame) -> Normalize:
+def _speeds(plant: StaticGeometry, frame: PlantFrame) -> Normalize:
     """Colours from rest to the fastest there is, or was at first: what has come to rest must look it."""
     norm = speed_scale([frame])
     fastest = 1.05 * float(np.abs(plant.speeds).max(initial=0.0))
     return Normalize(0.0, max(norm.vmax or 0.0, fastest)) if fastest else norm
 
 
-def _draw_blocked(ax: Axes, plant: Plant, blocked: Collection[str]) -> LineCollection:
+def _draw_blocked(ax: Axes, plant: StaticGeometry, blocked: Collection[str]) -> LineCollection:
     """Draw the beams of blocked photo-eyes, broad and opaque."""
     beams = [mark.points for mark in plant.marks if mark.kind == "photo_eye" and mark.name in blocked]
     lines = LineCollection(beams, colors=style.PHOTO_EYE, linewidths=4.0, zorder=Z_LINE, gid="blocked")
@@ -137,7 +137,7 @@ def _draw_trace(ax: Axes, trace: Trace, time: Floats, colour: str) -> None:
     ax.annotate(words, (1.005, 0.5), xycoords="axes fraction", fontsize=8.5, color=colour, va="center", weight="bold")
 
 
-def _name_events(ax: Axes, events: Sequence[Event]) -> None:
+def _name_events(ax: Axes, events: Sequence[MarkedEvent]) -> None:
     """Write the texts of events above the first row, one per line, each connected to its time."""
     low, high = ax.get_xlim()
     for number, event in enumerate(reversed(events)):

@@ -11,7 +11,7 @@ from matplotlib.colors import Normalize
 from matplotlib.path import Path as Outline
 
 from conveyor_sim.report.figures import style
-from conveyor_sim.report.figures.data import Floats, Plant
+from conveyor_sim.report.figures.data import Floats, StaticGeometry
 from conveyor_sim.report.figures.marks import draw_entries, draw_exits, draw_sensors
 from conveyor_sim.scene.geometry import BeltShape
 
@@ -20,7 +20,7 @@ Z_CHEVRON: Final = 1.2
 Z_RAIL: Final = 4.0
 
 
-def draw_plant(ax: Axes, plant: Plant, speeds: Floats, norm: Normalize, size: float) -> None:
+def draw_plant(ax: Axes, plant: StaticGeometry, speeds: Floats, norm: Normalize, size: float) -> None:
     """Draw belts, travel, rails and marks of `plant` in m.
 
     `speeds` (belts,) in m/s at that instant; `norm` maps a speed in m/s to a colour of the speed scale; `size` in m
@@ -35,7 +35,7 @@ def draw_plant(ax: Axes, plant: Plant, speeds: Floats, norm: Normalize, size: fl
     ax.set_aspect("equal")
 
 
-def draw_belts(ax: Axes, plant: Plant, speeds: Floats, norm: Normalize) -> PolyCollection:
+def draw_belts(ax: Axes, plant: StaticGeometry, speeds: Floats, norm: Normalize) -> PolyCollection:
     """One area a belt, in listing order, tinted with its speed: a bottle of stronger tint than its belt slides."""
     collection = PolyCollection(
         [plant.belt_outline(i) for i in range(len(plant.belts))],
@@ -49,7 +49,7 @@ def draw_belts(ax: Axes, plant: Plant, speeds: Floats, norm: Normalize) -> PolyC
     return collection
 
 
-def draw_travel(ax: Axes, plant: Plant, speeds: Floats, size: float) -> LineCollection:
+def draw_travel(ax: Axes, plant: StaticGeometry, speeds: Floats, size: float) -> LineCollection:
     """Chevrons that point where the surface of each belt travels; a belt at rest gets none.
 
     Where belts overlap, only the one that carries shows its travel.
@@ -101,7 +101,7 @@ def _spread(length: float, spacing: float) -> Floats:
     return np.asarray((np.arange(count) + 0.5) * (length / count), dtype=np.float64)
 
 
-def draw_rails(ax: Axes, plant: Plant) -> LineCollection:
+def draw_rails(ax: Axes, plant: StaticGeometry) -> LineCollection:
     """One line a rail, in the order of the rails' indices."""
     collection = LineCollection(
         [plant.rail_line(i) for i in range(len(plant.rails))],

@@ -17,7 +17,17 @@ from conveyor_sim.columns.bottles import BottleColumns, ContactColumns
 from conveyor_sim.columns.damage import DamageColumns, RailWearColumns
 from conveyor_sim.columns.ledger import Ledger
 from conveyor_sim.errors import BagError, ConveyorError
-from conveyor_sim.report.figures.data import Contacts, Damage, Energy, Floats, Flow, Frame, PeakForce, Plant, Velocity
+from conveyor_sim.report.figures.data import (
+    Contacts,
+    Damage,
+    EnergySeries,
+    Floats,
+    Flow,
+    PeakForceSeries,
+    PlantFrame,
+    StaticGeometry,
+    Velocity,
+)
 from conveyor_sim.scene import Scene, parse_overrides, parse_scene
 from conveyor_sim.scene.geometry import RailShape, initial_bottles
 from conveyor_sim.scene.moving import moving_shapes
@@ -36,7 +46,7 @@ class _Summary:
     ticks: Integers
     ids: Integers
     flow: Flow
-    peak_force: PeakForce
+    peak_force: PeakForceSeries
 
 
 class Recording:
@@ -50,7 +60,7 @@ class Recording:
         if not bag.counts.get("bottles"):
             raise BagError(f"{bag.path}: no message of topic bottles, expected at least one to draw")
         self.scene = _scene(bag)
-        self.plant = Plant.of(self.scene)
+        self.plant = StaticGeometry.of(self.scene)
         self.belts: tuple[str, ...] = tuple(bag.line.belts)
         self._initial = len(list(initial_bottles(self.scene)))
 
@@ -60,7 +70,7 @@ class Recording:
         return self._summary.flow
 
     @property
-    def peak_force(self) -> PeakForce:
+    def peak_force(self) -> PeakForceSeries:
         """Peak contact force over the bottles, at every recorded Bottles."""
         return self._summary.peak_force
 
@@ -70,7 +80,7 @@ class Recording:
         return forced_signals(self._bag)
 
     @property
-    def energy(self) -> Energy | None:
+    def energy(self) -> EnergySeries | None:
         """The energy ledger, at every recorded one; None if there is none."""
         frames = list(self._bag.read("ledger"))
         if not frames:
@@ -83,7 +93,7 @@ class Recording:
         belts = values.pop("belt_work")[:, :-1]
         rails = values.pop("rail_work").sum(axis=1)
         time = np.array([frame.time for frame in frames], dtype=np.float64)
-        return Energy(time=time, belts=belts, rails=rails, **values)
+        return EnergySeries(time=time, belts=belts, rails=rails, **values)
 
     @property
     def damage(self) -> Damage | None:
@@ -115,7 +125,7 @@ class Recording:
             limits=limits,
         )
 
-    def frames(self, times: Sequence[float] | None) -> list[Frame]:
+    def frames(self, times: Sequence[float] | None) -> list[PlantFrame]:
         """Return the recorded frames nearest to `times` (s), in ascending order, without repetition.
 
         Default: a quarter, half, three quarters and the end of the recording.
@@ -164,8 +174,8 @@ class Recording:
             for bottle in bottles
         ]
 
-    def _frame(self, tick: int, bottles: BottleColumns, contacts: ContactColumns | None) -> Frame:
-        return Frame(
+    def _frame(self, tick: int, bottles: BottleColumns, contacts: ContactColumns | None) -> PlantFrame:
+        return PlantFrame(
             time=self._bag.time(tick),
             x=bottles.x,
             y=bottles.y,
@@ -264,7 +274,7 @@ class Recording:
             entered=np.cumsum(np.array(entered, dtype=np.int64), axis=0),
         )
         force = np.array(forces, dtype=np.float64)
-        peak = PeakForce(time, force[:, 0], force[:, 1], force[:, 2].astype(np.int64))
+        peak = PeakForceSeries(time, force[:, 0], force[:, 1], force[:, 2].astype(np.int64))
         return _Summary(tick_array, seen, flow, peak)
 
 

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from conveyor_sim.report.figures import style
 from conveyor_sim.report.figures.bottles import ForceScale, draw_bottles, draw_forces, draw_orientation, speed_scale
-from conveyor_sim.report.figures.data import Frame, Plant, box_around
+from conveyor_sim.report.figures.data import PlantFrame, StaticGeometry, box_around
 from conveyor_sim.report.figures.labels import belt_labels, mark_labels, place, rail_labels, sensor_labels
 from conveyor_sim.report.figures.plant import draw_plant
 
@@ -27,7 +27,7 @@ _POINTS: Final = 72.0  # an inch
 _MANY: Final = 5000
 
 
-def table_figure(plant: Plant, frames: Sequence[Frame], title: str, peak: float = 0.0) -> Figure:
+def table_figure(plant: StaticGeometry, frames: Sequence[PlantFrame], title: str, peak: float = 0.0) -> Figure:
     """One panel a frame of the region around the widest belt, all on the same scales of speed and force.
 
     `peak` (N) is the largest force of the run, see ForceScale.
@@ -56,7 +56,7 @@ def table_figure(plant: Plant, frames: Sequence[Frame], title: str, peak: float 
     return figure
 
 
-def plant_figure(plant: Plant, frame: Frame, title: str, peak: float = 0.0) -> Figure:
+def plant_figure(plant: StaticGeometry, frame: PlantFrame, title: str, peak: float = 0.0) -> Figure:
     """Draw the complete plant at the time of `frame`, with names and speeds of the belts.
 
     `peak` (N) is the largest force of the run, see ForceScale.
@@ -80,7 +80,7 @@ def plant_figure(plant: Plant, frame: Frame, title: str, peak: float = 0.0) -> F
     return figure
 
 
-def scene_figure(plant: Plant, frame: Frame, title: str) -> Figure:
+def scene_figure(plant: StaticGeometry, frame: PlantFrame, title: str) -> Figure:
     """Draw the plant of a scene with the names of rails and the initial bottles."""
     box = whole_region(plant, [frame])
     width, height = box[2] - box[0], box[3] - box[1]
@@ -97,7 +97,7 @@ def scene_figure(plant: Plant, frame: Frame, title: str) -> Figure:
     return figure
 
 
-def table_region(plant: Plant, frames: Sequence[Frame]) -> Box:
+def table_region(plant: StaticGeometry, frames: Sequence[PlantFrame]) -> Box:
     """Return the box around the widest belt plus one bottle width; the complete plant if that is nearly as large."""
     if not plant.belts:
         return whole_region(plant, frames)
@@ -113,7 +113,13 @@ def table_region(plant: Plant, frames: Sequence[Frame]) -> Box:
 
 
 def draw_view(
-    ax: Axes, plant: Plant, frame: Frame, norm: Normalize, forces: ForceScale | None, box: Box, inches: float
+    ax: Axes,
+    plant: StaticGeometry,
+    frame: PlantFrame,
+    norm: Normalize,
+    forces: ForceScale | None,
+    box: Box,
+    inches: float,
 ) -> None:
     """Plant, bottles and forces within `box`, on axes that will be about `inches` wide."""
     points_per_metre = inches * _POINTS / (box[2] - box[0])
@@ -133,7 +139,7 @@ def draw_view(
     ax.set_ylabel("y (m)")
 
 
-def _lighten(axes: Iterable[Axes], frames: Sequence[Frame]) -> None:
+def _lighten(axes: Iterable[Axes], frames: Sequence[PlantFrame]) -> None:
     """Rasterise the bottles and forces of figures that show very many, to keep the SVG small."""
     drawn = sum(2 * len(frame.x) + (len(frame.contacts.force) if frame.contacts else 0) for frame in frames)
     if drawn > _MANY:
@@ -143,14 +149,14 @@ def _lighten(axes: Iterable[Axes], frames: Sequence[Frame]) -> None:
                     collection.set_rasterized(True)
 
 
-def force_scale(frames: Sequence[Frame], points_per_metre: float, peak: float) -> ForceScale | None:
+def force_scale(frames: Sequence[PlantFrame], points_per_metre: float, peak: float) -> ForceScale | None:
     """Return a scale at which the largest force is as wide as half a bottle, so that force chains stay distinct."""
     radii = np.concatenate([frame.radius for frame in frames]) if frames else np.empty(0)
     radius = float(np.median(radii)) if len(radii) else 0.0
     return ForceScale.covering(frames, float(np.clip(radius * points_per_metre, 1.5, 7.0)), peak)
 
 
-def whole_region(plant: Plant, frames: Sequence[Frame], share: float = 0.09) -> Box:
+def whole_region(plant: StaticGeometry, frames: Sequence[PlantFrame], share: float = 0.09) -> Box:
     """Return the box around plant and bottles and a margin, of `share` of its size, for names.
 
     A single point gets a box of SMALLEST m around it; an empty plant gets that box around the origin.
@@ -180,7 +186,7 @@ def _columns(panels: int, aspect: float) -> int:
 
 
 def colour_bar(
-    figure: Figure, axes: Sequence[Axes], frames: Sequence[Frame], norm: Normalize, orientation: Orientation
+    figure: Figure, axes: Sequence[Axes], frames: Sequence[PlantFrame], norm: Normalize, orientation: Orientation
 ) -> None:
     fastest = max(float(frame.speed.max(initial=0.0)) for frame in frames)
     bar = figure.colorbar(
@@ -201,7 +207,7 @@ def _heading(figure: Figure, title: str) -> None:
     figure.suptitle(title, x=0.01, ha="left", fontsize=13.0, fontweight="bold")
 
 
-def instant(frame: Frame) -> str:
+def instant(frame: PlantFrame) -> str:
     """Time and number of bottles, in words; hundredths of a second unless the tick is finer."""
     hundredths = abs(frame.time - round(frame.time, 2)) < 1e-9
     bottles = "1 bottle" if len(frame.x) == 1 else f"{len(frame.x)} bottles"

@@ -1,1 +1,1 @@
-"""The parts of a scene that become devices, one a file: fields, what can be wrong with them, how they are drawn."""
+"""Parts of a scene that become devices, one per file: fields, checks, and marks."""

@@ -1,4 +1,4 @@
-"""Alarms: what a scene file, a controller or the line declares of one (ISA-18.2)."""
+"""Alarms (ISA-18.2): declarations in a scene file, by a controller or by the line."""
 
 from collections.abc import Iterator
 from typing import Annotated, Literal, get_args
@@ -15,22 +15,22 @@ AlarmClass = Literal["error", "warning", "message"]
 CLASSES: tuple[AlarmClass, ...] = get_args(AlarmClass)
 
 PRIORITIES = {"error": 800, "warning": 500, "message": 200}
-"""Of the classes, where an alarm has none of its own: in the ranges of severity that OPC 40083 gives."""
+"""Default priorities by class, in the ranges of severity of OPC 40083."""
 
 LONGEST_DELAY = 86_400
-"""s, a day: of delays and of shelving."""
+"""Longest delay and shelving time, s: a day."""
 
 MOST_CAUSES = 100
-"""Alarms that one is suppressed by."""
+"""Largest number of alarms that suppress another."""
 
 LONGEST_ID = 100
 
 PREFIX = "alarms/"
-"""What the names of alarms begin with in the process image and in events; their ids do not."""
+"""Prefix of the names of alarms in the process image and in events; ids are without it."""
 
 
 def id_problem(id: str) -> str:
-    """Why a text can't be the id of an alarm, "" if it can."""
+    """Return why a text can't be the id of an alarm, "" if it can."""
     good = id.isprintable() and id == id.strip() and 0 < len(id) <= LONGEST_ID and not id.startswith(PREFIX)
     return "" if good else f"{shown(id)} given, expected {_ID_WORDS}"
 
@@ -55,7 +55,7 @@ _Group = Annotated[
 
 
 class AlarmFields(Part):
-    """What can be declared of an alarm, whoever declares it."""
+    """Fields of all declarations of an alarm."""
 
     text: _Short = quantity("What it says, cut after 200 characters. Left out: its id.", default="")
     alarm_class: AlarmClass = quantity("How bad it is.", default="warning")
@@ -72,8 +72,8 @@ class AlarmFields(Part):
         "that of the signal",
         default=0.0,
     )
-    on_delay: _Delay = quantity("It comes after its condition has held for so long.", "s", default=0.0)
-    off_delay: _Delay = quantity("It goes after its condition has been gone for so long.", "s", default=0.0)
+    on_delay: _Delay = quantity("The alarm comes when its condition has held for this time.", "s", default=0.0)
+    off_delay: _Delay = quantity("The alarm goes when its condition has been gone for this time.", "s", default=0.0)
     latching: Flag = quantity("Whether it stands until it is acknowledged and reset.", default=False)
     suppressed_by: Annotated[
         tuple[AlarmId, ...], Len(0, MOST_CAUSES), Holds(f"a list of at most {MOST_CAUSES} ids of alarms")
@@ -82,16 +82,16 @@ class AlarmFields(Part):
 
     @property
     def measured(self) -> bool:
-        """Whether the line finds out by itself whether its condition holds."""
+        """True if the line evaluates the condition."""
         return self.high is not None or self.low is not None
 
     @property
     def severity(self) -> int:
-        """Its priority, given or by its class."""
+        """Priority, given or by class."""
         return PRIORITIES[self.alarm_class] if self.priority is None else self.priority
 
     def wrong(self) -> Iterator[tuple[str, str]]:
-        """Fields that do not fit together, each with the rest of the sentence."""
+        """Yield fields that do not fit together, each with the rest of the sentence."""
         if not self.measured:
             if self.deadband:
                 yield "deadband", f"{shown(self.deadband)} given, expected `high` or `low` beside it"
@@ -104,12 +104,12 @@ class AlarmFields(Part):
 
 
 class Alarm(AlarmFields):
-    """An alarm of the scene: on a value that the line measures."""
+    """An alarm of the scene on a measured value."""
 
     tag: Text = quantity("Signal that it watches.")
 
     def wrong(self) -> Iterator[tuple[str, str]]:
-        """The same, and no limit at all."""
+        """Yield fields that do not fit together, and a problem for an alarm without limits."""
         if not self.measured:
             yield "high", "missing, expected a limit, `high` or `low`"
         yield from super().wrong()

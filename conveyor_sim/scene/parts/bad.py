@@ -1,4 +1,4 @@
-"""Which of the bottles that come from one place are bad."""
+"""Choice of bad bottles from one place."""
 
 from collections.abc import Iterator
 from typing import Annotated
@@ -15,13 +15,13 @@ class BadBottles(DevicePart):
     """A part that bottles come from, some of them bad."""
 
     bad_share: Share = quantity("Share of bad bottles, drawn at random from the seed.", "1", default=0.0)
-    bad_every: Count | None = quantity("Every so many-th bottle is bad.", "1", default=None)
+    bad_every: Count | None = quantity("Every n-th bottle is bad.", "1", default=None)
     bad_at: Annotated[tuple[Count, ...], Len(0), Holds("a list of whole numbers, 1 or greater")] = quantity(
         "The bottles that are bad, counted from 1 as they come: `[17, 60]`.", "1", default=()
     )
 
     def bad_problems(self, path: Path) -> Iterator[Problem]:
-        """Bad bottles given in more than one way."""
+        """Yield a problem for bad bottles given in more than one way."""
         ways = {"bad_share": self.bad_share, "bad_every": self.bad_every, "bad_at": self.bad_at}
         given = [name for name, value in ways.items() if value]
         if len(given) > 1:

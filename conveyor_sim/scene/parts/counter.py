@@ -17,9 +17,9 @@ class Counter(DevicePart):
     to: Point = quantity("The other end.", "m")
 
     def problems(self, path: Path, others: Others) -> Iterator[Problem]:
-        """A line without length."""
+        """Yield a problem for a line without length."""
         yield from line_problems(path, self.from_, self.to)
 
     def mark(self, name: str) -> Mark:
-        """Its line."""
+        """Return its line."""
         return self._mark("passage", name, (self.from_, self.to))

@@ -1,4 +1,4 @@
-"""`DevicePart`: what a part of a scene says of itself that becomes a device of the line."""
+"""Base classes of scene parts that become devices of the line."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -15,48 +15,48 @@ from conveyor_sim.scene.types import TOUCH, XY
 from conveyor_sim.scene.words import shown, some_of
 
 Others = Mapping[str, Mapping[str, Any]]
-"""What else there is in a scene: parts by the name of their field (`zones`), then by their own."""
+"""Other parts of a scene: by field (`zones`), then by name."""
 
 Look = Literal["beam", "region", "passage", "check", "entry", "exit"]
-"""How pictures and markers draw a part. beam: a dashed line between two ends; passage: a line with an arrow to its
+"""Look of a part in pictures and markers. beam: a dashed line between two ends; passage: a line with an arrow to its
 right; check: a line between two diamonds; region: an outline; exit: a hatched outline; entry: a triangle at a point.
 """
 
 
 @dataclass(frozen=True)
 class Mark:
-    """What is drawn of a part."""
+    """Mark of a part in pictures."""
 
     look: Look
     kind: str
-    """What it is, as in `photo_eye`."""
+    """Kind, such as `photo_eye`."""
     name: str
     points: NDArray[np.float64]
     """(k, 2), m: two ends, the corners of a region, or one point."""
     direction: float = 0.0
-    """rad, in which bottles go from an entry."""
+    """Direction of bottles at an entry, rad."""
     word: str = ""
-    """What it is, for a picture: "eye"."""
+    """Word in pictures, such as "eye"."""
 
 
 class DevicePart(Part):
     """A part that becomes a device."""
 
     KIND: ClassVar[str] = ""
-    """What it is, as in `photo_eye`."""
+    """Kind, such as `photo_eye`."""
     WORD: ClassVar[str] = ""
-    """The same for a picture, where that is another word."""
+    """Word in pictures; empty: KIND."""
 
     def problems(self, path: Path, others: Others) -> Iterator[Problem]:
-        """What is wrong with it although each field is valid by itself. path: its own; others: to look up names."""
+        """Yield problems of valid fields that do not fit together. path: of the part; others: to look up names."""
         yield from ()
 
     def mark(self, name: str) -> Mark | None:
-        """What is drawn of it; None: nothing. name: its own."""
+        """Return its mark; None without one. name: of the part."""
         return None
 
     def marks(self, name: str) -> Sequence[Mark]:
-        """The same, where it may be more than one."""
+        """Return all its marks."""
         mark = self.mark(name)
         return () if mark is None else (mark,)
 
@@ -73,11 +73,11 @@ class Giver(DevicePart):
 
     @property
     def heading(self) -> tuple[float, float]:
-        """Direction (rad) and speed (m/s) with which they appear."""
+        """Direction (rad) and speed (m/s) of new bottles."""
         return 0.0, 0.0
 
     def births(self) -> tuple[XY, ...]:
-        """Places (m) at which a bottle can appear, those farthest apart among them."""
+        """Places (m) of new bottles, including those farthest apart."""
         return (self.position,)
 
 
@@ -89,11 +89,11 @@ class Entry(Giver):
 
     @property
     def most(self) -> int | None:
-        """Bottles that can come from it; None: without end."""
+        """Largest number of bottles; None without limit."""
         return None
 
     def mark(self, name: str) -> Mark | None:
-        """A triangle where bottles appear."""
+        """Return a triangle at the place of new bottles."""
         return self._mark("entry", name, (self.position,), self.heading[0])
 
 
@@ -104,28 +104,28 @@ class Exit(DevicePart):
         region: tuple[XY, ...]
 
     def problems(self, path: Path, others: Others) -> Iterator[Problem]:
-        """A region that is none."""
+        """Yield a problem for an invalid region."""
         yield from polygon_problems((*path, "region"), self.region)
 
     def mark(self, name: str) -> Mark | None:
-        """Its region."""
+        """Return its region."""
         return self._mark("exit", name, self.region)
 
 
 def polygon_problems(path: Path, corners: tuple[XY, ...]) -> Iterator[Problem]:
-    """A region that is no simple polygon."""
+    """Yield a problem for a region that is no simple polygon."""
     if (reason := why_not_simple(corners)) is not None:
         yield Problem(path, f"{shown(corners)} given, expected a simple polygon ({reason})")
 
 
 def line_problems(path: Path, start: XY, end: XY) -> Iterator[Problem]:
-    """A line from `from` to `to`, at whose part the path leads, that has no length."""
+    """Yield a problem for a line from `from` to `to` without length. path: of the part."""
     if math.dist(start, end) <= TOUCH:
         yield Problem((*path, "to"), f"{shown(end)} given, expected a point away from `from` (zero length)")
 
 
 def name_problems(path: Path, name: str | None, field: str, others: Others) -> Iterator[Problem]:
-    """A name that is given and that no part of a field has."""
+    """Yield a problem for a name that no part of a field has."""
     known = others[field]
     if name is not None and name not in known:
         listed = some_of(known) or "none: there are none"

@@ -1,4 +1,4 @@
-"""Indicators of a scene file: what a line engineer wants to know of an exit."""
+"""Indicators of a scene file: measures of an exit."""
 
 from collections.abc import Iterator
 from typing import ClassVar
@@ -18,12 +18,12 @@ class Indicator(DevicePart):
     belt: Name = quantity("Belt that brings them there.")
     zone: Name = quantity("Zone before the exit: what is in it waits to leave.")
     jam_time: Positive = quantity(
-        "`jam`: nothing has passed for so long although the belt ran, bottles waited and it was not blocked.", "s"
+        "`jam`: nothing has passed for this time although the belt ran, bottles waited and it was not blocked.", "s"
     )
     starved_time: Positive | None = quantity(
-        "`starved`: the belt has run for so long and no bottle waited. Left out: the jam_time.", "s", default=None
+        "`starved`: the belt has run for this time and no bottle waited. Left out: the jam_time.", "s", default=None
     )
-    window: Positive = quantity("`flow` is over the last so many seconds.", "s", default=60.0)
+    window: Positive = quantity("Averaging time of `flow`.", "s", default=60.0)
     downstream: Name | None = quantity(
         "Belt that takes the bottles on. `blocked`: it stands, while bottles wait and `belt` runs or should run.",
         default=None,
@@ -34,7 +34,7 @@ class Indicator(DevicePart):
     )
 
     def problems(self, path: Path, others: Others) -> Iterator[Problem]:
-        """Names that refer to nothing, and those that make no sense together."""
+        """Yield problems of unknown names, and of names that do not fit together."""
         for field, value, section in (
             ("counter", self.counter, "counters"),
             ("belt", self.belt, "belts"),

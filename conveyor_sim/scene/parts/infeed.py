@@ -37,22 +37,22 @@ class Infeed(BadBottles, Entry):
 
     @property
     def most(self) -> int | None:
-        """Bottles that enter."""
+        """Number of bottles that enter; None without limit."""
         return self.count
 
     @property
     def heading(self) -> tuple[float, float]:
-        """Direction (rad) and speed (m/s) with which bottles appear."""
+        """Direction (rad) and speed (m/s) of new bottles."""
         return self.direction, self.speed
 
     def births(self) -> tuple[XY, ...]:
-        """The middle and both ends of where bottles appear, m."""
+        """Middle and both ends of the places of new bottles, m."""
         (x, y), left = self.position, (-math.sin(self.direction), math.cos(self.direction))
         sideways = (self.lateral_jitter * left[0], self.lateral_jitter * left[1])
         return (x - sideways[0], y - sideways[1]), (x, y), (x + sideways[0], y + sideways[1])
 
     def problems(self, path: Path, others: Others) -> Iterator[Problem]:
-        """Ways of feeding that exclude each other, and jitter that would change the order."""
+        """Yield problems of feeding rules that exclude each other, and of jitter that would change the order."""
         if (self.gap is None) == (self.rate is None):
             given = "neither" if self.gap is None else "both"
             yield Problem(path, f"{given} of gap and rate given, expected one of them")

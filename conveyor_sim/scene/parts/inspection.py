@@ -10,7 +10,7 @@ from conveyor_sim.scene.words import shown
 
 
 class Inspection(DevicePart):
-    """A machine that finds the bad bottles as their axes pass a line."""
+    """A machine that detects bad bottles as their axes pass a line."""
 
     KIND: ClassVar[str] = "inspection"
 
@@ -19,10 +19,10 @@ class Inspection(DevicePart):
     to: Point = quantity("The other end: bottles pass from the left to the right, seen from `from`.", "m")
 
     def problems(self, path: Path, others: Others) -> Iterator[Problem]:
-        """A line without length."""
+        """Yield a problem for a line without length."""
         if self.from_ == self.to:
             yield Problem((*path, "to"), f"{shown(self.to)} given, expected another point than from")
 
     def mark(self, name: str) -> Mark:
-        """Its line."""
+        """Return its line."""
         return self._mark("check", name, (self.from_, self.to))

@@ -1,4 +1,4 @@
-"""What machines of a scene file have in common: those that follow the PackML state model."""
+"""Fields of machines that follow the PackML state model."""
 
 from collections.abc import Iterator
 from typing import Annotated
@@ -13,11 +13,11 @@ from conveyor_sim.scene.types import Count, Holds, Name, NotNegative, PolygonLis
 from conveyor_sim.scene.words import shown
 
 MOST_STOPS = 100
-"""Kinds of failures, and planned stops, of one machine: each is a number of its stop reason."""
+"""Largest number of failures and of planned stops of one machine. Each is a number of its stop reason."""
 
 
 class ActingTimes(Part):
-    """How long a machine takes for what it does between two states of PackML; 0: it is passed at once."""
+    """Durations of the acting states of PackML; 0: the state is passed at once."""
 
     clearing: NotNegative = quantity("From Aborted to Stopped.", "s", default=0.0)
     starting: NotNegative = quantity("From Idle to Execute.", "s", default=0.0)
@@ -39,12 +39,12 @@ class PackmlPart(DevicePart):
         "Greatest rate that a command may ask for. Left out: `rate`.", "1/s", default=None
     )
     ramp_up: NotNegative = quantity(
-        "It gets from standstill to `rate` in so long whenever it comes into Execute, evenly; down it goes at once.",
+        "Time from standstill to `rate` after each entry into Execute, at an even slope; it stops at once.",
         "s",
         default=0.0,
     )
     suspend_after: NotNegative = quantity(
-        "Starved or blocked for so long without a break, it goes to Suspended; back as soon as it can work.",
+        "Starved or blocked for this time without a break, it goes to Suspended, and back as soon as it can work.",
         "s",
         default=2.0,
     )
@@ -59,7 +59,7 @@ class PackmlPart(DevicePart):
     ] = quantity("When it is stopped by plan.", default={})
 
     def problems(self, path: Path, others: Others) -> Iterator[Problem]:
-        """What else is wrong with it, a rate beyond its limit, and planned stops that overlap themselves."""
+        """Yield further problems, a rate beyond its limit, and overlapping planned stops."""
         yield from super().problems(path, others)
         if self.rate_limit is not None and self.rate_limit < self.rate:
             text = f"{shown(self.rate_limit)} given, expected at least {self.rate:g} (1/s), the rate"
@@ -73,7 +73,7 @@ class TakingPart(PackmlPart, Exit):
 
     region: PolygonList = quantity("Where it takes bottles, in the order of their arrival: a simple polygon.", "m")
     start_fill: Count | None = quantity(
-        "It starts, and goes on after it was starved, once so many bottles wait; the run begins in Starting then. "
+        "It starts, and resumes after it was starved, when this many bottles wait; the run begins in Starting then. "
         "Left out: one will do.",
         "1",
         default=None,
@@ -82,13 +82,13 @@ class TakingPart(PackmlPart, Exit):
         "Zone that `start_fill` counts, with its offset. Left out: the machine's own `region`.", default=None
     )
     run_down: NotNegative = quantity(
-        "Emptying out, by the command Complete: it works on until no bottle has come for so long, then it is Complete.",
+        "Emptying, by the command Complete: it works until no bottle has come for this time, then it is Complete.",
         "s",
         default=5.0,
     )
 
     def problems(self, path: Path, others: Others) -> Iterator[Problem]:
-        """What else is wrong with it, and a zone that is none, or is there for nothing."""
+        """Yield further problems, and an unknown or unused zone."""
         yield from super().problems(path, others)
         yield from name_problems((*path, "start_zone"), self.start_zone, "zones", others)
         if self.start_zone is not None and self.start_fill is None:

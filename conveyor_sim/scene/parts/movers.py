@@ -1,8 +1,8 @@
 """Rails of a scene file that move on command: gates, pushers and diverters. All are straight.
 
-Their drives are taken for pneumatic cylinders at 6 bar, of the bores of ISO 6432: 20 mm at gates that slide, 25 mm at
+Their drives are treated as pneumatic cylinders at 6 bar, of the bores of ISO 6432: 20 mm at gates that slide, 25 mm at
 pushers, and 25 mm at a crank of 50 mm where rails swing. A bore of 20 mm is that of common stop cylinders for single
-bottles; what rejects and diverts is one size larger.
+bottles. Pushers and diverters are one size larger.
 """
 
 import math
@@ -18,11 +18,11 @@ from conveyor_sim.scene.types import XY, Angle, Flag, Limit, Name, Point, Positi
 from conveyor_sim.scene.words import shown
 
 PRESSURE = 6e5
-"""Pa, above that of the air: what compressed air in a plant has."""
+"""Gauge pressure of compressed air in a plant, Pa."""
 
 
 def cylinder_force(bore: float) -> float:
-    """Force (N) of a cylinder of a bore (m) that pushes, without friction, to a tenth: pi/4 bore^2 times PRESSURE."""
+    """Return the force (N) of a cylinder by bore (m), without friction, to a tenth: pi/4 bore^2 times PRESSURE."""
     return round(0.25 * math.pi * bore**2 * PRESSURE, 1)
 
 
@@ -46,21 +46,21 @@ class _Mover(DevicePart):
 
     @property
     def drive_limit(self) -> float | None:
-        """N, or N m: the most that its drive can exert; None: whatever it takes."""
+        """Largest force or torque of its drive, N or N m; None without limit."""
         limit = getattr(self, self.DRIVE[0])
         return None if limit == "none" else float(limit)
 
     @property
     def drive_mass(self) -> float:
-        """kg, or kg m^2 about its start, of all that moves."""
+        """Moving mass, kg, or kg m^2 about its start."""
         raise NotImplementedError
 
     def shape_problems(self, path: Path) -> Iterator[Problem]:
-        """A geometry that can't be."""
+        """Yield problems of the geometry."""
         yield from line_problems(path, self.from_, self.to)
 
     def problems(self, path: Path, others: Others) -> Iterator[Problem]:
-        """A geometry that can't be, or a drive that is too weak for its own acceleration."""
+        """Yield problems of the geometry, and of a drive that is too weak for its acceleration."""
         wrong = list(self.shape_problems(path))
         yield from wrong
         force = self.drive_limit
@@ -94,7 +94,7 @@ class _Sliding(_Mover):
 
     @property
     def drive_mass(self) -> float:
-        """kg."""
+        """Moving mass, kg."""
         return self.moving_mass
 
 
@@ -119,11 +119,11 @@ class _Swinging(_Mover):
 
     @property
     def drive_mass(self) -> float:
-        """kg m^2."""
+        """Moment of inertia, kg m^2."""
         return math.dist(self.from_, self.to) ** 2 / 3.0 if self.inertia is None else self.inertia
 
     def shape_problems(self, path: Path) -> Iterator[Problem]:
-        """Ends that coincide, and angles that are none."""
+        """Yield problems of coinciding ends and invalid angles."""
         yield from super().shape_problems(path)
         if not 1e-6 <= abs(self.angle) <= 2.0 * math.pi:
             yield Problem(
@@ -155,7 +155,7 @@ class SwingingGate(_Swinging):
 
 
 class Pusher(_Sliding):
-    """A straight rail that strokes along a direction, and returns."""
+    """A straight rail that moves along a direction and returns."""
 
     KIND: ClassVar[str] = "pusher"
 
@@ -170,7 +170,7 @@ class Pusher(_Sliding):
 
 
 class Diverter(_Swinging):
-    """A straight rail that swings about its first end into the way of bottles, and returns."""
+    """A straight rail that swings about its first end into the path of bottles and returns."""
 
     KIND: ClassVar[str] = "diverter"
 
@@ -182,6 +182,6 @@ Gate = Annotated[
     Annotated[SlidingGate, Tag("(slide)")] | Annotated[SwingingGate, Tag("(swing)")],
     one_of({"slide": "(slide)", "swing": "(swing)"}),
 ]
-"""The kinds of gate."""
+"""Kinds of gate."""
 
 Mover = SlidingGate | SwingingGate | Pusher | Diverter

@@ -21,13 +21,13 @@ class PhotoEye(DevicePart):
         "s",
         default=0.0,
     )
-    on_delay: NotNegative = quantity("`blocked` comes on once the beam was blocked for so long.", "s", default=0.0)
-    off_delay: NotNegative = quantity("`blocked` goes off once the beam was free for so long.", "s", default=0.0)
+    on_delay: NotNegative = quantity("`blocked` turns on when the beam was blocked for this time.", "s", default=0.0)
+    off_delay: NotNegative = quantity("`blocked` turns off when the beam was free for this time.", "s", default=0.0)
 
     def problems(self, path: Path, others: Others) -> Iterator[Problem]:
-        """A beam without length."""
+        """Yield a problem for a beam without length."""
         yield from line_problems(path, self.from_, self.to)
 
     def mark(self, name: str) -> Mark:
-        """Its beam."""
+        """Return its beam."""
         return self._mark("beam", name, (self.from_, self.to))

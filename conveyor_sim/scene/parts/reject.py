@@ -7,7 +7,7 @@ from conveyor_sim.scene.types import NotNegative, PolygonList, Positive, quantit
 
 
 class Reject(Exit):
-    """A machine that throws the bottle out whose axis is in a region first after it has been fired."""
+    """A machine that rejects the first bottle whose axis is in a region after it was fired."""
 
     KIND: ClassVar[str] = "reject"
 

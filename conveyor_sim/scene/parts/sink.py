@@ -7,9 +7,9 @@ from conveyor_sim.scene.types import quantity
 
 
 class Sink(TakingPart):
-    """A machine downstream, such as a packer: takes one bottle after another out of a region, at most at a rate.
+    """A machine downstream, such as a packer. It takes single bottles out of a region, at most at a rate.
 
-    Those that wait press on whatever stands at the end of the region: a rail.
+    Waiting bottles press on the rail at the end of the region.
     """
 
     KIND: ClassVar[str] = "sink"

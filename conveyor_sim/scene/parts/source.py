@@ -11,7 +11,7 @@ from conveyor_sim.scene.types import Angle, Name, NotNegative, Point, quantity
 
 
 class Source(PackmlPart, BadBottles, Entry):
-    """A machine upstream, such as a filler: gives bottles at a rate while it runs; without room it is blocked."""
+    """A machine upstream, such as a filler. It gives bottles at a rate; without room it is blocked."""
 
     KIND: ClassVar[str] = "source"
 
@@ -23,10 +23,10 @@ class Source(PackmlPart, BadBottles, Entry):
 
     @property
     def heading(self) -> tuple[float, float]:
-        """Direction (rad) and speed (m/s) with which bottles appear."""
+        """Direction (rad) and speed (m/s) of new bottles."""
         return self.direction, self.speed
 
     def problems(self, path: Path, others: Others) -> Iterator[Problem]:
-        """A rate beyond its limit, and bad bottles given in two ways."""
+        """Yield problems of a rate beyond its limit, and of bad bottles given in two ways."""
         yield from super().problems(path, others)
         yield from self.bad_problems(path)

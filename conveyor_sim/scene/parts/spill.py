@@ -17,5 +17,5 @@ class Spill(Entry):
 
     @property
     def most(self) -> int | None:
-        """Bottles that can be dropped."""
+        """Largest number of dropped bottles."""
         return self.count

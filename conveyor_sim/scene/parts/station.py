@@ -1,4 +1,4 @@
-"""Stations of a scene file: machines that take a bottle, work on it, and give it again."""
+"""Stations of a scene file: machines that take a bottle, work on it, and return it."""
 
 from collections.abc import Iterator, Sequence
 from typing import Annotated, ClassVar, Literal
@@ -13,26 +13,26 @@ from conveyor_sim.scene.types import Angle, Count, Holds, Name, NotNegative, Num
 from conveyor_sim.scene.words import shown, some_of
 
 BAD = "bad"
-"""The attribute that inspections, rejects and sinks know: 0 or 1."""
+"""Attribute that inspections, rejects and sinks use: 0 or 1."""
 
 MOST_ATTRIBUTES = 20
 
 
 class Setting(Part):
-    """What a station makes of one attribute of a bottle."""
+    """Change of one attribute of a bottle by a station."""
 
-    to: Number = quantity("Its value, in what unit it may be. Attributes that nobody has set are 0.", "1")
+    to: Number = quantity("New value, in the unit of the attribute. Attributes that were never set are 0.", "1")
     deviation: NotNegative = quantity(
         "Standard deviation of the value, normally distributed, drawn from the seed.", "1", default=0.0
     )
     share: Share = quantity("Share of the bottles to which it is done, drawn from the seed.", "1", default=1.0)
-    every: Count | None = quantity("It is done to every so many-th bottle alone.", "1", default=None)
+    every: Count | None = quantity("Only every n-th bottle is changed.", "1", default=None)
     at: Annotated[tuple[Count, ...], Len(0), Holds("a list of whole numbers, 1 or greater")] = quantity(
         "It is done to these bottles alone, counted from 1 as they come.", "1", default=()
     )
 
     def problems(self, path: Path, attribute: str) -> Iterator[Problem]:
-        """Ways to choose bottles that exclude each other, and a bottle that is bad by a half."""
+        """Yield problems of choices of bottles that exclude each other, and of values of `bad` other than 0 and 1."""
         ways = {"share": self.share < 1.0, "every": self.every is not None, "at": bool(self.at)}
         given = [name for name, is_given in ways.items() if is_given]
         if len(given) > 1:
@@ -42,7 +42,7 @@ class Setting(Part):
 
 
 class Acceptance(Part):
-    """What a station takes for good in one attribute; a bottle that it does not becomes bad."""
+    """Limits of one attribute of a bottle. A bottle beyond them becomes bad."""
 
     low: Number | None = quantity("Least value. Left out: there is none.", "1", default=None)
     high: Number | None = quantity("Greatest value. Left out: there is none.", "1", default=None)
@@ -54,7 +54,7 @@ class Acceptance(Part):
     )
 
     def problems(self, path: Path) -> Iterator[Problem]:
-        """Limits that nothing, or all, is within."""
+        """Yield problems of limits that exclude or include all values."""
         if self.low is None and self.high is None:
             yield Problem(path, "neither low nor high given, expected one of them at least")
         elif self.low is not None and self.high is not None and self.low > self.high:
@@ -62,10 +62,10 @@ class Acceptance(Part):
 
 
 class Station(TakingPart, Giver):
-    """A machine such as a capper, a labeller or a checkweigher: takes a bottle out of a region, keeps it for a cycle of
-    1 / rate, works on it, and puts it back onto the line elsewhere: the same one, with the loads that it has borne.
+    """A machine such as a capper, a labeller or a checkweigher. It takes a bottle out of a region, holds it for a cycle
+    of 1 / rate, works on it, and returns it elsewhere on the line, with its accumulated loads.
 
-    Those that wait press on whatever stands at the end of the region: a rail.
+    Waiting bottles press on the rail at the end of the region.
     """
 
     KIND: ClassVar[str] = "station"
@@ -87,15 +87,15 @@ class Station(TakingPart, Giver):
 
     @property
     def heading(self) -> tuple[float, float]:
-        """Direction (rad) and speed (m/s) with which bottles come back."""
+        """Direction (rad) and speed (m/s) of returned bottles."""
         return self.direction, self.speed
 
     def marks(self, name: str) -> Sequence[Mark]:
-        """Where it takes bottles, and where it gives them."""
+        """Return the marks of the places where it takes and returns bottles."""
         return self._mark("exit", name, self.region), self._mark("entry", name, (self.position,), self.direction)
 
     def problems(self, path: Path, others: Others) -> Iterator[Problem]:
-        """What else is wrong with it, with its settings and tests, and tests of what nobody sets."""
+        """Yield further problems, those of its settings and tests, and tests of attributes that no station sets."""
         yield from super().problems(path, others)
         for name, setting in self.sets.items():
             yield from setting.problems((*path, "sets", name), name)

@@ -15,13 +15,15 @@ class Zone(DevicePart):
 
     region: PolygonList = quantity("Corners of the region in order: a simple polygon.", "m")
     full_at: Count | None = quantity(
-        "A back-up switch: `full` is on while there are so many bottles or more. Left out: none.", "1", default=None
+        "A back-up switch: `full` is on while the zone has at least this many bottles. Left out: none.",
+        "1",
+        default=None,
     )
 
     def problems(self, path: Path, others: Others) -> Iterator[Problem]:
-        """A region that is none."""
+        """Yield a problem for an invalid region."""
         yield from polygon_problems((*path, "region"), self.region)
 
     def mark(self, name: str) -> Mark:
-        """Its region."""
+        """Return its region."""
         return self._mark("region", name, self.region)

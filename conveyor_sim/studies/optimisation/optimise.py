@@ -9,7 +9,7 @@ from conveyor_sim.studies.optimisation.objective import Objective, parse_objecti
 from conveyor_sim.studies.optimisation.part import Optimise
 from conveyor_sim.studies.optimisation.search import Search
 from conveyor_sim.studies.optimisation.trials import Trial, as_good, front
-from conveyor_sim.studies.row import Job, Row
+from conveyor_sim.studies.row import Job, RunRow
 from conveyor_sim.studies.runs import Progress, Runs
 from conveyor_sim.studies.setup import Setup
 
@@ -64,7 +64,7 @@ def optimise(runs: Runs, setup: Setup, progress: Progress = lambda *_: None) -> 
 def _in_all(progress: Progress, before: int, total: int) -> Progress:
     """Progress of a batch as that of all runs of the trials."""
 
-    def reported(done: int, whole: int, left: float | None, row: Row | None) -> None:
+    def reported(done: int, whole: int, left: float | None, row: RunRow | None) -> None:
         all_left = None if left is None or done == whole else left * (total - before - done) / (whole - done)
         progress(before + done, total, all_left, row)
 

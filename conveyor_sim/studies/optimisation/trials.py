@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from conveyor_sim.statistics.comparisons import best
 from conveyor_sim.studies.optimisation.objective import Objective
-from conveyor_sim.studies.row import Row
+from conveyor_sim.studies.row import RunRow
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,7 @@ class Trial:
 
     number: int
     parameters: Mapping[str, Any]
-    rows: tuple[Row, ...]
+    rows: tuple[RunRow, ...]
     """By seed, in order."""
 
     @property

@@ -70,7 +70,7 @@ def _read(group: str, given: dict[str, Any]) -> Iterator[Case]:
 
 
 def _conversions(name: str, source: str, matrix: str) -> Iterator[Case]:
-    """One case for the values of a row, one for each of its conversions that stops or is none."""
+    """Return one case for the values of a row, and one per conversion that stops or does not exist."""
     header, *rows = matrix.strip().splitlines()
     targets = header.partition("|")[2].split()
     for row in rows:
@@ -96,7 +96,7 @@ def program(types: str, declare: str, body: str) -> str:
 
 
 def in_variables(expression: str) -> tuple[str, str]:
-    """Declarations of the typed literals of an expression, and the expression with their names."""
+    """Return declarations of the typed literals of an expression, and the expression with their names."""
     found: list[str] = []
 
     def name(match: re.Match[str]) -> str:
@@ -134,7 +134,7 @@ def variable(running: Program, name: str) -> Any:
 
 
 def value(word: str) -> Any:
-    """T and F; times in ms as 30ms; numbers; texts in quotes, with _ for a blank."""
+    """Return T and F; times in ms as 30ms; numbers; texts in quotes, with _ for a blank."""
     if word in ("T", "F"):
         return word == "T"
     if word.endswith("ms"):

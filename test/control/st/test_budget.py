@@ -1,4 +1,4 @@
-"""The budget of a scan counts executed statements and the work of expressions, and nothing of the machine's speed."""
+"""The budget of a scan counts executed statements and the work of expressions, independent of the machine's speed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Programs do what the standard says, or what is decided where it says nothing (`cases/`)."""
+"""Programs follow the standard, or the decisions where it leaves a choice (`cases/`)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A program as the controller of a line: what is mapped, what is refused, what tests see and keep of it."""
+"""A program as the controller of a line: tags, refusals, access by tests."""
 
 from __future__ import annotations
 
@@ -146,7 +146,7 @@ def test_a_task_runs_at_its_interval_and_its_outputs_hold(tmp_path: Path) -> Non
 
 
 def test_a_task_does_not_make_up_for_scans_that_there_were_not(tmp_path: Path) -> None:
-    """A free-running node may be delayed; its task continues at its interval, counted from the first scan."""
+    """A free-running node may be delayed. Its task continues at its interval, counted from the first scan."""
     plc = bound(tmp_path, TASKS)
     ticks = (0, 1, 2, 3, 100, 101, 102, 103, 104, 105)
     assert [scan(plc, tick)["belts/a/cmd_speed"] for tick in ticks] == [1, 1, 1, 2, 3, 3, 4, 4, 4, 5]
@@ -322,7 +322,7 @@ def fill(plant: Scenario, program: Path) -> None:
 
 
 def test_the_documented_line_and_its_fault(tmp_path: Path) -> None:
-    """docs/testing_control_logic.md: what is to clear the eye is stopped by the eye."""
+    """docs/testing_control_logic.md: the belt that should clear the eye is stopped by the eye."""
     faulty = tmp_path / "faulty.st"
     faulty.write_text((PROGRAMS / "table.st").read_text().replace("table_speed := 0.4", "table_speed := feeder_speed"))
     for program, goes_on in ((PROGRAMS / "table.st", True), (faulty, False)):
@@ -376,7 +376,7 @@ def test_a_program_that_is_too_large_is_refused_in_words(tmp_path: Path, body: s
 
 
 def chain(kind: str, count: int) -> str:
-    """Blocks that hold, or functions that call, each the one before it."""
+    """Return blocks that contain, or functions that call, each the one before it."""
     units = []
     for number in range(count):
         if kind == "blocks":
@@ -445,7 +445,7 @@ def test_what_is_no_file_is_said_to_be_none(tmp_path: Path) -> None:
 
 
 def test_a_program_brought_over_from_codesys_runs_the_line(tmp_path: Path) -> None:
-    """docs/structured_text.md, A program carried through: what was refused, and what became of it."""
+    """docs/structured_text.md, A program carried through: refusals and their solutions."""
     with pytest.raises(StructuredTextError, match=stating("codesys.st:111:17", "GVL", "not declared")):
         StructuredText(PROGRAMS / "brought_over" / "codesys.st")
     plant = Scenario(TABLE)

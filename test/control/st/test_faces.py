@@ -1,4 +1,4 @@
-"""A program under the commands: `conveyor-sim run --controller`, and what names a controller."""
+"""Programs on the command line: `conveyor-sim run --controller`, and other places that name a controller."""
 
 from __future__ import annotations
 

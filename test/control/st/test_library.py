@@ -1,4 +1,4 @@
-"""A program compiled to a shared library: the worked shim, and what becomes of a library that is broken."""
+"""Programs compiled to a shared library: the worked shim, and broken libraries."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ BODY = "TABLE_body(&p->program);"
 
 
 def built(folder: Path, name: str = "table", text: str | None = None) -> Path:
-    """The shim as a library, with another text of its own where one is given."""
+    """Build the shim as a library, optionally from a changed text."""
     compiler = shutil.which("cc")
     if compiler is None:
         pytest.skip("no C compiler")
@@ -42,7 +42,7 @@ def built(folder: Path, name: str = "table", text: str | None = None) -> Path:
 
 
 def broken(folder: Path, body: str, patience: float = 5.0) -> CompiledProgram:
-    """One whose scan does something else from the tenth on."""
+    """Build a library whose scan changes its behaviour from the tenth scan on."""
     text = SHIM.read_text()
     assert text.count(BODY) == 1
     text = "#include <threads.h>\n#include <unistd.h>\n" + text.replace(
@@ -178,7 +178,7 @@ def test_patience_and_length_bound_the_whole_answer(tmp_path: Path, body: str, t
 
 
 def test_a_program_that_does_not_read_is_ended_too(tmp_path: Path) -> None:
-    """Its state is more than a pipe holds; it is stopped before it reads."""
+    """Its state exceeds the buffer of a pipe, and it is stopped before it reads."""
     program = CompiledProgram(built(tmp_path), TAGS, patience=1.0)
     os.kill(program._process.pid, signal.SIGSTOP)
     with pytest.raises(ControlError, match="watchdog: restore took more than 1 s of wall time"):

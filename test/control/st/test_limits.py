@@ -1,4 +1,4 @@
-"""A command at a limit, from a program whose type has fewer digits than the limit."""
+"""Commands at a limit, from programs whose type has fewer digits than the limit."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def program(folder: Path, kind: str, value: str) -> StructuredText:
 
 
 def commanded(folder: Path, kind: str, value: str) -> float:
-    """Return what the line takes from a program with a variable of a type."""
+    """Return the command that the line gets from a variable of a type."""
     with Scenario("scenarios/zoned_line", overrides=LIMITS) as plant:
         plant.attach(program(folder, kind, value))
         plant.run_for(0.02)

@@ -1,4 +1,4 @@
-"""Variables that share memory, as a controller has them: tags, forces, traces, restarts and snapshots."""
+"""Variables that share memory, as a controller sees them: tags, forces, traces, restarts and snapshots."""
 
 from __future__ import annotations
 

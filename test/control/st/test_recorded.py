@@ -1,4 +1,4 @@
-"""A program's variables in recordings: where asked, as they are after each scan, and nothing else changes by it."""
+"""Recorded variables of programs: only the selected ones, after each scan, without any other effect."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ NAMES = ["plc/table/held", "plc/table/free/in", "plc/table/free/pt", "plc/table/
 
 
 def play(plant: Scenario, *record: str) -> list[tuple[int, list[float]]]:
-    """Run the table with its program attached a little later; ticks, and what the variables were after their scans."""
+    """Run the table with its program attached a little later, and return ticks and variables after their scans."""
     plant.run_for(0.1)
     plant.attach(StructuredText(PROGRAMS / "table.st", record=record))
     seen = []
@@ -40,7 +40,7 @@ def play(plant: Scenario, *record: str) -> list[tuple[int, list[float]]]:
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[tuple[int, list[float]]], int]:
-    """A folder with a recording and its inputs, what was seen of the variables, the hash of the state at the end."""
+    """Return a folder with a recording and its inputs, the observed variables, and the hash of the final state."""
     folder = tmp_path_factory.mktemp("recorded")
     with Scenario(TABLE, bag=folder / "bag", inputs=folder / "inputs") as plant:
         seen = play(plant, "table/held", "plc/Table/free/*")

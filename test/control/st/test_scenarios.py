@@ -1,4 +1,4 @@
-"""The programs of examples/st in the scenarios of their twins: they pass, and their mutants fail."""
+"""Programs of examples/st in the scenarios of their twins: they pass, and their mutants fail."""
 
 from __future__ import annotations
 

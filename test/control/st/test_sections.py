@@ -1,4 +1,4 @@
-"""Every qualifier in every section of every kind of unit: as `sections.py` has it, and as the page says it."""
+"""Every qualifier in every section of every kind of unit, as `sections.py` and the page state."""
 
 from __future__ import annotations
 

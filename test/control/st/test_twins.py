@@ -1,4 +1,4 @@
-"""The programs of examples/st do what the controllers in Python do, to the bit; and their mutants do not."""
+"""Programs of examples/st act bit for bit like the controllers in Python; their mutants do not."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def nothing(plant: Scenario) -> None:
 
 
 def level_holds(plant: Scenario) -> None:
-    """The feeder is held from 45 bottles on, and goes on once there are 35."""
+    """Check that the feeder is held from 45 bottles on, and restarts at 35."""
     held = plant.history["belts/feeder/cmd_speed"] == 0.0
     bottles = plant.history["belts/table/bottles"]
     begins, ends = np.flatnonzero(np.diff(held.astype(int)) == 1), np.flatnonzero(np.diff(held.astype(int)) == -1)
@@ -73,7 +73,7 @@ def level_holds(plant: Scenario) -> None:
 
 
 def gap_holds(plant: Scenario) -> None:
-    """As `test_the_gaps_are_as_asked_for`, which plays the twin in Python."""
+    """Check the gaps as `test_the_gaps_are_as_asked_for` does for the twin in Python."""
     assert abs(plant.signals["plc/gap/measured"] - GAP) < 0.05 * GAP
 
 
@@ -104,9 +104,9 @@ class Twins:
     seconds: float
     right: str
     wrong: str
-    """What a mutant has in its place."""
+    """Replacement text in the mutant."""
     holds: Callable[[Scenario], None] = nothing
-    """What the program brings about at the end, and its mutant does not; of others `test_scenarios.py` has it."""
+    """Final check that the program passes and its mutant fails; other pairs are in `test_scenarios.py`."""
 
 
 TWINS = {
@@ -122,7 +122,7 @@ TWINS = {
 
 
 def hashes(name: str, controller: Controller) -> tuple[list[int], Scenario]:
-    """The state, twice a second, and the line at the end."""
+    """Return the state hashes, twice per second, and the line at the end."""
     twins = TWINS[name]
     plant = twins.line()
     plant.attach(controller)

@@ -1,6 +1,6 @@
-"""Intermediate results of integers against a model that computes each operation as the page states it.
+"""Intermediate results of integers against a model that computes each operation as the page states.
 
-The model knows no ranges and no chains: every result is wrapped at the width that docs/structured_text.md gives it.
+The model has no ranges and no chains: every result is wrapped at the width in docs/structured_text.md.
 """
 
 from __future__ import annotations

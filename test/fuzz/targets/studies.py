@@ -21,7 +21,7 @@ from studies.small import Here, setup_of
 from conveyor_sim.accuracy.report.files import STUDY, read_study, write_study
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.studies.results import PARQUET, Results, read_results, write_parquet
-from conveyor_sim.studies.row import Row
+from conveyor_sim.studies.row import RunRow
 from conveyor_sim.studies.runs import Runs
 from conveyor_sim.studies.setup import Setup
 from conveyor_sim.studies.sweep import sweep
@@ -58,7 +58,7 @@ class Base:
 
     setup: Setup
     folder: Path
-    rows: list[Row]
+    rows: list[RunRow]
     results: Results
     files: frozenset[str]
     """Below the folder, without the lock."""
@@ -188,7 +188,7 @@ def _check(error: ConveyorError) -> None:
         raise Violation("words of a refusal", str(error)[:500])
 
 
-def _exact(row: Row | None) -> str:
+def _exact(row: RunRow | None) -> str:
     """All of a row but its times, for which there is no second truth."""
     if row is None:
         return ""

@@ -1,4 +1,4 @@
-"""Alarms of no line, driven tick by tick, and what happens to them."""
+"""Alarms without a line, driven tick by tick, and their events."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -23,7 +23,7 @@ class Board:
         self.declare(**declared)
 
     def declare(self, own: bool = False, **declared: Mapping[str, Any]) -> str:
-        """Why not, "" if it was."""
+        """Declare an alarm, and return why it was refused, "" if it was not."""
         alarms = [Declared(id, AlarmFields(**fields)) for id, fields in declared.items()]
         problem = self.alarms.declaration_problem(alarms)
         if problem is None:
@@ -31,13 +31,13 @@ class Board:
         return "" if problem is None else str(problem)
 
     def say(self, **conditions: bool) -> list[str]:
-        """What happened then: kinds and ids."""
+        """Report conditions, and return the kinds and ids of the resulting events."""
         before = len(self.events)
         self.alarms.report(self.tick, conditions)
         return [f"{kind} {id}" for _, kind, id in self.events[before:]]
 
     def to(self, tick: int) -> list[str]:
-        """The same of what falls due until the end of a tick."""
+        """Advance to the end of a tick, and return the kinds and ids of the resulting events."""
         before = len(self.events)
         while self.tick < tick:
             self.tick += 1
@@ -45,7 +45,7 @@ class Board:
         return [f"{kind} {id}" for _, kind, id in self.events[before:]]
 
     def do(self, operation: str, *ids: str, values: tuple[float, ...] = (), by: str = "anna") -> str:
-        """Why not, "" if it was done."""
+        """Do an operation, and return why it was refused, "" if it was not."""
         problem = operations.problem(self.alarms, operation, ids, values)
         if not problem:
             operations.perform(self.alarms, operation, ids, values, by, self.tick)

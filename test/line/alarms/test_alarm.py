@@ -1,4 +1,4 @@
-"""One alarm's states, by the diagram of ISA-18.2."""
+"""States of one alarm, by the diagram of ISA-18.2."""
 
 import pytest
 from line.alarms.board import Board
@@ -12,7 +12,7 @@ PATHS = {
     "SUPPRESSED": ["cause on"],
     "OUT_OF_SERVICE": ["remove_from_service"],
 }
-"""How an alarm that does not latch gets to each state."""
+"""Steps by which an alarm without latching gets to each state."""
 
 LATCHING = {
     "NORMAL": [],
@@ -46,7 +46,7 @@ DIAGRAM = {
     # Shelved once more is shelved for another time.
     ("SHELVED", "shelve"): "SHELVED",
 }
-"""All transitions of one that does not latch; whatever else is done is refused, or changes nothing."""
+"""All transitions of an alarm without latching. Any other operation is refused, or changes nothing."""
 
 DIAGRAM_LATCHING = {
     ("NORMAL", "on"): "UNACKNOWLEDGED",

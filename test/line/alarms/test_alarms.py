@@ -1,4 +1,4 @@
-"""Alarms together: delays, shelving, what follows from what, who was first, and how many there may be."""
+"""Several alarms: delays, shelving, suppression, first-out, and their largest number."""
 
 import re
 
@@ -233,7 +233,7 @@ def test_only_so_many() -> None:
 
 
 def test_more_alarms_at_once_than_there_can_be() -> None:
-    """Those that hold are taken first, wherever they are in the message; the others as far as there is room."""
+    """Alarms that hold come first, at any place in the message. Others are taken as long as there is room."""
     board = Board()
     said = {f"a{n}": n >= MOST_ALARMS + 400 for n in range(MOST_ALARMS + 500)}
     assert board.alarms.room_problem(said) == ""

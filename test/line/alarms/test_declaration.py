@@ -1,4 +1,4 @@
-"""Declarations as they travel."""
+"""Declarations of alarms in inputs."""
 
 import json
 import re

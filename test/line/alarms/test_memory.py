@@ -1,4 +1,4 @@
-"""What a checkpoint keeps of alarms, and what of a file is refused."""
+"""Alarms in checkpoints, and refused data of checkpoint files."""
 
 import copy
 import json
@@ -20,7 +20,7 @@ def line() -> Board:
 
 
 def busy(seed: int, ticks: int = 60) -> Board:
-    """After much of everything."""
+    """Return alarms after many events of all kinds."""
     board, draw = line(), random.Random(seed)
     board.declare(
         full={"suppressed_by": ["jam", "trip"], "group": "g", "off_delay": 0.7}, hot={"group": "h", "latching": True}

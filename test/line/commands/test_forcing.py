@@ -1,4 +1,4 @@
-"""Forced signals: controllers read what somebody has set, and the line goes on as it is."""
+"""Forced signals: controllers read the forced value, and the line itself does not change."""
 
 import math
 from pathlib import Path
@@ -14,7 +14,7 @@ SPEED, BLOCKED, REMOVED = "belts/one/speed", "photo_eyes/e/blocked", "outfeeds/o
 
 
 def passing() -> Simulation:
-    """A bottle that passes a photo-eye and leaves by an outfeed, 0.4 m further on."""
+    """Return a line with a bottle that passes a photo-eye and leaves by an outfeed 0.4 m further on."""
     return simulation(
         accuracy={"per_tick": 10},
         base=base(0.4),
@@ -47,7 +47,7 @@ def read(sim: Simulation, name: str) -> float:
 
 
 def test_it_changes_what_is_read_and_never_what_is() -> None:
-    """Same bits of the state at every tick as on a line on which nothing is forced, and the same counts."""
+    """State and counts have the same bits at every tick as without forced signals."""
     sim, free = passing(), passing()
     given = force((BLOCKED, 1.0), (SPEED, -9.0), (REMOVED, 700.0), ("zones/z/bottles", 5.0), ("belts/one/mode", 3.0))
     assert all(outcome.accepted for outcome in after(sim, given))

@@ -1,4 +1,4 @@
-"""Inputs: one record for all that acts on a line, taken in order, with what became of each."""
+"""Inputs: one record for every external action, taken in order, each with a result."""
 
 import math
 from pathlib import Path
@@ -44,7 +44,7 @@ def setting(writer: str, *given: tuple[str, float]) -> Input:
 
 
 def test_inputs_of_a_tick_are_taken_in_the_order_in_which_they_were_given() -> None:
-    """Whoever gave them, whatever they do, and each is judged as the line stands after those before it."""
+    """The order does not depend on writer or operation. Each input is checked on the line after those before it."""
     sim = two_drives()
     reset = setting("anna", ("belts/one/reset", 1.0))
     given = [
@@ -96,7 +96,10 @@ def test_the_names_of_one_input_in_their_order_all_or_none() -> None:
 
 
 def test_watchdogs_come_after_all_inputs() -> None:
-    """So a command at the very tick at which a watchdog would stop the belt is in time; what stops it is the line."""
+    """A command at the tick at which a watchdog would trip is in time.
+
+    The line itself is the writer of a stop.
+    """
     late, timely = two_drives(0.05), two_drives(0.05)
     for sim in (late, timely):
         sim.advance(5)
@@ -150,7 +153,7 @@ def test_what_cant_be_is_refused_with_the_reason_and_changes_nothing(changes: di
     ],
 )
 def test_what_is_of_the_wrong_type_is_not_taken(changes: dict[str, object], message: str) -> None:
-    """Nor kept: a type checker would have found it."""
+    """Neither is it queued. A type checker would report it."""
     sim = two_drives()
     given = setting("anna", (ONE, 0.9))._replace(**changes)  # type: ignore[arg-type]
     for use in (sim.line.refusal, sim.give):
@@ -162,7 +165,7 @@ def test_what_is_of_the_wrong_type_is_not_taken(changes: dict[str, object], mess
 
 
 def test_nobody_of_an_unknown_kind_says_an_alarm() -> None:
-    """Whatever becomes of the commands beside it, an alarm counts of those who may set commands alone."""
+    """Alarms count only from kinds of writer that may set commands, even if the commands beside them are refused."""
     sim = two_drives()
     for kind in ("ghost", "controller"):
         given = Input("commands", "x", kind, SET, (ONE, "alarms/jam"), (99.0, 1.0))
@@ -199,7 +202,7 @@ def test_what_waits_and_what_became_of_it_is_in_a_checkpoint(tmp_path: Path) -> 
 
 
 def test_a_device_may_object_to_a_command_as_it_stands(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Then nothing of the input is applied; what a device does not object to costs nothing."""
+    """Then no part of the input is applied."""
 
     def objection(self: Device, name: str, value: float, now: ScanContext) -> str:
         return f"{name}: it is running" if name.endswith("/reverse") and now.speeds[0] != 0.0 else ""
@@ -226,7 +229,7 @@ def test_the_source_of_an_old_outcome_says_what_it_was() -> None:
 
 
 def test_what_does_not_print_is_taken_as_a_replay_will_find_it() -> None:
-    """A writer, and the id of an alarm: the same answer before it is given, when it is, and from the record of it."""
+    """The writer and the id of an alarm: the check before, the result, and the record give the same answer."""
     sim, again = two_drives(), two_drives()
     given = [
         Input("operate", "\x1b[2J", "controller", "own", (), (), ()),

@@ -1,4 +1,4 @@
-"""In whose hands a device is, and which controller owns the line: whose commands are taken."""
+"""Control mode of devices and ownership of the line: which commands are accepted."""
 
 from pathlib import Path
 
@@ -41,7 +41,7 @@ def mode(kind: str, number: float, device: str = "belts/one") -> Input:
 
 
 def after(sim: Simulation, *given: Input) -> list[CommandOutcome]:
-    """What becomes of inputs in the next tick."""
+    """Return the results of inputs in the next tick."""
     for one in given:
         sim.give(one)
     sim.advance()
@@ -76,7 +76,7 @@ def test_only_devices_that_take_commands_have_a_mode() -> None:
 @pytest.mark.parametrize("number", IN_CONTROL)
 @pytest.mark.parametrize("kind", ["controller", "operator", "engineer", "test"])
 def test_commands_are_taken_of_those_in_control(kind: str, number: int) -> None:
-    """Whatever comes back into force, the setpoint stays on a change of hands."""
+    """The setpoint stays when the control mode changes."""
     sim = two_belts()
     outcomes = after(sim, mode("test", number), act(kind, SET, (ONE, 0.7)))
     allowed = kind in IN_CONTROL[number]
@@ -90,7 +90,7 @@ def test_commands_are_taken_of_those_in_control(kind: str, number: int) -> None:
 
 
 def test_what_a_controller_has_no_control_of_is_taken_out_of_its_scan() -> None:
-    """The rest is applied; a record of both gives the same again."""
+    """The rest is applied. A record of both parts gives the same results again."""
     sim = two_belts()
     after(sim, mode("operator", MANUAL))
     outcomes = after(sim, plc((ONE, 0.5), (TWO, 0.6), ("alarms/x", 1.0)))
@@ -212,7 +212,10 @@ def test_each_change_is_an_event_and_refusals_are_one_each_time_hands_change() -
 
 
 def test_a_watchdog_waits_for_a_controller_in_automatic_only() -> None:
-    """0.05 s: in other hands it rests, and has all of its time when the belt comes back."""
+    """Outside automatic mode it rests.
+
+    Its full time, 0.05 s, starts when the belt is back in automatic mode.
+    """
     sim = two_belts(watchdog=0.05)
     after(sim, mode("operator", MANUAL))
     sim.advance(20)

@@ -1,4 +1,4 @@
-"""Read-back: what each command is set to, who set it, and since when."""
+"""Read-back: value, writer and time of each command."""
 
 from pathlib import Path
 
@@ -13,7 +13,7 @@ ONE, TWO = "belts/one/cmd_speed", "belts/two/cmd_speed"
 
 
 def line() -> Simulation:
-    """Commands: cmd_speed of both, then run, reverse and reset of the second."""
+    """Return a line with the commands cmd_speed of both belts, then run, reverse and reset of the second."""
     return simulation(
         accuracy={"per_tick": 10},
         base=base(0.4),
@@ -30,7 +30,7 @@ def given(writer: str, name: str, value: float, kind: str = "test") -> Input:
 
 
 def told(columns: ReadBackColumns | None, sim: Simulation, name: str) -> tuple[float, str, str, int]:
-    """Value, writer, its kind, and since when."""
+    """Return value, writer, kind of writer, and tick of the last change."""
     assert columns is not None
     place = sim.process_image.command_names.index(name)
     writer = columns.writer[place]
@@ -93,7 +93,7 @@ def test_it_goes_on_from_a_checkpoint_and_is_told_at_once(tmp_path: Path) -> Non
 
 
 def test_more_writers_than_commands() -> None:
-    """Only those are named of whom something is in force."""
+    """Only writers of values in force are listed."""
     sim = line()
     for number in range(20):
         sim.give(given(f"writer {number}", TWO, 0.01 * number))

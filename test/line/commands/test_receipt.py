@@ -1,4 +1,4 @@
-"""Every input that is refused on receipt is refused by the line in every state, and all such inputs are refused."""
+"""An input is refused on receipt exactly if the line refuses it in every state."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ RECEIPTS = [Receipt(simulation.process_image.tags, simulation.scene.where) for s
 
 
 def receipt() -> Receipt:
-    """The receipt of the zoned line."""
+    """Return the receipt of the zoned line."""
     return RECEIPTS[0]
 
 
@@ -70,7 +70,7 @@ def test_the_line_refuses_what_its_receipt_refuses(
 
 @pytest.mark.parametrize("operation", ["set", "inject", "mode", "force"])
 def test_what_the_line_refuses_at_its_start_its_receipt_refuses(operation: str) -> None:
-    """But for what depends on the mode of a device, or on the state of a machine."""
+    """Exceptions depend on the control mode of a device, or on the state of a machine."""
     for kind, name, value in product(WRITER_KINDS, NAMES, VALUES):
         wanted = asked(kind, operation, (name,), (value,))
         known = receipt().refusal(wanted)

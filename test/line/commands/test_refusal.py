@@ -88,7 +88,7 @@ def test_switches_and_counts(name: str, value: float, reason: str) -> None:
     ],
 )  # fmt: skip
 def test_what_is_refused_and_why(names: list[str], values: list[float], reason: str) -> None:
-    """And the belts keep their speeds, also the one whose own value was good."""
+    """All belts keep their speeds, also one whose own value was valid."""
     assert refusal(named(COMMANDS), "command", names, values) == reason
     sim = two_belts()
     if names and names != ["belts/two/cmd_speed"]:
@@ -111,7 +111,7 @@ def test_the_limits_themselves_are_accepted() -> None:
 
 
 def test_a_command_takes_effect_at_the_next_tick_and_says_at_which() -> None:
-    """Queued, nothing changes; the scan from tick n to n + 1 runs with it, and the outcome names n."""
+    """A queued command changes nothing. The scan from tick n to n + 1 runs with it, and the result states n."""
     sim = two_belts()
     sim.advance(3)
     sim.command(["belts/one/cmd_speed", "belts/two/cmd_speed"], [-0.5, 1.0], source="plc")
@@ -128,7 +128,7 @@ def test_a_command_takes_effect_at_the_next_tick_and_says_at_which() -> None:
 
 
 def test_commands_apply_in_their_order() -> None:
-    """The last one stands; a refused one between them changes nothing; each has its outcome."""
+    """The last one stays in force. A refused one between them changes nothing. Each has a result."""
     sim = two_belts()
     for value in (0.4, 5.0, 0.6):
         sim.command(["belts/one/cmd_speed"], [value])
@@ -153,7 +153,7 @@ def test_a_refusal_lists_some_of_many_names() -> None:
 
 
 def test_what_is_refused_is_repeated_in_printable_words_once_and_for_all() -> None:
-    """The outcome's own words are refused in the same words again, so that a recording with them can be replayed."""
+    """Names in a result are refused with the same names again, so a recording that contains them can be replayed."""
     sim = two_belts()
     sim.command(["\x1b[31m\u202e" + "ü" * 300], [math.nan], "plc\r\n")
     sim.advance()

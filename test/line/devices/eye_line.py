@@ -1,4 +1,4 @@
-"""A straight line for tests of sensors: a belt, behind it a plate that can stop; bottles in a row. One kernel."""
+"""Straight line for tests of sensors: a belt, then a plate that can stop, and bottles in a row. It uses one kernel."""
 
 from __future__ import annotations
 
@@ -9,11 +9,14 @@ from scenes import RADIUS, base, belt, bottle, contact, segment, simulation
 from conveyor_sim.simulation import Simulation
 
 SPEED = 0.5
-"""m/s, of the belt."""
+"""Speed of the belt, m/s."""
 
 
 def eye_line(speed: float = SPEED, xs: tuple[float, ...] = (0.0,), **fields: Any) -> Simulation:
-    """Bottles at (x, 0) that move with a belt along x, up to x = 2; from there on a plate, as fast at first."""
+    """Return a line with bottles at (x, 0) that move with a belt along x, up to x = 2.
+
+    From there on they stand on a plate, initially as fast as the belt.
+    """
     given: dict[str, Any] = {
         "tick": 0.01,
         "accuracy": {"per_tick": 20},
@@ -29,21 +32,21 @@ def eye_line(speed: float = SPEED, xs: tuple[float, ...] = (0.0,), **fields: Any
 
 
 def across(x: float, half: float = 0.2, **more: Any) -> dict[str, Any]:
-    """A beam or a counter's line across the belt; a counter's forward is along x."""
+    """Return a beam, or the line of a counter, across the belt. A counter's forward direction is along x."""
     return {"from": [x, -half], "to": [x, half], **more}
 
 
 def read(sim: Simulation, place: str = "") -> dict[str, float]:
-    """Signals by name, of those that begin with a place by what follows."""
+    """Return signals by name; of those that begin with a place, by the rest of the name."""
     image = zip(sim.process_image.signal_names, sim.signals().tolist(), strict=True)
     return {name.removeprefix(place): value for name, value in image if name.startswith(place)}
 
 
 def rises(x: float, speed: float = SPEED) -> float:
-    """When a bottle that began at 0 breaks a beam at x, s."""
+    """Return the time when a bottle that started at 0 breaks a beam at x, s."""
     return (x - RADIUS) / speed
 
 
 def falls(x: float, speed: float = SPEED) -> float:
-    """When it frees it, s."""
+    """Return the time when the bottle frees the beam, s."""
     return (x + RADIUS) / speed

@@ -1,4 +1,4 @@
-"""Watchdogs: without a command for its time, a belt stops, once, until the next command."""
+"""Watchdogs: a belt without a command for its time-out stops, once, until the next command."""
 
 from scenes import base, belt, bottle, simulation
 
@@ -22,7 +22,7 @@ def watched(timeout: float = 0.05) -> Simulation:
 
 
 def speeds(sim: Simulation, ticks: int) -> list[float]:
-    """Of the watched belt, after each tick."""
+    """Return the speed of the watched belt after each tick."""
     found = []
     for _ in range(ticks):
         sim.advance()
@@ -31,7 +31,10 @@ def speeds(sim: Simulation, ticks: int) -> list[float]:
 
 
 def test_the_belt_stops_at_the_first_tick_past_the_time_out() -> None:
-    """0.05 s: ticks 0 to 4 still run; the outcome, as of a command of its own, is told once."""
+    """With 0.05 s, the belt still runs in ticks 0 to 4.
+
+    The stop is reported once, as the result of a command by the line.
+    """
     sim = watched()
     assert speeds(sim, 8) == [0.2] * 5 + [0.0] * 3
     (outcome,) = sim.take_outcomes()

@@ -11,7 +11,7 @@ RUN = "belts/belt/cmd_speed"
 
 
 def test_counters_count_by_direction_and_there_and_back() -> None:
-    """Three bottles pass two lines, one of which looks the other way; then the belt runs back under them."""
+    """Three bottles pass two lines of opposite directions. Then the belt moves back under them."""
     lines = {"there": across(0.3), "turned": {"from": [0.3, 0.2], "to": [0.3, -0.2]}, "beside": across(0.3, -0.1)}
     lines["short"] = {"from": [0.3, 0.01], "to": [0.3, 0.2]}
     sim = eye_line(xs=(0.0, -0.2, -0.4), counters=lines)
@@ -27,7 +27,7 @@ def test_counters_count_by_direction_and_there_and_back() -> None:
 
 
 def test_a_bottle_that_begins_on_the_line_is_past_it_and_rest_is_no_passage() -> None:
-    """Wherever that is between two numbers of the machine; only the way back over it counts."""
+    """Rounding may put the position on either side. Only the way back over the line counts."""
     places = (0.1, 0.7, 1.3)
     sim = eye_line(0.0, xs=places, counters={f"c{n}": across(x) for n, x in enumerate(places)})
     sim.advance(20)
@@ -41,7 +41,7 @@ def test_a_bottle_that_begins_on_the_line_is_past_it_and_rest_is_no_passage() ->
 
 
 def test_zones_count_axes_and_divide_by_their_area() -> None:
-    """An L-shaped zone of 0.75 m^2; its switch is on from four bottles on; what it shows can be made wrong."""
+    """An L-shaped zone of 0.75 m^2. Its switch is on from four bottles on. Its count can be falsified by a fault."""
     corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 0.5], [0.5, 0.5], [0.5, 1.0], [0.0, 1.0]]
     places = [(0.1, 0.1), (0.9, 0.4), (0.4, 0.9), (0.2, 0.6), (0.6, 0.6), (-0.01, 0.5), (0.7, 0.2)]
     sim = eye_line(
@@ -63,7 +63,7 @@ def test_zones_count_axes_and_divide_by_their_area() -> None:
 
 
 def test_ten_bottles_a_tick_are_ten() -> None:
-    """A rank abreast, in one tick of the line."""
+    """Ten bottles side by side pass in one tick."""
     rank = [bottle(-0.15, y, 0.5) for y in np.linspace(-0.9, 0.45, 10)]
     sim = eye_line(bottles=rank, counters={"line": across(0.0, 1.0)}, photo_eyes={"eye": across(0.0, 1.0)})
     sim.advance(60)
@@ -74,8 +74,10 @@ def test_ten_bottles_a_tick_are_ten() -> None:
 @pytest.mark.parametrize("turned", [0.0, 0.5])
 @pytest.mark.parametrize(("columns", "rows"), [(1, 1), (1, 30), (12, 9), (40, 40)])
 def test_the_range_of_a_count_is_what_a_region_can_hold(columns: int, rows: int, turned: float) -> None:
-    """Bottles in a hexagonal pattern, the densest there is, with axes on its edge; a belt of that size. A narrow region
-    is said to hold too many, for bottles beside it could use its ground.
+    """Bottles have the densest, hexagonal pattern, with axes on the edge of the region.
+
+    A belt of that size has the same range. The range of a narrow region is too large, because bottles beside it could
+    use its area.
     """
     radius, edge = 0.03, 1e-6
     along = 2.0 * radius * (np.arange(columns)[None, :] + 0.5 * (np.arange(rows)[:, None] % 2))

@@ -1,4 +1,4 @@
-"""Drives: what they do when commanded, tripped and reset, and what their encoder counts."""
+"""Drives: commands, trips and reset, and the count of the encoder."""
 
 import math
 from itertools import pairwise
@@ -12,7 +12,7 @@ from conveyor_sim.simulation import Simulation
 
 
 def driven(**drive: Any) -> Simulation:
-    """One belt at 0.5 m/s with a drive of 1 m/s^2 and 1000 pulses a metre, a bottle on it."""
+    """Return a belt at 0.5 m/s with a drive of 1 m/s^2 and 1000 pulses per metre, and a bottle on it."""
     return simulation(
         accuracy={"per_tick": 10},
         base=base(0.4),
@@ -22,12 +22,12 @@ def driven(**drive: Any) -> Simulation:
 
 
 def signal(sim: Simulation, name: str) -> float:
-    """A signal of the belt now."""
+    """Return the present value of a signal of the belt."""
     return float(sim.signals()[sim.process_image.signal_names.index(f"belts/one/{name}")])
 
 
 def told(sim: Simulation, **values: float) -> Simulation:
-    """With commands of the belt given."""
+    """Send commands to the belt, and return the simulation."""
     sim.command([f"belts/one/{name}" for name in values], list(values.values()))
     return sim
 
@@ -37,7 +37,7 @@ def states(sim: Simulation) -> tuple[float, float, float]:
 
 
 def test_the_engine_sees_the_ramped_speed() -> None:
-    """A bottle that sticks to the belt has the drive's acceleration: 1 m/s^2 is less than mu g."""
+    """A bottle that sticks to the belt has the acceleration of the drive: 1 m/s^2 is less than mu g."""
     sim = told(driven(), cmd_speed=1.0)
     sim.advance(30)
     assert signal(sim, "speed") == pytest.approx(0.8)
@@ -120,7 +120,7 @@ DT = 0.01
 
 
 def course(ramp: Ramp, setpoint: float, limit: float, jerk: float | None) -> list[float]:
-    """Speeds up to the setpoint, the first one included."""
+    """Return the speeds up to the setpoint, the first one included."""
     speeds = [ramp.value]
     while ramp.value != setpoint:
         speeds.append(ramp.approach(setpoint, limit, jerk, DT))

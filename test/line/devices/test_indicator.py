@@ -1,4 +1,4 @@
-"""Indicators of an exit: a jam is told from a queue that flows, from a stop downstream and from want of bottles."""
+"""Indicators of an exit: a jam is distinguished from a moving queue, a stop downstream, and a lack of bottles."""
 
 from __future__ import annotations
 
@@ -17,7 +17,10 @@ PITCH = 2.0 * RADIUS
 def exit_line(
     count: int, first: float = 1.903, more: dict[str, Any] | None = None, speed: float = 0.5, pitch: float = 2.0 * PITCH
 ) -> Simulation:
-    """A row of bottles that leave over x = 2.3, on the plate: what stands on that does not pass."""
+    """Return a line with a row of bottles that leave over x = 2.3, on the plate.
+
+    Bottles on a stopped plate do not pass.
+    """
     return eye_line(
         speed,
         xs=tuple(first - pitch * n for n in range(count)),
@@ -40,7 +43,7 @@ def exit_line(
 
 
 def history(sim: Simulation, ticks: int, *names: str) -> list[tuple[float, ...]]:
-    """Signals of the exit after each tick."""
+    """Return the signals of the exit after each tick."""
     found = []
     for _ in range(ticks):
         sim.advance()
@@ -50,7 +53,7 @@ def history(sim: Simulation, ticks: int, *names: str) -> list[tuple[float, ...]]
 
 
 def test_nose_to_tail_flow_is_no_jam_and_has_its_rate() -> None:
-    """A bottle every 0.26 s: 3.846 a second in a window of 2 s are 7 or 8 of them."""
+    """One bottle every 0.26 s is 3.846 per second, so a window of 2 s has 7 or 8 of them."""
     sim = exit_line(25, pitch=PITCH)
     jams, flows = zip(*history(sim, 600, "jam", "flow"), strict=True)
     assert not any(jams)
@@ -59,9 +62,9 @@ def test_nose_to_tail_flow_is_no_jam_and_has_its_rate() -> None:
 
 
 def test_bottles_that_wait_and_do_not_pass_while_the_belt_runs_are_a_jam() -> None:
-    """The plate stops under them at tick 100; one second after the passage at tick 80 it is told.
+    """The plate stops under them at tick 100. The jam is reported one second after the passage at tick 80.
 
-    Stopping the belt does not clear it, the next passage does.
+    Stopping the belt does not clear the jam, the next passage does.
     """
     sim = exit_line(4)
     assert not any(jam for (jam,) in history(sim, 100, "jam"))
@@ -79,7 +82,7 @@ def test_bottles_that_wait_and_do_not_pass_while_the_belt_runs_are_a_jam() -> No
 
 
 def test_the_time_of_a_jam_is_exact_in_ticks() -> None:
-    """A bottle stands in the zone, on the plate, while the belt runs. A second; a stop starts it anew."""
+    """A bottle stands in the zone, on the plate, while the belt runs, for one second. A stop restarts that time."""
     sim = exit_line(1, first=2.28, speed=0.0)
     sim.command([BELT], [0.1])
     jams = [jam for (jam,) in history(sim, 101, "jam")]
@@ -95,7 +98,7 @@ def test_the_time_of_a_jam_is_exact_in_ticks() -> None:
 
 @pytest.mark.parametrize("more", [{"downstream": "plate"}, {"backup": "behind"}], ids=["stands", "full"])
 def test_a_stop_downstream_blocks_and_is_no_jam(more: dict[str, str]) -> None:
-    """Bottles wait at a plate that stands, or before a zone that shows itself full; told at once, until it goes on."""
+    """Bottles wait at a stopped plate, or before a full zone. Blocked is reported at once, until they move on."""
     sim = exit_line(4, more=more)
     assert not any(any(row) for row in history(sim, 70, "blocked", "jam"))
     sim.command([PLATE], [0.0])
@@ -111,7 +114,10 @@ def test_a_stop_downstream_blocks_and_is_no_jam(more: dict[str, str]) -> None:
 
 
 def test_an_exit_whose_belt_runs_without_bottles_is_starved() -> None:
-    """After the last has left. A belt that stands is not starved. Nobody tells blocked who does not know downstream."""
+    """Starved begins after the last bottle has left.
+
+    A stopped belt is not starved. Without downstream devices, no signal reports blocked.
+    """
     sim = exit_line(1, first=2.25, more={"starved_time": 0.5})
     assert set(read(sim, "indicators/exit/")) == {"flow", "jam", "starved"}
     left = round((2.3 - 2.25) / 0.5 / 0.01)
@@ -123,7 +129,7 @@ def test_an_exit_whose_belt_runs_without_bottles_is_starved() -> None:
 
 
 def test_a_bottle_that_shakes_on_the_line_is_no_flow() -> None:
-    """Forward three times and back twice: it has left once."""
+    """Three times forward and twice back is one passage."""
     sim = exit_line(1, first=2.25, more={"window": 100.0})
     for speed, ticks in ((0.5, 25), (-0.5, 60), (0.5, 60), (-0.5, 60), (0.5, 60)):
         sim.command([PLATE], [speed])

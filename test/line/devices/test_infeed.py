@@ -1,4 +1,4 @@
-"""Infeeds: a tightly packed in-line, a rate, jitter from the seed, and no bottle onto another."""
+"""Infeeds: tightly packed in-line, rate, jitter from the seed, and free space for each bottle."""
 
 from typing import Any
 
@@ -13,7 +13,7 @@ TICK = 0.01
 
 
 def infeed(**fields: Any) -> Simulation:
-    """An infeed at the origin along x, onto a belt of the same speed."""
+    """Return a line with an infeed at the origin along x, onto a belt of the same speed."""
     belts = fields.pop("belts", {"belt": belt(SPEED)})
     rails = fields.pop("rails", {"stop": segment((4.0, -1.0), (4.0, 1.0))})
     scene_fields = {key: fields.pop(key) for key in ("seed", "outfeeds") if key in fields}
@@ -30,7 +30,7 @@ def infeed(**fields: Any) -> Simulation:
 
 
 def fed_at(sim: Simulation, ticks: int) -> list[int]:
-    """The tick at which each bottle entered."""
+    """Return the tick at which each bottle entered."""
     found = [sim.tick] * sim.counts.fed
     for _ in range(ticks):
         sim.advance()
@@ -55,7 +55,7 @@ def test_a_bottle_that_is_removed_at_once_does_not_hurry_the_in_line() -> None:
 @pytest.mark.parametrize("gap", [0.0, 0.001, 0.05])
 @pytest.mark.parametrize("direction", [0.0, 0.6])
 def test_packed_bottles_follow_each_other_at_the_gap(gap: float, direction: float) -> None:
-    """On a belt of the same speed: pitch 2 R + gap to rounding, whatever part of a tick that takes."""
+    """On a belt of the same speed, the pitch is 2 R + gap up to rounding, at any share of a tick."""
     belts = {"belt": belt(SPEED, (-1.0, -4.0), 9.0, 9.0, angle=direction)}
     sim = infeed(gap=gap, direction=direction, belts=belts)
     sim.advance(300)
@@ -68,7 +68,7 @@ def test_packed_bottles_follow_each_other_at_the_gap(gap: float, direction: floa
 
 
 def test_several_bottles_may_enter_in_one_tick() -> None:
-    """At 20 m/s, 1.5 bottles a tick."""
+    """At 20 m/s, 1.5 bottles enter per tick."""
     fast = {"belt": belt(20.0, (-1.0, -1.0), 9.0, 2.0, speed_limits=[0, 30])}
     sim = infeed(gap=0.003, speed=20.0, belts=fast, rails={"far": segment((8.0, -1.0), (8.0, 1.0))})
     sim.advance(30)
@@ -120,7 +120,7 @@ def test_it_starts_at_its_time(how: dict[str, float]) -> None:
 
 
 def test_a_full_line_blocks_it_and_never_overlaps() -> None:
-    """Against a stop the line fills up to the infeed, which says so; no bottle is put onto another."""
+    """Against a stop the line fills up to the infeed, which then reports blocked. No bottle overlaps another."""
     sim = infeed(gap=0.001, rails={"stop": segment((0.6, -1.0), (0.6, 1.0))})
     blocked = sim.process_image.signal_names.index("infeeds/in/blocked")
     before = sim.bottles().id.size
@@ -160,7 +160,10 @@ def test_a_blocked_infeed_recovers(how: dict[str, float]) -> None:
 
 
 def test_a_rate_is_kept_in_the_mean() -> None:
-    """1/0.3 s between bottles is no whole number of ticks: each enters at the first tick from its time on."""
+    """The time between bottles, 1/0.3 s, is no whole number of ticks.
+
+    Each bottle enters at the first tick from its time on.
+    """
     rate = 3.3
     entered = fed_at(infeed(rate=rate), 600)
     expected = [int(np.ceil(n / rate / TICK - 1e-9)) for n in range(len(entered))]
@@ -169,7 +172,7 @@ def test_a_rate_is_kept_in_the_mean() -> None:
 
 
 def test_bottles_that_had_to_wait_shift_those_behind_them() -> None:
-    """A timed line does not catch up: after a wait the next bottle comes one period after the one that waited."""
+    """A timed line does not catch up. After a wait, the next bottle enters one period after the delayed one."""
     rate = 2.0
     sim = infeed(rate=rate)
     sim.command(["belts/belt/cmd_speed"], [0.0])
@@ -181,7 +184,7 @@ def test_bottles_that_had_to_wait_shift_those_behind_them() -> None:
 
 
 def test_timing_jitter_of_a_rate() -> None:
-    """Early or late by up to the jitter, about times that are 1/rate apart; not the same every time."""
+    """Bottles are early or late by up to the jitter, around times 1/rate apart, with varying jitter."""
     rate, jitter = 2.5, 0.05
     entered = np.array(fed_at(infeed(rate=rate, timing_jitter=jitter, start=0.2), 1000)) * TICK
     late = entered - 0.2 - np.arange(entered.size) / rate
@@ -216,7 +219,7 @@ def test_lateral_jitter_moves_bottles_sideways_within_its_bounds() -> None:
 
 
 def test_jitter_is_drawn_from_the_seed() -> None:
-    """The same seed the same bottles, another seed others; without jitter the seed does not matter."""
+    """Equal seeds give equal bottles, other seeds other ones. Without jitter the seed has no effect."""
 
     def places(seed: int, **jitter: float) -> list[float]:
         sim = infeed(seed=seed, gap=0.001, **jitter)
@@ -230,7 +233,7 @@ def test_jitter_is_drawn_from_the_seed() -> None:
 
 
 def test_each_infeed_has_a_stream_of_its_own() -> None:
-    """What one infeed draws does not depend on how often another one has drawn."""
+    """The draws of one infeed do not depend on the number of draws of another."""
 
     def second(first_count: int) -> list[float]:
         common = {"bottle": "bottle", "direction": 0.0, "speed": SPEED, "gap": 0.001, "lateral_jitter": 0.05}

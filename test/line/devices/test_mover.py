@@ -1,4 +1,4 @@
-"""Gates, pushers and diverters as a controller has them: commands, end switches, a jam."""
+"""Gates, pushers and diverters as controllers see them: commands, end switches, jams, motion profiles."""
 
 import math
 from typing import Any
@@ -15,7 +15,10 @@ STROKE, TOP, ACCELERATION = 0.3, 0.5, 2.0
 
 
 def alone(*bottles: dict[str, Any], **more: Any) -> Simulation:
-    """A pusher, and a gate that is open at the start, far away; and a bottle out of the way, to share kernels."""
+    """Return a line with a pusher, and a gate far away that is open at the start.
+
+    A bottle out of the way makes the tests share kernels.
+    """
     steel = {"material": "steel", "max_speed": TOP, "acceleration": ACCELERATION}
     pusher = {"from": [0.0, -0.2], "to": [0.0, 0.2], "direction": 0.0, "stroke": STROKE, **steel}
     gate = {"kind": "swing", "from": [9.0, 5.0], "to": [9.5, 5.0], "angle": "-90 deg", "open": True, **steel}
@@ -23,7 +26,7 @@ def alone(*bottles: dict[str, Any], **more: Any) -> Simulation:
 
 
 def seen(sim: Simulation, name: str) -> tuple[float, ...]:
-    """Position and both end switches."""
+    """Return the position and both end switches."""
     signals = dict(zip(sim.process_image.signal_names, sim.signals().tolist(), strict=True))
     position, home, away, *_ = (value for signal, value in signals.items() if signal.startswith(f"{name}/"))
     return position, home, away
@@ -63,7 +66,7 @@ def test_a_stroke_takes_its_time_and_there_are_switches_at_its_ends() -> None:
 
 
 def test_a_jammed_rail_stands_where_it_was_and_goes_on_when_it_is_free() -> None:
-    """At once, as against a stop; a bottle that comes up against it stays on its side."""
+    """It stops at once. A bottle that moves up against it stays on its side."""
     sim = alone(bottle(0.3, 0.0, -0.2, 0.0))
     sim.command(["pushers/p/push"], [1])
     sim.advance(30)
@@ -97,7 +100,7 @@ TOP, ACCELERATION = 0.5, 2.0
 
 
 def at(course: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Position and speed at times (n,)."""
+    """Return position and speed at times (n,)."""
     phase = np.maximum(np.searchsorted(course[:, 0], times, side="right") - 1, 0)
     begin, position, speed, acceleration = course[phase].T
     since = times - begin

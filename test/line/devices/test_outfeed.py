@@ -1,4 +1,4 @@
-"""Outfeeds: bottles whose axis is in the region leave; their slots are used again, their ids never."""
+"""Outfeeds: bottles whose axes are in the region leave. Their slots are used again, their ids are not."""
 
 import numpy as np
 from scenes import RADIUS, base, belt, contact, segment, simulation
@@ -11,7 +11,7 @@ STAR = np.array([[0.0, 1.0], [0.2, 0.3], [1.0, 0.2], [0.3, -0.1], [0.6, -0.9], [
 
 
 def winding(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Whether the polygon winds around each point: another method than the one in use."""
+    """Return whether the polygon winds around each point, by a method other than that of the engine."""
     a = corners[None] - points[:, None]
     b = np.roll(corners, -1, axis=0)[None] - points[:, None]
     angle = np.arctan2(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0], (a * b).sum(axis=-1))
@@ -19,7 +19,7 @@ def winding(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 
 def in_polygon(corners: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Whether bottles at (x, y) are inside."""
+    """Return whether bottles at (x, y) are inside."""
     slots = np.empty(x.size, np.int64)
     inside = np.zeros(x.size, dtype=bool)
     inside[slots[: find_inside(corners, x, y, np.arange(x.size), slots)]] = True
@@ -27,7 +27,7 @@ def in_polygon(corners: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 
 def test_points_in_a_concave_polygon() -> None:
-    """Either way around."""
+    """Corners may be in either order."""
     points = np.random.default_rng(2).uniform(-1.2, 1.2, (5000, 2))
     expected = winding(STAR, points)
     assert 500 < expected.sum() < 4500
@@ -36,7 +36,7 @@ def test_points_in_a_concave_polygon() -> None:
 
 
 def test_points_on_shared_edges_belong_to_one_polygon() -> None:
-    """Regions side by side: a point on the edge or corner between them is in one of them, never in both or none."""
+    """A point on the edge or corner between adjoining regions belongs to exactly one of them."""
     x, y = (grid.ravel() for grid in np.meshgrid(np.linspace(0.0, 2.0, 9), np.linspace(0.0, 2.0, 9)))
     inner = (x > 0.0) & (x < 2.0) & (y > 0.0) & (y < 2.0)
     tiles = [np.array([[i, j], [i + 1, j], [i + 1, j + 1], [i, j + 1]]) for i in (0.0, 1.0) for j in (0.0, 1.0)]

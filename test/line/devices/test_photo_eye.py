@@ -1,4 +1,4 @@
-"""Photo-eyes: edges at the right time within a tick, delays in whole ticks, and what can be made to go wrong."""
+"""Photo-eyes: edges at the right time within a tick, delays in whole ticks, and faults."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from conveyor_sim.simulation import Simulation
 
 
 def trace(sim: Simulation, ticks: int, *eyes: str) -> dict[str, list[bool]]:
-    """`blocked` of each eye at every tick from 0 on."""
+    """Return `blocked` of each eye at every tick from 0 on."""
     found: dict[str, list[bool]] = {eye: [] for eye in eyes}
     for tick in range(ticks + 1):
         for eye in eyes:
@@ -25,13 +25,13 @@ def trace(sim: Simulation, ticks: int, *eyes: str) -> dict[str, list[bool]]:
 
 
 def changes(levels: list[bool]) -> list[int]:
-    """Ticks at which a signal is another than the tick before."""
+    """Return the ticks at which a signal changes."""
     return [tick for tick in range(1, len(levels)) if levels[tick] != levels[tick - 1]]
 
 
 @pytest.mark.parametrize("speed", [0.0731, 0.5, 1.37])
 def test_two_eyes_measure_the_speed_of_a_bottle_and_one_its_diameter(speed: float) -> None:
-    """At a tick of 10 ms, in which it moves by up to a fifth of its radius, within 0.1 %."""
+    """The tick is 10 ms, in which it moves by up to a fifth of its radius. The error is below 0.1 %."""
     eyes = {"one": across(0.1003), "other": across(0.3377)}
     sim = eye_line(speed, photo_eyes=eyes)
     sim.advance(round(0.45 / speed / 0.01))
@@ -45,7 +45,7 @@ def test_two_eyes_measure_the_speed_of_a_bottle_and_one_its_diameter(speed: floa
 
 
 def test_a_bottle_off_the_middle_of_the_beam_blocks_it_for_less_long() -> None:
-    """A beam that ends 0.04 m beside the axis: a chord of the circle; one 0.07 m beside it sees nothing."""
+    """A beam that ends 0.04 m beside the axis meets a chord of the circle. One 0.07 m beside it is never blocked."""
     eyes = {"chord": {"from": [0.3, 0.2], "to": [0.3, 0.04]}, "past": {"from": [0.3, 0.2], "to": [0.3, 0.07]}}
     sim = eye_line(photo_eyes=eyes)
     sim.advance(120)
@@ -55,7 +55,7 @@ def test_a_bottle_off_the_middle_of_the_beam_blocks_it_for_less_long() -> None:
 
 
 def test_a_bottle_that_passes_within_one_tick_leaves_two_edges() -> None:
-    """0.13 m at 1 m/s in a tick of 0.25 s: free at every tick, and yet seen."""
+    """The tick is 0.25 s at 1 m/s, the beam is blocked for 0.13 m: free at every tick, and yet detected."""
     eyes = {"eye": across(0.375)}
     sim = eye_line(1.0, tick=0.25, accuracy={"per_tick": 500}, photo_eyes=eyes)
     assert not any(trace(sim, 4, "eye")["eye"])
@@ -65,7 +65,7 @@ def test_a_bottle_that_passes_within_one_tick_leaves_two_edges() -> None:
 
 
 def test_bottles_nose_to_tail_are_one_and_a_gap_is_a_gap() -> None:
-    """Two that touch, a third 5 mm behind them. What is blocked at the start has no edge for it."""
+    """Two bottles touch, a third follows 5 mm behind. A beam that is blocked at the start has no edge for that."""
     row = (0.0, -2.0 * RADIUS, -4.0 * RADIUS - 5e-3)
     sim = eye_line(xs=row, photo_eyes={"eye": across(0.3), "there": across(0.01)})
     assert read(sim, "photo_eyes/there/") == {"blocked": 1.0, "rose": 0.0, "fell": 0.0, "edges": 0.0}
@@ -77,7 +77,7 @@ def test_bottles_nose_to_tail_are_one_and_a_gap_is_a_gap() -> None:
 
 
 def test_delays_and_debounce_are_exact_in_ticks() -> None:
-    """The beam is blocked for 0.26 s, from 0.4712 s on: changes fall on the first tick that is late enough."""
+    """The beam is blocked for 0.26 s from 0.4712 s on. Changes occur at the first tick that is late enough."""
     x = 0.3006
     delays: dict[str, dict[str, Any]] = {
         "plain": {},
@@ -109,7 +109,7 @@ def test_delays_and_debounce_are_exact_in_ticks() -> None:
 
 
 def test_a_stuck_eye_tells_nothing_else_until_it_is_right_again() -> None:
-    """Blocked from tick 48 to 73. Stuck from the tick on at which the fault acts, and right again from that on."""
+    """Blocked from tick 48 to 73. The eye is stuck from the tick at which the fault acts, until the fault ends."""
     x = 0.3006
     sim = eye_line(photo_eyes={name: across(x) for name in ("on", "off", "good")})
     sim.inject("photo_eyes/on/stuck_on", 1.0)
@@ -128,7 +128,10 @@ def test_a_stuck_eye_tells_nothing_else_until_it_is_right_again() -> None:
 
 
 def test_a_late_eye_is_late_by_so_much() -> None:
-    """Two beams at one place; the edges of the late one come 0.123 s later, and the fault's end lets none overtake."""
+    """Two beams are at one place. Edges of the late one come 0.123 s later.
+
+    No edge overtakes another when the fault ends.
+    """
     sim = eye_line(photo_eyes={"late": across(0.3006), "good": across(0.3006)})
     sim.inject("photo_eyes/late/delay", 0.123)
     sim.advance(71)
@@ -143,7 +146,7 @@ def test_a_late_eye_is_late_by_so_much() -> None:
 
 
 def test_chatter_has_its_rate_and_is_drawn_from_the_seed() -> None:
-    """Two edges a cycle; each eye on its own, and another seed draws others."""
+    """There are two edges per cycle. Each eye has separate draws, and another seed gives others."""
 
     def edges(seed: int) -> list[tuple[float, ...]]:
         sim = eye_line(seed=seed, photo_eyes={"one": across(1.5), "other": across(1.5), "good": across(1.5)})

@@ -1,4 +1,4 @@
-"""Sensors remember what they must: a run goes on from a checkpoint, or in other portions, with the same bits."""
+"""Memory of sensors: a run continues from a checkpoint, or in other portions, with the same bits."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from conveyor_sim.simulation import Simulation
 
 
 def sensing() -> Simulation:
-    """All kinds, with faults and delays under way."""
+    """Return a line with all kinds of sensors, with faults and delays in progress."""
     region = [[0.3, -0.2], [0.9, -0.2], [0.9, 0.2], [0.3, 0.2]]
     sim = eye_line(
         xs=(0.0, -0.131, -0.4),
@@ -34,7 +34,7 @@ def sensing() -> Simulation:
 
 
 def rows(sim: Simulation, end: int) -> list[bytes]:
-    """Signals after each tick."""
+    """Return the signals after each tick."""
     found = []
     while sim.tick < end:
         sim.advance()
@@ -43,7 +43,7 @@ def rows(sim: Simulation, end: int) -> list[bytes]:
 
 
 def test_a_checkpoint_in_the_middle_of_edges_goes_on_with_the_same_bits(tmp_path: Path) -> None:
-    """At tick 50 the beam has been broken for 0.03 s: debounce, delay and on-delay are all under way."""
+    """At tick 50 the beam has been broken for 0.03 s: debounce, delay and on-delay are in progress."""
     sim = sensing()
     rows(sim, 50)
     shown = read(sim)

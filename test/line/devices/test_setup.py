@@ -24,13 +24,13 @@ def test_equal_keys_draw_equal_numbers_and_others_do_not() -> None:
 
 @pytest.mark.parametrize("other", KEYS[1:], ids=str)
 def test_streams_of_one_seed_are_not_correlated(other: tuple[int, str, str]) -> None:
-    """Of ten thousand pairs of even numbers: within 4 standard deviations of none."""
+    """The correlation of ten thousand pairs of numbers is within 4 standard deviations of 0."""
     one, two = (random_stream(*key).uniform(size=10_000) for key in (KEYS[0], other))
     assert abs(np.corrcoef(one, two)[0, 1]) < 4.0 / np.sqrt(10_000)
 
 
 def test_the_numbers_are_the_same_on_every_machine() -> None:
-    """What was recorded must be drawn again: these were noted when streams got their names."""
+    """Replays must draw recorded numbers again. These were recorded when streams got their names."""
     assert random_stream(7, "infeeds/inlet", "jitter").integers(0, 2**32, 3).tolist() == [
         4216004101,
         1007638240,

@@ -1,4 +1,4 @@
-"""A belt with machines at its ends, in single file, for tests of what they do."""
+"""Belt with machines at its ends, in single file."""
 
 from typing import Any
 
@@ -7,22 +7,22 @@ from scenes import base, belt, contact, segment, simulation
 from conveyor_sim.simulation import Simulation
 
 END = [[1.75, -0.2], [2.0, -0.2], [2.0, 0.2], [1.75, 0.2]]
-"""Before the rail at the end of the belt."""
+"""Region before the rail at the end of the belt."""
 
 
 def source(rate: float = 2.0, **more: Any) -> dict[str, Any]:
-    """At the beginning of the belt."""
+    """Return a source at the start of the belt."""
     return {"kind": "source", "bottle": "bottle", "position": [0.0, 0.0], "direction": 0.0, "speed": 0.5,
             "rate": rate, **more}  # fmt: skip
 
 
 def sink(rate: float = 2.0, **more: Any) -> dict[str, Any]:
-    """At the end of the belt."""
+    """Return a sink at the end of the belt."""
     return {"kind": "sink", "region": END, "rate": rate, **more}
 
 
 def line(**fields: Any) -> Simulation:
-    """A belt of 2 m at 0.5 m/s in single file, with a rail at its end."""
+    """Return a belt of 2 m at 0.5 m/s in single file, with a rail at its end."""
     given = {
         "accuracy": {"per_tick": 50},
         "base": base(0.4),
@@ -34,11 +34,11 @@ def line(**fields: Any) -> Simulation:
 
 
 def signals(sim: Simulation) -> dict[str, float]:
-    """By name."""
+    """Return the signals by name."""
     return dict(zip(sim.process_image.signal_names, sim.signals().tolist(), strict=True))
 
 
 def station(region: list[list[float]], position: list[float], rate: float = 2.0, **more: Any) -> dict[str, Any]:
-    """Gives bottles as fast as the belt runs."""
+    """Return a station that gives bottles as fast as the belt runs."""
     return {"kind": "station", "region": region, "position": position, "direction": 0.0, "speed": 0.5, "rate": rate,
             **more}  # fmt: skip

@@ -1,4 +1,4 @@
-"""Counters of machines and of the line: what they add up to, resets, late joiners, checkpoints."""
+"""Counters of machines and of the line: sums, resets, late readers, checkpoints."""
 
 from __future__ import annotations
 
@@ -21,7 +21,10 @@ JAM = {"jam": {"between": {"kind": "list", "times": [3.0]}, "repair": {"kind": "
 
 
 def line(filler: dict[str, Any] | None = None, packer: dict[str, Any] | None = None, **fields: Any) -> Simulation:
-    """A filler of two bottles a second, a belt of 2 m at 0.5 m/s in single file, and a packer of 2.5."""
+    """Return a filler of two bottles per second, a belt of 2 m at 0.5 m/s, and a packer of 2.5 per second.
+
+    Bottles move in single file.
+    """
     source = {"kind": "source", "bottle": "bottle", "position": [0.0, 0.0], "direction": 0.0, "speed": 0.5, "rate": 2.0}
     sink = {"kind": "sink", "region": END, "rate": 2.5}
     given: dict[str, Any] = {
@@ -70,7 +73,7 @@ def test_times_add_up_to_all_time_and_bottles_to_the_signals() -> None:
 
 
 def test_failures_give_mtbf_and_mttr() -> None:
-    """Each 3 s of running, repaired in 1 s and 2 s in turn."""
+    """Each run lasts 3 s; repairs take 1 s and 2 s in turn."""
     sim = line(filler={"failures": JAM})
     sim.advance(2 * (300 + 100) + 2 * (300 + 200) + 50)
     filler = row(counters(sim), FILLER)
@@ -111,7 +114,7 @@ def test_parallel_packers_are_one_bottleneck_together() -> None:
 
 
 def test_a_reset_counts_anew_from_its_tick() -> None:
-    """One machine alone, then everything; what is reset stands as a line that starts then would."""
+    """One machine is reset alone, then everything. A reset counter equals that of a line that starts then."""
     sim = line(packer={"failures": JAM})
     sim.advance(1000)
     before = counters(sim)
@@ -146,7 +149,7 @@ def test_what_counts_nothing_can_t_be_reset() -> None:
 
 
 def test_counters_do_not_depend_on_who_looks_and_go_on_from_a_checkpoint(tmp_path: Path) -> None:
-    """A client that joins late reads what one reads that has looked at every tick."""
+    """A late client reads the same as one that has read at every tick."""
     watched, alone = (line(filler={"failures": JAM}, packer={"failures": JAM}) for _ in range(2))
     for sim in (watched, alone):
         reset(sim, FILLER)

@@ -1,4 +1,4 @@
-"""Efficiency from times and bottles, by numbers worked out by hand."""
+"""Efficiency from times and bottles, against numbers worked out by hand."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def test_a_shift_by_hand() -> None:
 
 
 def test_what_is_not_known_yet_is_no_number() -> None:
-    """At a start, and of a machine that has not failed."""
+    """At the start, and for a machine that has not failed."""
     fresh = efficiency(dict.fromkeys(CATEGORIES, 0.0), 0, 0, 0, 2.0)
     assert all(
         math.isnan(value) for value in (fresh.availability, fresh.effectiveness, fresh.quality, fresh.oee, fresh.mttr)

@@ -1,4 +1,4 @@
-"""Failures and planned stops: distributions against their closed forms, and what is counted."""
+"""Failures and planned stops: distributions against their closed forms, and the time that counts."""
 
 import math
 from typing import Any
@@ -61,7 +61,7 @@ def clock(counted: str) -> FailureClock:
 
 
 def test_failures_count_running_time_unless_they_are_to_count_the_clock() -> None:
-    """Five ticks to the first failure, three down, two to the second; it runs in every second tick only."""
+    """Five ticks to the first failure, three down, two to the second; the machine runs in every second tick only."""
     for counted, expected in (("running", [9, 12, 15, 18]), ("clock", [5, 8, 10, 13, 18])):
         jam = clock(counted)
         changes = [tick for tick in range(1, 19) if jam.advance(tick % 2 == 1)]

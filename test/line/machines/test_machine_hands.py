@@ -1,4 +1,4 @@
-"""Machines and people: Stop and Abort in every mode, and when a mode may change."""
+"""Machines and people: Stop and Abort in every control mode, and states in which the mode may change."""
 
 from pathlib import Path
 
@@ -19,7 +19,7 @@ def filling() -> Simulation:
 
 
 def act(sim: Simulation, kind: str, operation: str, *given: tuple[str, float]) -> CommandOutcome:
-    """What becomes of an input in the next tick."""
+    """Return the result of an input in the next tick."""
     names, values = zip(*given, strict=True)
     sim.take_outcomes()
     sim.give(Input("here", "Jo", kind, operation, names, values))
@@ -33,7 +33,7 @@ def command(sim: Simulation, kind: str, *words: Command) -> list[bool]:
 
 
 def mode(sim: Simulation, kind: str, number: float) -> str:
-    """Why a mode is refused, "" if it is not."""
+    """Return why a mode is refused, "" if it is not."""
     return act(sim, kind, MODE, (FILLER, number)).reason
 
 
@@ -42,7 +42,7 @@ def state(sim: Simulation) -> int:
 
 
 def reason(sim: Simulation) -> str:
-    """Why it stands, or last stood."""
+    """Return the reason for the present or last stop."""
     says = sim.process_image.signals[sim.process_image.signal_names.index(f"{FILLER}/stop_reason")]
     return says.texts[int(signals(sim)[says.name])]
 
@@ -63,7 +63,7 @@ def test_a_person_stops_a_machine_in_whatever_mode(kind: str, word: Command, the
 
 
 def test_the_stop_reason_tells_a_person_s_command_from_a_controller_s() -> None:
-    """By the writer of the input, whoever has control; a test commands as a controller does."""
+    """The writer of the input decides, not the control mode. A test counts as a controller."""
     sim = filling()
     for kind, ending in (("controller", ""), ("test", ""), ("operator", " by hand"), ("engineer", " by hand")):
         if kind == "operator":
@@ -97,7 +97,7 @@ def test_nothing_else_is_taken_of_an_operator_in_automatic(word: Command) -> Non
 
 @pytest.mark.parametrize("held", [Command.START, Command.RESET, Command.STOP])
 def test_a_controller_that_holds_its_last_command_does_not_undo_it(held: Command) -> None:
-    """What a person stopped stays so while the controller writes in every scan what it wrote before; twice over."""
+    """A person's stop stays while the controller repeats its commands in every scan."""
     sim = filling()
     before = [Command.STOP, Command.RESET, Command.START]
     command(sim, "controller", *before[: before.index(held) + 1])
@@ -130,7 +130,10 @@ def test_a_machine_changes_hands_only_where_it_works_on_nothing() -> None:
 
 
 def test_an_operator_takes_a_machine_and_gives_it_back() -> None:
-    """Stopped in Automatic, worked by hand in Manual; with `run` off it is back, and its controller starts it."""
+    """It is stopped in Automatic, then operated in Manual.
+
+    With `run` off it returns, and its controller starts it.
+    """
     sim = filling()
     assert command(sim, "operator", Command.STOP) == [True]
     assert mode(sim, "operator", MANUAL) == ""

@@ -1,4 +1,4 @@
-"""Machines and the PackML state model: what they do by themselves, on command, and why they stand."""
+"""Machines and the PackML state model: automatic transitions, commands, and stop reasons."""
 
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ COMMANDS = {text: number for number, text in COMMAND_TEXTS.items()}
 
 
 def at(sim: Simulation, machine: str = "packer") -> tuple[str, str, str]:
-    """Its state, where its time goes, and its stop reason, in words."""
+    """Return state, time category and stop reason, in words."""
     texts = {tag.name: tag.texts for tag in sim.process_image.signals}
     now = signals(sim)
     names = [f"machines/{machine}/{what}" for what in ("state", "category", "stop_reason")]
@@ -23,7 +23,10 @@ def at(sim: Simulation, machine: str = "packer") -> tuple[str, str, str]:
 
 
 def command(sim: Simulation, word: str, machine: str = "packer") -> str:
-    """Command it at the next tick; why it is refused, "" if it is not. The command goes back to none after it."""
+    """Send a command for the next tick, and return why it was refused, "" if it was not.
+
+    The command is set back to none after it.
+    """
     sim.take_outcomes()
     for value in (COMMANDS[word], 0):
         sim.command([f"machines/{machine}/cntrl_cmd"], [float(value)])
@@ -34,7 +37,7 @@ def command(sim: Simulation, word: str, machine: str = "packer") -> str:
 
 
 def packing(**more: Any) -> Simulation:
-    """A packer with more bottles than it takes, one after another."""
+    """Return a packer with more bottles than it takes, one after another."""
     packer = sink(2.0, **{"suspend_after": 100.0, **more})
     sim = line(machines={"filler": source(4.0), "packer": packer}, duration=100.0)
     sim.advance(600)
@@ -89,7 +92,7 @@ def test_a_command_that_the_state_does_not_allow_is_refused_and_changes_nothing(
 
 
 def test_a_command_counts_as_it_changes() -> None:
-    """A controller that writes all its outputs in every scan does not stop a machine again that was started anew."""
+    """A controller that writes all outputs in every scan does not stop a restarted machine again."""
     sim = packing()
     stop = float(COMMANDS["Stop"])
     for _ in range(3):
@@ -145,7 +148,7 @@ def test_the_fault_stop_holds_it_until_it_is_gone() -> None:
 
 
 def test_a_command_does_not_hide_that_a_machine_has_failed() -> None:
-    """A controller that stops the line for a failure; the machine that failed still says so, and starts by command."""
+    """A controller stops the line for a failure. The failed machine still shows it, and starts by command."""
     sim = packing()
     sim.inject("machines/packer/stop", 1.0)
     sim.advance()
@@ -171,7 +174,7 @@ def test_one_that_was_held_by_command_stays_so_when_a_fault_goes() -> None:
 
 
 def test_starved_and_blocked_become_suspended_after_their_time_and_not_before() -> None:
-    """A packer that could take a bottle every quarter of a second and gets one every half: it waits, never for long."""
+    """A packer could take a bottle every 0.25 s and gets one every 0.5 s, so each wait is short."""
     sim = line(machines={"filler": source(2.0), "packer": sink(4.0, suspend_after=1.0)}, duration=100.0)
     sim.advance(600)
     seen = set()
@@ -236,7 +239,7 @@ def test_acting_states_take_their_times() -> None:
 
 
 def test_it_ramps_up_whenever_it_comes_into_execute() -> None:
-    """From 0 to 2 a second in 2 s: two bottles while it ramps, one a half second then."""
+    """From 0 to 2 per second in 2 s: two bottles during the ramp, then one every half second."""
     sim = packing(ramp_up=2.0)
     sim.inject("machines/packer/stop", 1.0)
     sim.advance(100)
@@ -254,7 +257,7 @@ def test_it_ramps_up_whenever_it_comes_into_execute() -> None:
 
 
 def test_minimum_fill_before_it_starts_and_after_it_was_starved() -> None:
-    """In its own region, in which two have room, or in a zone."""
+    """The fill is counted in its region, which has room for two, or in a zone."""
     zone = [[1.2, -0.2], [2.0, -0.2], [2.0, 0.2], [1.2, 0.2]]
     machines = {"filler": source(), "packer": sink(4.0, start_fill=4, start_zone="before", suspend_after=0.1)}
     sim = line(machines=machines, zones={"before": {"region": zone}}, duration=100.0)
@@ -294,7 +297,7 @@ JAM = {"between": {"kind": "list", "times": [3.0]}, "repair": {"kind": "list", "
 
 
 def stands(sim: Simulation, ticks: int, machine: str = "packer") -> list[tuple[int, str, str, str]]:
-    """Each change of its state, category or reason, at its tick."""
+    """Return each change of state, category or reason, with its tick."""
     before, found = at(sim, machine), []
     for _ in range(ticks):
         sim.advance()
@@ -305,7 +308,7 @@ def stands(sim: Simulation, ticks: int, machine: str = "packer") -> list[tuple[i
 
 
 def test_failures_count_running_time_and_are_repaired() -> None:
-    """It is starved until the first bottle comes after 3.5 s; then it is always busy."""
+    """The machine is starved until the first bottle arrives after 3.5 s, then always busy."""
     machines = {"filler": source(4.0), "packer": sink(2.0, failures={"jam": JAM}, suspend_after=100.0)}
     sim = line(machines=machines, duration=100.0)
     found = [(category, reason, tick) for tick, _, category, reason in stands(sim, 2000) if tick > 400]
@@ -326,7 +329,7 @@ def test_failures_may_count_the_clock() -> None:
 
 
 def test_two_variants_of_a_line_draw_the_same_failures() -> None:
-    """Another machine before it in the list, another failure beside it: its jams come at the same ticks."""
+    """Another machine before it in the list, and another failure mode, leave its jams at the same ticks."""
     way = {
         "between": {"kind": "exponential", "mean": 2.0}, "repair": {"kind": "weibull", "mean": 1.0, "shape": 2.0},
         "counted": "clock",
@@ -378,7 +381,7 @@ def test_a_planned_stop_ends_early_by_command_and_does_not_start_what_an_operato
 
 
 def test_one_planned_stop_ends_during_another_and_the_machine_stands_on() -> None:
-    """Whichever is first in the scene, and whichever begins first; those that follow at once make one stop."""
+    """The order in the scene and in time does not matter. Stops that follow at once make one stop."""
     for lunch, reel, stops, end in (
         ((2.0, 3.0), (2.0, 1.0), [(200, "lunch")], 500),
         ((2.0, 3.0), (3.0, 1.0), [(200, "lunch")], 500),
@@ -409,7 +412,7 @@ def test_those_who_watch_are_told_of_changes_alone() -> None:
 
 
 def busy() -> Simulation:
-    """Machines with all that they can have, drawn and given."""
+    """Return machines with all optional features."""
     way = {"between": {"kind": "exponential", "mean": 3.0}, "repair": {"kind": "weibull", "mean": 1.0, "shape": 2.0}}
     more: dict[str, Any] = {
         "failures": {"jam": way, "wear": {**way, "counted": "clock"}}, "ramp_up": 0.7, "suspend_after": 0.4,

@@ -1,4 +1,4 @@
-"""Machines that give, take, look at and throw out bottles; spills."""
+"""Machines that feed, take, inspect and reject bottles; spills."""
 
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ from conveyor_sim.simulation import Simulation
 
 
 def test_a_source_keeps_its_rate_and_a_sink_takes_in_order() -> None:
-    """Three a second, which is no whole number of ticks: the mean is exact all the same."""
+    """The period of 1/3 s is no whole number of ticks; the mean rate is still exact."""
     sim = line(machines={"filler": source(3.0), "packer": sink(3.0)})
     sim.advance(1000)
     now = signals(sim)
@@ -40,7 +40,7 @@ def test_a_rate_can_be_commanded_within_its_limit() -> None:
 
 
 def test_a_stopped_packer_blocks_the_filler() -> None:
-    """And nothing is lost: what was fed is on the line or was taken."""
+    """No bottle is lost: each one fed is on the line or was taken."""
     sim = line(machines={"filler": source(), "packer": sink()})
     sim.advance(1000)
     assert signals(sim)["machines/filler/blocked_time"] == 0.0
@@ -74,7 +74,7 @@ def test_a_packer_without_bottles_is_starved() -> None:
 
 
 def test_an_inspection_sees_the_bad_ones_when_they_pass() -> None:
-    """Every third; at 0.5 m/s a bottle passes 1 m from its entry after 2 s, between two ticks."""
+    """Every third bottle is bad. At 0.5 m/s it passes 1 m from its entry after 2 s, between two ticks."""
     looking = {"kind": "inspection", "from": [1.003, -0.1], "to": [1.003, 0.1]}
     sim = line(machines={"filler": source(bad_every=3), "eye": looking, "packer": sink()})
     sim.advance(199)
@@ -91,7 +91,10 @@ def test_an_inspection_sees_the_bad_ones_when_they_pass() -> None:
 
 
 def test_the_share_of_bad_bottles_comes_from_the_seed() -> None:
-    """Of a hundred 30, +- 4 standard deviations; equal for equal seeds, other for others; no bottle moves for it."""
+    """There are 30 in a hundred, within 4 standard deviations.
+
+    Equal seeds give equal bottles, others do not. Motion does not change.
+    """
     looking = {"kind": "inspection", "from": [0.1, -0.1], "to": [0.1, 0.1]}
     feed = {"bottle": "bottle", "position": [0.0, 0.0], "direction": 0.0, "speed": 0.5, "rate": 3.0}
     out = {"out": {"region": END}}
@@ -111,7 +114,10 @@ def test_the_share_of_bad_bottles_comes_from_the_seed() -> None:
 
 
 def test_a_reject_hits_the_bottle_before_it() -> None:
-    """Bottles are 0.25 m apart: one is before it for 0.1 m / 0.5 m/s; the second is hit, the gap after it is not."""
+    """Bottles are 0.25 m apart, each in front of it for 0.1 m / 0.5 m/s.
+
+    The second one is hit, the gap after it is not.
+    """
     region = [[0.95, -0.1], [1.05, -0.1], [1.05, 0.1], [0.95, 0.1]]
     thrower = {"kind": "reject", "region": region, "delay": 0.05}
     sim = line(machines={"filler": source(bad_every=2), "thrower": thrower})
@@ -135,7 +141,7 @@ def test_a_reject_hits_the_bottle_before_it() -> None:
 
 
 def fire(sim: Simulation) -> None:
-    """One stroke."""
+    """Start one stroke."""
     for value in (1.0, 0.0):
         sim.command(["machines/thrower/fire"], [value])
         sim.advance()
@@ -156,7 +162,7 @@ def test_a_spill_drops_a_bottle_as_soon_as_there_is_room() -> None:
 
 
 def test_a_run_goes_on_from_a_checkpoint_with_the_same_bits(tmp_path: Path) -> None:
-    """In the middle of strokes, cycles, waiting bottles and ramps; however it is divided."""
+    """Strokes, cycles, waiting bottles and ramps are in progress; the run is divided in several ways."""
     region = [[0.95, -0.1], [1.05, -0.1], [1.05, 0.1], [0.95, 0.1]]
     machines = {
         "filler": source(3.0, bad_share=0.4),
@@ -182,7 +188,7 @@ def test_a_run_goes_on_from_a_checkpoint_with_the_same_bits(tmp_path: Path) -> N
 
 
 def test_bad_bottles_are_those_that_the_scene_numbers() -> None:
-    """From 1 on, as they come; from an infeed and from a source alike."""
+    """Bottles are counted from 1 in order of entry, from an infeed and from a source."""
     looking = {"kind": "inspection", "from": [0.3, -0.1], "to": [0.3, 0.1]}
     feed = {
         "bottle": "bottle",

@@ -1,4 +1,4 @@
-"""The PackML state model: every command in every state, every acting state, and how long they last."""
+"""The PackML state model: every command in every state, every acting state, and their durations."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Stations: the same bottle again, with what it has borne, after its cycle; settings and tests; faults of neither."""
+"""Stations: the same bottle with its loads after a cycle; settings and tests, also wrong tests."""
 
 import json
 import math
@@ -28,7 +28,7 @@ LOADED: dict[str, Any] = {
 
 
 def stationed(supply: float = 2.0, machines: dict[str, Any] | None = None, **given: Any) -> Simulation:
-    """A filler, a station in the middle of the belt before a rail across it, and a packer."""
+    """Return a filler, a station in the middle of the belt before a rail across it, and a packer."""
     more = {
         name: given.pop(name) for name in ("belts", "rails", "outputs", "contacts", "seed", "limits") if name in given
     }
@@ -41,7 +41,7 @@ def of(sim: Simulation, what: str, machine: str = "capper") -> float:
 
 
 def test_a_bottle_comes_back_after_a_cycle_with_its_id() -> None:
-    """Single bottles, far apart: each is away for 1 / rate, and no event says that it was removed or fed."""
+    """Single bottles, far apart, are each away for 1 / rate, without an event of removal or feeding."""
     sim = stationed(0.2, rate=2.0)
     gone: dict[int, int] = {}
     back: dict[int, int] = {}
@@ -75,7 +75,7 @@ def test_no_bottle_is_lost_between_the_line_and_a_station() -> None:
 
 
 def test_in_the_long_run_it_works_at_its_rate() -> None:
-    """Three a second, which is no whole number of ticks, while bottles wait: the mean is exact all the same."""
+    """The period of 1/3 s is no whole number of ticks. While bottles wait, the mean rate is still exact."""
     sim = stationed(4.0, rate=3.0)
     sim.advance(800)
     before = of(sim, "processed")
@@ -122,7 +122,7 @@ def test_a_station_that_has_failed_keeps_its_bottle() -> None:
 
 
 def test_what_it_has_borne_stays_with_a_bottle() -> None:
-    """Sliding work never falls, though the bottle changes its slot; a limit that it passed is reported once."""
+    """Sliding work never decreases, although the bottle changes its slot. A passed limit is reported once."""
     # The belt presses them to one side, where they rub along a rail.
     belts = {"one": belt(0.5, (-0.2, -0.1), 2.3, 0.25, angle=-0.1)}
     rails = {**RAILS, "side": segment((2.0, -0.066), (-0.2, -0.066))}
@@ -146,7 +146,7 @@ def test_what_it_has_borne_stays_with_a_bottle() -> None:
 
 
 def test_the_ledger_closes_over_what_is_taken_and_given() -> None:
-    """Kinetic energy goes with a bottle and comes with it. The same line with a sink in its place closes as well."""
+    """Kinetic energy is booked with each bottle. The ledger of the same line with a sink closes as well."""
     share = []
     for machines in ({}, {"capper": sink(2.0, region=BEFORE)}):
         sim = stationed(4.0, rate=2.0, machines=machines, **LOADED)
@@ -159,7 +159,7 @@ def test_the_ledger_closes_over_what_is_taken_and_given() -> None:
 
 
 def test_settings_and_tests() -> None:
-    """A share of caps is missing, fill levels scatter, one bottle gets a crooked label; what is found becomes bad."""
+    """Some caps are missing, fill levels vary, one label is crooked; bottles that fail a test become bad."""
     sets = {
         "cap": {"to": 1.0, "share": 0.7},
         "fill_level": {"to": 0.5, "deviation": 0.01},
@@ -183,7 +183,7 @@ def test_settings_and_tests() -> None:
 
 
 def test_tests_that_are_wrong_at_times() -> None:
-    """Nine in ten without a cap: a fifth of these pass, and a quarter of those with one do not."""
+    """Nine in ten bottles have no cap: a fifth of these pass, and a quarter of those with a cap fail."""
     test = {"cap": {"low": 1.0, "false_accept": 0.2, "false_reject": 0.25}}
     sim = stationed(4.0, rate=4.0, sets={"cap": {"to": 1.0, "share": 0.4}}, tests=test, seed=4)
     sim.advance(6000)
@@ -194,7 +194,7 @@ def test_tests_that_are_wrong_at_times() -> None:
 
 
 def test_another_station_sees_what_the_first_has_made() -> None:
-    """Every second cap is missing. The checker finds these; the mender sets them, and what is bad good again."""
+    """Every second cap is missing. The checker detects these; the mender sets them, and the bottles are good again."""
     check = {"cap": {"low": 1.0}}
     checker = station([[1.3, -0.2], [1.4, -0.2], [1.4, 0.2], [1.3, 0.2]], [1.5, 0.0], 4.0, tests=check,
                       sets={"bad": {"to": 0.0}})  # fmt: skip
@@ -209,7 +209,7 @@ def test_another_station_sees_what_the_first_has_made() -> None:
 
 
 def test_what_is_gone_is_forgotten() -> None:
-    """So that a shift of eight hours keeps no more than is on the line."""
+    """Memory is bounded by the bottles on the line, also in a shift of eight hours."""
     sim = stationed(4.0, rate=3.0, sets={"cap": {"to": 1.0}, "bad": {"to": 1.0}})
     sim.advance(2500)
     there = {*sim.bottles().id.tolist(), *_held(sim)}
@@ -233,7 +233,7 @@ JAM = {"between": {"kind": "exponential", "mean": 3.0}, "repair": {"kind": "weib
 
 
 def test_a_run_goes_on_from_a_checkpoint_with_the_same_bits(tmp_path: Path) -> None:
-    """With a bottle in the station and without; loads, attributes and draws too."""
+    """The station holds a bottle or none; loads, attributes and draws are included."""
     sim = stationed(
         4.0, rate=2.3, ramp_up=0.4, failures={"jam": JAM}, sets={"cap": {"to": 1.0, "share": 0.6, }},
         tests={"cap": {"low": 1.0, "false_accept": 0.3}}, **LOADED,

@@ -1,4 +1,4 @@
-"""Why machines stand, and where their time goes: every state."""
+"""Stop reasons of machines and time categories, for every state."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Times by category: sums that grow at changes only."""
+"""Times by category, summed at changes only."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def test_every_tick_is_in_one_category() -> None:
 
 
 def test_sums_are_those_of_a_look_at_every_tick() -> None:
-    """Random changes, several within a tick too; the last one of a tick counts from it on."""
+    """Changes are random, also several within a tick; the last one of a tick counts from that tick on."""
     draw = np.random.default_rng(3)
     account = TimeAccount("running")
     seen = dict.fromkeys(CATEGORIES, 0)

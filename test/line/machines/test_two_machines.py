@@ -1,4 +1,4 @@
-"""Two machines that fail and a buffer between them: the theory, and the simulated line against it."""
+"""Two failing machines with a buffer between them: theory against the simulated line."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ def theory() -> ModuleType:
 
 
 def half_width(values: list[float]) -> float:
-    """Of the confidence interval of a mean, 99 %."""
+    """Return half the width of the 99 % confidence interval of a mean."""
     return float(student.ppf(0.995, len(values) - 1) * np.std(values, ddof=1) / math.sqrt(len(values)))
 
 
 def fluid(first: Any, second: Any, rate: float, buffer: float, duration: float, seed: int) -> float:
-    """Throughput over rate of the model of continuous flow, simulated from event to event; half full at first."""
+    """Return throughput / rate of the continuous-flow model, simulated by events; the buffer is half full at first."""
     draw = random.Random(seed)
     time, level, made, up_1, up_2 = 0.0, buffer / 2, 0.0, True, True
     while time < duration:
@@ -59,9 +59,9 @@ def fluid(first: Any, second: Any, rate: float, buffer: float, duration: float, 
 
 
 def discrete(draws: Sequence[tuple[Draw, Draw]], cycle: float, holds: int, transport: float) -> Iterator[float]:
-    """The model of discrete bottles that take a time from machine to machine: when the second one takes each.
+    """Return the times at which the second machine takes each bottle, by a model with transport time.
 
-    draws: of each machine, where its times between failures and to repair come from. The unit of time is any.
+    draws: sources of the times between failures and to repair, of each machine. Any unit of time may be used.
     """
     until = [between() for between, _ in draws]
     ready, taken = [0.0, 0.0], deque([-math.inf] * holds)
@@ -78,7 +78,7 @@ def discrete(draws: Sequence[tuple[Draw, Draw]], cycle: float, holds: int, trans
 
 
 def delayed(machines: Sequence[Any], rate: float, holds: int, transport: float, bottles: int, seed: int) -> float:
-    """Its throughput over rate, with exponential times."""
+    """Return throughput / rate of the discrete model, with exponential times."""
     draw = random.Random(seed)
     draws = [tuple(partial(draw.expovariate, 1.0 / mean) for mean in machine) for machine in machines]
     return bottles / (rate * next(islice(discrete(draws, 1.0 / rate, holds, transport), bottles, None)))
@@ -109,7 +109,10 @@ def test_the_closed_form_has_the_known_limits(theory: ModuleType) -> None:
 
 @pytest.mark.parametrize("transport", [0.0, 0.75, 1.5])
 def test_bottles_on_their_way_buffer_nothing(theory: ModuleType, transport: float) -> None:
-    """Many small bottles, 60 on the conveyor: the closed form with the room that is left, not with all of it."""
+    """There are many small bottles, 60 on the conveyor.
+
+    The closed form applies with the room that is left, not with all of it.
+    """
     first, second = theory.Machine(4.0, 1.0), theory.Machine(4.0, 1.0)
     runs = [delayed((first, second), 20.0, 60, transport, 60_000, seed) for seed in range(10)]
     expected = theory.conveyor_efficiency(first, second, 20.0, 60, transport)
@@ -120,7 +123,7 @@ def test_bottles_on_their_way_buffer_nothing(theory: ModuleType, transport: floa
 
 
 class Runs:
-    """Some runs of the simulated line, 300 s each after the warm-up."""
+    """Runs of the simulated line, 300 s each after the warm-up."""
 
     LENGTH, DURATION, SEEDS = 1.0, 300.0, range(8)
 
@@ -132,11 +135,11 @@ class Runs:
 
     @property
     def efficiencies(self) -> list[float]:
-        """Of each run."""
+        """Efficiency of each run."""
         return [taken / (self.theory.RATE * self.DURATION) for taken in self.taken]
 
     def expected(self, holds: int, transport: float) -> list[int]:
-        """What the model of discrete bottles takes in each run if its machines fail at the same times."""
+        """Return the bottles that the discrete model takes in each run with the same failures."""
         tick = self.scenes[0].tick
         begin, end = self.theory.WARM_UP / tick, (self.theory.WARM_UP + self.DURATION) / tick
         counts = []
@@ -152,7 +155,7 @@ class Runs:
 
 
 def failures_of(scene: Scene, name: str) -> tuple[Draw, Draw]:
-    """What a machine draws, in ticks: times between its failures, and to repair."""
+    """Return the draws of a machine in ticks: times between failures, and to repair."""
     machine: Any = scene.machines[name]
     way = machine.failures["breakdown"]
     between, repair = (

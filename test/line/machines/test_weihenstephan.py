@@ -1,4 +1,4 @@
-"""Machines in the words of the Weihenstephan Standards: second names, made of the same tags."""
+"""Data points of the Weihenstephan Standards, derived from tags of machines."""
 
 import re
 from pathlib import Path
@@ -34,7 +34,7 @@ def points(sim: Simulation, machine: str) -> dict[str, float]:
 
 
 def filling() -> Simulation:
-    """A filler, and a capper that waits for the first bottle."""
+    """Return a filler, and a capper that waits for the first bottle."""
     capper = station([[1.0, -0.2], [1.2, -0.2], [1.2, 0.2], [1.0, 0.2]], [1.5, 0.0], suspend_after=0.1)
     lunch = {"lunch": {"start": 2.0, "duration": 1.0}}
     return line(machines={"filler": source(rate_limit=4.0, planned_stops=lunch), "capper": capper}, duration=100.0)

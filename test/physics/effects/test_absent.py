@@ -1,4 +1,4 @@
-"""What a scene does not call for is not there, and what is there but idle changes no bit."""
+"""Effects that a scene does not call for are absent. Present but idle effects change no bit."""
 
 from typing import Any
 
@@ -58,7 +58,7 @@ OFF = {
 
 @pytest.mark.parametrize("name", OFF)
 def test_an_effect_forced_off_has_no_arrays(name: str) -> None:
-    """Of a line with one of everything."""
+    """Force each effect off in a line with one of every part."""
     outputs = {"bottles": 50, "contacts": 50}
     before = world_of(**line(outputs=outputs))
     world = world_of(**line(outputs=outputs, effects={name: "off"}))

@@ -53,7 +53,7 @@ def test_hertz() -> None:
 
 
 def test_a_light_mover_is_a_body_when_it_is_held_up() -> None:
-    """As many bottles as find room on both sides of it, each against a wall; without a limit it is none."""
+    """The bound counts the bottles with room on both sides, each against a wall. A mover without limit has none."""
     k, light, length = 1e5, 0.05, 0.4
     gate = {"kind": "slide", "from": [0.0, 3.0], "to": [length, 3.0], "direction": 0.0, "stroke": 0.1, "max_speed": 0.1,
             "acceleration": 1.0, "material": "steel", "moving_mass": light}  # fmt: skip
@@ -152,7 +152,7 @@ def test_tangential_spring() -> None:
 
 
 def test_ring_base() -> None:
-    """As the point's for the sliding; for the spin, times J / (m R_b^2)."""
+    """The bound of sliding is that of a point; that of spinning is J / (m R_b^2) times it."""
     types = {"bottle": kind(base_radius=0.05, inertia=INERTIA / 4)}
     fields: dict[str, Any] = {"bottle_types": types, "floor": {"friction": 0.4}}
     found, point = bounds(contact(5e3), **fields), slip_time(0.4, 9.81, 0.01)
@@ -166,7 +166,7 @@ ELASTIC = {"impact of two bottles", "lattice stability"}
 
 
 def test_implicit_friction_lifts_the_bounds_of_friction() -> None:
-    """Those of points; a ring's friction is explicit all the same."""
+    """Implicit friction removes the bounds of points. Friction of rings stays explicit."""
     fields: dict[str, Any] = {"floor": {"friction": 0.4}, "friction_solver": "implicit"}
     rough = contact(5e3, friction=0.3)
     assert set(bounds(rough, **fields)) == ELASTIC
@@ -202,7 +202,7 @@ def test_bounds_of_stability_do_not_depend_on_the_tolerance() -> None:
 
 
 def test_atan_has_the_bounds_of_the_polynomial() -> None:
-    """Of the same slope at rest."""
+    """Both curves have the same slope at rest."""
     fields: dict[str, Any] = {"floor": {"friction": 0.4}}
     rough = contact(5e3, friction=0.3)
     assert bounds(rough, **fields, friction_curve="atan") == bounds(rough, **fields)

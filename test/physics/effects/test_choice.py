@@ -206,13 +206,13 @@ def test_every_effect_is_decided_and_says_why_not() -> None:
 @pytest.mark.parametrize(
     ("fields", "why"),
     [
-        ({"accuracy": {"integrator": "rk4"}}, "with rk4 a step leaves nobody out"),
-        ({"accuracy": {"integrator": "linearly_implicit"}}, "with linearly_implicit a step leaves nobody out"),
+        ({"accuracy": {"integrator": "rk4"}}, "rk4 can't leave bottles out of a step"),
+        ({"accuracy": {"integrator": "linearly_implicit"}}, "linearly_implicit can't leave bottles out of a step"),
         ({"base": [{**base(0.4)[0], "tangential": {"stiffness": 900.0}}]}, "springs under the bottles pull anew"),
         ({"belts": {"bend": CURVED}}, "no straight belt"),
     ],
 )  # fmt: skip
-def test_where_nobody_can_ride_it_says_why(fields: dict[str, Any], why: str) -> None:
+def test_riding_names_the_reason_for_its_absence(fields: dict[str, Any], why: str) -> None:
     """Also where it is forced on, which is refused."""
     given = {"belts": {"one": belt(0.1)}, "base": base(0.4), **fields}
     (choice,) = (choice for choice in choose_effects(Plant.of(scene(**given))) if choice.name == "riding")
@@ -233,7 +233,7 @@ def test_every_name_that_a_scene_may_force_is_one_effect() -> None:
 
 
 def test_most_bottles() -> None:
-    """Those of the start and of every infeed; none if one has no end."""
+    """Bottles of the start and of every infeed count. There is no maximum if an infeed has no end."""
     grid = {"grid": {"type": "bottle", "origin": [3.0, 3.0], "rows": 2, "columns": 5, "pitch": 0.2}}
     fields: dict[str, Any] = {"contacts": GLASS, "bottles": [bottle(0.0, 1.0), grid]}
     assert Plant.of(scene(**fields)).most_bottles == 11

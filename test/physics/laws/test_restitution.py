@@ -81,7 +81,7 @@ def test_tsuji_dashpot_keeps_restitution_at_any_speed(speed: float, e: float) ->
 
 @pytest.mark.parametrize("e", RESTITUTIONS)
 @pytest.mark.parametrize("elastic", ["linear", "hertz", "table"])
-def test_onset_has_its_restitution_at_its_speed_whatever_the_spring(elastic: str, e: float) -> None:
+def test_onset_has_its_restitution_at_its_speed_for_every_spring(elastic: str, e: float) -> None:
     """The table: two slopes."""
     speed, k = 0.5, 1e6
 

@@ -1,4 +1,4 @@
-"""What sets the steps of a scene, and remedies: each is applied, and must help as it says."""
+"""Limits on the steps of a scene, and remedies. Each remedy is applied, and must help as stated."""
 
 import math
 from typing import Any

@@ -119,7 +119,7 @@ def everything(sim: Simulation) -> list[bytes]:
 
 
 def test_a_loaded_run_goes_on_bit_for_bit_on_any_number_of_threads(tmp_path: Path) -> None:
-    """Saved in a queue whose springs are stretched, with commands that wait and outcomes that nobody took."""
+    """Saved in a queue whose springs are stretched, with waiting commands and results that were not taken."""
     given = queue(**SPRINGS_AND_RINGS)
     reference = Simulation(given, threads=1)
     before = run(reference, SAVED)
@@ -324,7 +324,7 @@ def test_another_scene_is_refused_with_the_field_that_differs(
 
 
 def test_the_order_of_belts_matters(saved: Path) -> None:
-    """Where belts overlap, the last listed carries; and indices follow the order."""
+    """The last of overlapping belts carries, and indices follow the order."""
     one = queue()
     text = json.loads(one.source_text)
     text["belts"] = dict(reversed(text["belts"].items()))
@@ -500,7 +500,7 @@ def archive(*members: tuple[str, bytes], compression: int = zipfile.ZIP_STORED) 
 
 
 def npy(shape: str, data: bytes, kind: str = "<f8") -> bytes:
-    """A .npy file, whatever its header says."""
+    """Return a .npy file with any header."""
     text = f"{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}, }}\n".encode()
     return b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text + data
 
@@ -544,7 +544,7 @@ def test_a_file_of_the_old_format_is_refused_in_one_sentence(saved: Path, tmp_pa
 
 
 def test_what_is_no_regular_file_is_refused_at_once(tmp_path: Path, own_socket: Path) -> None:
-    """Nobody writes to the pipe, and the devices have no end."""
+    """The pipe has no writer, and the devices have no end."""
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "round").symlink_to(tmp_path / "round")
     (tmp_path / "to zero").symlink_to("/dev/zero")
@@ -639,7 +639,7 @@ def test_what_is_no_checkpoint_is_refused(tmp_path: Path) -> None:
 
 
 @contextmanager
-def as_nobody() -> Iterator[None]:
+def without_privileges() -> Iterator[None]:
     """Without root's right to write everywhere."""
     user = os.geteuid()
     if user == 0:
@@ -662,7 +662,7 @@ def test_a_file_that_can_not_be_written_is_told_and_nothing_is_left(saved: Path,
     assert missing(text, ["can't be written", "No such file or directory", "folder", str(tmp_path / "no")]) == []
     assert missing(failure_to_save(sim, tmp_path), ["is a folder", "new name", "checkpoint", "room"]) == []
     locked.mkdir(mode=0o500)
-    with as_nobody():
+    with without_privileges():
         assert failure_to_save(sim, locked / "file").startswith("can't be written (Permission denied), expected ")
     assert list(locked.iterdir()) == []
 

@@ -1,4 +1,4 @@
-"""What bounds the time step, and the steps in a tick that follow."""
+"""Bounds on the time step, and the resulting steps in a tick."""
 
 import math
 

@@ -37,7 +37,7 @@ CONTACT_TIME = 0.002
 """s, of each contact undamped."""
 PAIRS = 64
 FRACTIONS = (0.37, 0.88)
-"""Of a step, by which contacts last longer than a whole number: errors of their begin and end cancel at some."""
+"""Fractions of a step beyond whole steps in a contact: at some, errors of begin and end cancel."""
 
 
 def laws() -> dict[str, dict[str, Any]]:
@@ -155,7 +155,7 @@ def peaks() -> list[float]:
 def test_predicted_errors_bound_what_is_measured(
     head_on: Scene, peaks: list[float], integrator: str, steps: int
 ) -> None:
-    """RMS over phases: never larger than predicted, and at least a third of it, whatever the law.
+    """RMS over phases: never larger than predicted, and at least a third of it, for every law.
 
     Dormand and Prince's substeps may be shorter than the steps on which the prediction rests.
     """
@@ -244,7 +244,7 @@ def test_rk4_weighs_the_stages_after_a_first_touch() -> None:
 
 
 def test_a_jump_at_first_touch_is_missed_for_part_of_a_step() -> None:
-    """Of c dt / m_r the root mean square over phases, 1/sqrt(3); beyond c^2 = k m_r it is of k dt / c."""
+    """The error is c dt / m_r over sqrt(3), RMS over phases; beyond c^2 = k m_r it is that of k dt / c."""
     euler = METHODS["semi_implicit_euler"]
     for c, rate in ((0.1, 0.1), (1.0, 1.0), (4.0, 0.25)):
         (share,) = euler.first_touch(c, 1.0 / c)
@@ -252,7 +252,7 @@ def test_a_jump_at_first_touch_is_missed_for_part_of_a_step() -> None:
 
 
 def test_the_error_is_that_of_the_worst_impact() -> None:
-    """Of the lighter bottles: their contact is shorter."""
+    """The lighter bottles decide, because their contact is shorter."""
     fields: dict[str, Any] = {
         "bottle_types": {"heavy": kind(), "light": kind(0.03, 0.02)},
         "contacts": [contact(4e3)],

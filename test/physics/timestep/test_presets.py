@@ -14,7 +14,7 @@ from conveyor_sim.support.resources import scene_path
 
 
 def steps_a_contact(**accuracy: object) -> float:
-    """Of two bottles without damping."""
+    """Return the steps per contact of two bottles without damping."""
     two = [bottle(0.0, 0.0, 1.0), bottle(1.0, 0.0)]
     fields = {"contacts": [contact(5e3)], "bottles": two, "floor": "none", "tick": 1.0}
     model = build_model(scene(**fields, accuracy=accuracy))

@@ -148,7 +148,7 @@ def test_who_comes_late_is_sent_what_is_latched(address: str, bag: Path) -> None
 
 def test_bottles_and_gates_are_drawn_where_they_are(source: BagTagProvider, address: str, bag: Path) -> None:
     assert source.control("pause", 0.0, "a test") == "" and source.control("seek", 7.0, "a test") == ""
-    until(lambda: source.shown.tick == 700, "7 s")
+    until(lambda: source.snapshot.tick == 700, "7 s")
 
     def drawn(found: dict[str, list[Any]]) -> bool:
         return any(marker.header.stamp.sec == 7 for message in found["/markers"] for marker in message.markers)

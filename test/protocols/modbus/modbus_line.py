@@ -101,7 +101,7 @@ def serving(role: WriterKind | None) -> Iterator[Line]:
     """Serve the line. role: role in which clients write; None: they may not."""
     simulation = Simulation(load_scene("config/scenarios/zoned_line.yaml"), threads=1)
     source = SteppedTagProvider(simulation)
-    rows = modbus_map(source.about.tags)
+    rows = modbus_map(source.info.tags)
     server = ModbusServer(source, rows, role, quota=Quota(idle=LONG))
     with ServerThread() as thread:
         thread.run(server.start())

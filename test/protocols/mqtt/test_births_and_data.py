@@ -33,12 +33,12 @@ def test_births_have_every_tag_with_what_stays_the_same_of_it(line: Line) -> Non
     assert node.metrics["Node Control/Rebirth"].datatype == BOOLEAN and node.value("Node Control/Rebirth") is False
     assert node.value("run/state") == RUNNING and node.value("run/lost") == ""
     kinds = {"bool": BOOLEAN, "count": INT64, "enumeration": INT32, "number": DOUBLE}
-    shown = [tag for tag in line.source.about.tags if tag.role in (*SIGNALS, *COMMANDS)]
+    shown = [tag for tag in line.source.info.tags if tag.role in (*SIGNALS, *COMMANDS)]
     assert len(shown) > 100 and set(device.metrics) == {tag.name for tag in shown} | {"run/tick", "run/time"}
     for tag in shown:
         metric = device.metrics[tag.name]
         found = properties_of(metric)
-        assert (metric.datatype, value_of(metric)) == (kinds[tag.kind], line.source.shown.values[tag.name]), tag.name
+        assert (metric.datatype, value_of(metric)) == (kinds[tag.kind], line.source.snapshot.values[tag.name]), tag.name
         assert found.pop("Quality") == 192 and metric.metadata.description == tag.description
         assert found.pop("readOnly") == (tag.role not in COMMANDS and not tag.name.endswith("/mode"))
         if tag.kind in ("number", "count"):
@@ -51,9 +51,9 @@ def test_births_have_every_tag_with_what_stays_the_same_of_it(line: Line) -> Non
 def test_only_what_changes_is_sent_and_all_of_it(line: Line) -> None:
     line.advance(400)
     assert set(line.host.kinds()[2:]) == {"DDATA"}
-    for tag in line.source.about.tags:
+    for tag in line.source.info.tags:
         if tag.role in (*SIGNALS, *COMMANDS):
-            assert line.host.values[tag.name] == line.source.shown.values[tag.name], tag.name
+            assert line.host.values[tag.name] == line.source.snapshot.values[tag.name], tag.name
     data = line.host.heard[2:]
     before: dict[str, object] = {name: value_of(metric) for name, metric in line.host.heard[1].metrics.items()}
     for heard in data:
@@ -87,7 +87,7 @@ def test_how_time_passes_is_said_with_what_changes_or_now_and_then(line: Line) -
 def test_times_are_those_of_the_scene_on_request(serve: Callable[..., Line]) -> None:
     line = serve(stamps="simulated")
     line.advance(100)
-    start = datetime.fromisoformat(line.source.about.start_time.replace("Z", "+00:00"))
+    start = datetime.fromisoformat(line.source.info.start_time.replace("Z", "+00:00"))
     assert line.host.last("DDATA").metrics["run/tick"].timestamp == int(start.timestamp() * 1000) + 1000
     assert line.host.last("DDATA").payload.timestamp > datetime(2026, 1, 1, tzinfo=timezone.utc).timestamp() * 1000
 
@@ -143,7 +143,7 @@ def test_where_time_steps_back_all_is_said_again(line: Line) -> None:
     line.source._simulation = Simulation(load_scene(SCENE), threads=1)
     line.advance()
     assert line.host.last("DBIRTH").value("run/tick") == 1 and line.host.kinds().count("DBIRTH") == 2
-    for name, value in line.source.shown.values.items():
+    for name, value in line.source.snapshot.values.items():
         assert line.host.values[name] == value, name
 
 
@@ -208,7 +208,7 @@ def test_everything_comes_back_when_the_broker_does(line: Line) -> None:
     line.host.rebirth()  # as a host does that was away: the line may have been there first
     line.until(lambda: line.host.last("NBIRTH").value("bdSeq") >= 1 and line.host.alive["line"], "births")
     line.advance()
-    assert line.host.values[SETPOINT] == line.source.shown.values[SETPOINT]
+    assert line.host.values[SETPOINT] == line.source.snapshot.values[SETPOINT]
     assert line.node.status().state == "connected"
 
 
@@ -226,5 +226,5 @@ def test_a_broker_that_stands_still_holds_up_nothing_and_is_told_the_newest(line
     finally:
         os.kill(line.broker.process.pid, signal.SIGCONT)
     line.advance()
-    for name, value in line.source.shown.values.items():
+    for name, value in line.source.snapshot.values.items():
         assert line.host.values[name] == value, name

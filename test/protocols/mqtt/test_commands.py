@@ -198,7 +198,7 @@ def test_a_controller_holds_nothing_without_the_broker(controlled: Line) -> None
 
 
 def test_a_float_is_taken_for_a_double_and_a_limit_in_it_is_the_limit(controlled: Line) -> None:
-    tag = replace(next(tag for tag in controlled.source.about.tags if tag.name == SETPOINT), high=0.6)
+    tag = replace(next(tag for tag in controlled.source.info.tags if tag.name == SETPOINT), high=0.6)
     payload = Payload()
     for name, value in ((SETPOINT, 0.25), (SETPOINT, 0.6), (SETPOINT, 0.6000001)):
         payload.metrics.add(name=name, datatype=9).float_value = value

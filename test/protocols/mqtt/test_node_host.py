@@ -42,11 +42,11 @@ def test_it_reads_births_and_commands_the_line(serve: Callable[..., Line]) -> No
     node, device = told["NBIRTH"]["metrics"], told["DBIRTH"]["metrics"]
     assert node["bdSeq"] == {"type": "Int64", "value": 0}
     assert node["Node Control/Rebirth"] == {"type": "Boolean", "value": False}
-    shown = line.source.about.tags
+    shown = line.source.info.tags
     assert {tag.name for tag in shown if tag.role not in ("fault", "run")} <= set(device)
     assert device["belts/zone1/speed"] == {
         "type": "Double",
-        "value": pytest.approx(line.source.shown.values["belts/zone1/speed"], abs=0.1),
+        "value": pytest.approx(line.source.snapshot.values["belts/zone1/speed"], abs=0.1),
         "Quality": 192,
         "engUnit": "m/s",
         "engLow": -1,

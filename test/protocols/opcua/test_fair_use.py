@@ -138,7 +138,7 @@ def test_a_subscription_that_costs_too_much_ends_and_others_go_on(serve: Serve) 
                 line.source.after_tick()
                 await asyncio.sleep(0.02)
             heard_before = len(foreign.values)
-            line.source.show(tick=line.source.shown.tick + 1)
+            line.source.show(tick=line.source.snapshot.tick + 1)
             await until(lambda: len(foreign.values) > heard_before)
             return cheap, costly, foreign
 

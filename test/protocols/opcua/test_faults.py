@@ -233,7 +233,7 @@ def test_a_server_that_is_started_again_is_found_where_it_was(serve: Serve, cert
     line.server = OpcUaServer(line.source, certificates=certificates, port=port)
     line.thread.run(line.server.start())
     line.advance()
-    assert line.server.port == port and line.read(SETPOINT) == line.source.shown.values[SETPOINT]
+    assert line.server.port == port and line.read(SETPOINT) == line.source.snapshot.values[SETPOINT]
 
 
 def test_what_waits_for_a_client_is_bounded(serve: Serve) -> None:

@@ -65,7 +65,7 @@ def test_that_of_a_recording_is_its_own_up_to_its_place(tmp_path: Path, certific
                 end = START + timedelta(days=1)
                 assert values(node.read_raw_history(START, end)) == [(0.5, START)]
                 source.control("seek", 1.2, "a test")
-                until(lambda: source.shown.tick == 120, "the place")
+                until(lambda: source.snapshot.tick == 120, "the place")
                 expected = [(0.5, START), (0.1, START + 51 * TICK), (0.2, START + 101 * TICK)]
                 assert values(node.read_raw_history(START, end)) == expected
                 assert values(node.read_raw_history(end, START)) == expected[::-1]

@@ -42,7 +42,7 @@ def test_it_reads_writes_subscribes_and_calls(line: Line, tmp_path: Path) -> Non
     told: dict[str, Any] = json.loads(next(row for row in done.stdout.splitlines() if row.startswith("{")))
     assert told["namespaces"][2] == "urn:conveyor_sim:line"
     assert {"speed", "cmd_speed", "running", "mode"} <= set(told["children"])
-    shown = line.source.shown.values
+    shown = line.source.snapshot.values
     assert told["speed"] == {"value": shown["belts/zone1/cmd_speed"], "type": "Double", "status": "Good"}
     assert told["bottles"] == {"value": shown["belts/zone1/bottles"], "type": "UInt32", "status": "Good"}
     assert told["running"] == {"value": True, "type": "Boolean", "status": "Good"}

@@ -49,7 +49,7 @@ def test_a_machine_is_an_object_of_the_standards_type(line: Line) -> None:
     kind = client.get_node(client.get_node(f"ns=2;s={OBJECT}").read_type_definition())
     assert kind.read_browse_name().Name == "PackMLBaseObjectType"
     assert kind.nodeid.NamespaceIndex == client.get_namespace_index(NAMESPACE) > 2
-    shown = line.source.shown.values
+    shown = line.source.snapshot.values
     assert child(client, "Status", "CurMachSpeed").read_value() == pytest.approx(shown["machines/filler/cur_rate"] * 60)
     assert child(client, "Status", "MachSpeed").read_value() == pytest.approx(shown["machines/filler/rate"] * 60)
     assert child(client, "Status", "MachSpeed", "EURange").read_value().High == pytest.approx(96.0)  # 1.6 a second
@@ -108,7 +108,7 @@ def test_admin_has_counts_the_stop_reason_and_alarms(line: Line) -> None:
     line.client()
     line.advance(300)
     (count,) = admin(line, "ProdProcessedCount")
-    produced = line.source.shown.values["machines/filler/produced"]
+    produced = line.source.snapshot.values["machines/filler/produced"]
     assert (count.Count, count.AccCount, count.Name, count.Unit.UnitId) == (produced, produced, "bottles", 4404786)
     assert produced > 0 and admin(line, "MachDesignSpeed") == pytest.approx(96.0)
     assert (admin(line, "AlarmExtent"), admin(line, "Alarm")) == (0, [])
@@ -116,7 +116,7 @@ def test_admin_has_counts_the_stop_reason_and_alarms(line: Line) -> None:
     line.simulation.inject("machines/filler/stop", 1.0)
     line.advance(3)
     reason = admin(line, "StopReason")
-    shown = line.source.shown.values
+    shown = line.source.snapshot.values
     assert (reason.ID, reason.Value) == (shown["machines/filler/stop_reason"],) * 2
     assert (reason.Message, reason.Category, reason.Trigger) == ("fault stop", shown["machines/filler/category"], True)
     assert reason.DateTime.timestamp() == pytest.approx(946684803.01, abs=0.02)

@@ -21,8 +21,8 @@ def properties(line: Line, name: str) -> dict[str, Any]:
 
 def test_every_signal_and_command_reads_as_the_simulation_shows_it(line: Line) -> None:
     line.advance(400)
-    shown = line.source.shown.values
-    names = [tag.name for tag in line.source.about.tags if tag.role in (*SIGNALS, *COMMANDS)]
+    shown = line.source.snapshot.values
+    names = [tag.name for tag in line.source.info.tags if tag.role in (*SIGNALS, *COMMANDS)]
     assert set(names) == set(shown) and shown["belts/zone1/speed"] > 0.0
     client = line.client()
     values = client.read_values([client.get_node(f"ns=2;s={name}") for name in names])
@@ -44,7 +44,7 @@ def test_tags_stand_below_their_device_and_the_place_of_the_line(serve: Serve, t
 
 
 def test_numbers_have_unit_and_range(line: Line) -> None:
-    tag = next(tag for tag in line.source.about.tags if tag.name == "belts/zone1/cmd_speed")
+    tag = next(tag for tag in line.source.info.tags if tag.name == "belts/zone1/cmd_speed")
     node = line.node(tag.name)
     assert node.read_type_definition().Identifier == ua.ObjectIds.AnalogUnitRangeType
     assert node.read_data_type_as_variant_type() is ua.VariantType.Double
@@ -59,7 +59,7 @@ def test_numbers_have_unit_and_range(line: Line) -> None:
 def test_units_have_the_numbers_of_the_opc_foundation(line: Line) -> None:
     """From UNECE_to_OPCUA.csv."""
     expected = {"m/s": 5067859, "1/h": 4731184, "1/min": 4405556, "N": 5129559, "J": 4869973, "%": 20529, "1": 4404786}
-    found = {tag.unit: unit_of(tag).UnitId for tag in line.source.about.tags}
+    found = {tag.unit: unit_of(tag).UnitId for tag in line.source.info.tags}
     assert {unit: number for unit, number in found.items() if unit in expected}.items() <= expected.items()
     assert len(expected.keys() & found) >= 2
 

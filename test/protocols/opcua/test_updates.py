@@ -96,7 +96,7 @@ def test_after_a_step_back_nothing_is_of_the_future(simulated: Line) -> None:
     simulated.source.show(tick=20)
     simulated.until(lambda: heard.values == [50, 20])
     assert heard.stamps == [START + timedelta(seconds=0.5), START + timedelta(seconds=0.2)]
-    for tag in simulated.source.about.tags:
+    for tag in simulated.source.info.tags:
         if tag.role != "fault" and tag.role != "run":
             assert simulated.node(tag.name).read_data_value().SourceTimestamp == heard.stamps[-1], tag.name
     for name in ("run/state", "run/reason", "run/lost", "run/date_time", f"{SETPOINT}/written_by"):

@@ -22,8 +22,8 @@ def shown(line: Line) -> dict[str, float]:
 def test_data_points_are_those_of_the_line(line: Line) -> None:
     line.advance(300)
     found = shown(line)
-    tags = {tag.name: tag for tag in line.source.about.tags}
-    assert found == data_points("machines/filler", tags, line.source.shown.values)
+    tags = {tag.name: tag for tag in line.source.info.tags}
+    assert found == data_points("machines/filler", tags, line.source.snapshot.values)
     assert found["WS_Cur_Mode"] == BY_ITSELF and found["WS_Cur_Prog"] == PRODUCTION
     assert STATE_TEXTS[int(found["WS_Cur_State"])] == "Operating"
     assert found["WS_Tot_Containers"] > 0
@@ -35,6 +35,6 @@ def test_they_follow_what_is_done_to_the_machine(line: Line) -> None:
     line.advance(3)
     found = shown(line)
     assert STATE_TEXTS[int(found["WS_Cur_State"])] == "Equipment failure"
-    assert found["WS_Not_Of_Fail_Code"] == line.source.shown.values["machines/filler/stop_reason"] > 0
+    assert found["WS_Not_Of_Fail_Code"] == line.source.snapshot.values["machines/filler/stop_reason"] > 0
     assert found["WS_Cur_Mach_Spd"] == 0.0 < found["WS_Set_Mach_Spd"]
     assert found["WS_Cur_Mode"] == BY_ITSELF  # it has failed, nobody has taken it in hand

@@ -53,7 +53,7 @@ def source(bag: Path) -> Iterator[BagTagProvider]:
 
 def seek(source: BagTagProvider, time: float) -> None:
     assert source.control("seek", time, "a test") == ""
-    until(lambda: source.shown.tick == round(time * 100), f"{time:g} s")
+    until(lambda: source.snapshot.tick == round(time * 100), f"{time:g} s")
 
 
 def test_its_past_is_where_tags_changed_forwards_and_back(source: BagTagProvider, bag: Path) -> None:
@@ -62,17 +62,17 @@ def test_its_past_is_where_tags_changed_forwards_and_back(source: BagTagProvider
         speeds = [(frame.tick, float(frame.data[place])) for frame in opened.signals()]
     changes = [speeds[0], *(now for was, now in pairwise(speeds) if was[1] != now[1])]
     assert len(changes) > 3  # the ramp
-    assert source.past.read(SPEED, 0, TICKS, 1000) == (changes, None)
-    assert source.past.read(SPEED, -100, 10**9, 1000, back=True) == (changes[::-1], None)
-    assert source.past.read(SPEED, 0, TICKS, 2) == (changes[:2], changes[2][0])
-    assert source.past.read(SPEED, changes[1][0], changes[-1][0] - 1, 1000) == (changes[1:-1], None)
-    assert source.past.read(SETPOINT, 1, TICKS, 1000) == ([(SET_AT + 1, 0.25)], None)
-    assert source.past.read(SETPOINT, 0, TICKS, 1, back=True) == ([(SET_AT + 1, 0.25)], 0)
-    assert source.past.read("nothing", 0, TICKS, 1000) == ([], None)
+    assert source.history.read(SPEED, 0, TICKS, 1000) == (changes, None)
+    assert source.history.read(SPEED, -100, 10**9, 1000, back=True) == (changes[::-1], None)
+    assert source.history.read(SPEED, 0, TICKS, 2) == (changes[:2], changes[2][0])
+    assert source.history.read(SPEED, changes[1][0], changes[-1][0] - 1, 1000) == (changes[1:-1], None)
+    assert source.history.read(SETPOINT, 1, TICKS, 1000) == ([(SET_AT + 1, 0.25)], None)
+    assert source.history.read(SETPOINT, 0, TICKS, 1, back=True) == ([(SET_AT + 1, 0.25)], 0)
+    assert source.history.read("nothing", 0, TICKS, 1000) == ([], None)
 
 
 def test_a_long_past_is_read_in_parts(source: BagTagProvider, monkeypatch: pytest.MonkeyPatch) -> None:
-    whole, _ = source.past.read(SPEED, 0, TICKS, 1000)
+    whole, _ = source.history.read(SPEED, 0, TICKS, 1000)
     monkeypatch.setattr(tag_history, "MOST_READ", 10)
     monkeypatch.setattr(tag_history, "WINDOW", 100)
     for back in (False, True):
@@ -81,7 +81,7 @@ def test_a_long_past_is_read_in_parts(source: BagTagProvider, monkeypatch: pytes
         parts = 0
         rest: int | None = 0
         while rest is not None:
-            samples, rest = source.past.read(SPEED, first, last, 1000, back)
+            samples, rest = source.history.read(SPEED, first, last, 1000, back)
             found += samples
             parts += 1
             if rest is not None:
@@ -94,12 +94,12 @@ def test_it_shows_what_was_recorded_at_any_time_forwards_and_back(source: BagTag
         names = opened.line.signal_names
         recorded = {frame.tick: dict(zip(names, frame.data.tolist(), strict=True)) for frame in opened.signals()}
     tags = image_of(load_scene("config/scenarios/zoned_line.yaml")).tags
-    assert [tag.name for tag in source.about.tags] == [tag.name for tag in tags]
-    shown = source.shown
+    assert [tag.name for tag in source.info.tags] == [tag.name for tag in tags]
+    shown = source.snapshot
     assert (shown.tick, shown.run.state, shown.run_id, shown.lost) == (0, PAUSED, "this run", "")
     for time in (8.0, 2.0, 9.0, 0.0, 10.0):
         seek(source, time)
-        shown = source.shown
+        shown = source.snapshot
         values = {name: shown.values[name] for name in names}
         assert values == recorded[round(time * 100)]
         after = time > SET_AT / 100
@@ -109,28 +109,28 @@ def test_it_shows_what_was_recorded_at_any_time_forwards_and_back(source: BagTag
 
 def test_it_plays_with_what_happens_and_ends_and_begins_anew(source: BagTagProvider) -> None:
     seek(source, 4.9)
-    assert source.shown.owner == ""
+    assert source.snapshot.owner == ""
     heard = source.events(0)[0]
     assert source.control("resume", 0, "a test") == ""
-    until(lambda: source.shown.run.state == REPLAYING, "it plays")
-    until(lambda: source.shown.owner == "me", "the owner")
+    until(lambda: source.snapshot.run.state == REPLAYING, "it plays")
+    until(lambda: source.snapshot.owner == "me", "the owner")
     _, events = source.events(heard)
     assert {"owner_changed", "signal_forced"} <= {event.kind for event in events}
     assert source.control("speed", 0, "a test") == ""
-    until(lambda: source.shown.run.state == ENDED, "the end")
-    assert source.shown.tick == TICKS
+    until(lambda: source.snapshot.run.state == ENDED, "the end")
+    assert source.snapshot.tick == TICKS
     assert source.control("resume", 0, "a test") == ""
     assert source.control("speed", 1, "a test") == ""
-    until(lambda: source.shown.run.state == REPLAYING and source.shown.tick < TICKS, "from the beginning")
+    until(lambda: source.snapshot.run.state == REPLAYING and source.snapshot.tick < TICKS, "from the beginning")
     assert source.control("loop", 1, "a test") == ""
     assert source.control("speed", 0, "a test") == ""
     before = source.events(0)[0]
     until(lambda: source.events(0)[0] > before + 2 * 21, "rounds")
     assert source.control("pause", 0, "a test") == ""
-    until(lambda: source.shown.run.state == PAUSED, "the pause")
-    tick = source.shown.tick
+    until(lambda: source.snapshot.run.state == PAUSED, "the pause")
+    tick = source.snapshot.tick
     assert source.control("speed", 1, "a test") == ""
-    assert source.shown.tick == tick
+    assert source.snapshot.tick == tick
 
 
 def test_it_can_not_be_commanded_nor_led_out_of_itself(source: BagTagProvider) -> None:

@@ -60,7 +60,7 @@ def test_a_target_once_more_does_nothing(source: HandshakeTagProvider) -> None:
 
 def test_no_tick_is_seen_before_the_target(source: HandshakeTagProvider) -> None:
     seen = []
-    source.listen(lambda: seen.append(source.shown.tick))
+    source.listen(lambda: seen.append(source.snapshot.tick))
     source.control("target", 3, "plc")
     for _ in range(3):
         advance(source)

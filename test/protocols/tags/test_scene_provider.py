@@ -75,11 +75,11 @@ def kept() -> Iterator[SceneTagProvider]:
 @pytest.fixture
 def running(kept: SceneTagProvider) -> SceneTagProvider:
     """Return the shared provider at the start of its run."""
-    run = kept.shown.run_id
+    run = kept.snapshot.run_id
     assert kept.control("reset", 0, "a test") == ""
-    until(lambda: kept.shown.run_id != run, "the reset")
-    assert kept.shown.run.state == RUNNING or kept.control("resume", 0, "a test") == ""
-    until(lambda: kept.shown.run.state == RUNNING, "it runs")
+    until(lambda: kept.snapshot.run_id != run, "the reset")
+    assert kept.snapshot.run.state == RUNNING or kept.control("resume", 0, "a test") == ""
+    until(lambda: kept.snapshot.run.state == RUNNING, "it runs")
     return kept
 
 
@@ -89,12 +89,12 @@ def setpoint(value: float, writer: str = "me") -> Input:
 
 def pause(source: SceneTagProvider) -> None:
     assert source.control("pause", 0.0, "a test") == ""
-    until(lambda: source.shown.run.state == PAUSED, "the pause")
+    until(lambda: source.snapshot.run.state == PAUSED, "the pause")
 
 
 def test_it_is_shown_as_it_is(served: Served) -> None:
     source = served()
-    about, scene = source.about, zoned()
+    about, scene = source.info, zoned()
     assert (about.name, about.where, about.tick) == (scene.name, scene.where, 0.01)
     assert [tag.name for tag in about.tags] == [tag.name for tag in image_of(scene).tags]
     for told, tag in zip(about.tags, image_of(scene).tags, strict=True):
@@ -107,8 +107,8 @@ def test_it_is_shown_as_it_is(served: Served) -> None:
         )
         assert (told.initial, told.nominal, dict(told.texts)) == (tag.initial, tag.nominal, dict(tag.texts))
         assert (told.description, told.device, told.device_class) == (tag.description, tag.device, tag.device_class)
-    until(lambda: source.shown.tick > 10, "ticks")
-    shown = source.shown
+    until(lambda: source.snapshot.tick > 10, "ticks")
+    shown = source.snapshot
     assert shown.run.state == RUNNING and not shown.lost and shown.run_id
     assert shown.values.keys() == {*image_of(scene).signal_names, *image_of(scene).command_names}
     assert shown.values[SPEED] == 0.5
@@ -117,7 +117,7 @@ def test_it_is_shown_as_it_is(served: Served) -> None:
 
 def test_every_tick_of_a_line_in_real_time_can_be_heard_of(running: SceneTagProvider) -> None:
     source, ticks = running, list[int]()
-    end = source.listen(lambda: ticks.append(source.shown.tick))
+    end = source.listen(lambda: ticks.append(source.snapshot.tick))
     until(lambda: len(ticks) > 100, "a second of ticks")
     end()
     assert ticks == sorted(ticks)
@@ -133,7 +133,7 @@ def mirror(source: SceneTagProvider, pipe: Connection) -> RemoteTagProvider:
 def catch_up(frames: Frames, view: RemoteTagProvider) -> int:
     """Apply all waiting frames and return their number."""
     count = 0
-    while (frame := frames.fetch()) is not None and frame.shown:
+    while (frame := frames.fetch()) is not None and frame.is_new:
         view.apply(frame)
         count += 1
     return count
@@ -143,23 +143,23 @@ def test_a_mirror_shows_what_its_source_does(running: SceneTagProvider) -> None:
     frames, (pipe, _) = Frames(running), Pipe()
     view = mirror(running, pipe)
     view.apply(frames.fetch())
-    assert view.about == running.about
+    assert view.info == running.info
     assert running.give(setpoint(0.25)) == ""
-    until(lambda: running.shown.values[SPEED] == 0.25, "the speed")
+    until(lambda: running.snapshot.values[SPEED] == 0.25, "the speed")
     pause(running)
     catch_up(frames, view)
-    assert view.shown.values == running.shown.values and view.shown.forced == running.shown.forced
-    assert (view.shown.tick, view.shown.run, view.shown.run_id) == (
-        running.shown.tick,
-        running.shown.run,
-        running.shown.run_id,
+    assert view.snapshot.values == running.snapshot.values and view.snapshot.forced == running.snapshot.forced
+    assert (view.snapshot.tick, view.snapshot.run, view.snapshot.run_id) == (
+        running.snapshot.tick,
+        running.snapshot.run,
+        running.snapshot.run_id,
     )
-    assert view.shown.read_back is not None and "me" in view.shown.read_back.writers
+    assert view.snapshot.read_back is not None and "me" in view.snapshot.read_back.writers
     assert view.events(0) == running.events(0)
-    run = running.shown.run_id
+    run = running.snapshot.run_id
     assert running.control("reset", 0.0, "a test") == "" and running.control("resume", 0.0, "a test") == ""
-    until(lambda: running.shown.run_id != run and running.shown.run.state == RUNNING, "the reset")
-    catch_up_until(frames, view, lambda: view.shown.run_id == running.shown.run_id)
+    until(lambda: running.snapshot.run_id != run and running.snapshot.run.state == RUNNING, "the reset")
+    catch_up_until(frames, view, lambda: view.snapshot.run_id == running.snapshot.run_id)
     frames.end()
     assert frames.fetch() is None
 
@@ -176,15 +176,15 @@ def test_who_fetches_nothing_misses_ticks_and_fills_no_memory(running: SceneTagP
     frames, (pipe, _) = Frames(running), Pipe()
     view = mirror(running, pipe)
     frames.counts = False  # a process that starts
-    first = running.shown.tick
-    until(lambda: running.shown.tick > first + MOST_FRAMES + 10, "more ticks than wait")
+    first = running.snapshot.tick
+    until(lambda: running.snapshot.tick > first + MOST_FRAMES + 10, "more ticks than wait")
     assert frames.left_out == 0
     frames.counts = True
     until(lambda: frames.left_out > 10, "more ticks than wait")
     pause(running)
-    tick = running.shown.tick
+    tick = running.snapshot.tick
     assert catch_up(frames, view) == MOST_FRAMES
-    assert view.shown.tick == tick and view.shown.values == running.shown.values
+    assert view.snapshot.tick == tick and view.snapshot.values == running.snapshot.values
     assert view.events(0) == running.events(0), "none of them is missing"
     frames.end()
 
@@ -198,16 +198,16 @@ def test_who_gets_no_answer_is_refused(running: SceneTagProvider) -> None:
 def test_what_is_given_acts_and_is_on_record_and_replays(served: Served, tmp_path: Path) -> None:
     source = served(record=tmp_path / "bag")
     assert source.give(setpoint(0.25)) == ""
-    until(lambda: source.shown.values[SPEED] == 0.25, "the speed")
-    read_back = source.shown.read_back
+    until(lambda: source.snapshot.values[SPEED] == 0.25, "the speed")
+    read_back = source.snapshot.read_back
     assert read_back is not None and "me" in read_back.writers
     assert source.give(Input(OPERATE, "Jo", "operator", MODE, ("belts/zone1",), (3.0,))) == ""
-    until(lambda: source.shown.values["belts/zone1/mode"] == 3.0, "the mode")
+    until(lambda: source.snapshot.values["belts/zone1/mode"] == 3.0, "the mode")
     assert source.give(Input("modbus", "he", "controller", OWN, (), ())) == ""
-    until(lambda: source.shown.owner == "he", "the owner")
+    until(lambda: source.snapshot.owner == "he", "the owner")
     assert source.give(setpoint(0.3)) == ""  # in other hands
     until(lambda: any(event.kind == "command_refused" for event in source.events(0)[1]), "the refusal")
-    assert source.shown.values[SETPOINT] == 0.25
+    assert source.snapshot.values[SETPOINT] == 0.25
     source.close()
     assert source.recordings == [tmp_path / "bag"]
     report = replay(tmp_path / "bag")
@@ -218,20 +218,20 @@ def test_what_is_given_acts_and_is_on_record_and_replays(served: Served, tmp_pat
 def test_pause_step_resume_reset(served: Served, tmp_path: Path) -> None:
     source = served(record=tmp_path / "bag")
     pause(source)
-    tick, run = source.shown.tick, source.shown.run_id
+    tick, run = source.snapshot.tick, source.snapshot.run_id
     assert source.control("step", 3, "a test") == ""
-    until(lambda: source.shown.tick == tick + 3, "the step")
+    until(lambda: source.snapshot.tick == tick + 3, "the step")
     assert source.give(setpoint(0.25)) == ""
     assert source.control("step", 1, "a test") == ""
-    until(lambda: source.shown.values[SETPOINT] == 0.25, "the setpoint")
+    until(lambda: source.snapshot.values[SETPOINT] == 0.25, "the setpoint")
     assert "expected a whole number" in source.control("step", 0.5, "a test")
     assert source.control("resume", 0, "a test") == ""
-    until(lambda: source.shown.tick > tick + 20, "ticks")
+    until(lambda: source.snapshot.tick > tick + 20, "ticks")
     assert "expected it to be paused" in source.control("step", 1, "a test")
     assert source.control("reset", 0, "a test") == ""
-    until(lambda: source.shown.run_id != run, "the reset")
-    until(lambda: source.shown.run.state == RUNNING, "it goes on")
-    assert source.shown.values[SETPOINT] == 0.5  # as it begins
+    until(lambda: source.snapshot.run_id != run, "the reset")
+    until(lambda: source.snapshot.run.state == RUNNING, "it goes on")
+    assert source.snapshot.values[SETPOINT] == 0.5  # as it begins
     assert "seek" in source.control("seek", 1.0, "a test")
     source.close()
     assert source.recordings == [tmp_path / "bag", tmp_path / "bag_1"]
@@ -243,23 +243,27 @@ def test_in_lockstep_time_passes_up_to_the_target_with_what_was_written_before_i
 ) -> None:
     source = served(zoned(duration=0.1), record=tmp_path / "bag", lockstep=True)
     seen: list[tuple[int, float]] = []
-    source.listen(lambda: seen.append((source.shown.tick, source.shown.values[SETPOINT])))
-    assert (source.shown.tick, source.shown.run.state, source.shown.run.reason) == (0, LOCKSTEP, "by handshake")
+    source.listen(lambda: seen.append((source.snapshot.tick, source.snapshot.values[SETPOINT])))
+    assert (source.snapshot.tick, source.snapshot.run.state, source.snapshot.run.reason) == (
+        0,
+        LOCKSTEP,
+        "by handshake",
+    )
     assert source.give(setpoint(0.1)) == "" == source.control("target", 4, "a test")
     assert source.give(setpoint(0.2)) == "" == source.control("target", 4, "a test")  # which changes nothing
-    until(lambda: source.shown.tick == 4, "the target")
-    assert source.shown.values[SETPOINT] == 0.1
+    until(lambda: source.snapshot.tick == 4, "the target")
+    assert source.snapshot.values[SETPOINT] == 0.1
     assert source.control("target", 6, "a test") == "" == source.give(setpoint(0.3))
     assert source.control("target", 9, "a test") == ""  # before the line is at 6
-    until(lambda: source.shown.tick == 9, "the last target")
+    until(lambda: source.snapshot.tick == 9, "the last target")
     assert {tick for tick, _ in seen} <= {0, 4, 6, 9}
     assert {value for tick, value in seen if tick == 6} <= {0.2}
-    assert source.shown.values[SETPOINT] == 0.3
+    assert source.snapshot.values[SETPOINT] == 0.3
     assert "expected at most 10, the end of the run" in source.control("target", 11, "a test")
     assert "expected only run/target_tick" in source.control("pause", 0, "a test")
     assert source.control("target", 10, "a test") == ""
-    until(lambda: source.shown.run.state == ENDED, "the end")
-    assert source.shown.tick == 10
+    until(lambda: source.snapshot.run.state == ENDED, "the end")
+    assert source.snapshot.tick == 10
     source.close()
     with open_bag(tmp_path / "bag") as bag:
         acted = [(frame.tick, frame.data.values) for frame in bag.outcomes() if frame.data.names == (SETPOINT,)]
@@ -269,15 +273,15 @@ def test_in_lockstep_time_passes_up_to_the_target_with_what_was_written_before_i
 
 def test_the_end_of_the_scene_is_shown_and_a_reset_leads_on(served: Served) -> None:
     source = served(zoned(duration=0.5), factor=0.0)
-    until(lambda: source.shown.run.state == ENDED, "the end")
-    assert source.shown.tick == 50 and not source.shown.lost
+    until(lambda: source.snapshot.run.state == ENDED, "the end")
+    assert source.snapshot.tick == 50 and not source.snapshot.lost
     assert source.give(setpoint(0.25)) == "the run has ended, expected a reset"
     assert source.control("resume", 0, "a test") == "the run has ended, expected a reset"
     assert source.control("speed", 1.0, "a test") == "the run has ended, expected a reset"
     assert source.control("reset", 0, "a test") == ""
-    until(lambda: source.shown.run.state == PAUSED and source.shown.tick == 0, "the reset")
+    until(lambda: source.snapshot.run.state == PAUSED and source.snapshot.tick == 0, "the reset")
     assert source.control("resume", 0, "a test") == ""
-    until(lambda: source.shown.run.state == ENDED, "the end, again")
+    until(lambda: source.snapshot.run.state == ENDED, "the end, again")
 
 
 def test_what_the_guard_stops_is_shown_with_the_reason(served: Served) -> None:
@@ -289,11 +293,11 @@ def test_what_the_guard_stops_is_shown_with_the_reason(served: Served) -> None:
         **NO_FLOOR,
     )
     source = served(given)
-    until(lambda: source.shown.run.state == STOPPED, "the stop")
-    assert source.shown.run.reason.startswith("bottle 0 sinks ") and not source.shown.lost
+    until(lambda: source.snapshot.run.state == STOPPED, "the stop")
+    assert source.snapshot.run.reason.startswith("bottle 0 sinks ") and not source.snapshot.lost
     assert source.give(setpoint(0.1)) == "the run has stopped, expected a reset"
     assert source.control("reset", 0, "a test") == ""
-    until(lambda: source.shown.run.state == PAUSED, "the reset")
+    until(lambda: source.snapshot.run.state == PAUSED, "the reset")
 
 
 def test_what_waits_while_it_is_paused_is_bounded(running: SceneTagProvider) -> None:
@@ -303,15 +307,15 @@ def test_what_waits_while_it_is_paused_is_bounded(running: SceneTagProvider) -> 
     assert [bool(reason) for reason in refused] == [False] * MOST_WAITING + [True] * 100
     assert refused[-1] == "1000 inputs wait for the next tick already"
     assert source.control("step", 1, "a test") == ""
-    until(lambda: source.shown.values[SETPOINT] == 0.2, "the last of them")
+    until(lambda: source.snapshot.values[SETPOINT] == 0.2, "the last of them")
     until(lambda: source.give(setpoint(0.3)) == "", "room again")
 
 
 def test_a_process_that_is_killed_is_told_of_and_followed_by_another(served: Served, tmp_path: Path) -> None:
     source = served(record=tmp_path / "bag")
-    until(lambda: source.shown.tick > 20, "ticks")
-    run, seen = source.shown.run_id, list[LineSnapshot]()
-    source.listen(lambda: seen.append(source.shown))
+    until(lambda: source.snapshot.tick > 20, "ticks")
+    run, seen = source.snapshot.run_id, list[LineSnapshot]()
+    source.listen(lambda: seen.append(source.snapshot))
     os.kill(source.pid, signal.SIGKILL)
     until(lambda: any(shown.lost for shown in seen), "its loss")
     assert "the process that simulates zoned_line was killed by signal 9" in [shown.lost for shown in seen]
@@ -325,15 +329,15 @@ def test_a_process_that_is_killed_is_told_of_and_followed_by_another(served: Ser
 
 def test_a_process_that_hangs_is_stale_until_it_goes_on(running: SceneTagProvider) -> None:
     source = running
-    until(lambda: source.shown.tick > 5, "ticks")
+    until(lambda: source.snapshot.tick > 5, "ticks")
     os.kill(source.pid, signal.SIGSTOP)
     try:
-        until(lambda: source.shown.lost, "silence")
-        assert source.shown.lost == "no message of the simulation for 5 s"
-        assert source.give(setpoint(0.1)) == source.shown.lost == source.control("pause", 0, "a test")
+        until(lambda: source.snapshot.lost, "silence")
+        assert source.snapshot.lost == "no message of the simulation for 5 s"
+        assert source.give(setpoint(0.1)) == source.snapshot.lost == source.control("pause", 0, "a test")
     finally:
         os.kill(source.pid, signal.SIGCONT)
-    until(lambda: not source.shown.lost, "a sign of life")
+    until(lambda: not source.snapshot.lost, "a sign of life")
 
 
 def test_a_scene_that_can_not_be_recorded_is_said(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import pytest
 from matplotlib.axes import Axes
 
 from conveyor_sim.report.figures import style
-from conveyor_sim.report.figures.data import Contacts, Frame, Plant
+from conveyor_sim.report.figures.data import Contacts, PlantFrame, StaticGeometry
 from conveyor_sim.scene import Scene, load_scene
 
 SCENE = Path(__file__).with_name("small_plant.yaml")
@@ -22,14 +22,14 @@ def scene() -> Scene:
 
 
 @pytest.fixture
-def plant(scene: Scene) -> Plant:
-    return Plant.of(scene)
+def plant(scene: Scene) -> StaticGeometry:
+    return StaticGeometry.of(scene)
 
 
 @pytest.fixture
-def frame(plant: Plant) -> Frame:
+def frame(plant: StaticGeometry) -> PlantFrame:
     """Two bottles that touch on the table, the second also at the rail `top`; a third on the feeder."""
-    return Frame(
+    return PlantFrame(
         time=2.5,
         x=np.array([0.6, 0.7, -1.0]),
         y=np.array([0.951, 0.952, 0.5]),

@@ -11,12 +11,12 @@ from matplotlib.colors import Normalize
 
 from conveyor_sim.report.figures import style
 from conveyor_sim.report.figures.bottles import ForceScale, draw_bottles, draw_forces, draw_orientation, speed_scale
-from conveyor_sim.report.figures.data import Contacts, Frame
+from conveyor_sim.report.figures.data import Contacts, PlantFrame
 
 NORM = Normalize(0.0, 1.0)
 
 
-def test_one_circle_a_bottle_of_its_size_and_place(ax: Axes, frame: Frame) -> None:
+def test_one_circle_a_bottle_of_its_size_and_place(ax: Axes, frame: PlantFrame) -> None:
     drawn = {
         (float(x), float(y), float(circles.get_widths()[0]) / 2.0)
         for circles in draw_bottles(ax, frame, NORM, 0.5)
@@ -25,7 +25,7 @@ def test_one_circle_a_bottle_of_its_size_and_place(ax: Axes, frame: Frame) -> No
     assert drawn == set(zip(frame.x.tolist(), frame.y.tolist(), frame.radius.tolist(), strict=True))
 
 
-def test_circles_are_to_scale_on_the_page(ax: Axes, frame: Frame) -> None:
+def test_circles_are_to_scale_on_the_page(ax: Axes, frame: PlantFrame) -> None:
     ax.set_xlim(-2.0, 2.0)
     ax.set_ylim(-2.0, 2.0)
     ax.set_aspect("equal")
@@ -36,24 +36,24 @@ def test_circles_are_to_scale_on_the_page(ax: Axes, frame: Frame) -> None:
     assert circles.get_transforms()[0][0, 0] * unit == pytest.approx(0.05 * metre)
 
 
-def test_colour_is_the_speed(ax: Axes, frame: Frame) -> None:
+def test_colour_is_the_speed(ax: Axes, frame: PlantFrame) -> None:
     small, large = draw_bottles(ax, frame, NORM, 0.5)
     np.testing.assert_allclose(small.get_facecolor(), style.SPEED(frame.speed[:2]))
     np.testing.assert_allclose(large.get_facecolor(), style.SPEED(frame.speed[2:]))
 
 
-def test_no_bottles_draw_nothing(ax: Axes, frame: Frame) -> None:
+def test_no_bottles_draw_nothing(ax: Axes, frame: PlantFrame) -> None:
     empty = frame.within((10.0, 10.0, 11.0, 11.0))
     assert draw_bottles(ax, empty, NORM, 0.5) == []
     assert len(draw_orientation(ax, empty, NORM, 0.5).get_segments()) == 0
 
 
-def test_tick_shows_the_angle(ax: Axes, frame: Frame) -> None:
+def test_tick_shows_the_angle(ax: Axes, frame: PlantFrame) -> None:
     ticks = np.array(draw_orientation(ax, frame, NORM, 0.5).get_segments())
     np.testing.assert_allclose(ticks[:, 1], [[0.65, 0.951], [0.7, 1.002], [-1.08, 0.5]])
 
 
-def test_width_of_a_line_of_force_is_proportional_to_the_force(ax: Axes, frame: Frame) -> None:
+def test_width_of_a_line_of_force_is_proportional_to_the_force(ax: Axes, frame: PlantFrame) -> None:
     scale = ForceScale.covering([frame], widest=6.0)
     assert scale is not None
     lines = draw_forces(ax, frame, scale)
@@ -62,32 +62,32 @@ def test_width_of_a_line_of_force_is_proportional_to_the_force(ax: Axes, frame: 
     np.testing.assert_allclose(lines.get_linewidths(), [1.5, 6.0])
 
 
-def test_all_frames_share_one_scale(frame: Frame) -> None:
+def test_all_frames_share_one_scale(frame: PlantFrame) -> None:
     harder = replace(frame, contacts=Contacts(np.zeros((1, 2, 2)), np.array([80.0])))
     scale = ForceScale.covering([frame, harder], widest=6.0)
     assert scale is not None
     assert scale.points_per_newton == pytest.approx(6.0 / 80.0)
 
 
-def test_forces_far_below_the_peak_of_the_run_look_weak(frame: Frame) -> None:
+def test_forces_far_below_the_peak_of_the_run_look_weak(frame: PlantFrame) -> None:
     scale = ForceScale.covering([frame], widest=6.0, peak=4000.0)
     assert scale is not None
     assert 40.0 * scale.points_per_newton == pytest.approx(0.6)
 
 
-def test_forces_too_weak_to_see_are_left_out(ax: Axes, frame: Frame) -> None:
+def test_forces_too_weak_to_see_are_left_out(ax: Axes, frame: PlantFrame) -> None:
     weak = replace(frame, contacts=Contacts(np.zeros((2, 2, 2)), np.array([1000.0, 1e-3])))
     scale = ForceScale.covering([weak], widest=6.0)
     assert scale is not None
     assert len(draw_forces(ax, weak, scale).get_segments()) == 1
 
 
-def test_without_contacts_there_is_no_scale(frame: Frame) -> None:
+def test_without_contacts_there_is_no_scale(frame: PlantFrame) -> None:
     assert ForceScale.covering([replace(frame, contacts=None)], widest=6.0) is None
     assert ForceScale.covering([replace(frame, contacts=Contacts())], widest=6.0) is None
 
 
-def test_legend_shows_forces_in_newtons_at_their_width(ax: Axes, frame: Frame) -> None:
+def test_legend_shows_forces_in_newtons_at_their_width(ax: Axes, frame: PlantFrame) -> None:
     scale = ForceScale.covering([frame], widest=6.0)
     assert scale is not None
     legend = scale.legend(ax.figure)
@@ -96,17 +96,17 @@ def test_legend_shows_forces_in_newtons_at_their_width(ax: Axes, frame: Frame) -
     assert shown["20 N"].get_linewidth() == pytest.approx(3.0)
 
 
-def test_speed_scale_spans_the_belts(frame: Frame) -> None:
+def test_speed_scale_spans_the_belts(frame: PlantFrame) -> None:
     assert speed_scale([frame]).vmax == pytest.approx(1.05 * 0.8)
 
 
-def test_one_bottle_shot_off_does_not_stretch_the_speed_scale(frame: Frame) -> None:
+def test_one_bottle_shot_off_does_not_stretch_the_speed_scale(frame: PlantFrame) -> None:
     speed = np.concatenate([np.full(99, 0.5), [30.0]])
-    many = Frame(0.0, *np.zeros((3, 100)), np.full(100, 0.05), speed, frame.belt_speeds)
+    many = PlantFrame(0.0, *np.zeros((3, 100)), np.full(100, 0.05), speed, frame.belt_speeds)
     assert speed_scale([many]).vmax == pytest.approx(1.05 * 0.8)
 
 
-def test_speed_scale_spans_the_bottles_where_all_belts_rest(frame: Frame) -> None:
+def test_speed_scale_spans_the_bottles_where_all_belts_rest(frame: PlantFrame) -> None:
     resting = replace(frame, belt_speeds=np.zeros(6), speed=np.array([0.3, 0.3, 0.3]))
     assert speed_scale([resting]).vmax == pytest.approx(1.05 * 0.3)
     assert speed_scale([replace(resting, speed=np.zeros(3))]).vmax == 1.0

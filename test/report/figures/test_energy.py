@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.report.figures import style
-from conveyor_sim.report.figures.data import Energy
+from conveyor_sim.report.figures.data import EnergySeries
 from conveyor_sim.report.figures.energy import energy_figure
 from conveyor_sim.report.figures.recording import Recording
 from conveyor_sim.scene import load_scene
@@ -61,7 +61,7 @@ def test_every_account_is_drawn_as_recorded(tmp_path: Path) -> None:
 def test_a_line_at_rest_has_nothing_to_divide_by() -> None:
     """No belts, nothing in motion: no curve but the residual's."""
     zero = np.zeros(3)
-    still = Energy(np.arange(3.0), *[zero] * 5, np.zeros((3, 0)), *[zero] * 6)
+    still = EnergySeries(np.arange(3.0), *[zero] * 5, np.zeros((3, 0)), *[zero] * 6)
     figure = energy_figure(still, [])
     np.testing.assert_array_equal(line(figure, "residual").get_ydata(), zero)
     assert [ax.get_legend() for ax in figure.axes] == [None] * 4
@@ -69,7 +69,7 @@ def test_a_line_at_rest_has_nothing_to_divide_by() -> None:
 
 def test_belts_that_do_least_are_drawn_together() -> None:
     zero, work = np.zeros(3), np.outer(np.arange(3.0), [1.0, -9.0, 2.0, 7.0, 8.0, 3.0])
-    figure = energy_figure(Energy(np.arange(3.0), *[zero] * 5, work, *[zero] * 6), list("abcdef"))
+    figure = energy_figure(EnergySeries(np.arange(3.0), *[zero] * 5, work, *[zero] * 6), list("abcdef"))
     for index, name in ((1, "b"), (3, "d"), (4, "e"), (5, "f")):
         np.testing.assert_array_equal(line(figure, name).get_ydata(), work[:, index])
     np.testing.assert_array_equal(line(figure, "2 other belts").get_ydata(), work[:, 0] + work[:, 2])

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from conveyor_sim.report.figures import style
-from conveyor_sim.report.figures.data import Flow, PeakForce
+from conveyor_sim.report.figures.data import Flow, PeakForceSeries
 from conveyor_sim.report.figures.flow import entries_per_minute, flow_figure, force_figure, rate_window
 
 TIME = np.arange(0, 1001) * 0.02
@@ -88,12 +88,12 @@ def test_a_recording_of_one_instant_is_drawn() -> None:
     zero, one = np.zeros(1, dtype=np.int64), np.zeros((1, 1), dtype=np.int64)
     figure = flow_figure(Flow(np.zeros(1), zero, zero, zero, one, one), ["feeder"])
     assert len(figure.axes) == 3
-    assert len(force_figure(PeakForce(np.zeros(1), np.zeros(1), np.zeros(1), zero - 1)).axes) == 1
+    assert len(force_figure(PeakForceSeries(np.zeros(1), np.zeros(1), np.zeros(1), zero - 1)).axes) == 1
 
 
 def test_forces_drawn_are_the_forces_recorded() -> None:
     largest = 50.0 + 40.0 * np.sin(TIME)
-    force = PeakForce(TIME, largest, 0.5 * largest, np.full(1001, 7))
+    force = PeakForceSeries(TIME, largest, 0.5 * largest, np.full(1001, 7))
     figure = force_figure(force)
     np.testing.assert_array_equal(line(figure, "largest").get_ydata(), largest)
     np.testing.assert_array_equal(line(figure, "percentile_99").get_ydata(), 0.5 * largest)
@@ -103,5 +103,5 @@ def test_forces_drawn_are_the_forces_recorded() -> None:
 def test_the_hardest_impact_is_told_with_its_bottle_and_time() -> None:
     largest = np.ones(1001)
     largest[100] = 123.4
-    figure = force_figure(PeakForce(TIME, largest, np.ones(1001), np.where(largest > 1.0, 42, 0)))
+    figure = force_figure(PeakForceSeries(TIME, largest, np.ones(1001), np.where(largest > 1.0, 42, 0)))
     assert [text.get_text() for text in figure.axes[0].texts] == ["123 N, bottle 42, 2.00 s"]

@@ -8,25 +8,25 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 
-from conveyor_sim.report.figures.data import Plant
+from conveyor_sim.report.figures.data import StaticGeometry
 from conveyor_sim.report.figures.labels import belt_labels, mark_labels, place, rail_labels
 from conveyor_sim.report.figures.plant import draw_plant
 
 
-def test_belts_carry_name_and_speed(plant: Plant) -> None:
+def test_belts_carry_name_and_speed(plant: StaticGeometry) -> None:
     texts = [label.text for label in belt_labels(plant, plant.speeds)]
     assert texts[:3] == ["feeder\n0.8 m/s", "table\n0.2 m/s", "slope\n-0.5 m/s"]
 
 
-def test_rails_of_curved_belts_are_not_named_again(plant: Plant) -> None:
+def test_rails_of_curved_belts_are_not_named_again(plant: StaticGeometry) -> None:
     assert [label.text for label in rail_labels(plant)] == ["top", "bottom"]
 
 
-def test_infeeds_and_outfeeds_are_named(plant: Plant) -> None:
+def test_infeeds_and_outfeeds_are_named(plant: StaticGeometry) -> None:
     assert [label.text for label in mark_labels(plant)] == ["infeed inlet", "outfeed reject"]
 
 
-def test_labels_are_inside_the_axes_apart_and_near_their_anchors(ax: Axes, plant: Plant) -> None:
+def test_labels_are_inside_the_axes_apart_and_near_their_anchors(ax: Axes, plant: StaticGeometry) -> None:
     draw_plant(ax, plant, plant.speeds, Normalize(0.0, 1.0), 0.1)
     ax.set_xlim(-3.5, 6.0)
     ax.set_ylim(-2.0, 4.0)
@@ -44,7 +44,7 @@ def test_labels_are_inside_the_axes_apart_and_near_their_anchors(ax: Axes, plant
         assert not one.overlaps(other)
 
 
-def test_the_name_of_a_belt_is_not_written_on_another_belt(ax: Axes, plant: Plant) -> None:
+def test_the_name_of_a_belt_is_not_written_on_another_belt(ax: Axes, plant: StaticGeometry) -> None:
     draw_plant(ax, plant, plant.speeds, Normalize(0.0, 1.0), 0.1)
     ax.set_xlim(-3.5, 6.0)
     ax.set_ylim(-2.0, 4.0)

@@ -11,8 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from conveyor_sim.report.figures import style
-from conveyor_sim.report.figures.data import Contacts, Frame, Plant
-from conveyor_sim.report.figures.moment import Event, Trace, moment_figure
+from conveyor_sim.report.figures.data import Contacts, PlantFrame, StaticGeometry
+from conveyor_sim.report.figures.moment import MarkedEvent, Trace, moment_figure
 
 TIME = np.linspace(0.0, 2.5, 251)
 STEP = np.where(TIME < 1.0, 0.0, 1.0)
@@ -37,11 +37,11 @@ def axes(figure: Figure) -> list[Axes]:
     )
 
 
-def drawn(plant: Plant, frame: Frame, *events: Event, blocked: tuple[str, ...] = ()) -> list[Axes]:
+def drawn(plant: StaticGeometry, frame: PlantFrame, *events: MarkedEvent, blocked: tuple[str, ...] = ()) -> list[Axes]:
     return axes(moment_figure(plant, frame, "small_plant", "It did not hold", blocked, TIME, TRACES, events))
 
 
-def test_it_says_what_where_and_when(plant: Plant, frame: Frame) -> None:
+def test_it_says_what_where_and_when(plant: StaticGeometry, frame: PlantFrame) -> None:
     view, *rows = drawn(plant, frame)
     assert view.get_title(loc="left") == "t = 2.50 s, 3 bottles\nIt did not hold"
     assert view.figure.get_suptitle() == "small_plant"
@@ -52,7 +52,7 @@ def test_it_says_what_where_and_when(plant: Plant, frame: Frame) -> None:
     ]  # fmt: skip
 
 
-def test_traces_are_the_signals_and_tell_their_last_values(plant: Plant, frame: Frame) -> None:
+def test_traces_are_the_signals_and_tell_their_last_values(plant: StaticGeometry, frame: PlantFrame) -> None:
     _, *rows = drawn(plant, frame)
     for row, trace in zip(rows, TRACES, strict=True):
         (line,) = (line for line in row.lines if line.get_gid() == trace.name)
@@ -61,7 +61,7 @@ def test_traces_are_the_signals_and_tell_their_last_values(plant: Plant, frame: 
     assert "on" in {text.get_text() for text in rows[0].texts}
 
 
-def test_only_blocked_eyes_are_broad(plant: Plant, frame: Frame) -> None:
+def test_only_blocked_eyes_are_broad(plant: StaticGeometry, frame: PlantFrame) -> None:
     def beams(*blocked: str) -> int:
         view = drawn(plant, frame, blocked=blocked)[0]
         return sum(len(c.get_segments()) for c in view.collections if c.get_gid() == "blocked")  # type: ignore[attr-defined]
@@ -69,8 +69,8 @@ def test_only_blocked_eyes_are_broad(plant: Plant, frame: Frame) -> None:
     assert (beams(), beams("entry")) == (0, 1)
 
 
-def test_events_are_marked_in_every_trace_and_named_once(plant: Plant, frame: Frame) -> None:
-    _, *rows = drawn(plant, frame, Event(0.5, "stop = 1"), Event(2.0, "stop = 0"))
+def test_events_are_marked_in_every_trace_and_named_once(plant: StaticGeometry, frame: PlantFrame) -> None:
+    _, *rows = drawn(plant, frame, MarkedEvent(0.5, "stop = 1"), MarkedEvent(2.0, "stop = 0"))
     for row in rows:
         assert [line.get_xdata()[0] for line in row.lines if line.get_gid() is None] == [0.5, 2.0]
     texts = [[text.get_text() for text in row.texts if "stop" in text.get_text()] for row in rows]
@@ -78,7 +78,7 @@ def test_events_are_marked_in_every_trace_and_named_once(plant: Plant, frame: Fr
     assert texts[1:] == [[], [], []]
 
 
-def test_what_has_come_to_rest_looks_it(plant: Plant, frame: Frame) -> None:
+def test_what_has_come_to_rest_looks_it(plant: StaticGeometry, frame: PlantFrame) -> None:
     """Rounding leaves some speed and force; neither scale is made of that."""
     still = replace(
         frame,
@@ -93,7 +93,7 @@ def test_what_has_come_to_rest_looks_it(plant: Plant, frame: Frame) -> None:
     assert np.allclose(large.get_facecolor(), rest) and np.allclose(small.get_facecolor(), rest)
 
 
-def test_forced_signals_are_named_and_their_traces_say_so(plant: Plant, frame: Frame) -> None:
+def test_forced_signals_are_named_and_their_traces_say_so(plant: StaticGeometry, frame: PlantFrame) -> None:
     traces = (replace(TRACES[0], forced=True), *TRACES[1:])
     forced = ("photo_eyes/entry/blocked", "zones/z/bottles")
     figure = moment_figure(plant, frame, "small_plant", "It did not hold", (), TIME, traces, forced=forced)

@@ -21,16 +21,16 @@ from conveyor_sim.physics.stepping.guard.world_snapshot import WorldSnapshot
 from conveyor_sim.scene.types import Unchecked
 
 DEEPEST = 0.75
-"""Overlap over the (smaller) radius: at 1 an axis is on a rail, and the normal turns round beyond."""
+"""Largest allowed overlap over the (smaller) radius. At 1 an axis is on a rail; beyond, the normal reverses."""
 
 GROWTH = 2.0
-"""Of all energy in a tick, what belts do apart: explicit methods swing by less in a contact that they can follow."""
+"""Largest allowed growth of the energy in a tick, without the work of belts. Resolved contacts oscillate by less."""
 
 SOFT = 0.2
-"""Overlap over the radius from which it is reported: places and gaps are wrong by as much."""
+"""Overlap over the radius from which a contact is reported as soft. Positions are wrong by as much."""
 
 CLOSELY = 128
-"""Steps after which overlaps are looked at again at the latest; that costs about half a step."""
+"""Largest number of steps between checks of overlaps. A check costs about half a step."""
 
 
 @dataclass
@@ -59,7 +59,7 @@ class Guard:
     """Checks of a State before and after every tick."""
 
     def __init__(self, state: State, found: RailContacts) -> None:
-        """found: scratch of the thread that calls."""
+        """Prepare checks of a State. found: scratch of the calling thread."""
         self._state = state
         self._model = state.model
         self._found = found
@@ -67,7 +67,7 @@ class Guard:
         self._every = max(1, math.ceil(CLOSELY / self._model.steps_per_tick))
         tick, slip = self._model.tick_ns * 1e-9, self._model.settings.slip_limit
         self._friction = tick * self._model.largest_base_friction
-        # Bottles that move within the slip limit have no energy worth the name.
+        # The energy of bottles within the slip limit is negligible.
         self._noise = 0.5 * slip**2 / self._model.gravity if self._model.gravity > 0.0 else 0.0
         self._something_there = self._model.pair_law is not None or self._model.rail_law is not None
         self._kinetic = 0.0
@@ -77,22 +77,22 @@ class Guard:
         self.memory = GuardMemory()
 
     def begin(self, tick: int, surface_speed: float, rail_speed: float) -> Violation | None:
-        """Keep the state at the beginning of a tick; report a bottle that is not finite there.
+        """Copy the state at the beginning of a tick. Return a violation if a bottle is not finite.
 
-        surface_speed: m/s, the largest of any belt's surface; rail_speed: m/s, of any rail that moves.
+        surface_speed: m/s, of the fastest belt surface. rail_speed: m/s, of the fastest moving rail.
         """
         model, world = self._model, self._state.world
         self._memory.take(world)
         if tick % self._every == 0:
             world.probe.due[0] = 1
         bad, _, _, weight, self._kinetic = self._look(world.bottles, world.spin)
-        # A rail that pushes a queue works against its friction; one that hits a bottle of speed v leaves it v + 2 u.
+        # A rail of speed u that pushes a queue works against friction. A hit takes a bottle from v to v + 2 u.
         hits = 4.0 * rail_speed**2 * self._mass() if rail_speed > 0.0 else 0.0
         self._work = weight * (self._friction * (surface_speed + rail_speed) + self._noise) + hits
         return Words(model, world).put_in(bad) if bad >= 0 else None
 
     def end(self, dt: float) -> Violation | None:
-        """What is wrong with the state at the end of a tick, reached in steps of dt (s); it is put back then."""
+        """Return a violation at the end of a tick with steps of dt (s), and put the state back; None without one."""
         world, model = self._state.world, self._model
         bad, fastest, square, _, kinetic = self._look(world.bottles, world.spin)
         deep = float(world.probe.depth[0]), float(world.probe.depth[1])
@@ -109,34 +109,34 @@ class Guard:
         depth = max(deep)
         if self.memory.put_in and depth > DEEPEST and self._was_deep():
             return None
-        # Until overlaps are seen that are not too deep.
+        # It stays true until a check finds no deep overlap.
         self.memory.put_in = self.memory.put_in and depth == 0.0
         if depth > SOFT >= self.memory.deepest or depth > DEEPEST:
             worst = deep.index(depth)
             bottle, other = int(world.probe.bottle[worst]), int(world.probe.other[worst])
             words = self._words_before(bottle) if depth > DEEPEST else Words(model, world, self._squeeze(bottle))
-            found = (words.rail if worst else words.pair)(bottle, other, depth)
+            violation = (words.rail if worst else words.pair)(bottle, other, depth)
             if depth > DEEPEST:
-                return found
-            self._soft = found
+                return violation
+            self._soft = violation
         self.memory.deepest = max(self.memory.deepest, depth)
         return None
 
     def forget(self) -> None:
-        """What was seen of overlaps since the last tick."""
+        """Discard the overlaps seen since the last tick."""
         self._state.world.probe.depth[:] = 0.0
         self._state.world.probe.due[0] = 0
 
     def soft(self, tick: int) -> GuardEvent | None:
-        """A contact that is too soft for what it bears, reported once, at a tick."""
-        found, self._soft = self._soft, None
-        if found is None:
+        """Return the event of a contact that is too soft for its load, once; None without one."""
+        soft, self._soft = self._soft, None
+        if soft is None:
             return None
-        text = f"{found.what} at ({found.x:.4g}, {found.y:.4g}) m: {found.why}"
-        return GuardEvent(tick, "soft", found.bottle, found.x, found.y, text)
+        text = f"{soft.what} at ({soft.x:.4g}, {soft.y:.4g}) m: {soft.why}"
+        return GuardEvent(tick, "soft", soft.bottle, soft.x, soft.y, text)
 
     def chatters(self, tick: int, slot: int, share: float) -> GuardEvent:
-        """A bottle that shakes by a share of slip_limit at every step."""
+        """Return the event of a bottle that chatters. share: amplitude over slip_limit."""
         bottle, x, y = Words(self._model, self._state.world).place(slot)
         text = (
             f"bottle {bottle} at ({x:.4g}, {y:.4g}) m shakes by {share:.2g} of slip_limit at every step: friction "
@@ -145,12 +145,12 @@ class Guard:
         return GuardEvent(tick, "chatter", bottle, x, y, text)
 
     def _mass(self) -> float:
-        """Of all bottles, kg."""
+        """Return the mass of all bottles, kg."""
         bottles = self._state.world.bottles
         return float(self._model.type_mass[bottles.type[bottles.id >= 0]].sum())
 
     def _grown(self) -> tuple[float, float] | None:
-        """Energy (J) before and after the tick if it grew by too much: a contact that opened may explain a speed."""
+        """Return the energy (J) before and after the tick if it grew too much; else None."""
         after = WorldSnapshot()
         after.take(self._state.world)
         total = self._energy()
@@ -160,7 +160,7 @@ class Guard:
         return (before, total) if total > GROWTH * before + self._work else None
 
     def _was_deep(self) -> bool:
-        """Whether bottles were put in so deep before the tick: they may part."""
+        """Return True if overlaps were as deep before the tick, because bottles were placed so; they may part."""
         after, watch = WorldSnapshot(), self._state.world.probe
         bottle, other = watch.bottle.copy(), watch.other.copy()
         after.take(self._state.world)
@@ -174,7 +174,7 @@ class Guard:
         return float(stored_energy(self._state.world, self._found).sum())
 
     def _compile(self, bottles: Bottles, spin: Spin | None) -> Any:
-        """Look for the first time."""
+        """Run the first check, which compiles it."""
         self._look = entry(look, bottles, spin)
         return self._look(bottles, spin)
 
@@ -182,14 +182,14 @@ class Guard:
         return squeeze_of(self._model, self._state.world, self._found, slot)
 
     def _words_before(self, slot: int = -1) -> Words:
-        """Have the state as it was at the beginning of the tick, to find words for; slot: the bottle in question."""
+        """Put back the state at the beginning of the tick, and return its words. slot: the violating bottle."""
         after = None if slot < 0 else self._squeeze(slot)
         self._put_back()
-        # Once an axis has passed a rail, that pushes it on.
+        # Once an axis has passed a rail, the rail pushes it further.
         before = None if slot < 0 else self._squeeze(slot)
         return Words(self._model, self._state.world, before if before is not None and before.held else after or before)
 
     def _put_back(self) -> None:
-        """Have the state as it was at the beginning of the tick."""
+        """Put back the state at the beginning of the tick."""
         self._memory.restore(self._state)
         self.forget()

@@ -1,4 +1,4 @@
-"""Which gate, pusher or diverter presses on a bottle, and what holds the bottle against it."""
+"""Gate, pusher or diverter that presses on a bottle, and the object that holds the bottle against it."""
 
 from dataclasses import dataclass
 
@@ -13,27 +13,27 @@ from conveyor_sim.physics.model import Model
 from conveyor_sim.scene.moving import MovingShape
 
 ACTIONS = {"gates": "gate {} closes on", "pushers": "pusher {} pushes", "diverters": "diverter {} swings against"}
-"""What a mover does to a bottle, by kind."""
+"""Verb phrases of movers, by kind."""
 
 
 @dataclass(frozen=True)
 class Squeeze:
-    """A rail that moves into a bottle."""
+    """A moving rail that presses on a bottle."""
 
     what: str
     """A clause, such as "gate exit closes on bottle 7 against rail wall"."""
     field: str
-    """Of the scene: what limits its drive."""
+    """Field of the scene that limits its drive."""
     force: float | None
-    """N, the most that it exerts on the bottle; None: it has no limit."""
+    """Largest force on the bottle, N; None without limit."""
     held: bool
-    """Whether something holds the bottle on the other side."""
+    """True if another object holds the bottle on the other side."""
 
 
 def squeeze_of(model: Model, world: World, found: RailContacts, slot: int) -> Squeeze | None:
-    """Who moves into a bottle, or into those that it touches, one by one; None if nobody does. found: scratch.
+    """Return the moving rail that presses on a bottle, directly or through others; None without one. found: scratch.
 
-    Of several, the first one without a limit. The neighbour lists must hold.
+    Of several rails, one without a force limit comes first. The neighbour lists must be valid.
     """
     moving = world.moving
     if moving is None:
@@ -60,14 +60,14 @@ def squeeze_of(model: Model, world: World, found: RailContacts, slot: int) -> Sq
 
 
 def _cluster(slot: int, kind: NDArray[np.uint8], a: NDArray[np.int64], b: NDArray[np.int64]) -> set[int]:
-    """The bottle and all that touch it, or one that does."""
+    """Return the slots of the bottles connected to a bottle by contacts, with its own slot."""
     pairs = kind == BOTTLE_BOTTLE
-    ends, found = np.column_stack([a[pairs], b[pairs]]), {slot}
+    ends, cluster = np.column_stack([a[pairs], b[pairs]]), {slot}
     while True:
-        touching = set(ends[np.isin(ends, list(found)).any(axis=1)].ravel().tolist()) | found
-        if touching == found:
-            return found
-        found = touching
+        touching = set(ends[np.isin(ends, list(cluster)).any(axis=1)].ravel().tolist()) | cluster
+        if touching == cluster:
+            return cluster
+        cluster = touching
 
 
 def _moves(moving: MovingRails, q: int) -> bool:
@@ -90,7 +90,7 @@ def _held_by(
     b: NDArray[np.int64],
     normal: NDArray[np.float64],
 ) -> str:
-    """What a bottle touches on the side away from its contact `pushed`, in words; "" if nothing."""
+    """Return the object that a bottle touches opposite its contact `pushed`, in words; "" without one."""
     facing, held = 0.0, ""
     for c in range(kind.size):
         second = kind[c] == BOTTLE_BOTTLE and b[c] == bottle

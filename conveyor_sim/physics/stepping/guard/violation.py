@@ -1,4 +1,4 @@
-"""What the guard found, in words: which bottle, where, when, why, and what helps."""
+"""Violations in words: bottle, place, time, cause, and remedy."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -13,15 +13,15 @@ from conveyor_sim.physics.model import Model
 from conveyor_sim.physics.stepping.guard.squeeze import Squeeze
 
 CAME_FAST = 0.5
-"""Of the speed that a contact can stop: above it an overlap is put down to an impact, below to a lasting force."""
+"""Speed over the speed that a contact can stop. Above it the cause is an impact, below it a lasting force."""
 
 REMEDY_DEPTH = 0.1
-"""Overlap over the radius for which a stiffness is proposed."""
+"""Overlap over the radius at the proposed stiffness."""
 
 
 @dataclass(frozen=True)
 class Violation:
-    """Something that no bottle can do."""
+    """A state that no bottle can reach."""
 
     bottle: int
     """Id."""
@@ -29,36 +29,36 @@ class Violation:
     """m, at the beginning of the tick."""
     y: float
     what: str
-    """What was found, as a clause that begins with the bottle."""
+    """The violation, as a clause that begins with the bottle."""
     why: str
-    """The cause, and after a semicolon what helps."""
+    """The cause, and after a semicolon the remedy."""
     kind: Literal["unstable", "tunnelling"]
     curable: bool = True
-    """Whether shorter steps may help."""
+    """True if shorter steps may help."""
 
     def sentence(self, time: float, tried: int) -> str:
-        """In one sentence; time: s, at the beginning of the tick; tried: by what factor steps were shorter."""
+        """Return one sentence. time: s, at the beginning of the tick. tried: factor by which steps were shortened."""
         even = "" if tried == 1 else f", even in steps {tried} times shorter"
         return f"{self.what} in the tick that began at {time:g} s at ({self.x:.4g}, {self.y:.4g}) m{even}: {self.why}"
 
 
 class Words:
-    """Finds words for one state, that at the beginning of a tick."""
+    """Words for violations of one state, that at the beginning of a tick."""
 
     def __init__(self, model: Model, world: World, squeeze: Squeeze | None = None) -> None:
-        """squeeze: what moves into the bottle in question, as found where the tick came to."""
+        """Describe a state. squeeze: moving rail that presses on the violating bottle at the end of the tick."""
         self._model = model
         self._world = world
         self._squeeze = squeeze
         self._bottles = world.bottles
 
     def put_in(self, slot: int) -> Violation:
-        """A bottle that was not finite before a step was taken."""
+        """Return the violation of a bottle that was not finite before the first step."""
         what = f"bottle {self._id(slot)} has no finite position or velocity before a step was taken"
         return self._unstable(slot, what, "the number was written into the state; reset it", curable=False)
 
     def not_finite(self, slot: int) -> Violation:
-        """A bottle that is not finite any more."""
+        """Return the violation of a bottle that is no longer finite."""
         what = f"bottle {self._id(slot)} has no finite position or velocity"
         if self._model.integrator != "dormand_prince":
             return self._unstable(slot, what, self._too_long())
@@ -69,22 +69,22 @@ class Words:
         return self._unstable(slot, what, why, curable=False)
 
     def far(self, slot: int, speed: float, dt: float) -> Violation:
-        """A bottle that moves too far in one step. speed: m/s."""
+        """Return the violation of a bottle that moves too far in one step. speed: m/s."""
         what = f"bottle {self._id(slot)} moves {1e3 * speed * dt:.3g} mm in one step of {dt:g} s"
         limit = f"more than {1e3 * self._model.settings.skin:.3g} mm could pass through a contact unseen"
         why = f"it has {speed:.3g} m/s, and {limit}; choose a finer accuracy"
         return self._tunnelling(slot, what, self._forced() or why)
 
     def energy(self, slot: int, before: float, after: float, explained: float) -> Violation:
-        """Energy (J) that came from nowhere; slot: of the fastest bottle."""
+        """Return the violation of unexplained energy (J). slot: of the fastest bottle."""
         rise = f"from {before:.3g} to {after:.3g} J"
         what = f"bottle {self._id(slot)} is the fastest while the energy of all rises {rise}"
-        what_works = "belts and rails" if self._model.plant.moving else "belts"
-        why = f"{what_works} explain {explained:.3g} J of it at most, so it comes of the time step: {self._too_long()}"
+        workers = "belts and rails" if self._model.plant.moving else "belts"
+        why = f"{workers} explain {explained:.3g} J of it at most, so it comes of the time step: {self._too_long()}"
         return self._unstable(slot, what, self._forced() or why)
 
     def pair(self, slot: int, other: int, depth: float) -> Violation:
-        """Two bottles that overlap too deep; depth: over the smaller radius."""
+        """Return the violation of two bottles that overlap too deep. depth: over the smaller radius."""
         a, b = self._bottles, slot
         kinds = a.type[[b, other]].astype(np.int64)
         relative = float(np.hypot(a.vx[b] - a.vx[other], a.vy[b] - a.vy[other]))
@@ -97,7 +97,7 @@ class Words:
         return self._tunnelling(slot, what, why)
 
     def rail(self, slot: int, rail: int, depth: float) -> Violation:
-        """A bottle that has sunk too deep into a rail; depth: over the radius."""
+        """Return the violation of a bottle too deep in a rail. depth: over the radius."""
         model, bottles, kind = self._model, self._bottles, int(self._bottles.type[slot])
         shape = model.plant.rails[rail]
         entry = int(rail_entries(model, np.array([kind]), np.array([rail]))[0])
@@ -109,11 +109,11 @@ class Words:
         return self._tunnelling(slot, what, why)
 
     def place(self, slot: int) -> tuple[int, float, float]:
-        """Id, x and y (m)."""
+        """Return id, x and y (m) of a bottle."""
         return self._id(slot), float(self._bottles.x[slot]), float(self._bottles.y[slot])
 
     def _velocity_of_rail(self, rail: int, slot: int) -> tuple[float, float]:
-        """m/s, at a bottle's axis."""
+        """Return the velocity of a rail at a bottle's axis, m/s."""
         moving, q = self._world.moving, rail - len(self._model.plant.rails_at_rest)
         if moving is None or q < 0:
             return 0.0, 0.0
@@ -121,7 +121,7 @@ class Words:
         return float(moving.vx[q] - moving.turn[q] * dy), float(moving.vy[q] + moving.turn[q] * dx)
 
     def _forced(self, pressed: bool = False) -> str:
-        """That a rail without a force limit squeezes a bottle, "" if none does; pressed: by a lasting force."""
+        """Return that a rail without force limit squeezes a bottle, "" without one. pressed: by a lasting force."""
         squeeze = self._squeeze
         if squeeze is None or squeeze.force is not None or not (squeeze.held or pressed):
             return ""

@@ -1,4 +1,4 @@
-"""A copy of all state that a tick changes, to go back to."""
+"""A copy of all state that a tick changes."""
 
 from dataclasses import dataclass
 

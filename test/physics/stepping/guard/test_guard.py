@@ -197,7 +197,7 @@ def test_a_soft_contact_is_told_once_with_the_force_that_presses_it() -> None:
 
 @pytest.mark.parametrize(("of_bound", "shakes"), [(0.9, False), (1.9, True)])
 def test_chatter_is_told_where_it_shakes_more_than_a_quarter_of_the_limit(of_bound: float, shakes: bool) -> None:
-    """The slip settles at +-2 (1 - 1/b) v_lim for b = dt mu g / v_lim; without the guard nobody sees it."""
+    """The slip settles at +-2 (1 - 1/b) v_lim for b = dt mu g / v_lim; only the guard detects it."""
     mu, limit, per_tick = 0.4, 0.01, 64
     dt = round(of_bound * limit / (mu * 9.81), 8)
     sim = simulation(
@@ -250,8 +250,8 @@ def test_listening_for_chatter_leaves_no_trace() -> None:
             bottles=[bottle(0.6 - (2 * i + 1.05) * RADIUS, 0.002 * (i % 2)) for i in range(5)],
             outputs={**NO_OUTPUTS, "ledger": 100},
         )
-        assert sim.integration._listening > 0
-        sim.integration._listening = every
+        assert sim.integration._chatter_ticks > 0
+        sim.integration._chatter_ticks = every
         hashes = []
         for _ in range(30):
             sim.advance()

@@ -1,4 +1,4 @@
-"""What the guard says is in the bag, in the summary, and no run that it stops takes the recording with it."""
+"""Guard events are in the bag and the summary, and a run that the guard stops keeps its recording."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the guard says of a rail that presses on a bottle: which one, on which, against what, and how hard."""
+"""Description of a rail that presses on a bottle: rail, bottle, counterpart and force."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ ROW = [(RADIUS - DEEP + i * PITCH, 0.0) for i in range(3)]
 """Three bottles between the pusher and the wall."""
 
 
-def found(slot: int, points: Any, moves: tuple[int, ...], **fields: Any) -> Squeeze | None:
-    """What is said of a bottle while some of the rails move: pusher p, then diverter d about (0, 2)."""
+def squeeze(slot: int, points: Any, moves: tuple[int, ...], **fields: Any) -> Squeeze | None:
+    """Return the squeeze of a bottle while some rails move: pusher p, then diverter d about (0, 2)."""
     wall = ROW[-1][0] + RADIUS - DEEP
     given = {
         "contacts": [contact(1e5), contact(1e5, "steel")],
@@ -39,18 +39,18 @@ def found(slot: int, points: Any, moves: tuple[int, ...], **fields: Any) -> Sque
 @pytest.mark.parametrize("slot", [0, 1, 2])
 def test_a_row_before_a_pusher(slot: int) -> None:
     """Whichever bottle the guard objects to: what pushes is at the other end of the row."""
-    assert found(slot, ROW, (0,)) == Squeeze("pusher p pushes bottle 0 against bottle 1", "force_limit", 294.5, True)
+    assert squeeze(slot, ROW, (0,)) == Squeeze("pusher p pushes bottle 0 against bottle 1", "force_limit", 294.5, True)
 
 
-def test_a_rail_that_rests_squeezes_nobody() -> None:
-    assert found(1, ROW, ()) is None
-    assert found(1, ROW, (1,)) is None
+def test_a_rail_at_rest_squeezes_no_bottle() -> None:
+    assert squeeze(1, ROW, ()) is None
+    assert squeeze(1, ROW, (1,)) is None
 
 
 def test_a_diverter_has_a_torque() -> None:
     """So its force falls with the distance from its pivot; free bottles are held by nothing."""
     points = [*ROW, (0.25, 2.0 + RADIUS - DEEP)]
     said = "diverter d swings against bottle 3"
-    assert found(3, points, (0, 1)) == Squeeze(said, "torque_limit", pytest.approx(14.7 / 0.25), False)
+    assert squeeze(3, points, (0, 1)) == Squeeze(said, "torque_limit", pytest.approx(14.7 / 0.25), False)
     arm = {"from": [0.0, 2.0], "to": [0.5, 2.0], "angle": 0.5, "torque_limit": "none", **COMMON}
-    assert found(3, points, (1,), diverters={"d": arm}) == Squeeze(said, "torque_limit", None, False)
+    assert squeeze(3, points, (1,), diverters={"d": arm}) == Squeeze(said, "torque_limit", None, False)
