@@ -46,7 +46,7 @@ class InfeedDevice(Device):
         self.due = infeed.start
         """Time when the next bottle is due (rate), or when the last one entered (gap), s."""
         self.extra = 0.0
-        """Jitter of the next bottle along the in-line, m (gap) or s (rate)."""
+        """Timing jitter of the next bottle, s."""
         self.offset = 0.0
         """Lateral jitter of the next bottle, m."""
         self._draw()
