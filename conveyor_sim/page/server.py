@@ -44,11 +44,14 @@ class RecordingServer(AbstractContextManager["RecordingServer"]):
         with ExitStack() as stack:
             bags = [path] if other is None else [path, other]
             # Blocks on display and the story are read in parallel, each by its own reader.
-            looked, read_on = ([stack.enter_context(open_bag(bag, by_index=True)) for bag in bags] for _ in range(2))
-            self._shown = [PageRecording(bag, SERVED) for bag in looked]
-            self._read_on = [PageRecording(bag, SERVED) for bag in read_on]
-            self._comparison = None if other is None else RecordingComparison(read_on[0], read_on[1], SERVED.story)
-            self._reading, self._reading_on = threading.Lock(), threading.Lock()
+            for_blocks, for_stories = (
+                [stack.enter_context(open_bag(bag, by_index=True)) for bag in bags] for _ in range(2)
+            )
+            self._blocks = [PageRecording(bag, SERVED) for bag in for_blocks]
+            self._stories = [PageRecording(bag, SERVED) for bag in for_stories]
+            a, *b = for_stories
+            self._comparison = RecordingComparison(a, b[0], SERVED.story) if b else None
+            self._block_lock, self._story_lock = threading.Lock(), threading.Lock()
             try:
                 self._server = _Server((ADDRESS, port), _Handler)
             except OSError as error:
@@ -73,23 +76,23 @@ class RecordingServer(AbstractContextManager["RecordingServer"]):
         Names: head, story/<n>, block/<n>, each of them after other/ for the other recording, and difference/<n>.
         """
         place = int(name.startswith("other/"))
-        if place >= len(self._shown):
+        if place >= len(self._blocks):
             raise KeyError(name)
         kind, _, number = name.removeprefix("other/").partition("/")
-        shown, read_on, comparison = self._shown[place], self._read_on[place], self._comparison
+        blocks, stories, comparison = self._blocks[place], self._stories[place], self._comparison
         if kind == "head" and not number:
             compared = {"compared": comparison.head()} if comparison is not None and not place else {}
-            return self._deflated(self._reading, lambda: text({**shown.head(), **compared}))
-        counts = {"story": read_on.stories, "block": shown.blocks}
+            return self._deflated(self._block_lock, lambda: text({**blocks.head(), **compared}))
+        counts = {"story": stories.stories, "block": blocks.blocks}
         if comparison is not None and not place:
             counts["difference"] = comparison.stretches
         if kind not in counts or not (number.isdecimal() and len(number) < 10) or int(number) >= counts[kind]:
             raise KeyError(name)
         if kind == "block":
-            return self._deflated(self._reading, lambda: shown.block(int(number)))
+            return self._deflated(self._block_lock, lambda: blocks.block(int(number)))
         if kind == "difference" and comparison is not None:
-            return self._deflated(self._reading_on, lambda: text(comparison.part(int(number))))
-        return self._deflated(self._reading_on, lambda: read_on.story(int(number)))
+            return self._deflated(self._story_lock, lambda: text(comparison.part(int(number))))
+        return self._deflated(self._story_lock, lambda: stories.story(int(number)))
 
     def __exit__(self, *_: object) -> None:
         """Stop the server."""
