@@ -11,7 +11,7 @@ const REMEMBERED = 20; // s in which a refusal by the line is attributed to a re
 
 export class Desk {
   constructor(view, about) {
-    Object.assign(this, { view, about, status: about.status, latency: 0, told: 0, given: new Map() });
+    Object.assign(this, { view, about, status: about.status, latency: 0, told: 0, requests: new Map() });
     const { line } = view;
     this.link = element("span", { id: "link", role: "status" });
     this.late = element("span", { id: "latency", title: "Latency: from the tick of the line to its frame on this screen" });
