@@ -66,6 +66,7 @@ numba-next: set-up-test
 lint: set-up-test
 	@$(PYTHON) -m ruff check .
 	@$(PYTHON) -m ruff format --check .
+	@$(PYTHON) tools/check_prose.py
 	@$(PYTHON) -m mypy
 
 docs: set-up-test

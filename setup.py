@@ -15,7 +15,7 @@ VERSION = re.search(r'^__version__ = "(.+)"$', Path(NAME, "__init__.py").read_te
 
 
 def requirements(name: str) -> list[str]:
-    """The lines of a file in requirements/, less its comments."""
+    """Return the lines of a file in requirements/ without its comments."""
     lines = Path("requirements", f"{name}.txt").read_text().splitlines()
     return [line for line in lines if not line.startswith("#")]
 

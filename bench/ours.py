@@ -1,4 +1,4 @@
-"""This project's engine, as a contestant and as the source of packed states."""
+"""Engine of this project, as a contestant and as the source of packed states."""
 
 from __future__ import annotations
 

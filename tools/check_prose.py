@@ -22,7 +22,7 @@ START = re.compile(r"(What|Of|Whether|Nobody|Those|That|As|The same|Until|Where|
 WORDS = re.compile(r"\b(nobody|whoever|whatever|so many|so long|is told|of its own)\b", re.IGNORECASE)
 """Words that read as a private dialect; CONTRIBUTING.md shows what to write instead."""
 
-MOST_STARTS, MOST_WORDS = 150, 60
+MOST_STARTS, MOST_WORDS = 0, 1
 """Matches left in the package. Lower these limits as matches go; never raise them."""
 
 

@@ -74,7 +74,8 @@ class Comparison:
         if self.strict_texts:
             self.differ(place, f"{old!r:.90} -> {new!r:.90}")
         else:
-            self.texts[f"{place.split(': tick')[0]}: {old!r:.200} -> {new!r:.200}"] = None
+            topic = re.sub(r"^[\w.]+/[\w.]+(?=/)", "", place.split(": tick")[0])  # once for all entries
+            self.texts[f"{topic}: {old!r:.200} -> {new!r:.200}"] = None
 
 
 def sources_hash(source: Path) -> str:

@@ -1,4 +1,4 @@
-"""Build the environment of `make run`, `make test` and others: set_up.py DISTRO [test] [bench] [docs]
+"""Build the environment of `make run`, `make test` and others: set_up.py DISTRO [test] [bench] [docs].
 
 The result is a virtual environment with the ROS 2 wheels of that distribution, this package (editable) and
 conveyor_msgs, built from msg_defs/. `set-up.json` in the environment holds a key of each stage's inputs; a stage whose

@@ -15,6 +15,7 @@ class Number(click.FloatRange):
     """A number in a range, and never NaN, which no comparison finds outside."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Convert text to a number in the range; NaN is refused."""
         number: float = super().convert(value, param, ctx)
         if math.isnan(number):
             self.fail(f"{value} is not in the range {self._describe_range()}.", param, ctx)

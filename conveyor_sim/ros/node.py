@@ -29,6 +29,7 @@ from conveyor_sim.ros.lockstep_service import LockstepService
 from conveyor_sim.ros.publishers import RosSink
 from conveyor_sim.ros.services import Services
 from conveyor_sim.ros.spinner import Spinner
+from conveyor_sim.run.active_run import ActiveRun
 from conveyor_sim.run.compilation import Cancelled, Compilation
 from conveyor_sim.run.pacing import RateCap
 from conveyor_sim.run.session import RunSession
@@ -128,15 +129,18 @@ class SimNode:
         def read_checkpoint(path: Path) -> Simulation:
             return Simulation.load(path, threads, scene, values.checkpoint_folder)
 
-        stepper = self._stepper = Stepper(
+        run = ActiveRun(
             open_session,
-            real_time_factor=float(node.get_parameter("real_time_factor").value),  # it may have been changed meanwhile
             playing=not values.start_paused,
             lockstep_max_ticks=values.lockstep_max_ticks,
-            beat=clock.beat if clock else lambda stamp_ns, now: None,
             ended=lambda: executor.create_task(diagnostics.publish),  # without waiting for the next second
-            died=self._die,
             log=node.get_logger(),
+        )
+        stepper = self._stepper = Stepper(
+            run,
+            real_time_factor=float(node.get_parameter("real_time_factor").value),  # it may have been changed meanwhile
+            beat=clock.beat if clock else lambda stamp_ns, now: None,
+            died=self._die,
         )
         with one_sentence():
             commands = subscribe_commands(node, stepper)

@@ -64,7 +64,7 @@ class RosSink:
             self._publishers[name] = publisher
 
     def wants(self, topic: str) -> bool:
-        """Return True for latched topics, which late subscribers receive, and for topics with subscribers."""
+        """Return True for latched topics, which late subscribers get, and topics with subscribers, within `caps`."""
         if topic in self._latched:
             return True
         if not self._publishers[topic].get_subscription_count():

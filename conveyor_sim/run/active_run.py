@@ -48,15 +48,19 @@ class ActiveRun:
         *,
         playing: bool,
         lockstep_max_ticks: int,
-        stepped_by: str,
-        ended: Callable[[], object],
+        stepped_by: str = "",
+        ended: Callable[[], object] = lambda: None,
         log: Log,
     ) -> None:
-        """Open the first run. The parameters are those of `Stepper`. Raises what `open_session` raises."""
+        """Open the first run. Raise what `open_session` raises.
+
+        stepped_by: name of the lockstep owner that the run state shows while there is none; empty: none is shown.
+        ended: called at the end of each run, when its recording is complete.
+        """
         self._open_session = open_session
         self._stepped_by = stepped_by
         self._report_end = ended
-        self._log = log
+        self.log = log
         self.session = open_session(0, None)
         self._before = 0  # number of runs before this one
         self.state = SimulationState.PLAYING if playing else SimulationState.PAUSED
@@ -143,7 +147,7 @@ class ActiveRun:
         self.reception.take_account(outcomes)
         for event in self.session.outputs.take_noticed():
             self.guard_events += 1
-            self._log.warning(f"guard: {event.text}")
+            self.log.warning(f"guard: {event.text}")
         self.store(outcomes)
 
     def store(self, outcomes: list[CommandOutcome]) -> None:
@@ -166,7 +170,7 @@ class ActiveRun:
         self.state, self.ended = SimulationState.PAUSED, True
         self.show()
         self.close_recording()
-        self._log.info(f"end of the run, {self.session.account}" + self.session.to_bag)
+        self.log.info(f"end of the run, {self.session.account}" + self.session.to_bag)
         self._report_end()
 
     def fail(self, error: Exception) -> None:
@@ -174,7 +178,7 @@ class ActiveRun:
         is_known = isinstance(error, ConveyorError)
         self.failure = str(error) if is_known else f"{type(error).__name__}: {error}"
         self.state = SimulationState.PAUSED
-        self._log.error(f"stopped: {self.failure}" if is_known else traceback.format_exc())
+        self.log.error(f"stopped: {self.failure}" if is_known else traceback.format_exc())
         self._abandon(f"the simulation has stopped: {self.failure}")
         self.show()
         self.close_recording()
@@ -184,7 +188,7 @@ class ActiveRun:
         reason = "the simulation is shutting down"
         self._abandon(reason)
         if not self.ended and self.simulation.tick > 0:
-            self._log.info(f"stopped, {self.session.account}" + self.session.to_bag)
+            self.log.info(f"stopped, {self.session.account}" + self.session.to_bag)
         if not self.standstill:
             self.failure = reason
             self.show()
@@ -197,7 +201,7 @@ class ActiveRun:
             self.session.close()
         except ConveyorError as error:
             self.failure = str(error)
-            self._log.error(f"the recording may be incomplete: {error}")
+            self.log.error(f"the recording may be incomplete: {error}")
 
     def _leave(self, reason: str) -> Advance | None:
         """End this run. Return the advance to refuse once the next run is there: the answer names that run."""

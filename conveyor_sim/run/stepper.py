@@ -15,12 +15,12 @@ from pathlib import Path
 from typing import TypeVar
 
 from conveyor_sim.line.commands.inputs import DISOWN, OWN, SET, Input
-from conveyor_sim.run.active_run import ActiveRun, Advance, OpenSession
+from conveyor_sim.run.active_run import ActiveRun, Advance
 from conveyor_sim.run.calls import CallQueue
 from conveyor_sim.run.inbox import MESSAGE_BYTES, TOO_LARGE, size_of, sizes_of
 from conveyor_sim.run.lockstep import LOCKSTEP, LockstepAnswer, LockstepRequest, Refused
 from conveyor_sim.run.pacing import Pacer
-from conveyor_sim.run.run_state import Log, SimulationState
+from conveyor_sim.run.run_state import SimulationState
 from conveyor_sim.run.step_loop import StepLoop
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.printable import SENTENCE, printable
@@ -37,33 +37,16 @@ class Stepper:
 
     def __init__(
         self,
-        open_session: OpenSession,
+        run: ActiveRun,
         *,
         real_time_factor: float,
-        playing: bool,
-        lockstep_max_ticks: int,
-        stepped_by: str = "",
         beat: Callable[[int, float], None],
-        ended: Callable[[], object] = lambda: None,
         died: Callable[[Exception], None],
-        log: Log,
     ) -> None:
-        """stepped_by: name of the lockstep owner that the run state shows while there is none; empty: none is shown.
-        beat: called after each tick and while idle, with the simulated time in ns and the wall time in s.
-        ended: called at the end of each run, when its recording is complete.
+        """beat: called after each tick and while idle, with the simulated time in ns and the wall time in s.
         died: called if the thread can't go on.
-
-        Raises what `open_session` raises.
         """
-        self.run = ActiveRun(
-            open_session,
-            playing=playing,
-            lockstep_max_ticks=lockstep_max_ticks,
-            stepped_by=stepped_by,
-            ended=ended,
-            log=log,
-        )
-        self._log = log
+        self.run = run
         self.pacer = Pacer(real_time_factor, self.simulation.model.tick_ns * 1e-9)
         self._calls = CallQueue()
         self._loop = StepLoop(self.run, self._calls, self.pacer, beat, died)
@@ -143,12 +126,12 @@ class Stepper:
         """
         self.run.reset()
         self.pacer.restart()
-        self._log.info(f"reset: run {self.run_id}" + self.run.session.to_bag)
+        self.run.log.info(f"reset: run {self.run_id}" + self.run.session.to_bag)
 
     def save(self, path: Path, folder: Path | None = None) -> None:
         """Write a checkpoint of the present state; the path may not leave the folder. Raise CheckpointError."""
         self.simulation.save(path, folder)
-        self._log.info(f"saved tick {self.simulation.tick} to {printable(path)}")
+        self.run.log.info(f"saved tick {self.simulation.tick} to {printable(path)}")
 
     def load(self, simulation: Simulation, path: Path) -> None:
         """Close this run and its recording and open the next with a Simulation from a checkpoint, PAUSED.
@@ -157,7 +140,7 @@ class Stepper:
         """
         self.run.load(simulation, lambda: disown(simulation))
         self.pacer.restart()
-        self._log.info(
+        self.run.log.info(
             f"loaded {printable(path)}: run {self.run_id} from tick {simulation.tick}" + self.run.session.to_bag
         )
         if simulation.tick >= self.run.session.last_tick:

@@ -27,7 +27,7 @@ def plus_minus(interval: Interval, unit: str = "", sign: bool = False) -> str:
 
 
 def told(difference: Interval, first: str, second: str, unit: str = "", confidence: float = CONFIDENCE) -> str:
-    """Return a sentence: is first - second, over seeds, significant? If not, how many seeds would show it?"""
+    """Return a sentence on the significance of first - second over seeds, and on the seeds that would show it."""
     what = f"the difference of {first} and {second}, {plus_minus(difference, unit, sign=True)}"
     seeds = f"{difference.values} seed{'' if difference.values == 1 else 's'}"
     if difference.excludes_zero:

@@ -71,7 +71,7 @@ def staggered(tangential: dict[str, Any]) -> Simulation:
 
 
 def force_on_stop(sim: Simulation, seconds: float) -> float:
-    """Return the force on the stop, N, a time after the belt slowly reached twice the slip limit, without oscillation."""
+    """Return the force on the stop, N, some time after the belt slowly reached twice the slip limit."""
     ticks = 200
     for tick in range(ticks):
         sim.command(["belts/belt/cmd_speed"], [2.0 * SLIP_LIMIT * (tick + 1) / ticks])

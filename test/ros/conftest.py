@@ -19,6 +19,7 @@ from std_srvs.srv import Trigger
 from conveyor_sim.bag.messages.typestore import default_distro
 from conveyor_sim.ros.child import Child
 from conveyor_sim.ros.domain import private_domain
+from conveyor_sim.run.active_run import ActiveRun
 from conveyor_sim.run.session import RunSession
 from conveyor_sim.run.stepper import Stepper
 from conveyor_sim.scene import load_scene
@@ -96,14 +97,12 @@ class NullSink:
 def stepper() -> Iterator[Stepper]:
     """Paused, and not started."""
     scene = load_scene(SMALL_LINE)
-    made = Stepper(
+    run = ActiveRun(
         lambda runs, loaded: RunSession(Simulation(scene), NullSink(), None, "world", default_distro()),
-        real_time_factor=0.0,
         playing=False,
         lockstep_max_ticks=1,
-        beat=lambda stamp_ns, now: None,
-        died=lambda error: None,
         log=logging.getLogger(__name__),
     )
+    made = Stepper(run, real_time_factor=0.0, beat=lambda stamp_ns, now: None, died=lambda error: None)
     yield made
     made.shutdown()

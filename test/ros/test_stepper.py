@@ -18,6 +18,7 @@ from conveyor_sim.bag.recover import recover
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.line.commands.inputs import CommandOutcome
 from conveyor_sim.ros.child import Child
+from conveyor_sim.run.active_run import ActiveRun
 from conveyor_sim.run.calls import MOST_CALLS
 from conveyor_sim.run.lockstep import LockstepRequest, Refused
 from conveyor_sim.run.session import RunSession
@@ -100,15 +101,13 @@ class Watcher:
 def test_what_the_run_is_doing_is_said_whenever_that_changes() -> None:
     """Lockstep is a separate state, so that a line that waits for its controller does not look paused."""
     scene, watcher = load_scene(Path(__file__).with_name("small_line.yaml"), {"duration": 0.05}), Watcher()
-    stepper = Stepper(
+    run = ActiveRun(
         lambda runs, loaded: RunSession(Simulation(scene), watcher, None, "world", default_distro()),
-        real_time_factor=0.0,
         playing=False,
         lockstep_max_ticks=10,
-        beat=lambda stamp_ns, now: None,
-        died=lambda error: None,
         log=logging.getLogger(__name__),
     )
+    stepper = Stepper(run, real_time_factor=0.0, beat=lambda stamp_ns, now: None, died=lambda error: None)
 
     def ask(target: int, release: bool = False) -> None:
         request = LockstepRequest("plc", target, (), (), release)
@@ -148,15 +147,13 @@ def test_a_run_that_cant_go_on_says_why() -> None:
         def tick(self) -> list[CommandOutcome]:
             raise SimulationError("it broke")
 
-    stepper = Stepper(
+    run = ActiveRun(
         lambda runs, loaded: Broken(Simulation(scene), watcher, None, "world", default_distro()),
-        real_time_factor=0.0,
         playing=True,
         lockstep_max_ticks=10,
-        beat=lambda stamp_ns, now: None,
-        died=lambda error: None,
         log=logging.getLogger(__name__),
     )
+    stepper = Stepper(run, real_time_factor=0.0, beat=lambda stamp_ns, now: None, died=lambda error: None)
     stepper.start()
     deadline = time.monotonic() + 60.0
     while len(watcher.seen) < 2 and time.monotonic() < deadline:

@@ -47,6 +47,7 @@ class HeadOn:
 
     @property
     def name(self) -> str:
+        """Return the name of the case."""
         return f"{'head on' if self.slip == 0.0 else 'sliding impact'}, {self.collision.name}"
 
     @cached_property

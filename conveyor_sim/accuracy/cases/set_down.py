@@ -31,6 +31,7 @@ class SetDown:
 
     @property
     def name(self) -> str:
+        """Return the name of the case."""
         return f"set down on a belt, on {'a ring' if self.ring else 'a point'}"
 
     @property

@@ -129,7 +129,7 @@ class LineAlarm:
 
     @property
     def suppresses(self) -> bool:
-        """Return True if alarms caused by this one are suppressed. Shelving does not change that."""
+        """Return True if alarms caused by this one are suppressed. An active alarm suppresses even while shelved."""
         return (self.active or self.stands) and not self.out_of_service
 
     def settle(self) -> list[Kind]:

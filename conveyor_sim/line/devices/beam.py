@@ -35,7 +35,7 @@ class Beams(Device):
         )
         self._room: F8 = np.empty((4, 0))
         self._began: F8 | None = None
-        self._ways: BottleMotion | None = None
+        self._motion: BottleMotion | None = None
         self._states: list[int] = [0] * len(ends)
 
     def begin(self, now: ScanContext) -> None:
@@ -54,12 +54,12 @@ class Beams(Device):
             vx = vy = np.zeros(bottles.x.size)
             start = np.stack((bottles.x, bottles.y, vx, vy))
         self._began = None
-        ways = BottleMotion(start, bottles.x, bottles.y, vx, vy, bottles.radius, bottles.id)
+        motion = BottleMotion(start, bottles.x, bottles.y, vx, vy, bottles.radius, bottles.id)
         # The layout for kernels is made once, so equal arrays are passed in the same tuple.
-        if self._ways is None or any(a is not b for a, b in zip(self._ways, ways, strict=True)):
-            self._ways = ways
-        ways = self._ways
-        while short := block_beams(ways, now.length, self._beams):
+        if self._motion is None or any(a is not b for a, b in zip(self._motion, motion, strict=True)):
+            self._motion = motion
+        motion = self._motion
+        while short := block_beams(motion, now.length, self._beams):
             near, spans = self._beams.near, self._beams.spans
             if short == 1:
                 self._beams = self._beams._replace(near=np.empty((2, 2 * near.shape[1]), dtype=np.int64))

@@ -1,6 +1,5 @@
 """Belts: speed setpoint, actual speed, bottles on the belt, watchdog. Without a drive, the speed follows at once."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -83,7 +82,7 @@ class BeltDevice(Device):
         self._index = setup.index("belts", short_name)
         self._speed_command = speed_command(short_name)
         timeout = belt.watchdog
-        self.watchdog = None if timeout is None else Watchdog(max(1, math.ceil(timeout / setup.scene.tick - 1e-9)))
+        self.watchdog = None if timeout is None else Watchdog(max(1, setup.ticks(timeout)))
 
     @property
     def alarms(self) -> Sequence[Declared]:

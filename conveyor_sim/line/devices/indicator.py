@@ -1,6 +1,5 @@
 """Indicators of an exit from its sensors: flow, jam, starved, blocked."""
 
-import math
 from collections.abc import Sequence
 
 from conveyor_sim.line.alarms.declaration import Declared, error
@@ -26,7 +25,7 @@ class IndicatorDevice(Device):
     """Ticks of the passages within the window."""
 
     def __init__(self, name: str, indicator: Indicator, setup: DeviceSetup) -> None:
-        downstream, backup, tick = indicator.downstream, indicator.backup, setup.scene.tick
+        downstream, backup = indicator.downstream, indicator.backup
         self._can_block = downstream is not None or backup is not None
         most = setup.fastest_flow(indicator.belt) * HOUR
         tags = [
@@ -44,8 +43,8 @@ class IndicatorDevice(Device):
         self._downstream = None if downstream is None else setup.device(BeltDevice, f"belts/{downstream}")
         self._backup = None if backup is None else setup.device(ZoneDevice, f"zones/{backup}")
         starved_time = indicator.jam_time if indicator.starved_time is None else indicator.starved_time
-        self._jam_ticks, self._starved_ticks = _ticks(indicator.jam_time, tick), _ticks(starved_time, tick)
-        self._window, self._window_ticks = indicator.window, _ticks(indicator.window, tick)
+        self._jam_ticks, self._starved_ticks = setup.ticks(indicator.jam_time), setup.ticks(starved_time)
+        self._window, self._window_ticks = indicator.window, setup.ticks(indicator.window)
         self.passed = 0
         """Largest number of bottles out minus those back in so far. A bottle that shakes on the line counts once."""
         self.recent = []
@@ -92,8 +91,3 @@ class IndicatorDevice(Device):
 
 def _runs(belt: BeltDevice, now: ScanContext) -> bool:
     return abs(belt.speed(now)) >= STANDS
-
-
-def _ticks(seconds: float, tick: float) -> int:
-    """Return the first tick at which `seconds` have passed."""
-    return max(1, math.ceil(seconds / tick - 1e-9))

@@ -46,7 +46,7 @@ class InfeedDevice(Device):
         self.due = infeed.start
         """Time when the next bottle is due (rate), or when the last one entered (gap), s."""
         self.extra = 0.0
-        """Jitter of the next bottle along the in-line, m (gap) or s (rate)."""
+        """Timing jitter of the next bottle, s."""
         self.offset = 0.0
         """Lateral jitter of the next bottle, m."""
         self._draw()
@@ -77,7 +77,7 @@ class InfeedDevice(Device):
                 self.blocked = self._late(time, pitch)
                 return False
             # Beyond one tick's travel the last bottle no longer pulls the in-line.
-            ahead = self._way_to_rails(state, min(ahead, advance))
+            ahead = self._distance_to_rails(state, min(ahead, advance))
         if not self._enter(now, ahead):
             self.blocked = self._late(time, pitch)
             return False
@@ -94,15 +94,15 @@ class InfeedDevice(Device):
         dy = float(bottles.y[slot]) - self._infeed.position[1]
         return dx * self._direction[0] + dy * self._direction[1]
 
-    def _way_to_rails(self, state: State, most: float) -> float:
+    def _distance_to_rails(self, state: State, most: float) -> float:
         """Return the distance ahead, up to `most` m, at which a bottle meets a rail in its present place."""
-        ways = np.linspace(0.0, most, 2 + int(2.0 * most / self._radius))
-        clear = self._clear_of_rails(state, ways)
+        distances = np.linspace(0.0, most, 2 + int(2.0 * most / self._radius))
+        clear = self._clear_of_rails(state, distances)
         if clear.all():
             return most
         # Rails alongside do not stop the bottle.
         first = int(np.argmin(clear))
-        low, high = float(ways[max(0, first - 1)]), float(ways[first])
+        low, high = float(distances[max(0, first - 1)]), float(distances[first])
         while high - low > CLEAR:
             middle = 0.5 * (low + high)
             if self._clear_of_rails(state, np.array([middle]))[0]:
@@ -111,10 +111,10 @@ class InfeedDevice(Device):
                 high = middle
         return low
 
-    def _clear_of_rails(self, state: State, ways: F8) -> NDArray[np.bool_]:
+    def _clear_of_rails(self, state: State, distances: F8) -> NDArray[np.bool_]:
         """Return whether a bottle at distances ahead (n,), m, touches no rail."""
-        places = np.array([self._place(float(way)) for way in ways])
-        clear = np.ones(ways.size, dtype=bool)
+        places = np.array([self._place(float(distance)) for distance in distances])
+        clear = np.ones(distances.size, dtype=bool)
         for rail in state.rails():
             for piece in rail.pieces:
                 clear &= piece.distance(places) >= self._radius - CLEAR

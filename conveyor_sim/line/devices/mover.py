@@ -82,7 +82,7 @@ class Mover(Device):
         else:
             shape = self._shape
             speed = self.speed
-            self.course = course_to(self.position, speed, self.target, shape.max_speed, shape.acceleration)
+            self.course = profile_to(self.position, speed, self.target, shape.max_speed, shape.acceleration)
 
     def begin(self, now: ScanContext) -> None:
         """Set the motion profile of this tick in the engine."""
@@ -128,30 +128,30 @@ _plan: Any = plan_profile.py_func  # type: ignore[attr-defined]
 
 def resting(position: float) -> F8:
     """Return the motion profile of permanent rest at a position."""
-    course = np.zeros((PHASES, 4))
-    course[:, 1] = position
-    return course
+    profile = np.zeros((PHASES, 4))
+    profile[:, 1] = position
+    return profile
 
 
-def course_to(position: float, speed: float, target: float, max_speed: float, acceleration: float) -> F8:
+def profile_to(position: float, speed: float, target: float, max_speed: float, acceleration: float) -> F8:
     """Return the fastest motion profile from a position and speed to rest at the target; it may turn round first.
 
     Units are m and s, or rad and s. Times count from now.
     """
-    course = np.zeros((1, PHASES, 4))
-    _plan(course, 0, 0.0, position, speed, target, max_speed, acceleration)
-    return np.asarray(course[0])
+    profile = np.zeros((1, PHASES, 4))
+    _plan(profile, 0, 0.0, position, speed, target, max_speed, acceleration)
+    return np.asarray(profile[0])
 
 
-def position_at(course: F8, seconds: float) -> float:
+def position_at(profile: F8, seconds: float) -> float:
     """Return the position on a motion profile `seconds` after its start."""
-    k = max(0, int(np.searchsorted(course[:, 0], seconds, side="right")) - 1)
-    since = seconds - course[k, 0]
-    return float(course[k, 1] + (course[k, 2] + 0.5 * course[k, 3] * since) * since)
+    k = max(0, int(np.searchsorted(profile[:, 0], seconds, side="right")) - 1)
+    since = seconds - profile[k, 0]
+    return float(profile[k, 1] + (profile[k, 2] + 0.5 * profile[k, 3] * since) * since)
 
 
-def later(course: F8, seconds: float) -> F8:
+def later(profile: F8, seconds: float) -> F8:
     """Return the motion profile with times counted from `seconds` later."""
-    shifted = course.copy()
+    shifted = profile.copy()
     shifted[:, 0] -= seconds
     return shifted

@@ -3,6 +3,7 @@
 Every purpose of every device has its own stream of random numbers, so two variants of a line draw equal numbers.
 """
 
+import math
 from collections.abc import Callable
 from hashlib import blake2b
 from typing import TypeVar
@@ -50,6 +51,10 @@ class DeviceSetup:
     def index(self, field: str, name: str) -> int:
         """Return the index of a part in its field of the scene, from 0."""
         return list(getattr(self.scene, field)).index(name)
+
+    def ticks(self, seconds: float) -> int:
+        """Return the first tick at which `seconds` have passed."""
+        return math.ceil(seconds / self.scene.tick - 1e-9)
 
     def entry(self, bottle: str, direction: float, speed: float) -> BottleEntry:
         """Return the entry of bottles of a type in a direction (rad) at a speed (m/s)."""

@@ -1,6 +1,5 @@
 """`MachineDevice`: PackML states, rate, failures and planned stops of machines that feed or take bottles."""
 
-import math
 from collections.abc import Callable, Collection, Sequence
 from types import SimpleNamespace
 
@@ -85,7 +84,7 @@ class MachineDevice(Device):
             ],
         )
         tick = self._tick = setup.scene.tick
-        self._suspend_ticks = self._ticks(part.suspend_after)
+        self._suspend_ticks = setup.ticks(part.suspend_after)
         self._ramp = part.rate * tick / part.ramp_up if part.ramp_up else 0.0
         self._plans = [PlannedTimes(stop, tick) for stop in part.planned_stops.values()]
         self._watchers: list[Watcher] = []
@@ -95,7 +94,7 @@ class MachineDevice(Device):
         self.cntrl_cmd = 0
         self.packml = StateMachine(
             first,
-            {PackMLState[field.upper()]: self._ticks(time) for field, time in part.acting_times},
+            {PackMLState[field.upper()]: setup.ticks(time) for field, time in part.acting_times},
             conditional,
         )
         self.speed = rate
@@ -363,10 +362,6 @@ class MachineDevice(Device):
         """Return state, category, stop_reason, fault, failures and cur_rate (1/s)."""
         rate = (self.speed if self._ramp else self.rate) if self._works and not self._waits else 0.0
         return *self._shown, self.failures, rate
-
-    def _ticks(self, seconds: float) -> int:
-        """Return the first tick at which `seconds` have passed."""
-        return math.ceil(seconds / self._tick - 1e-9)
 
     def _draws(self, setup: DeviceSetup, times: Times, purpose: str) -> Draws:
         return Draws(times, setup.random(self.name, purpose), self._tick)

@@ -52,59 +52,51 @@ StateNumber = Literal[1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17]
 CNTRL_CMD = "/cntrl_cmd"
 """Ending of the names of commands that take PackML commands."""
 
+_S = PackMLState
+
 FROM: Mapping[Command, frozenset[PackMLState]] = {
-    Command.RESET: frozenset({PackMLState.STOPPED, PackMLState.COMPLETE}),
-    Command.START: frozenset({PackMLState.IDLE}),
-    Command.STOP: frozenset(PackMLState)
-    - {PackMLState.CLEARING, PackMLState.STOPPED, PackMLState.STOPPING, PackMLState.ABORTING, PackMLState.ABORTED},
-    Command.HOLD: frozenset(
-        {
-            PackMLState.EXECUTE,
-            PackMLState.STARTING,
-            PackMLState.SUSPENDED,
-            PackMLState.UNHOLDING,
-            PackMLState.SUSPENDING,
-            PackMLState.UNSUSPENDING,
-        }
-    ),
-    Command.UNHOLD: frozenset({PackMLState.HELD}),
-    Command.SUSPEND: frozenset({PackMLState.EXECUTE}),
-    Command.UNSUSPEND: frozenset({PackMLState.SUSPENDED}),
-    Command.ABORT: frozenset(PackMLState) - {PackMLState.ABORTING, PackMLState.ABORTED},
-    Command.CLEAR: frozenset({PackMLState.ABORTED}),
-    Command.COMPLETE: frozenset({PackMLState.EXECUTE}),
+    Command.RESET: frozenset({_S.STOPPED, _S.COMPLETE}),
+    Command.START: frozenset({_S.IDLE}),
+    Command.STOP: frozenset(PackMLState) - {_S.CLEARING, _S.STOPPED, _S.STOPPING, _S.ABORTING, _S.ABORTED},
+    Command.HOLD: frozenset({_S.EXECUTE, _S.STARTING, _S.SUSPENDED, _S.UNHOLDING, _S.SUSPENDING, _S.UNSUSPENDING}),
+    Command.UNHOLD: frozenset({_S.HELD}),
+    Command.SUSPEND: frozenset({_S.EXECUTE}),
+    Command.UNSUSPEND: frozenset({_S.SUSPENDED}),
+    Command.ABORT: frozenset(PackMLState) - {_S.ABORTING, _S.ABORTED},
+    Command.CLEAR: frozenset({_S.ABORTED}),
+    Command.COMPLETE: frozenset({_S.EXECUTE}),
 }
 """States in which a command is allowed."""
 
 TO: Mapping[Command, PackMLState] = {
-    Command.RESET: PackMLState.RESETTING,
-    Command.START: PackMLState.STARTING,
-    Command.STOP: PackMLState.STOPPING,
-    Command.HOLD: PackMLState.HOLDING,
-    Command.UNHOLD: PackMLState.UNHOLDING,
-    Command.SUSPEND: PackMLState.SUSPENDING,
-    Command.UNSUSPEND: PackMLState.UNSUSPENDING,
-    Command.ABORT: PackMLState.ABORTING,
-    Command.CLEAR: PackMLState.CLEARING,
-    Command.COMPLETE: PackMLState.COMPLETING,
+    Command.RESET: _S.RESETTING,
+    Command.START: _S.STARTING,
+    Command.STOP: _S.STOPPING,
+    Command.HOLD: _S.HOLDING,
+    Command.UNHOLD: _S.UNHOLDING,
+    Command.SUSPEND: _S.SUSPENDING,
+    Command.UNSUSPEND: _S.UNSUSPENDING,
+    Command.ABORT: _S.ABORTING,
+    Command.CLEAR: _S.CLEARING,
+    Command.COMPLETE: _S.COMPLETING,
 }
 """Acting state that a command leads to."""
 
 COMPLETES: Mapping[PackMLState, PackMLState] = {
-    PackMLState.CLEARING: PackMLState.STOPPED,
-    PackMLState.STARTING: PackMLState.EXECUTE,
-    PackMLState.STOPPING: PackMLState.STOPPED,
-    PackMLState.ABORTING: PackMLState.ABORTED,
-    PackMLState.HOLDING: PackMLState.HELD,
-    PackMLState.UNHOLDING: PackMLState.EXECUTE,
-    PackMLState.SUSPENDING: PackMLState.SUSPENDED,
-    PackMLState.UNSUSPENDING: PackMLState.EXECUTE,
-    PackMLState.RESETTING: PackMLState.IDLE,
-    PackMLState.COMPLETING: PackMLState.COMPLETE,
+    _S.CLEARING: _S.STOPPED,
+    _S.STARTING: _S.EXECUTE,
+    _S.STOPPING: _S.STOPPED,
+    _S.ABORTING: _S.ABORTED,
+    _S.HOLDING: _S.HELD,
+    _S.UNHOLDING: _S.EXECUTE,
+    _S.SUSPENDING: _S.SUSPENDED,
+    _S.UNSUSPENDING: _S.EXECUTE,
+    _S.RESETTING: _S.IDLE,
+    _S.COMPLETING: _S.COMPLETE,
 }
 """Final state of each acting state."""
 
-MODE_STATES = (PackMLState.STOPPED, PackMLState.IDLE, PackMLState.ABORTED, PackMLState.COMPLETE)
+MODE_STATES = (_S.STOPPED, _S.IDLE, _S.ABORTED, _S.COMPLETE)
 """States in which the control mode of a machine may change: it works on no bottle and does not continue by itself.
 PackML leaves this choice to the machine (PML_UnitModeConfig of Beckhoff Tc3_PackML_V3)."""
 

@@ -32,19 +32,12 @@ _TEXTS = {
     FAULT: "fault stop",
 }
 
-WAITING = frozenset({PackMLState.SUSPENDED, PackMLState.SUSPENDING, PackMLState.UNSUSPENDING})
-FAILED = frozenset(
-    {
-        PackMLState.HOLDING,
-        PackMLState.HELD,
-        PackMLState.UNHOLDING,
-        PackMLState.ABORTING,
-        PackMLState.ABORTED,
-        PackMLState.CLEARING,
-    }
-)
-STOPPED = frozenset({PackMLState.STOPPING, PackMLState.STOPPED})
-WORKING = frozenset({PackMLState.EXECUTE, PackMLState.COMPLETING})
+_S = PackMLState
+
+WAITING = frozenset({_S.SUSPENDED, _S.SUSPENDING, _S.UNSUSPENDING})
+FAILED = frozenset({_S.HOLDING, _S.HELD, _S.UNHOLDING, _S.ABORTING, _S.ABORTED, _S.CLEARING})
+STOPPED = frozenset({_S.STOPPING, _S.STOPPED})
+WORKING = frozenset({_S.EXECUTE, _S.COMPLETING})
 
 
 def reason_texts(part: PackmlPart) -> dict[int, str]:

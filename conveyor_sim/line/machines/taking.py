@@ -29,7 +29,7 @@ class TakingDevice(MachineDevice):
         self._region = Region(part.region)
         self._fill, self._zone_name, self._setup = part.start_fill or 0, part.start_zone, setup
         self._zone: ZoneDevice | None = None
-        self._run_down_ticks = self._ticks(part.run_down)
+        self._run_down_ticks = setup.ticks(part.run_down)
         self.waiting = ()
 
     def queue(self, now: ScanContext) -> Mapping[int, int]:

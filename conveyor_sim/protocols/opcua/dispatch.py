@@ -86,6 +86,7 @@ class Dispatcher(OpenProcessor):
             raise ServiceError(Codes.BadDecodingError) from error
 
     async def answer_request(self, typeid: Any, requesthdr: Any, seqhdr: Any, body: Any) -> Any:
+        """Answer a request after a check of its session."""
         joining = self.session is None
         try:
             self._require_session(typeid, requesthdr)

@@ -93,6 +93,7 @@ class Items(OpenItems):
                 await asyncio.sleep(0)
 
     async def notify(self, event: Any, mid: int) -> None:
+        """Queue an event for an item, if the work budget allows it."""
         item = self.by_id.get(mid)
         if item is None or item.mode == ua.MonitoringMode.Disabled or not self.isub.spend(self._units[mid]):
             return
@@ -102,6 +103,7 @@ class Items(OpenItems):
                 await self.isub.enqueue_event(mid, fields, item.queue_size)
 
     def commit(self, result: ua.MonitoredItemCreateResult, item: Any) -> None:
+        """Register a new item and count it."""
         super().commit(result, item)
         if result.MonitoredItemId in self.by_id:
             self._count(item, 1)

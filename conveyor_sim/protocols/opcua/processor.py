@@ -119,6 +119,7 @@ class Processor(Dispatcher):
         return goes_on
 
     async def answer_request(self, typeid: Any, requesthdr: Any, seqhdr: Any, body: Any) -> Any:
+        """Answer a request after a check of its session."""
         try:
             self._require_session(typeid, requesthdr)
             if self._is_active:

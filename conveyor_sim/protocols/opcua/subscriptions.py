@@ -125,6 +125,7 @@ class Subscription(OpenSubscription):
         return bool(self.waiting_changes or self.waiting_events)
 
     def next_answer(self) -> ua.PublishResult:
+        """Return the next notification of the subscription."""
         result = super().next_answer()
         result.MoreNotifications = self.is_publishing and self._waits
         message = result.NotificationMessage
@@ -139,10 +140,12 @@ class Subscription(OpenSubscription):
         return result
 
     def add_changes(self, result: ua.PublishResult) -> None:
+        """Add waiting data changes to an answer, as far as its size allows."""
         if changes := _take(self.waiting_changes, self._room(result)):
             result.NotificationMessage.NotificationData.append(ua.DataChangeNotification(changes))
 
     def add_events(self, result: ua.PublishResult) -> None:
+        """Add waiting events to an answer, as far as its size allows."""
         if events := _take(self.waiting_events, self._room(result)):
             result.NotificationMessage.NotificationData.append(ua.EventNotificationList(events))
 

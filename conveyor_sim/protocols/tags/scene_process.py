@@ -38,6 +38,7 @@ from conveyor_sim.protocols.tags.scene_messages import (
     VariablesRequest,
 )
 from conveyor_sim.protocols.tags.tag_provider import MOST_EVENTS, Control
+from conveyor_sim.run.active_run import ActiveRun
 from conveyor_sim.run.compilation import Cancelled, Compilation
 from conveyor_sim.run.inbox import size_of
 from conveyor_sim.run.lockstep import Refused
@@ -216,15 +217,15 @@ class _Process:
             simulation = loaded or Simulation(task.scene, task.threads)
             return RunSession(simulation, self._copies, bag_folder(task.record, task.number + runs), FRAME, distro)
 
-        return Stepper(
+        run = ActiveRun(
             open_session,
-            real_time_factor=task.real_time_factor,
             playing=task.playing and not task.lockstep,
             lockstep_max_ticks=1,
             stepped_by=HANDSHAKE if task.lockstep else "",
-            beat=lambda stamp_ns, now: self._beat(),
-            died=self._fail,
             log=_Log(self._copies),
+        )
+        return Stepper(
+            run, real_time_factor=task.real_time_factor, beat=lambda stamp_ns, now: self._beat(), died=self._fail
         )
 
     def _beat(self) -> None:

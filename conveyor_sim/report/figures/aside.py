@@ -1,5 +1,6 @@
-"""Pictures of a recording, drawn by a process of its own, which gets ready while the line still runs, and by others
-that it forks: they share what it has read of the bag.
+"""Figures of a recording, drawn by a child process that loads matplotlib while the line still runs.
+
+It forks further processes, which share the data that it has read from the bag.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from conveyor_sim.support.child_process import end_with, pipes_of_child
 from conveyor_sim.support.garbage import collected_later
 
 LONGEST = ("flow", "table", "damage_rails", "energy", "plant")
-"""What takes longest is drawn first, so that no process is left with it at the end."""
+"""Figures that take longest. They are drawn first, so that no process ends late."""
 
 
 Task = tuple[Path, Sequence[float] | None, Sequence[int] | None, Sequence[str]]
@@ -85,7 +86,7 @@ _shared: tuple[Figures, Bag]
 
 
 def _share(figures: Figures, bag: Bag) -> None:
-    """What a forked process has from the one that read the bag."""
+    """Share the figures and the opened bag with forked processes."""
     global _shared
     _shared = figures, bag
 

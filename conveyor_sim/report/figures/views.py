@@ -188,6 +188,7 @@ def _columns(panels: int, aspect: float) -> int:
 def colour_bar(
     figure: Figure, axes: Sequence[Axes], frames: Sequence[PlantFrame], norm: Normalize, orientation: Orientation
 ) -> None:
+    """Draw the colour bar of bottle speeds."""
     fastest = max(float(frame.speed.max(initial=0.0)) for frame in frames)
     bar = figure.colorbar(
         ScalarMappable(norm, style.SPEED),

@@ -8,7 +8,7 @@ import pytest
 from physics.test_moving_rails import plant
 from scenes import RADIUS, bottle
 
-from conveyor_sim.line.devices.mover import course_to, later, resting
+from conveyor_sim.line.devices.mover import later, profile_to, resting
 from conveyor_sim.simulation import Simulation
 
 STROKE, TOP, ACCELERATION = 0.3, 0.5, 2.0
@@ -124,7 +124,7 @@ def at(course: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     ],
 )
 def test_it_takes_the_least_time_there_is(position: float, speed: float, target: float, duration: float) -> None:
-    course = course_to(position, speed, target, TOP, ACCELERATION)
+    course = profile_to(position, speed, target, TOP, ACCELERATION)
     assert course[-1] == pytest.approx([duration, target, 0.0, 0.0], abs=1e-8)
     times = np.linspace(0.0, duration + 1.0, 20001)
     where, fast = at(course, times)
@@ -136,7 +136,7 @@ def test_it_takes_the_least_time_there_is(position: float, speed: float, target:
 
 
 def test_a_course_seen_later_is_the_same() -> None:
-    course = course_to(0.1, -0.2, 0.7, TOP, ACCELERATION)
+    course = profile_to(0.1, -0.2, 0.7, TOP, ACCELERATION)
     times = np.linspace(0.4, 3.0, 50)
     np.testing.assert_allclose(at(later(course, 0.4), times - 0.4), at(course, times), atol=1e-12)
     assert at(resting(0.3), times)[0] == pytest.approx(np.full(50, 0.3))

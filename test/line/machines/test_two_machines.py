@@ -183,9 +183,11 @@ def test_the_simulated_line_has_the_efficiency_of_the_closed_form(runs: Runs) ->
 
 
 def test_with_the_same_failures_the_same_bottles_pass(runs: Runs) -> None:
-    """Model: discrete bottles, with the failures that the line draws. Each run within 2.5 %, all within 0.7 %; without
-    transport delay, with no buffer or an infinite one, it would be off by 1.5 % at least. (A queue that moves has room
-    for somewhat less than one that stands, from which `holds` is.)
+    """The model of discrete bottles has the failures that the line draws.
+
+    Each run is within 2.5 %, the sum within 0.7 %. Without transport delay, without a buffer or with an infinite one,
+    the error would be at least 1.5 %. (A moving queue has room for somewhat less than a standing one, from which
+    `holds` is derived.)
     """
     simulated = np.array(runs.taken)
     departures = {

@@ -227,7 +227,7 @@ class Stepped(SteppedTagProvider):
 
     def show(self, **changes: Any) -> None:
         """Show the line with some fields replaced."""
-        self._shown = replace(self._shown, **changes)
+        self._snapshot = replace(self._snapshot, **changes)
         self._listeners.tell()
 
 
