@@ -62,7 +62,7 @@ class Simulation:
 
     The same scene and the same commands at the same ticks give the same bits. The number of threads, observations, and
     the division of ticks into calls of `advance` do not matter. `line` has the devices, and the inputs that wait for
-    the next tick. `integration` has the figures of the steps. Raises SceneError for an invalid scene.
+    the next tick. `integration` holds statistics of the steps. Raises SceneError for an invalid scene.
     """
 
     def __init__(self, scene: Scene, threads: int | None = None, shorten: bool = True) -> None:
@@ -150,7 +150,8 @@ class Simulation:
     def advance(self, ticks: int = 1) -> None:
         """Advance by `ticks` ticks.
 
-        Raises SimulationError, in one sentence, for a tick that the guard rejects. The state is then that before it.
+        Raises SimulationError, in one sentence, for a tick that the guard rejects. The state is then that before the
+        tick.
         """
         for _ in range(ticks):
             self._line.begin(self.tick)
@@ -171,7 +172,7 @@ class Simulation:
     def give(self, request: Input) -> None:
         """Queue an input. The next tick applies it, or refuses it with the reason (`take_outcomes`).
 
-        Raises ValueError for the writer kind "line", which is that of inputs by the line itself.
+        Raises ValueError for the writer kind "line", which is reserved for inputs created by the line.
         """
         if request.by_line:
             raise ValueError(f"writer_kind: line given by {request.source}, expected another: that is the line itself")
@@ -234,7 +235,7 @@ class Simulation:
     def editing(self) -> Iterator[tuple[Bottles, NDArray[np.int64]]]:
         """Yield the arrays of the bottles, which may be changed inside, and their slots in the order of the IDs.
 
-        The ledger books the change of energy as fed.
+        The energy ledger counts the change of energy as fed.
         """
         with self._accounts.feeding():
             yield self._state.world.bottles, self._slots()

@@ -72,7 +72,7 @@ class OutputWriter:
         return noticed
 
     def tell(self, outcome: CommandOutcome) -> None:
-        """Write an outcome that belongs to no later tick."""
+        """Write a command result that belongs to no tick."""
         self._hand_out("outcomes", OUTPUTS["outcomes"], self._header(outcome.tick), _itself, outcome)
 
     def show_run(self, run: RunState) -> None:

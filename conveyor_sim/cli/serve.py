@@ -41,7 +41,7 @@ TAKEN_BY_SCENE = (*OF_SCENE, "real_time_factor")
 OF_BAG = ("loop",)
 
 DRAWING = ("web", "foxglove")
-"""Faces that show where bottles are."""
+"""Protocol options whose clients display bottle positions."""
 
 OF_FACES = (
     "modbus_role",
@@ -72,14 +72,28 @@ _WHERE = {
 @click.option("--opcua-certificates", type=click.Path(path_type=Path), help="Folder of its certificate and key.")
 @click.option("--opcua-history", multiple=True, metavar="PATTERN", help="Tags to keep values of: 'belts/*/speed'.")
 @click.option("--modbus", type=PORT, is_flag=False, flag_value=5020, help="Serve Modbus TCP on this port.")
-@click.option("--modbus-role", type=click.Choice(["controller", "operator"]), help="As what its clients may write.")
-@click.option("--modbus-map", type=click.Path(path_type=Path), help="File that keeps its addresses; it only grows.")
 @click.option(
-    "--mqtt", is_flag=False, flag_value="mqtt://127.0.0.1:1883", metavar="URL", help="Publish by Sparkplug B there."
+    "--modbus-role",
+    type=click.Choice(["controller", "operator"]),
+    help="Role of clients that write (default: none may write).",
 )
-@click.option("--mqtt-role", type=click.Choice(MQTT_ROLES), help="As what its hosts may write (default: viewer).")
+@click.option(
+    "--modbus-map",
+    type=click.Path(path_type=Path),
+    help="File that stores the address map; existing addresses never change.",
+)
+@click.option(
+    "--mqtt",
+    is_flag=False,
+    flag_value="mqtt://127.0.0.1:1883",
+    metavar="URL",
+    help="Publish with Sparkplug B to the broker at this URL.",
+)
+@click.option("--mqtt-role", type=click.Choice(MQTT_ROLES), help="Role of hosts that write (default: viewer).")
 @click.option("--mqtt-password-file", type=click.Path(path_type=Path), help="File of the password for the broker.")
-@click.option("--mqtt-ca", type=click.Path(path_type=Path), help="Certificates by which a broker of mqtts:// is known.")
+@click.option(
+    "--mqtt-ca", type=click.Path(path_type=Path), help="CA certificates that authenticate the broker of a mqtts:// URL."
+)
 @click.option("--mqtt-primary-host", default="", metavar="ID", help="Publish only while this host is online.")
 @click.option("--web", type=PORT, is_flag=False, flag_value=8080, help="Serve a page for browsers on this port.")
 @click.option("--foxglove", type=PORT, is_flag=False, flag_value=8765, help="Serve Foxglove on this port.")
@@ -89,21 +103,26 @@ _WHERE = {
     "--opcua-users",
     "users",
     type=click.Path(path_type=Path),
-    help="File of those who may do more than read by OPC UA and on the page.",
+    help="File of users with more than read access over OPC UA and on the web page.",
 )
 @click.option(
     "--anonymous/--no-anonymous",
     "--opcua-anonymous/--no-opcua-anonymous",
     "anonymous",
     default=True,
-    help="Whether all may read there (default: they may).",
+    help="Allow reading without a login (default: allowed).",
 )
 @click.option("--limit", "limits", multiple=True, metavar="NAME=VALUE", help="A limit: 'opcua.nodes_per_read=500'.")
 @click.option("--bind", default="127.0.0.1", help="Address to listen on, for other machines (default: this one only).")
-@click.option("--stamps", type=click.Choice(["wall", "simulated"]), default="wall", help="What times of values are.")
+@click.option(
+    "--stamps",
+    type=click.Choice(["wall", "simulated"]),
+    default="wall",
+    help="Kind of time stamps of values: wall time or simulated time.",
+)
 @click.option("--real-time-factor", type=Number(0.0, 1e6), default=1.0, help="0: as fast as possible.")
-@click.option("--lockstep", is_flag=True, help="Of SCENE: it waits for each scan of a PLC that is a client.")
-@click.option("--loop", is_flag=True, help="Of BAG: begin anew at its end.")
+@click.option("--lockstep", is_flag=True, help="SCENE only: advance only when a PLC client has finished its scan.")
+@click.option("--loop", is_flag=True, help="BAG only: restart at the end.")
 @click.option("--duration", type=float, help="Of SCENE: simulated time in s, instead of the scene's.")
 @click.option(
     "--out",
@@ -112,15 +131,15 @@ _WHERE = {
     type=click.Path(path_type=Path),
     help="Of SCENE: folder to record to (default: runs/<UTC time>).",
 )
-@click.option("--no-record", is_flag=True, help="Of SCENE: nothing is written.")
+@click.option("--no-record", is_flag=True, help="SCENE only: do not record.")
 @click.option("--threads", type=click.IntRange(1), help="Of SCENE: threads to step with.")
 @click.option("--outside-tables", is_flag=True, help=OUTSIDE_TABLES)
 def serve(what: str | None, node: str | None, bind: str, stamps: Stamps, **given: Any) -> None:
     """Serve a line to SCADA systems, HMIs, PLCs, MQTT hosts, browsers and Foxglove.
 
     SCENE is simulated in real time, and recorded with all that clients write. BAG is played back. With --node it is the
-    line that a running node simulates. Without the option of a face, OPC UA and Modbus are served, each on its
-    port. Ctrl-C ends it.
+    line that a running node simulates. Without a protocol option, OPC UA and Modbus are served on their default ports.
+    Ctrl-C ends it.
     """
     with collected_later():
         from conveyor_sim.protocols.hosting.limit_options import limit_settings
@@ -140,7 +159,7 @@ def serve(what: str | None, node: str | None, bind: str, stamps: Stamps, **given
         bind, stamps, **{name: given[name] for name in OF_FACES}, **limit_settings(given["limits"])
     )
     for kind, place in chosen:
-        kind.require_place(place, settings)  # not only once everything has been compiled
+        kind.require_place(place, settings)  # before kernels are compiled
     paused: SceneTagProvider | None = None
     with ExitStack() as stack:
         if (what is None) == (node is None):
@@ -279,7 +298,7 @@ def _node(namespace: str, console: Console, drawn: bool) -> Iterator[NodeSource]
 
 
 def watch(serving: Serving, console: Console, greeting: Sequence[str]) -> None:
-    """Tell how it goes, after a greeting, until a signal comes; from the greeting on it ends in order."""
+    """Print the greeting, then the progress until a signal arrives; from the greeting on, serving ends orderly."""
     from conveyor_sim.support.stop_request import StopRequest
 
     with StopRequest() as stop:

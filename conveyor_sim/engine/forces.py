@@ -49,7 +49,7 @@ def pair_phase(world: World, worker: Worker, dt: float, spring_dt: float) -> Non
 
 @part
 def bottle_forces(world: World, worker: Worker, dt: float, spring_dt: float, first: int, end: int) -> None:
-    """Fill `world.load` (N) and `world.spin.moment` (N m) of bottles first to end (eq. 22), except those that ride.
+    """Fill `world.load` (N) and `world.spin.moment` (N m) of bottles first to end (eq. 22), except skipped ones.
 
     First to end is a block (`riding.py`).
     """
@@ -59,7 +59,7 @@ def bottle_forces(world: World, worker: Worker, dt: float, spring_dt: float, fir
         begin, stop = stepped_run(world.riding, first, end, run)
         sum_pair_forces(world.pairs, world.slots, world.load, _moments(world.spin), begin, stop)
         sum_pair_parts(world.pairs, world.slots, world.ledger, begin, stop)
-    # All bottles in lists by unit are stepped.
+    # Bottles in unit lists never ride, so the loop over runs is not needed here.
     add_rail_forces(world, worker.rail_contacts, first, end, spring_dt)
     check_footing(world.bottles, world.belts, world.surface, world.footing, world.ring, first, end)
     for run in range(stepped_runs(world.riding, first)):
@@ -107,7 +107,7 @@ def _count_closed(world: World, worker: Worker, dt: float) -> None:
         for run in range(stepped_runs(world.riding, first)):
             left, right = stepped_run(world.riding, first, end, run)
             for i in range(left, right):
-                # The base is a contact, too.
+                # The base counts as one more closed contact.
                 implicit.closed[i] += 1.0
                 implicit.compliance[i] = world.settings.ahead * dt * implicit.mobility[i] * implicit.closed[i]
     wait_for_all(worker)

@@ -196,7 +196,7 @@ class Device:
         """Switch to another control mode (authority.MODES) at this tick. Commands in force stay."""
 
     def restored(self, tick: int) -> None:
-        """Derive again what depends on public attributes, which were restored for a tick."""
+        """Recompute state that is derived from public attributes, after these were restored."""
 
     @property
     def held(self) -> Sequence[int]:
@@ -213,7 +213,10 @@ class Device:
         """
 
     def end(self, now: ScanContext) -> None:
-        """Evaluate the steps, before bottles are taken and fed. Called at the start too, after `feed`."""
+        """Update the device after the steps of a tick, before bottles are removed and fed.
+
+        Called at the start too, after `feed`.
+        """
 
     def take(self, now: ScanContext) -> None:
         """Take bottles off the line."""

@@ -273,7 +273,7 @@ class Line:
     def close(self, passed: Sequence[DamageEvent], clogged: Mapping[str, bool]) -> None:
         """End a tick.
 
-        passed: limits passed in it. clogged: by outfeed, where that is watched.
+        passed: load limits exceeded in the tick. clogged: True for clogged ones, by name of a monitored outfeed.
         """
         for limit in passed:
             self._log.note(limit.tick, "limit_passed", limit.kind, limit.value, limit.bottle, limit.text)
@@ -381,7 +381,7 @@ def _with_texts(request: Input) -> str:
 
 
 def _part(name: str, part: Any, *waking: Device | ReadBack | Modes | Forcing) -> _Part:
-    """Return a part that is stored by its public attributes. waking: to be updated after a restore."""
+    """Return a part that is stored by its public attributes. waking: objects to be notified after a restore."""
 
     def put_back(tick: int, memory: Any) -> None:
         restore(part, memory, f"line.{name}")

@@ -64,7 +64,7 @@ LONGEST = 2.0**31
 
 @dataclass(frozen=True)
 class Tag:
-    """One value of a line, by name. Docs and tables show it as it is, so no field may be empty."""
+    """One value of a line, by name. Docs and tables display the fields unchanged, so a description is required."""
 
     name: str
     """Full name: "machines/filler/running"."""

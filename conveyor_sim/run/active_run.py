@@ -1,4 +1,4 @@
-"""`ActiveRun`: the run that a stepper makes, its state, and the advance that a client waits for.
+"""`ActiveRun`: current run of a stepper, its state, and the advance that a client waits for.
 
 Only the stepping thread uses it.
 """
@@ -204,7 +204,10 @@ class ActiveRun:
             self.log.error(f"the recording may be incomplete: {error}")
 
     def _leave(self, reason: str) -> Advance | None:
-        """End this run. Return the advance to refuse once the next run is there: the answer names that run."""
+        """End this run.
+
+        Return the pending advance, to be refused once the next run is open, because the answer contains its ID.
+        """
         broken_off, self.advance = self.advance, None
         self.lockstep.clear()
         self.reception.forget_stored()

@@ -15,7 +15,7 @@ class AlarmChanges:
         self._raised: dict[str, float] = {}
 
     def of(self, answer: Mapping[str, float]) -> dict[str, float]:
-        """Return the alarms that come (1) or go (0) with the answer of a scan. An alarm missing in it goes.
+        """Return alarms that a scan raises (1) or clears (0). Alarms missing in its answer are cleared.
 
         Raises ControlError for a value that is no number.
         """

@@ -53,7 +53,7 @@ class Pressed:
     """Largest lasting load on a bottle, compared with the load at which explicit contact friction is stable."""
 
     load: float
-    """Half of the sum of normal forces on a bottle, as two contacts share it in a row; mean over WINDOW, N."""
+    """Mean over WINDOW of half the sum of normal forces on a bottle, as for two contacts in a row, N."""
     expected: float
     """N"""
     expected_of: str

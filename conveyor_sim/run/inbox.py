@@ -77,7 +77,7 @@ class Inbox:
         return ""
 
     def occupy(self, count: int, size: int) -> None:
-        """Reserve room for `count` commands of a checkpoint, even beyond the bounds."""
+        """Reserve room for `count` commands of a checkpoint or a lockstep request, even beyond the bounds."""
         with self._lock:
             self._waiting += count
             self._bytes += size

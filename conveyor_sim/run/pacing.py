@@ -40,7 +40,7 @@ class Pacer:
         self._due = None
 
     def catch_breath(self, now: float) -> None:
-        """Forget the time spent waiting for the client that drives the ticks: it is no lag."""
+        """Exclude the time spent waiting for the stepping client from the lag."""
         if self._due is not None and self._due < now:
             self._due = now
 
@@ -72,7 +72,10 @@ class RateCap:
         self._due = 0.0
 
     def ready(self, now: float) -> bool:
-        """Return True if a message may be sent now. Half a period early is in time, so that jitter drops no message."""
+        """Return True if a message may be sent now.
+
+        Messages may be up to half a period early, so that jitter drops none.
+        """
         return now >= self._due - 0.5 * self._period
 
     def sent(self, now: float) -> None:

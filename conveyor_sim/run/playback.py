@@ -141,7 +141,7 @@ class Playback:
             yield from self._with_made(PlayedMessage(topic, data))
 
     def _with_made(self, message: PlayedMessage) -> Iterator[PlayedMessage]:
-        """Yield the messages made from a message, then the message."""
+        """Yield the messages derived from a message, then the message itself."""
         if message.topic == "outcomes":
             yield from self._sent(message.data)
         elif message.topic == "signals" and self._eyes:

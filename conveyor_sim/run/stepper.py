@@ -104,7 +104,7 @@ class Stepper:
         self._calls.put(lambda: setattr(self.pacer, "factor", factor))
 
     def play(self) -> None:
-        """Run freely. Raise Refused if the run can't."""
+        """Start free running. Raise Refused if that is not possible."""
         if self.run.state is not SimulationState.PLAYING:
             self.run.require_free()
             self.pacer.restart()
@@ -147,7 +147,7 @@ class Stepper:
             self.run.end()
 
     def step(self, ticks: int) -> Future[None]:
-        """Advance by `ticks` at full speed. Raise Refused if that can't be."""
+        """Advance by `ticks` at full speed. Raise Refused if that is not possible."""
         self.run.require_paused()
         self.run.require_free()
         tick, last = self.simulation.tick, self.run.session.last_tick
@@ -160,7 +160,10 @@ class Stepper:
         return future
 
     def advance_lockstep(self, request: LockstepRequest) -> Future[LockstepAnswer]:
-        """Advance as a controller requests; a repeated request gets the same answer. Raise Refused if that can't be."""
+        """Advance as a controller requests; a repeated request gets the same answer.
+
+        Raise Refused if that is not possible.
+        """
         run, lockstep = self.run, self.run.lockstep
         repeated = lockstep.repeated(request)
         if repeated is not None:

@@ -69,7 +69,7 @@ class Topic:
     """Relative to the node's namespace, unless it begins with /. <...> stands for a name of the scene."""
     type: str
     what: str
-    """Description for docs/ros.md, as `when`."""
+    """Description for docs/ros.md, like `when`."""
     when: str = ""
     """Times of its messages in words; "": at its rate."""
     qos: Qos = DATA
@@ -92,9 +92,9 @@ class Topic:
     compare: Compare = NOT_COMPARED
     """Comparison by a replay."""
     subscribed: bool = False
-    """True if it is sent to the line, and not by it."""
+    """True if the line receives it instead of sending it."""
     by_controller: bool = False
-    """True if a controller beside the line sends it, and not the node."""
+    """True if a controller sends it instead of the node."""
 
     @property
     def each_counts(self) -> bool:

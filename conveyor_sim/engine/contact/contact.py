@@ -3,8 +3,8 @@
 Between a and b, with the unit normal n from a to b and the tangent t = (-n_y, n_x): the force on a is -N n + T t, on b
 its negative. Laws along the normal have one file each in `laws/`; `law_sums.py` adds them up.
 
-There are no branches, so a loop over pairs is vectorised, and separated pairs get exactly 0. Only a table of forces
-breaks that.
+There are no branches, so a loop over pairs is vectorised, and separated pairs get exactly 0. The only exception is a
+tabulated law, which has branches.
 """
 
 import math
@@ -135,10 +135,9 @@ def spring_energy(law: ContactLaw, e: int, spring: Any, overlap: float) -> float
 def carried(law: ContactLaw, e: int, spring: Any, overlap: float, deeper: float, further: float) -> Any:
     """Return the elongation (m) of a spring after its overlap (m) grew by `deeper` (m), or None without a spring.
 
-    A spring that has become stiffer keeps its force, because material that joins a contact joins it without load. One
-    that has become softer keeps its elongation (Thornton, Cummins and Cleary 2013). So its energy never grows by
-    itself. further: m, elongation of the same step; a spring that has become stiffer meets it with its mean
-    stiffness.
+    A spring that has become stiffer keeps its force, because the added contact area carries no tangential load yet. One
+    that has become softer keeps its elongation (Thornton, Cummins and Cleary 2013). So a change of stiffness never adds
+    energy. further: m, elongation in the same step, to which a stiffening spring responds with its mean stiffness.
     """
     if spring is None:
         return None
@@ -159,7 +158,10 @@ def _loss(mindlin: Any, e: int, middle: float, depth: float, deeper: float) -> f
 
 @part
 def stretched(spring: Any, slip: float, dt: float) -> Any:
-    """Return the elongation (m) that acts in a step, its own slip included, or None. Otherwise springs gain energy."""
+    """Return the elongation (m) including the slip of this step, or None.
+
+    Without that slip, springs would gain energy.
+    """
     if spring is None:
         return None
     return spring + dt * slip
@@ -178,7 +180,7 @@ def spring_after(
     stiffness = _tangential_stiffness(law, e, depth)
     longer = spring + dt * slip
     most = law.friction[e] * (0.0 if normal < 0.0 else normal)
-    # The force is `share` of that of the spring, as is N.
+    # The spring force is scaled by `share`, as N is.
     scaled = share * stiffness
     cut = math.copysign(most, longer) / (scaled if scaled > 0.0 else 1.0)
     kept = cut if scaled * abs(longer) > most else longer

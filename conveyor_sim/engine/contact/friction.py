@@ -9,9 +9,9 @@ Implicit: the force is that of the slip *after* the step, s + b v_lim p(s) = s_0
 
 That is semi-implicit Euler. For velocity Verlet and rk4 the same equation is solved with B = max(0, ahead b - at_once)
 in place of b (`integrators.AHEAD`). At rest the force then removes at most 1/ahead of the slip in a step. Velocity
-Verlet, whose slip s_0 is that at the end of the step, reverses no slip while that is at most 2/3, rk4 while it is at
-most 1. Up to b = at_once/ahead friction is the explicit one, and so is its order. Beyond, a steady pull of a share f of
-mu N creeps by B f v_lim too fast (semi-implicit Euler: by b f v_lim, at any b).
+Verlet, which uses the slip at the end of the step, reverses no slip for 1/ahead up to 2/3, rk4 for 1/ahead up to 1. For
+b up to at_once/ahead, force and order equal those of explicit friction. Beyond, a steady pull of a share f of mu N
+creeps by B f v_lim too fast (semi-implicit Euler: by b f v_lim, at any b).
 
 The formulas have no branches and no division by a slip that may be 0, so that loops over them are vectorised.
 """
@@ -23,7 +23,7 @@ from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.contact.arctangent import arctangent
 
 _LEAST = 1e-100
-"""Smallest share of v_lim that is used for a slip in a quotient."""
+"""Lower limit of a slip in a denominator, as a share of v_lim."""
 
 
 @part

@@ -74,7 +74,7 @@ def _gather(packed: Any, spin: Any, pairs: Pairs, reach: Any, first: int, count:
     for c in range(count):
         a, b = uint64(pairs.i[first + c]), uint64(pairs.j[first + c])
         i, j = a * _4, b * _4
-        # All loads come before all stores, otherwise they can't be joined.
+        # Loads precede stores, so that the compiler can combine them into vector loads.
         dx = packed[j] - packed[i]
         dy = packed[j + _1] - packed[i + _1]
         dvx = packed[j + _2] - packed[i + _2]
@@ -252,7 +252,7 @@ def _compliance(settings: EngineSettings, implicit: Any, gathered: Any, c: int) 
 
 @part
 def find_touching(settings: EngineSettings, bottles: Bottles, pairs: Any, worker: Worker) -> None:
-    """Mark in `pairs.touch` the closed ones of this worker's share of the pairs; for the implicit solver."""
+    """Mark the closed pairs of this worker's share in `pairs.touch`, for the implicit solver."""
     if pairs is None:
         return
     begin, stop = share(worker, pairs.used[0])

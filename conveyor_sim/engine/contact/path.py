@@ -82,6 +82,6 @@ def slip_time_of(path: Any, spring_dt: float) -> float:
 
 @part
 def displacement_in_touch(displacement: float, approach: float, overlap: float) -> float:
-    """Return the part of a displacement (m) along a contact that was covered in touch. approach: m, overlap gained."""
+    """Return the part of a tangential displacement (m) that occurred during contact. approach: m, overlap gained."""
     depth = 0.0 if overlap < 0.0 else overlap
     return displacement * (depth / approach) if depth < approach else displacement

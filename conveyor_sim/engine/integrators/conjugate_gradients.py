@@ -28,7 +28,7 @@ LEAST = 1e-9
 """Kicks below this speed, m/s, are neglected."""
 
 MOST_ROUNDS = 1000
-"""Rounds after which the search ends. The change up to then reduces the error as well, only less."""
+"""Rounds after which the search ends. The solution at that point still reduces the error."""
 
 
 @part

@@ -81,7 +81,7 @@ LEAST = 1e-13
 FLOOR = 1e-9
 """Shortest substep as a share of dt; it is taken even with a larger error.
 
-A jump of the force costs less than 1e-9 of the impact speed by then, and a state that is not finite must end.
+At this length a force jump costs less than 1e-9 of the impact speed, and non-finite states must terminate.
 """
 
 
@@ -194,7 +194,7 @@ def _note_errors(radius: Any, spin: Any, slopes: Any, h: float, first: int, end:
 
 @part
 def _finite(error: float) -> float:
-    """Return the error, or inf if it is not a number, which would disappear among the others."""
+    """Return the error, or inf for NaN, which a maximum would ignore."""
     return error if error < math.inf else math.inf
 
 

@@ -1,4 +1,4 @@
-"""Linearly implicit: forces ahead in the step are linear in the change of velocity, for which a system is solved.
+"""Linearly implicit: forces are linearised in the change of velocity, which a linear system determines.
 
     (M + theta^2 h^2 K + theta h C) dv = h F(r + theta h v, v),  r += h (v + theta dv),  v += dv     (`tangent.py`)
 
@@ -234,7 +234,7 @@ def _turn(spin: Any, linear: Linear, dt: float, theta: float, first: int, end: i
 
 @part
 def _book_solution(world: World, linear: Linear, ledger: Any, worker: Worker, dt: float, theta: float) -> None:
-    """Book a step from the laws at the point where it took the forces; the linear model's difference is its error."""
+    """Book a step with the contact laws at its evaluation point; the difference from the linear model is an error."""
     if ledger is None:
         return
     bottles: Bottles = world.bottles
@@ -242,7 +242,7 @@ def _book_solution(world: World, linear: Linear, ledger: Any, worker: Worker, dt
     change, way, product = linear.change, linear.way, linear.product
     for first in range(begin, stop, BLOCK):
         end = min(first + BLOCK, stop)
-        # The arrays of the search, which has ended, hold the new state meanwhile.
+        # The arrays of the finished search temporarily hold the new state.
         for i in range(uint64(first), uint64(end)):
             way.x[i], way.y[i], product.x[i], product.y[i] = bottles.x[i], bottles.y[i], bottles.vx[i], bottles.vy[i]
             bottles.vx[i] -= change.x[i]

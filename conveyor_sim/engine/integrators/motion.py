@@ -61,7 +61,7 @@ def note_moved(world: World, worker: Worker, first: int, end: int) -> None:
 
 @part
 def lists_hold(world: World, worker: Worker) -> bool:
-    """Wait for all; rebuild the lists if a bottle has moved too far. Return False if they did not fit."""
+    """Wait for all; rebuild the lists if a bottle has moved too far. Return False if a list is too short."""
     wait_for_all(worker)
     if flag_raised(worker, MOVED):
         wait_for_all(worker)

@@ -61,7 +61,7 @@ def _keep_normals(normals: Any, sums: Any, j: int, first: int, end: int) -> None
 
 @part
 def go_to(world: World, times: F8, weights: F8, squared: F8, s: int, h: float, first: int, end: int) -> None:
-    """Move bottles to row s of a tableau in a step of h seconds; angles wait for the end of the step."""
+    """Move bottles to row s of a tableau in a step of h seconds; angles are updated at the end of the step."""
     bottles, spin, slopes = world.bottles, world.spin, world.slopes
     ahead = h * times[s]
     for i in range(uint64(first), uint64(end)):

@@ -7,9 +7,9 @@ rest are off by mu g dt / v_lim. Leapfrog uses the belt's velocity at the bottle
 agree to the bit.
 
 The order is 1 through dashpots, clamped or not, and through friction, with or without a jump at first touch. Without
-damping its errors in energy stay bounded; a rebound and a peak force are then of order 2, with Hertz a rebound is of
-2.5. Measured in a rebound: 0.93 with a dashpot, 0.99 clamped, 1.99 without, 2.46 with Hertz; 1.00 in friction
-(test/physics/test_head_on.py, test_contact_laws.py, test_set_down.py). A step takes one force evaluation.
+damping its errors in energy stay bounded; rebounds and peak forces then converge with order 2, rebounds with Hertz with
+order 2.5. Measured orders for a rebound: 0.93 with a dashpot, 0.99 clamped, 1.99 without, 2.46 with Hertz; 1.00 in
+friction (test/physics/test_head_on.py, test_contact_laws.py, test_set_down.py). A step takes one force evaluation.
 """
 
 from typing import Any

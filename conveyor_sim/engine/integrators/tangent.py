@@ -9,7 +9,7 @@ a higher order. Slopes are differences of `contact_force`, so every law has them
 In steps longer than a contact, theta > 1/2, three things differ, by `late` = 2 theta - 1:
 - A contact that was closed before the step and is open ahead is retained, or a packing at rest would come loose.
 - Friction uses the normal force before the step: ahead, with deep overlaps, bottles would press far too hard.
-- Friction and damping resist by their secant to rest, force over slip, if a step could otherwise reverse a slip.
+- Friction and damping use the secant, force over slip, instead of the slope, if a step could reverse a slip.
 """
 
 from conveyor_sim.engine.arrays.contacts import ContactLaw

@@ -144,7 +144,7 @@ def _add_contact(
         step,
         hold,
     )
-    # The block, which contains this contact, will subtract that again.
+    # The assembled block, which contains this contact, subtracts this term again.
     normal -= along * closing_change / step[0]
     load.fx[i] += -normal * nx - tangential * ny
     load.fy[i] += tangential * nx - normal * ny

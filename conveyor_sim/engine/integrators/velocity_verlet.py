@@ -45,7 +45,8 @@ from conveyor_sim.engine.threads.workers import BLOCK, share
 def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> int:
     """Take `steps` steps of dt seconds; return how many were finished (see the package's docstring).
 
-    A step ends and the next one starts in one pass over the bottles. A call that is interrupted has moved them.
+    A step ends and the next one starts in one pass over the bottles. After an interrupted call, bottles are already at
+    their next positions.
     """
     stage: Any = world.stage
     damage = _is_there(world.damage)
@@ -61,7 +62,7 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
     while True:
         drawn = 0.0 if fresh else dt
         done += not fresh
-        # Forces have one call site, because each would compile them again.
+        # Forces have a single call site, because each call site is compiled separately.
         pair_phase(world, worker, dt, drawn)
         for first in range(begin, stop, BLOCK):
             end = min(first + BLOCK, stop)

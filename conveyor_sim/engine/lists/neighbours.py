@@ -98,7 +98,7 @@ def _fill_radii(pairs: Pairs, reach: Any, bottles: Bottles) -> None:
 
 @part
 def _copy_springs(pairs: Pairs, springs: Any) -> None:
-    """Copy the springs by pair, unless that is done and the list was too short."""
+    """Copy the springs by pair, unless a previous attempt with a shorter list has done so."""
     if springs is None:
         return
     if springs.kept_count[0] >= 0:

@@ -1,7 +1,7 @@
 """Velocity field of the belt under each bottle, stored by bottle until it may have left the belt.
 
 At a rebuild each bottle's belt is either certain, wherever it moves within the skin, or tested at every force
-evaluation. Only the latter are visited then.
+evaluation. Force evaluations visit only the bottles to be tested.
 """
 
 from typing import Any
@@ -52,7 +52,7 @@ def _certain(belts: Any, i: int) -> bool:
 
 @part
 def check_footing(bottles: Bottles, belts: Any, surface: Any, footing: Any, ring: Any, first: int, end: int) -> None:
-    """Put those of bottles first to end that may have changed belts on the belt under their axes."""
+    """Update the belt of those bottles, first to end, that may have moved to another belt."""
     if belts is None:
         return
     floor = surface.ux.size - 1

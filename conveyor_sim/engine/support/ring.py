@@ -65,10 +65,10 @@ def _mean(a: float, b: float, rest: float, weight: float) -> tuple[float, float,
 def ring_share(own: float, other: float, limit: float, first: float, rest: float) -> float:
     """Return F/(mu m g s_v) for own s_v and other s_w, M/(mu m g R_b s_w) for own s_w and other s_v; s/m; finite.
 
-    It is [1 - (s_w/first)^2/2 - rest/s_v^2]/limit, in which nothing cancels; its c_1 = s_v s_w/first is in the second
-    term.
+    It is [1 - (s_w/first)^2/2 - rest/s_v^2]/limit, which is free of cancellation; its c_1 = s_v s_w/first is in the
+    second term.
     """
-    # `rest` scales with the fourth power of the smaller speed: far below the other one it is nothing but rounding.
+    # `rest` scales with the fourth power of the smaller speed: far below the other speed it is only rounding error.
     least = 1e-8 * first
     own = least if least > own else own
     inverse = 1.0 / (own * first * limit)

@@ -82,7 +82,7 @@ def reserved_mode(kind: str, modes: Iterable[float]) -> float | None:
 
 
 def reserved(device: str, kind: str, mode: float) -> str:
-    """Return why a kind of writer can't put a device into such a mode, or out of it."""
+    """Return why a kind of writer may not switch a device to or from a mode."""
     return f"{device}: {MODES[int(mode)]} is not for {kind}s, expected an engineer"
 
 

@@ -1,8 +1,8 @@
 """`Input`: the record of every external action on a line, and its result.
 
 An input is applied at the start of one tick, or refused as a whole with a reason. Inputs of one tick are taken in order
-of arrival, and names within an input in their order. Each is checked against the line as it is after those before it.
-Watchdogs act after all inputs, devices after the watchdogs.
+of arrival, and names within an input in their order. Each input is checked against the state of the line after the
+preceding inputs. Watchdogs act after all inputs, devices after the watchdogs.
 """
 
 from dataclasses import dataclass
@@ -96,7 +96,7 @@ class CommandOutcome:
     part: bool = False
     """True if only this part of the input was refused; the rest has a separate result."""
     repeated: bool = False
-    """True if such a refusal was reported before, since control authority last changed."""
+    """True if an equal refusal was already reported since the last change of control authority."""
 
     @property
     def source(self) -> str:
@@ -162,7 +162,7 @@ def _of_wrong_type(request: Input) -> str | None:
 
 
 def recorded_input(source: str, names: tuple[str, ...], values: tuple[float, ...]) -> Input:
-    """Return the input of a result that was recorded before writers and operations were. Its source determines them."""
+    """Return the input of a result from an old recording without writer and operation; its source determines both."""
     if source == FAULT:
         return Input(source, source, "test", INJECT, names, values)
     kind = "line" if source in (WATCHDOG, ARRIVAL) else "controller"
@@ -170,5 +170,5 @@ def recorded_input(source: str, names: tuple[str, ...], values: tuple[float, ...
 
 
 def arrival(reason: str, tick: int) -> CommandOutcome:
-    """Return the report of inputs before a tick that never reached the line."""
+    """Return a result that reports inputs which never reached the line."""
     return CommandOutcome(tick, Input(ARRIVAL, ARRIVAL, "line", SET, (), ()), False, reason)

@@ -46,7 +46,7 @@ class Receipt:
     """Checks of the inputs of one line."""
 
     def __init__(self, tags: Sequence[Tag], where: str) -> None:
-        """tags: all of the line. where: its place in the plant."""
+        """Build the tables of the checks. tags: all tags of the line. where: path of the line in the plant."""
         self._where = where
         modes = {tag.device: tag for tag in tags if tag.device and tag.name == f"{tag.device}/mode"}
         signals = {tag.name: tag.without_limits() for tag in tags if tag.role in SIGNALS}
@@ -60,7 +60,7 @@ class Receipt:
         self._counting = {LINE, *(tag.device for tag in tags if tag.device_class in COUNTING)}
 
     def refusal(self, request: Input) -> Refusal | None:
-        """Return why no state of the line would allow an input; None if some state may."""
+        """Return why an input is invalid in every state of the line; None if it may be valid in some state."""
         operation, names, values = request.operation, request.names, request.values
         if reason := unauthorized(request, MAY):
             return Refusal("operation", reason)

@@ -31,7 +31,7 @@ class Watchdog:
         self.tripped = False
 
     def rest(self, tick: int, rests: bool) -> None:
-        """Rest outside automatic mode, and restart the time-out at each change of mode."""
+        """Suspend the watchdog outside automatic mode, and restart its time-out at each mode change."""
         self.rests = rests
         self.command(tick)
 

@@ -57,13 +57,18 @@ class Ramp:
 class DriveDevice(BeltDevice):
     """Belt with a drive. It runs at the start, at the speed of the scene.
 
-    A trip stops it along its ramp, until the fault is gone and `reset` has risen since.
+    A trip ramps it down; it runs again after the fault has ended and `reset` has had a rising edge.
     """
 
     def __init__(self, name: str, belt: StraightBelt | CurvedBelt, drive: Drive, setup: DeviceSetup) -> None:
         tags = [
             switch(f"{name}/running", "status", "Commanded to run, and not tripped.", 1.0, "state"),
-            switch(f"{name}/at_speed", "status", "At the end of its ramp, also at standstill.", 1.0),
+            switch(
+                f"{name}/at_speed",
+                "status",
+                "True while the speed equals the commanded speed, including standstill.",
+                1.0,
+            ),
             switch(f"{name}/fault", "status", "It has tripped.", adds_to="state"),
             switch(f"{name}/run", "command", "Runs while on.", 1.0),
             switch(f"{name}/reverse", "command", "Runs backward while on."),

@@ -16,10 +16,10 @@ COLUMNS = ("id", "type", "x", "y", "theta", "vx", "vy", "omega")
 def state_hash(tick: int, columns: Iterable[NDArray[Any]], state: State) -> int:
     """Return 64 bits over a tick, columns, tangential springs that are not slack, and positions and speeds of rails.
 
-    A Simulation passes COLUMNS, and setpoints and speeds of belts. Recordings hold this hash, so its definition stays.
-    Other state also decides the next ticks, and only `full_state_hash` covers it: memories of devices and random
-    streams, waiting commands, bottles that machines hold, the next id, neighbour lists and contact laws. The same holds
-    for motion profiles and drives of moving rails, and for histories of impacts.
+    A Simulation passes COLUMNS, and setpoints and speeds of belts. Recordings contain this hash, so its definition must
+    not change. Other state also decides the next ticks, and only `full_state_hash` covers it: memories of devices and
+    random streams, waiting commands, bottles that machines hold, the next id, neighbour lists and contact laws. The
+    same holds for motion profiles and drives of moving rails, and for histories of impacts.
     """
     digest = hashlib.blake2b(np.int64(tick).tobytes(), digest_size=8)
     for column in columns:

@@ -1,6 +1,6 @@
 """Arrays of a World by name, the role of each, and a World with arrays put back.
 
-The roles decide what a checkpoint checks, a state hash covers, the guard copies, and more room takes along. They are
+The roles determine what checkpoints check, state hashes cover, the guard copies, and a resize carries over. They are
 given as beginnings of names such as `pairs.spring.elongation`. An array without a role is state.
 """
 

@@ -75,7 +75,7 @@ class Integration:
         return memory
 
     def restore(self, memory: dict[str, Any]) -> None:
-        """Take over the snapshot of another one of the same Model. Raise ValueError for anything else."""
+        """Restore the snapshot of an Integration of the same Model. Raise ValueError for any other data."""
         restore(self._memory, memory, "integration")
 
     def put_in(self) -> None:

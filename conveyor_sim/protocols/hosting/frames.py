@@ -20,7 +20,7 @@ HEALTH = 1.0
 
 
 class Frames:
-    """Frames for one process. The view's thread only adds them; another thread fetches and sends them.
+    """Frames for one process. The thread of the mirror adds frames; another thread fetches and sends them.
 
     A process that is far behind misses ticks, not states: merged frames hold the newest message of each topic, and up
     to MOST_EVENTS events.

@@ -1,4 +1,4 @@
-"""`RemoteTagProvider`: the line in the process of a protocol server. The parent has the line, logins and ownership.
+"""`RemoteTagProvider`: tag provider in the process of a protocol server. The parent has the line, logins and ownership.
 
 The parent decides on `give`, `control` and logins. The protocol server waits for the answer, because its client must
 get the reason for a refusal. An answer takes well below a millisecond: it comes from a thread of the parent that never
@@ -90,7 +90,7 @@ class ParentCalls:
 
 
 class RemoteTagProvider(LineMirror):
-    """The line by the frames that the parent sends; one thread applies them."""
+    """Mirror of a line, updated by frames from the parent; one thread applies them."""
 
     def __init__(self, task: ServerTask, calls: ParentCalls, decode: Decode, history: TagHistory | None) -> None:
         """Start without data. decode: decodes the message of a topic. history: of the recording that is played
@@ -128,7 +128,7 @@ class RemoteTagProvider(LineMirror):
         self._calls.tell("watch", on)
 
     def apply(self, frame: LineFrame) -> None:
-        """Show the data of a frame. Messages that can't be decoded make the line lost, with the reason."""
+        """Show the data of a frame. Mark the line as lost, with the reason, if a message can't be decoded."""
         try:
             self._apply(frame)
         except Exception as error:  # messages of a damaged recording or another version may have any content
@@ -182,11 +182,14 @@ class RemoteHolding:
         return self._ask("holder", "")
 
     def judged_as(self, writer: str) -> str:
-        """Return the name by which a writer's claim on the line is judged."""
+        """Return the writer name to be compared with the owner of the line."""
         return self._ask("judged_as", writer, writer)
 
     def take(self, writer: str) -> str:
-        """Give a writer the line from the next tick on. Return the reason for a refusal, "" if there is none."""
+        """Make a writer the owner of the line from the next tick on.
+
+        Return the reason for a refusal, "" if there is none.
+        """
         try:
             return str(self._calls.ask("take", writer))
         except NoAnswerError as error:
@@ -197,7 +200,7 @@ class RemoteHolding:
         self._calls.tell("leave", writer)
 
     def look(self) -> None:
-        """Release the line if that had to wait for room among the inputs."""
+        """Retry a release that failed because the input queue was full."""
         self._calls.tell("look")
 
     def _ask(self, what: ParentService, otherwise: str, *arguments: str) -> str:

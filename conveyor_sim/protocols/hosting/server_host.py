@@ -44,7 +44,7 @@ STALLED = 5.0
 """s of wall time without a heartbeat after which a protocol server is killed and restarted."""
 
 START = 120.0
-"""s of wall time that a protocol server has for its start."""
+"""Longest time that a protocol server may take to start, s of wall time."""
 
 CLOSING = 1.5
 """s of wall time that a protocol server has for an orderly end."""
@@ -61,7 +61,7 @@ FRESH = 0.5
 """s of wall time that a protocol server has to report its status."""
 
 RECENT = 10
-"""Heartbeats over which the health states the longest lag."""
+"""Number of heartbeats over which the longest lag is reported."""
 
 _NONE = Status(0, 0, 0, 0, 0.0)
 
@@ -319,7 +319,7 @@ class ServerHost:
         }
         try:
             answer = todo[call.what](*call.arguments)
-        except Exception as error:  # rather a refusal than no answer
+        except Exception as error:  # a refusal is better than no answer
             answer = f"{type(error).__name__}: {error}"
         if call.number:
             self._send(ParentAnswer(call.number, answer))
@@ -329,7 +329,9 @@ class ServerHost:
             return
         name, password, origin = call.arguments
         user = self._logins.enter(name, password, origin, time.monotonic())
-        answer = None if user is None else user._replace(salt=b"", hash=b"")  # which stay here
+        answer = (
+            None if user is None else user._replace(salt=b"", hash=b"")
+        )  # salt and hash must not leave this process
         self._send(ParentAnswer(call.number, answer), pipe)
 
     def _watch(self, on: bool) -> None:

@@ -34,13 +34,13 @@ class ServerKind:
     make: Callable[[TagProvider, Any, ServerSettings, SharedState], ProtocolServer]
     """Function that makes a protocol server for the value of its option, not started. Raises ConveyorError."""
     exposes: Callable[[ServerSettings], str]
-    """Function that returns what clients can do, for the greeting: a half sentence."""
+    """Function that returns a phrase for the greeting on what clients can do."""
     by_default: bool = True
     """True if it is served when no protocol is chosen."""
     extra: str = "scada"
     """Extra of this package that installs the libraries."""
     clients: str = ""
-    """Clients in the greeting, if these are not all clients that reach the port."""
+    """Clients named in the greeting; empty: all clients that can reach the port."""
     isolated: bool = True
     """True if it runs in a separate process, which finds it in SERVER_KINDS by its name and makes it."""
 

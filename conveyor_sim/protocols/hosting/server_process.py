@@ -50,7 +50,7 @@ class _Process:
         self._source.apply(frames.recv())
 
     def run(self) -> None:
-        """Serve until the parent wants the end, or is gone."""
+        """Serve until the parent requests the end or terminates."""
         asyncio.run(self._serve())
 
     async def _serve(self) -> None:
@@ -114,7 +114,7 @@ def _or_end(follow: Callable[[], None]) -> None:
 
 
 def main() -> None:
-    """Run the process. Arguments: numbers of the pipes of frames and of calls and answers; name in FACES."""
+    """Run the process. Arguments: descriptors of the pipes for frames and for calls; name in SERVER_KINDS."""
     die_with_parent()
     frames, pipe = pipes_of_child()
     with collected_later():

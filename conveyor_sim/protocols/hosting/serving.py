@@ -96,7 +96,7 @@ class Serving(AbstractContextManager["Serving"]):
         return tuple(host.health() for host in list(self._hosts))
 
     def close(self) -> None:
-        """End all of them, within two seconds even if one is stalled."""
+        """Stop all servers, within two seconds even if one hangs."""
         for host in self._hosts:
             host.end()
         for host in self._hosts:

@@ -1,4 +1,4 @@
-"""`ThreadHost`: one protocol server in a thread of this process, where the owner of the line decides when time passes.
+"""`ThreadHost`: one protocol server in a thread of this process, for lines that this process steps itself.
 
 Two protocol servers run this way: those of a test's line (`SteppedTagProvider`), because the test steps it, and the
 only one of `attach`. All others run in processes (server_host.py). A protocol server in a thread is not restarted.
@@ -26,7 +26,7 @@ class ThreadHost:
     def __init__(
         self, kind: ServerKind, place: Any, settings: ServerSettings, source: TagProvider, logins: Logins
     ) -> None:
-        """Serve from now on. place: port or URL. Raises ConveyorError, in one sentence, if that can't be."""
+        """Serve from now on. place: port or URL. Raises ConveyorError with one sentence on failure."""
         self.kind = kind
         self._lag = 0.0  # s of wall time, the longest since the last `health`
         self._thread = ServerThread()

@@ -1,4 +1,4 @@
-"""All contact with private names of asyncua, and the behaviour of the library that each of them works around.
+"""All uses of private names of asyncua, and the behaviour of the library that each of them works around.
 
 The classes turn private methods and attributes into public ones for the rest of this folder.
 `test_asyncua_internals.py` checks that the library has each name. Written for asyncua 2.1.

@@ -98,7 +98,7 @@ class Bounds:
         self._units += CHANGE_UNITS * sum(map(size_of, message.NotificationData or []))
 
     def require_history(self, params: ua.HistoryReadParameters) -> None:
-        """Reduce the values per node to what one answer takes."""
+        """Limit the values per node to the size of one answer."""
         details = params.HistoryReadDetails
         most = max(1, self.limits.history_values // len(params.NodesToRead))
         details.NumValuesPerNode = min(details.NumValuesPerNode or most, most)

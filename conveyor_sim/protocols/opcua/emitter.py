@@ -15,8 +15,8 @@ _AT_ONCE = 2000
 
 
 class Emitter:
-    """Emitter of one server. All events come from the Server object, because its subscribers do not get those of
-    others.
+    """Emitter of one server. All events come from the Server object, because its subscribers do not receive events of
+    other nodes.
     """
 
     def __init__(self, server: InternalServer) -> None:

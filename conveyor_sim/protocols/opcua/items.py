@@ -109,7 +109,7 @@ class Items(OpenItems):
             self._count(item, 1)
 
     def modify(self, params: ua.MonitoredItemModifyRequest) -> ua.MonitoredItemModifyResult:
-        """Change an item, its event filter included, which the library would go on evaluating as it was before."""
+        """Change an item and its event filter; the library would keep evaluating the old filter."""
         item = self.by_id.get(params.MonitoredItemId)
         if item is None:
             return ua.MonitoredItemModifyResult(ua.StatusCode(ua.StatusCodes.BadMonitoredItemIdInvalid))

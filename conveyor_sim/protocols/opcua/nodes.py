@@ -183,7 +183,7 @@ class Nodes:
 
 
 def nothing(kind: ua.VariantType) -> Any:
-    """Return the value that stands for no value of a type."""
+    """Return the null value of an OPC UA type."""
     if kind is ua.VariantType.DateTime:
         return NEVER
     return None if kind is ua.VariantType.String else ua.get_default_value(kind)

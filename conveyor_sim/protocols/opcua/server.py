@@ -1,4 +1,4 @@
-"""`OpcUaServer`: a line as an OPC UA server, with permanent names."""
+"""`OpcUaServer`: OPC UA server for a line, with permanent node IDs."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ class OpcUaServer:
         return Status(len(server.bserver.clients), items, requests.writes, refused, longest, left_out)
 
     async def start(self) -> None:
-        """Listen; this takes one to two seconds. Raises ServerError if it is not possible, CertificateError."""
+        """Start to listen, which takes one to two seconds. Raise ServerError or CertificateError on failure."""
         for name in ("asyncua.server", "asyncua.common", "asyncua.uaprotocol", "asyncua.crypto"):
             logging.getLogger(name).setLevel(logging.CRITICAL)  # it logs all input of clients
         host, port = self._at
@@ -203,7 +203,7 @@ class OpcUaServer:
 
 @contextmanager
 def _without_collection() -> Iterator[None]:
-    """Collect no garbage while nodes are made. With the standard's 6000 nodes it takes longer than making them."""
+    """Disable garbage collection while nodes are created; it takes longer than creating the 6000 standard nodes."""
     was = gc.isenabled()
     gc.disable()
     try:

@@ -2,7 +2,8 @@
 permits.
 
 The library lets every admitted client write all variables that are not read-only, and call all methods. An "admin" can
-even change the address space. Here the library gets no write, and no call except the two that refresh conditions.
+even change the address space. This module passes no writes to the library, and no calls except the two ConditionRefresh
+methods.
 """
 
 from __future__ import annotations

@@ -25,10 +25,10 @@ from conveyor_sim.protocols.server.quotas import share_of_guests
 Codes = ua.StatusCodes
 
 EXCEEDED = Codes.BadResourceUnavailable
-"""Status of the notification that ends a subscription beyond the budget of its session."""
+"""Status code of the notification when a subscription is ended for exceeding the budget of its session."""
 
 NOTICE = 30.0
-"""s for which a subscription that was ended waits for a Publish request that can report it."""
+"""Time that an ended subscription waits for a Publish request to report the end, s."""
 
 REFRESH_PERIOD = 1.0
 """s between two refreshes of the conditions of one subscription."""
@@ -37,7 +37,7 @@ _AT_ONCE = 2000
 """Work units after which a refresh of conditions lets other tasks run."""
 
 _LEFT = 0.1
-"""Share of the burst that a session has after its costliest subscription was ended."""
+"""Share of the burst to which a budget is restored after the costliest subscription was ended."""
 
 
 class Subscription(OpenSubscription):

@@ -111,7 +111,7 @@ class Connection(OpenProtocol):
             self.places.leave_user(self.place)
 
     def note_failure(self) -> None:
-        """Note that a client did not prove its identity: its connection makes room before others."""
+        """Record a failed login. Such connections are dropped first."""
         if self.place is not None:
             self.place.has_failed = True
 
@@ -202,7 +202,7 @@ class Connection(OpenProtocol):
             self.guests.spend(units)
 
     def _make_room(self) -> None:
-        """Close the connection because another one needs its place, with its session."""
+        """Close the connection and its session to make room for another connection."""
         self._end_session()
         self._refuse(ua.StatusCodes.BadTcpServerTooBusy, "another client needs the place")
 

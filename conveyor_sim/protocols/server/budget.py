@@ -15,7 +15,7 @@ class Budget:
         self._level, self._at = burst, clock()
 
     def spend(self, units: float) -> bool:
-        """Use units, even if they are not there yet. Return True if the budget was sufficient."""
+        """Spend units; the balance may become negative. Return True if it did not."""
         now = self._clock()
         self._level = min(self._burst, self._level + self._rate * (now - self._at)) - units
         self._at = now

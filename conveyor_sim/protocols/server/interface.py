@@ -56,7 +56,7 @@ class Health(NamedTuple):
 
     @property
     def text(self) -> str:
-        """Words for the user."""
+        """Health as text for the user."""
         times = "" if not self.restarts else f", restarted {'once' if self.restarts == 1 else f'{self.restarts} times'}"
         silent = f", no answer for {self.silent:.1f} s" if self.silent else ""
         return f"lag {self.lag * 1e3:.0f} ms{silent}{times}"
@@ -70,7 +70,7 @@ class ProtocolServer(Protocol):
         """Address for clients: "modbus://127.0.0.1:5020"."""
 
     async def start(self) -> None:
-        """Serve from now on. Raises ServerError, in one sentence, if that is not possible; it leaves nothing behind."""
+        """Start serving. Raise ServerError with one sentence on failure, after all resources are released."""
 
     async def stop(self) -> None:
         """End all connections. Do nothing if it was not started or is stopped."""
@@ -80,7 +80,7 @@ class ProtocolServer(Protocol):
 
 
 def require_free(protocol: str, host: str, port: int) -> None:
-    """Raise ServerError, with the reason that libraries leave out, if a server can't listen at an address."""
+    """Raise ServerError with the operating system's reason if a server can't listen at an address."""
     expected = "an address of this machine"
     try:
         family = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0][0]

@@ -1,7 +1,7 @@
-"""`ConnectionSlots`: bounded number of connections to a protocol server, and the order in which they make room.
+"""`ConnectionSlots`: limit on connections to a protocol server, and the order in which new ones displace them.
 
-A client needs a place before it can identify itself, so connections without a session never block others. When all
-places are taken, a connection whose login failed makes room, else the connection at the earliest stage. Among several,
+A client needs a slot before it can log in, so connections without a session are the first to be dropped. When all slots
+are taken, a connection with a failed login is dropped, otherwise one at the earliest stage. Among several,
 it is the one that was idle for longest.
 Guests have a session and no user. They hold at most three quarters of the places; the rest is for users and for
 connections without a session yet. This also holds for the places of one address. A user is never dropped for a guest.
@@ -72,7 +72,7 @@ class ConnectionSlots:
     """All connections of one protocol server."""
 
     def __init__(self, quota: Quota, keeps_active: bool = False) -> None:
-        """Start with all places free. keeps_active: True if guests that are not idle keep their places, too.
+        """Start with all places free. keeps_active: True if active guests are never dropped.
 
         This is for a protocol without users, where a new connection can't be a user's.
         """

@@ -28,7 +28,7 @@ Role = Literal["viewer", "operator", "engineer", "controller", "test"]
 ROLES: tuple[Role, ...] = get_args(Role)
 
 MOST_WRONG, PERIOD = 10, 60.0
-"""Wrong passwords for one name from one machine after which more are refused unchecked, until PERIOD s of wall time
+"""Limit of wrong passwords per name and machine. Further ones are refused unchecked until PERIOD seconds of wall time
 have passed since the first one.
 """
 

@@ -26,7 +26,10 @@ SHORTEST = 0.005
 
 
 class BagTagProvider(LineMirror, AbstractContextManager["BagTagProvider"]):
-    """Playback from the start of a recording until close(). Only what is played is read, by its index."""
+    """Playback from the start of a recording until close().
+
+    Only the played parts are read, through the index of the recording.
+    """
 
     takes_inputs = False
     controls: frozenset[Control] = frozenset({"pause", "resume", "seek", "speed", "loop"})

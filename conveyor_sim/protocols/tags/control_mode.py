@@ -1,4 +1,4 @@
-"""Control mode of devices, as protocol servers check it at once; the line itself decides at the tick."""
+"""Checks of control authority against the latest snapshot, for immediate answers; the line checks again at the tick."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def refused_for_good(source: TagProvider, receipt: Receipt, request: Input) -> R
     Such an input is still passed on if its writer may use the operation: the line then records the refusal.
     """
     refusal = receipt.refusal(request)
-    # The line may accept a part of several commands, so these are not passed on.
+    # An input with commands is not passed on, because the line might accept a part of it.
     if refusal is not None and refusal.cause != "operation" and request.operation != SET:
         source.give(request)
     return refusal

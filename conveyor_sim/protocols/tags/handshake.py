@@ -2,8 +2,8 @@
 
 The client reads the inputs of tick `run/tick`, writes its outputs, and writes `run/target_tick` last. All writes since
 the previous target then act as one set, and the line advances to the target. `run/tick` changes only at the target,
-when all inputs of that tick are available. Writing the same target again has no effect. So a run has the same bits
-however fast either side is.
+when all inputs of that tick are available. Writing the same target again has no effect. So runs are bit-identical
+regardless of the speed of either side.
 """
 
 from __future__ import annotations
@@ -69,8 +69,7 @@ class HandshakeTagProvider(SteppedTagProvider):
         return ""
 
     def take(self, patience: float) -> tuple[Input, ...] | None:
-        """Return the inputs for the present tick once the target is later; None if it is not after `patience` s of wall
-        time.
+        """Wait for a target beyond the present tick and return the inputs for that tick; None after `patience` seconds.
 
         Called by the stepping thread.
         """

@@ -1,7 +1,7 @@
-"""`Holding`: which of several clients without names is the controller of the line.
+"""`Holding`: ownership of the line among clients that have no names.
 
-Modbus has no sessions and no names. So the first write of a client takes the line. The end of its connection or its
-silence gives the line up, because an absent client must not hold it for ever. A restart of the protocol server ends
+Modbus has no sessions and no names. So the first write of a client takes the line. The line is released when the
+connection ends or is idle for too long, so that absent clients do not block it. A restart of the protocol server ends
 all connections, but gives nothing up: for GRACE seconds only the holder's machine can go on with the line.
 """
 
@@ -14,7 +14,7 @@ from conveyor_sim.line.commands.inputs import DISOWN, OWN, Input
 from conveyor_sim.protocols.tags.tag_provider import LineSnapshot, TagProvider
 
 GRACE = 30.0
-"""s of wall time after a restart of the protocol server in which the holder of the line can come back."""
+"""Wall time after a server restart within which the holder of the line can reconnect, s."""
 
 
 class HoldingService(Protocol):
@@ -25,16 +25,19 @@ class HoldingService(Protocol):
         """Writer that holds the line; empty: none."""
 
     def judged_as(self, writer: str) -> str:
-        """Return the name by which a writer's claim on the line is judged."""
+        """Return the writer name to be compared with the owner of the line."""
 
     def take(self, writer: str) -> str:
-        """Give a writer the line from the next tick on. Return the reason for a refusal, "" if there is none."""
+        """Make a writer the owner of the line from the next tick on.
+
+        Return the reason for a refusal, "" if there is none.
+        """
 
     def leave(self, writer: str) -> None:
         """Release the line if a writer holds it."""
 
     def look(self) -> None:
-        """Release the line if that had to wait for room among the inputs."""
+        """Retry a release that failed because the input queue was full."""
 
 
 class Holding:
@@ -54,7 +57,10 @@ class Holding:
         return self._holder if self._run_id == self._source.snapshot.run_id else ""  # another run has no holder
 
     def take(self, writer: str) -> str:
-        """Give a writer the line from the next tick on. Return the reason for a refusal, "" if there is none."""
+        """Make a writer the owner of the line from the next tick on.
+
+        Return the reason for a refusal, "" if there is none.
+        """
         holder, snapshot = self.holder, self._source.snapshot
         if holder == writer:
             self._leaving, self._away_until = False, 0.0
@@ -73,7 +79,7 @@ class Holding:
         return ""
 
     def judged_as(self, writer: str) -> str:
-        """Return the name by which a writer's claim on the line is judged.
+        """Return the writer name to be compared with the owner of the line.
 
         After a restart of the protocol server it is the holder's name for each client on the holder's machine.
         """
@@ -97,7 +103,7 @@ class Holding:
             self.look()
 
     def look(self) -> None:
-        """Release the line if the holder leaves, as soon as there is room among the inputs."""
+        """Release the line of a holder that has left, as soon as the input queue has room."""
         if self._away_until and time.monotonic() > self._away_until:
             self._leaving, self._away_until = True, 0.0
         if self._leaving and not (self.holder and self._is_owner(self._source.snapshot)):

@@ -94,13 +94,13 @@ class DrawableProvider(TagProvider, Protocol):
 
 
 class LineMirror:
-    """Reading half of a `TagProvider`. One thread updates it, any thread may read it.
+    """Read-only part of a `TagProvider`. One thread updates it, any thread may read it.
 
     `show` publishes all updates at once. Time may go back, and another run of the same line may begin.
     """
 
     takes_inputs = True
-    """True if inputs may ever take effect."""
+    """True if the line accepts inputs."""
     recording: Path | None = None
     """Recording that is played back; None: the line is simulated."""
     _run_id: str
@@ -248,7 +248,7 @@ class LineMirror:
         self._drawn[topic] = decode
 
     def state_run(self, run: RunState) -> None:
-        """Set the state of the run where no message has it."""
+        """Set the state of the run if no message contains it."""
         self._run = run
 
     def forget(self) -> None:
@@ -290,7 +290,7 @@ class LineMirror:
             self._listeners.tell()
 
     def add(self, event: Event) -> None:
-        """Add an event that no message has."""
+        """Add an event that did not arrive in a message."""
         self._events.add([event])
 
     def _count_watchers(self, more: int) -> None:
@@ -357,7 +357,7 @@ class LineMirror:
 
 
 def decoded(topic: str, data: bytes) -> Any:
-    """Return the decoded message of a topic, which this version has serialized."""
+    """Return the decoded message of a topic. It must have been serialized by this version."""
     return typestore().deserialize_cdr(data, TOPICS[topic].type)
 
 

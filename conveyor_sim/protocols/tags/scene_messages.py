@@ -12,7 +12,7 @@ from conveyor_sim.protocols.tags.tag_provider import Control
 from conveyor_sim.scene import Scene
 
 PATIENCE = 20.0
-"""Wall time for an orderly end after the other process has gone, s."""
+"""Wall time for an orderly shutdown after the other process has ended, s."""
 
 
 @dataclass(frozen=True)

@@ -52,7 +52,7 @@ SHORTEST = 0.005
 """Shortest wall time between two copies, s: half a tick of a line in real time."""
 
 LIFE_SIGN = 0.5
-"""Wall time after which a copy is sent without news, s, while the stepping thread is alive."""
+"""Longest wall time between two updates while the stepping thread runs, s; sent even without changes."""
 
 FRAME_INTERVAL = 0.02
 """Shortest wall time between two frames for drawing, s."""
@@ -61,8 +61,7 @@ SHARE = 0.05
 """Largest share of the stepping thread's time for frames."""
 
 TAKEN = frozenset({"bottles", "contacts", "belts"})
-"""Topics of a frame for drawing, independent of the output rates of the scene; others of DRAWING_TOPICS come at their
-rates.
+"""Drawing topics that are produced for each frame; the other DRAWING_TOPICS follow the output rates of the scene.
 """
 
 MOST_NOTES = 100
@@ -71,7 +70,7 @@ FRAME = "world"
 
 
 class Copies:
-    """Sink whose messages a separate thread sends."""
+    """Sink that stores messages and sends them in a separate thread."""
 
     def __init__(self, pipe: Connection, shortest: float) -> None:
         """Start sending. shortest: wall time between two copies, s; messages of that time are merged into one copy."""
@@ -124,7 +123,7 @@ class Copies:
         self._now_events.clear()
 
     def live(self) -> None:
-        """Have a copy sent as a life sign if none was sent for long. Called by the stepping thread."""
+        """Send an update as a heartbeat if none was sent for LIFE_SIGN seconds. Called by the stepping thread."""
         with self._wake:
             if time.monotonic() > self._sent + LIFE_SIGN:
                 self._new = True
@@ -179,7 +178,7 @@ class _Log:
 
 
 class _Process:
-    """Runs, one after another, until the pipe ends."""
+    """Successive runs of the scene, until the pipe is closed."""
 
     def __init__(self, pipe: Connection, task: SceneTask, stop: StopRequest) -> None:
         self._pipe, self._task, self._stop = pipe, task, stop
@@ -262,7 +261,7 @@ class _Process:
         self._stop.request()
 
     def _listen(self) -> None:
-        """Carry out requests. At None, or the end of the pipe by the parent's death, end in order within PATIENCE."""
+        """Process requests until None arrives or the pipe closes, then shut down within PATIENCE seconds."""
         with suppress(EOFError, OSError):
             while (request := self._pipe.recv()) is not None:
                 self._do(request)

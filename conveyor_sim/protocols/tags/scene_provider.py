@@ -281,7 +281,7 @@ class SceneTagProvider(LineMirror, AbstractContextManager["SceneTagProvider"]):
 
 
 def _pass_on(requests: SimpleQueue[Any], pipe: Connection) -> None:
-    """Send requests to the process, which may not read; None is the last one."""
+    """Send requests to the process until None; block while the process does not read."""
     with suppress(OSError):
         while True:
             request = requests.get()

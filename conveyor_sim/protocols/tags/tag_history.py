@@ -20,7 +20,7 @@ WINDOW = 1000
 
 
 class TagSample(NamedTuple):
-    """Value, and the tick at which it began."""
+    """Value of a tag and the tick from which it applies."""
 
     tick: int
     value: float

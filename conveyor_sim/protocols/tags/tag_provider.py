@@ -90,7 +90,7 @@ class LineSnapshot:
 
 
 class TagProvider(Protocol):
-    """Tags with their values, and an entry for inputs. Its methods may be called from any thread."""
+    """Tag values of a line, with a method to submit inputs. Its methods may be called from any thread."""
 
     @property
     def info(self) -> LineInfo:
@@ -121,7 +121,7 @@ class TagProvider(Protocol):
         """Queue an input for the next tick. Return the reason for a refusal, "" if it was queued."""
 
     def control(self, what: Control, value: float, by: str) -> str:
-        """Control the run in the name of `by`. Return the reason for a refusal, "" if the request was accepted."""
+        """Control the run on behalf of `by`. Return the reason for a refusal, "" if the request was accepted."""
 
 
 class Listeners:
@@ -163,7 +163,7 @@ class RecentEvents:
             self._kept = total + len(events), (*last, *events)[-MOST_EVENTS:]
 
     def bring(self, total: int, newest: Sequence[Event]) -> None:
-        """Add the newest of `total` events in all; events in between are unknown."""
+        """Add the newest of `total` events; events between the stored ones and these may be missing."""
         if newest:
             _, last = self._kept
             self._kept = total, (*last, *newest)[-MOST_EVENTS:]
@@ -182,7 +182,7 @@ class SteppedTagProvider:
     """
 
     controls: frozenset[Control] = frozenset()
-    """None: the stepping thread decides when time passes."""
+    """Empty set: only the stepping thread advances time."""
 
     def __init__(self, simulation: Simulation) -> None:
         """Start with a snapshot of the simulation."""

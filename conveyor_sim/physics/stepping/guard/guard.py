@@ -27,7 +27,7 @@ GROWTH = 2.0
 """Largest allowed growth of the energy in a tick, without the work of belts. Resolved contacts oscillate by less."""
 
 SOFT = 0.2
-"""Overlap over the radius from which a contact is reported as soft. Positions are wrong by as much."""
+"""Overlap over the radius from which a contact is reported as soft. Positions have an error of the same size."""
 
 CLOSELY = 128
 """Largest number of steps between checks of overlaps. A check costs about half a step."""
@@ -48,7 +48,7 @@ class GuardMemory:
     deepest: float = 0.0
     """Largest overlap over a radius so far."""
     put_in: bool = False
-    """True after bottles were placed from outside: deep overlaps may come from that, and may part."""
+    """True after bottles were placed from outside: deep overlaps are then tolerated until they separate."""
 
     def report(self, event: GuardEvent) -> None:
         """Append an event."""
