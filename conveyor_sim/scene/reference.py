@@ -65,7 +65,7 @@ BEHIND: dict[str, list[tuple[str, type[BaseModel]]]] = {
         ("Times of a failure: `kind: weibull`", failures.Weibull),
         ("Times of a failure: `kind: list`", failures.FixedTimes),
         ("An entry of `planned_stops` of a machine", failures.PlannedStop),
-        ("An entry of `sets` of a station", station.Setting),
+        ("An entry of `sets` of a station", station.AttributeRule),
         ("An entry of `tests` of a station", station.Acceptance),
     ],
 }

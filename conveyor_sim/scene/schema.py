@@ -17,7 +17,7 @@ from conveyor_sim.scene.effect_names import EffectName, Forced
 from conveyor_sim.scene.limits import Limits as DamageLimits
 from conveyor_sim.scene.machines import Machine
 from conveyor_sim.scene.part import Part
-from conveyor_sim.scene.parts.alarm import Alarm
+from conveyor_sim.scene.parts.alarm import MeasuredAlarm
 from conveyor_sim.scene.parts.counter import Counter
 from conveyor_sim.scene.parts.device_part import DevicePart, Entry, Exit, Giver
 from conveyor_sim.scene.parts.indicator import Indicator
@@ -259,7 +259,7 @@ class Scene(Part):
     indicators: Annotated[dict[Name, Indicator], _named("indicators")] = quantity(
         "What is known of exits: flow, jam, starved, blocked.", default={}
     )
-    alarms: Annotated[dict[Name, Alarm], _named("alarms")] = quantity(
+    alarms: Annotated[dict[Name, MeasuredAlarm], _named("alarms")] = quantity(
         "Alarms on measured values, beside those that the line has by itself.", default={}
     )
     bottles: Annotated[

@@ -55,7 +55,7 @@ def test_a_picture_that_is_old_is_not_called_new(page: Any, live: Live) -> None:
     soon(page, lambda: page.inner_text("#latency").endswith(" ms behind"), "how late it is")
     os.kill(live.source.pid, signal.SIGSTOP)
     try:
-        soon(page, lambda: "nothing new for" in page.inner_text("#latency"), "that nothing comes")
+        soon(page, lambda: "no new frame for" in page.inner_text("#latency"), "that nothing comes")
     finally:
         os.kill(live.source.pid, signal.SIGCONT)
     soon(page, lambda: page.inner_text("#latency").endswith(" ms behind"), "new pictures")

@@ -12,7 +12,7 @@ from conveyor_sim.line.devices.setup import DeviceSetup
 from conveyor_sim.line.machines.stop_reason import BLOCKED, NONE, STARVED
 from conveyor_sim.line.machines.taking import TakingDevice
 from conveyor_sim.line.tag import count, seconds, switch
-from conveyor_sim.scene.parts.station import BAD, Acceptance, Setting, Station
+from conveyor_sim.scene.parts.station import BAD, Acceptance, AttributeRule, Station
 
 EMPTY = -1
 
@@ -154,7 +154,7 @@ class StationDevice(TakingDevice):
 class AttributeSetting:
     """Setting of one attribute by a station."""
 
-    def __init__(self, attribute: str, setting: Setting, random: np.random.Generator) -> None:
+    def __init__(self, attribute: str, setting: AttributeRule, random: np.random.Generator) -> None:
         self.attribute, self.random = attribute, random
         self._setting, self._at = setting, frozenset(setting.at)
 

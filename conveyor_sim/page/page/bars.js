@@ -29,7 +29,7 @@ export class Bars {
     this.canvas.style.height = `${this.names.length * ROW + UNDER}px`;
     this.canvas.hidden = this.key.hidden = !this.names.length;
     this.note.hidden = this.view.letter === "B"; // one note for both recordings is enough
-    this.note.textContent = this.names.length ? "A click on a bar jumps to that time, Enter to the next change." : "There is no machine.";
+    this.note.textContent = this.names.length ? "A click on a bar jumps to that time, Enter to the next change." : "The line has no machines.";
   }
 
   _span() {

@@ -52,7 +52,7 @@ export class Compare {
       element("button", { class: "first", dataset: { key: kind }, onclick: () => this.view.jump(time, "", bottle ?? -1) },
         element("time", {}, seconds(time)),
         element("span", { class: "what" }, element("b", {}, TITLES[kind]), ...texts.map((text) => element("small", {}, text))))));
-    const nothing = this.failed || (this.done ? this.words() : "Looking for the first difference …");
+    const nothing = this.failed || (this.done ? this.words() : "Searching for the first difference …");
     refill(this.first, rows.length ? rows : [element("li", { class: "muted" }, nothing)]);
   }
 

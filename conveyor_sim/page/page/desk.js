@@ -11,10 +11,10 @@ const REMEMBERED = 20; // s in which a refusal by the line is attributed to a re
 
 export class Desk {
   constructor(view, about) {
-    Object.assign(this, { view, about, status: about.status, latency: 0, told: 0, given: new Map() });
+    Object.assign(this, { view, about, status: about.status, latency: 0, told: 0, requests: new Map() });
     const { line } = view;
     this.link = element("span", { id: "link", role: "status" });
-    this.late = element("span", { id: "latency", title: "Latency: from the tick of the line to its picture on this screen" });
+    this.late = element("span", { id: "latency", title: "Latency: from the tick of the line to its frame on this screen" });
     this.run = element("span", { id: "run" });
     this.buttons = new Map();
     const can = about.users ? about.controls : [];
@@ -77,18 +77,18 @@ export class Desk {
     this.told = now;
     const age = !this.at || this.stands ? 0 : wallTime() + this.view.line.offset - this.at;
     this.late.classList.toggle("stale", clock.live && age > STALE);
-    const late = this.stands ? "" : age > STALE ? `nothing new for ${age.toFixed(0)} s` : this.shown ? `${Math.max(0, Math.round(1000 * this.latency))} ms behind` : "";
+    const late = this.stands ? "" : age > STALE ? `no new frame for ${age.toFixed(0)} s` : this.shown ? `${Math.max(0, Math.round(1000 * this.latency))} ms behind` : "";
     const text = clock.live ? late : `${seconds(this.view.recording.end - clock.time, 1)} ago`;
     if (this.late.textContent !== text) this.late.textContent = text;
   }
 
   // Sends a request to the line and shows the reason of a refusal. Returns true if it was accepted.
   async ask(what, names, values = []) {
-    for (const [text, time] of this.given) if (wallTime() > time + REMEMBERED) this.given.delete(text);
-    this.given.set(names.join(", "), wallTime());
+    for (const [text, time] of this.requests) if (wallTime() > time + REMEMBERED) this.requests.delete(text);
+    this.requests.set(names.join(", "), wallTime());
     const { refused } = await this.view.line.ask({ do: what, names, values });
     warn(refused ? `Refused: ${refused}` : "");
-    if (!refused) byId("said").textContent = `${what} ${names.join(", ")} given`;
+    if (!refused) byId("said").textContent = `${what} ${names.join(", ")}: accepted`;
     return !refused;
   }
 
@@ -103,7 +103,7 @@ export class Desk {
   // Shows requests that the line has refused one tick later.
   happened({ kind = [], name = [], text = [] }) {
     kind.forEach((one, i) => {
-      if (one === "command_refused" && this.given.has(name[i])) warn(`Refused: ${text[i]}`);
+      if (one === "command_refused" && this.requests.has(name[i])) warn(`Refused: ${text[i]}`);
     });
   }
 

@@ -76,7 +76,7 @@ async function compare(view, source, { stretches }) {
     try {
       view.compare.add(await read(source, `difference/${part}`));
     } catch (error) {
-      view.compare.failed = `They can't be compared further: ${error.message}`;
+      view.compare.failed = `The recordings can't be compared further: ${error.message}`;
       warn(view.compare.failed);
       return;
     }
@@ -154,7 +154,7 @@ async function startRecording() {
   run(view);
   // The story of a long recording is read while the page already draws.
   for (let part = 0; parts > 1 && part < parts; part++) {
-    say(`Reading what happened: ${Math.round((100 * part) / parts)} %`);
+    say(`Reading the events: ${Math.round((100 * part) / parts)} %`);
     unread = await told(source, part, (more) => view.toldMore(more)) || unread;
   }
   if (parts > 1) warn(unread);

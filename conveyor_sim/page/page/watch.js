@@ -11,7 +11,7 @@ export class Watch {
     this.rows = new Map();
     this.input = element("input", { list: "signals", placeholder: "Add a signal …", "aria-label": "Add a signal to the watch table", onchange: () => this._typed() });
     this.list = element("ul", { class: "rows watched", "aria-label": "Watched signals" });
-    this.none = element("p", { class: "muted" }, "Watched signals are listed here with what they are now. ◎ in a faceplate adds one.");
+    this.none = element("p", { class: "muted" }, "Watched signals are listed here with their present values. ◎ in a faceplate adds one.");
     this.all = element("button", { onclick: () => view.desk.ask("unforce", []) }, "End all forces");
     this.root = element("section", {}, element("h2", {}, "Watch table"), this.input, this.none, this.list, view.desk?.commands ? this.all : "");
   }

@@ -103,7 +103,7 @@ class AlarmFields(Part):
             yield "low", f"{shown(self.low)} given, expected {text}: {shown(self.high - 2.0 * self.deadband)} at most"
 
 
-class Alarm(AlarmFields):
+class MeasuredAlarm(AlarmFields):
     """An alarm of the scene on a measured value."""
 
     tag: Text = quantity("Signal that it watches.")

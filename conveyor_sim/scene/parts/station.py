@@ -18,7 +18,7 @@ BAD = "bad"
 MOST_ATTRIBUTES = 20
 
 
-class Setting(Part):
+class AttributeRule(Part):
     """Change of one attribute of a bottle by a station."""
 
     to: Number = quantity("New value, in the unit of the attribute. Attributes that were never set are 0.", "1")
@@ -75,7 +75,7 @@ class Station(TakingPart, Giver):
     direction: Angle = quantity("Direction of the bottle's velocity then.", "rad")
     speed: NotNegative = quantity("Its speed then, along `direction`.", "m/s")
     sets: Annotated[
-        dict[Name, Setting],
+        dict[Name, AttributeRule],
         Len(0, MOST_ATTRIBUTES),
         Holds(f"a mapping of at most {MOST_ATTRIBUTES} names of attributes to settings"),
     ] = quantity("What it does to attributes of a bottle, by their names: cap, label, fill_level, crooked.", default={})
