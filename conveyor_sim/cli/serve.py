@@ -30,7 +30,7 @@ LOOK = 1.0
 PLAIN_LOOK = 10.0
 """Wall time between two progress lines where output is not a terminal, s."""
 
-IN_LOCKSTEP = "in lockstep: the line stands until a client writes run/target_tick"
+IN_LOCKSTEP = "in lockstep: simulated time advances only when a client writes run/target_tick"
 
 PORT = click.IntRange(0, 65535)
 
@@ -137,8 +137,8 @@ _WHERE = {
 def serve(what: str | None, node: str | None, bind: str, stamps: Stamps, **given: Any) -> None:
     """Serve a line to SCADA systems, HMIs, PLCs, MQTT hosts, browsers and Foxglove.
 
-    SCENE is simulated in real time, and recorded with all that clients write. BAG is played back. With --node it is the
-    line that a running node simulates. Without a protocol option, OPC UA and Modbus are served on their default ports.
+    SCENE is simulated in real time, and recorded with all that clients write. BAG is played back. With --node, serve
+    the line of a running ROS node. Without a protocol option, OPC UA and Modbus are served on their default ports.
     Ctrl-C ends it.
     """
     with collected_later():
@@ -282,7 +282,7 @@ def _bag(path: Path, console: Console, speed: float, loop: bool) -> BagTagProvid
 
 @contextmanager
 def _node(namespace: str, console: Console, drawn: bool) -> Iterator[NodeSource]:
-    """Yield the line of a node once its tags are known. drawn: True if a page shows it."""
+    """Yield the line of a node once its tags are known. drawn: True if the web page or Foxglove displays it."""
     try:
         from conveyor_sim.ros.node_source import NodeSource
     except ImportError as error:
@@ -298,7 +298,7 @@ def _node(namespace: str, console: Console, drawn: bool) -> Iterator[NodeSource]
 
 
 def watch(serving: Serving, console: Console, greeting: Sequence[str]) -> None:
-    """Print the greeting, then the progress until a signal arrives; from the greeting on, serving ends orderly."""
+    """Print the greeting, then the progress until a signal arrives. From then on, a signal ends serving cleanly."""
     from conveyor_sim.support.stop_request import StopRequest
 
     with StopRequest() as stop:

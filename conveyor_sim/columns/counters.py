@@ -29,7 +29,10 @@ class CounterColumns:
     """Rejected bottles."""
     failures: NDArray[np.uint64]
     running: NDArray[np.float64]
-    """Time in this category and in those that follow, s; `line/machines/time_account.py` defines them."""
+    """Time in the category "running", s; the following fields likewise.
+
+    `line/machines/time_account.py` defines them.
+    """
     starved: NDArray[np.float64]
     blocked: NDArray[np.float64]
     down: NDArray[np.float64]

@@ -59,7 +59,7 @@ def bottle_forces(world: World, worker: Worker, dt: float, spring_dt: float, fir
         begin, stop = stepped_run(world.riding, first, end, run)
         sum_pair_forces(world.pairs, world.slots, world.load, _moments(world.spin), begin, stop)
         sum_pair_parts(world.pairs, world.slots, world.ledger, begin, stop)
-    # Bottles in unit lists never ride, so the loop over runs is not needed here.
+    # Bottles listed near rails or belt edges never ride, so no loop over runs is needed.
     add_rail_forces(world, worker.rail_contacts, first, end, spring_dt)
     check_footing(world.bottles, world.belts, world.surface, world.footing, world.ring, first, end)
     for run in range(stepped_runs(world.riding, first)):

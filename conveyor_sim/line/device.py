@@ -120,7 +120,7 @@ class Device:
     def classify(self, kind: str) -> None:
         """Set device name and class in all tags.
 
-        kind: of its part of the scene.
+        kind: kind of the device's part in the scene.
         """
         self._take_tags([replace(tag, device=self._name, device_class=kind) for tag in self._tags])
 

@@ -117,7 +117,7 @@ class Line:
             "alarms": _Part(self._alarms.snapshot, self._alarms.restore),
             "counters": _part("counters", self._counters.memory),
         }
-        self.now.begin_scan()  # because reading states above cached an empty line
+        self.now.begin_scan()  # because reading states above cached bottle counts of an empty line
 
     @property
     def fed(self) -> int:

@@ -116,7 +116,7 @@ def cut_at_mouths(rails: Sequence[RailShape], radius: float) -> list[RailShape]:
 
 
 def _is_narrow(arc: ArcPiece, radius: float) -> bool:
-    """Return True if an axis beyond the centre, as seen from the arc, can be within a radius (m) of both ends."""
+    """Return True if a bottle of this radius (m) can touch both ends from the centre's far side."""
     if is_full_turn(arc.span):
         return False
     return (arc.radius * math.sin(0.5 * arc.span) if arc.span > math.pi else arc.radius) < radius

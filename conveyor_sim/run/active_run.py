@@ -54,7 +54,7 @@ class ActiveRun:
     ) -> None:
         """Open the first run. Raise what `open_session` raises.
 
-        stepped_by: name of the lockstep owner that the run state shows while there is none; empty: none is shown.
+        stepped_by: name that the run state shows as lockstep owner while no request owns the run; empty: none is shown.
         ended: called at the end of each run, when its recording is complete.
         """
         self._open_session = open_session
@@ -116,7 +116,10 @@ class ActiveRun:
             raise Refused(f"run '{owner}' owns the simulation; expected its release, or a reset")
 
     def reset(self) -> None:
-        """Close this run and open the next one at tick 0. Raise ConveyorError if that fails; there is no tick then."""
+        """Close this run and open the next one at tick 0.
+
+        Raise ConveyorError if that fails; the run is then stopped.
+        """
         reason = "the simulation was reset"
         broken_off = self._leave(reason)
         self._before += 1

@@ -1,8 +1,8 @@
 """Lockstep protocol: one owner advances the simulation to absolute ticks, and may repeat a request safely.
 
 A request is complete: it holds its owner, target tick and commands. A repeated request therefore means that its answer
-was lost, and gets the stored answer. A request that does not lead on from the present tick is refused with the reason.
-No rule depends on wall time.
+was lost, and gets the stored answer. A request that does not continue from the present tick is refused, with the
+reason. No rule depends on wall time.
 """
 
 from __future__ import annotations

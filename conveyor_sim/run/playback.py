@@ -61,9 +61,9 @@ class PlayedTopic:
 class Playback:
     """The messages of an open bag by tick: `cue` goes to a tick, `take` then yields tick after tick.
 
-    Some topics are not recorded because others hold their content. Their messages are made from these, and precede
-    them. Commands come from `outcomes`: on `belts/<belt>/cmd_speed` if they were sent there, else on `commands`, even
-    refused ones. `photo_eyes/<eye>` come from `signals`.
+    Some topics are not recorded because others hold their content. Playback derives these messages from the recorded
+    ones and publishes them first. Commands come from `outcomes`: on `belts/<belt>/cmd_speed` if they were sent there,
+    else on `commands`, even refused ones. `photo_eyes/<eye>` come from `signals`.
     """
 
     def __init__(self, bag: Bag, only: Collection[str] | None = None) -> None:

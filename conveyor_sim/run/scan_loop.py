@@ -32,7 +32,7 @@ class AttachedController(Protocol):
     writer: str
     """Name of the writer of its commands."""
     controller: Controller | None = None
-    """Object of this process whose memory belongs into checkpoints; None if there is no such object."""
+    """Controller object of this process, whose memory is stored in checkpoints; None if there is no such object."""
     recorded: RecordedVariables = RecordedVariables(None)
     """Variables that are recorded, and that test conditions can read."""
 
@@ -65,7 +65,7 @@ class LocalController(AttachedController):
     ) -> None:
         """Bind a controller to the tags of the line, and declare its alarms by `give`.
 
-        record: patterns of variables that are recorded, beside those of the controller's own (`RecordedVariables`).
+        record: patterns of recorded variables, in addition to the controller's own patterns (`RecordedVariables`).
         Raises ControlError for a controller that does not fit the line, and for a pattern that fits no variable.
         """
         image = simulation.process_image

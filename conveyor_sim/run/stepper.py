@@ -115,7 +115,7 @@ class Stepper:
         self.run.state = SimulationState.PAUSED
 
     def stop(self) -> None:
-        """Reset, and be STOPPED. Raise ConveyorError if the new run can't be opened."""
+        """Reset the run and set its state to STOPPED. Raise ConveyorError if the new run can't be opened."""
         self.reset()
         self.run.state = SimulationState.STOPPED
 
@@ -187,7 +187,7 @@ class Stepper:
         def done() -> None:
             outcomes = run.reception.take_stored(simulation.tick)
             answer.set_result(LockstepAnswer.of(simulation, self.run_id, outcomes))
-            if request.release and not run.standstill:  # as the next tick begins, if there is to be one
+            if request.release and not run.standstill:  # takes effect at the start of the next tick, if there is one
                 disown(simulation)
 
         run.advance = Advance(request.target_tick, paced=True, done=done, failed=answer.set_exception)
@@ -214,7 +214,7 @@ class Stepper:
 def require_fitting(simulation: Simulation, request: LockstepRequest) -> None:
     """Raise Refused if a request releases devices that the line does not have."""
     modes = simulation.line.modes
-    # A controller releases the same ones in every request.
+    # Controllers repeat the same patterns in every request, so unchanged ones are not checked.
     if list(request.released) != modes.released and (reason := modes.pattern_problem(request.released)):
         raise Refused(f"released: {reason}")
 

@@ -36,9 +36,9 @@ class EngineSettings(NamedTuple):
     error: float
     """Largest error of a step, m/s, for integrators with error control."""
     ahead: float
-    """Steps by which implicit friction looks ahead, minus `at_once`: see `friction.py`."""
+    """Factor of b in implicit friction: B = max(0, ahead b - at_once) (`friction.py`)."""
     at_once: float
-    """Share of v_lim that friction may remove from a slip without looking ahead."""
+    """Part of ahead times b that stays explicit in implicit friction (`friction.py`)."""
     lag: float
     """Steps by which velocities are older than positions, in the slip on belts: 1/2 for leapfrog, else 0."""
 

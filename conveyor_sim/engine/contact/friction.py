@@ -7,11 +7,11 @@ the arctangent.
 Implicit: the force is that of the slip *after* the step, s + b v_lim p(s) = s_0 with b = dt mu N/(m_t v_lim), where
 1/m_t is the slip per unit of impulse. It never reverses the slip, at any step size.
 
-That is semi-implicit Euler. For velocity Verlet and rk4 the same equation is solved with B = max(0, ahead b - at_once)
-in place of b (`integrators.AHEAD`). At rest the force then removes at most 1/ahead of the slip in a step. Velocity
-Verlet, which uses the slip at the end of the step, reverses no slip for 1/ahead up to 2/3, rk4 for 1/ahead up to 1. For
-b up to at_once/ahead, force and order equal those of explicit friction. Beyond, a steady pull of a share f of mu N
-creeps by B f v_lim too fast (semi-implicit Euler: by b f v_lim, at any b).
+This form is used by semi-implicit Euler and leapfrog. For velocity Verlet and rk4 the same equation is solved with B =
+max(0, ahead b - at_once) in place of b (`integrators.AHEAD`). At rest the force then removes at most 1/ahead of the
+slip in a step. Velocity Verlet, which uses the slip at the end of the step, reverses no slip for 1/ahead up to 2/3, rk4
+for 1/ahead up to 1. For b up to at_once/ahead, force and order equal those of explicit friction. For larger b, a
+contact pulled steadily by f mu N creeps too fast by B f v_lim (semi-implicit Euler: by b f v_lim, at any b).
 
 The formulas have no branches and no division by a slip that may be 0, so that loops over them are vectorised.
 """

@@ -187,7 +187,7 @@ def _step(linear: Linear, alpha: float, first: int, end: int) -> None:
 
 @part
 def kick_with_rest(bottles: Bottles, spin: Any, linear: Linear, first: int, end: int) -> None:
-    """Add to the change of bottles first to end the kick of each one's residual."""
+    """Add each bottle's residual impulse, divided by its inertia, to its velocity change."""
     change, left = linear.change, linear.left
     for i in range(uint64(first), uint64(end)):
         change.x[i] += left.x[i] * bottles.inverse_mass[i]

@@ -5,9 +5,9 @@
 If a step resolves the stiffest contact, theta is 1/2, the implicit midpoint rule. Its order is 2 where forces are
 smooth and through friction, and at first touch that of every method: 1 with a dashpot, clamped or not, 2 without, 2.5
 in velocity with Hertz (RMS over 64 phases: 1.00, 1.00, 2.00, 2.52; through friction 2.00). In longer steps theta goes
-to 1, implicit Euler, and the system is solved again about its own solution up to PASSES times, because contacts close
-and open. Impacts within a step are then lost, but packings and queues stay stable and press with the right forces, at
-any step.
+to 1, implicit Euler, and the system is linearised at its solution and solved again, up to PASSES times, because
+contacts close and open. Impacts within a step are then lost, but packings and queues stay stable and press with the
+right forces, at any step.
 
 A system is solved by conjugate gradients (`conjugate_gradients.py`).
 """

@@ -1,4 +1,4 @@
-"""One contact in the linearly implicit method: its force ahead, and its resistance to a change of velocity.
+"""One contact in the linearly implicit method: force at the predicted state, resistance to a change of velocity.
 
 A step of h from (r, v) changes v by dv and takes forces at r + theta h (v + theta dv) and v + theta dv, linear in dv:
     (M + theta^2 h^2 K + theta h C) dv = h F(r + theta h v, v)

@@ -93,7 +93,7 @@ def _turn(turn: Any, i: int) -> float:
 def add_straddling_friction(
     world: World, spin: Any, load: ForceSums, powers: Any, lag: float, first: int, end: int
 ) -> None:
-    """Add the friction on rings that may straddle belts to the load of bottles first to end, which start with a unit.
+    """Add the friction on rings that may straddle belts to the load of bottles first to end; UNIT divides first.
 
     powers: (units, H + 1), W, to which the power taken from each belt is added, or None. lag: s, as in
     `relative_velocity`.

@@ -68,7 +68,7 @@ def check_footing(bottles: Bottles, belts: Any, surface: Any, footing: Any, ring
 def find_carriers(bottles: Bottles, belts: Any, surface: Surface, carriers: Any, carried: Any) -> None:
     """Write the belt under each bottle's axis, and the number of bottles on each belt, (belts,).
 
-    The belts are (slots,), -1 for the floor and free slots. The state does not change.
+    `carriers` holds one belt index per slot; -1 for the floor and free slots. The state does not change.
     """
     floor = surface.ux.size - 1
     for h in range(floor):

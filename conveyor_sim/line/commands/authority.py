@@ -37,7 +37,7 @@ MAY: Mapping[str, Right] = {
     OWN: Right(("controller",), "Takes the line, except devices that match the patterns in texts."),
     DISOWN: Right(("controller",), "Releases ownership."),
     FORCE: Right((*PEOPLE, "test"), "Forces signals to values."),
-    UNFORCE: Right((*PEOPLE, "test"), "Ends forcing of signals, without names of all."),
+    UNFORCE: Right((*PEOPLE, "test"), "Ends forcing of the named signals; of all if no names are given."),
     "acknowledge": Right((*PEOPLE, "test"), "Acknowledges alarms, without names all of them."),
     "reset": Right((*PEOPLE, "test"), "Clears latched alarms, without names all of them."),
     "shelve": Right((*PEOPLE, "test"), "Shelves alarms for a time in seconds (values), or once."),

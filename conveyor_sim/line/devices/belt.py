@@ -16,7 +16,7 @@ from conveyor_sim.scene.geometry import belt_shape
 
 @dataclass
 class Watchdog:
-    """Stop of a belt when no command was accepted for its time-out, in simulated time."""
+    """Watchdog that stops a belt if no command was accepted within its time-out (simulated time)."""
 
     timeout_ticks: int
     last: int = 0

@@ -19,7 +19,7 @@ from conveyor_sim.scene.load import parse_overrides, parse_scene
 from conveyor_sim.scene.schema import Scene
 
 WORTH = 0.8
-"""Largest ratio of steps, and of cost per tick, with and without a remedy for it to be reported."""
+"""Largest ratio, with over without, of steps and cost per tick at which a remedy is reported."""
 
 NAMED = 2
 """Largest number of reported remedies, the cheapest first."""

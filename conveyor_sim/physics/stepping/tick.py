@@ -51,7 +51,7 @@ class Integration:
 
     @property
     def found(self) -> RailContacts:
-        """Scratch of the calling thread."""
+        """Work arrays of the calling thread for rail contacts."""
         return self._pool.group(1)[0].rail_contacts
 
     @property
@@ -79,7 +79,7 @@ class Integration:
         restore(self._memory, memory, "integration")
 
     def put_in(self) -> None:
-        """Note that bottles were placed from outside."""
+        """Note that bottles were placed by an edit or a restore, not by devices."""
         self._memory.put_in = True
 
     def take_tick(self, tick: int, surface_speed: float) -> None:

@@ -107,7 +107,7 @@ class Frames:
             self._wake.notify()
 
     def _renew(self) -> None:
-        """Start again with the messages of the present era, because earlier ones no longer hold."""
+        """Replace collected messages with the newest ones, after a reset or seek."""
         if self._era != (era := self._view.era):
             self._era, self._anew = era, True
             newest = dict(self._view.newest)

@@ -19,7 +19,7 @@ class ServerChild:
         self.pipe, its_pipe = Pipe()
         """Calls and answers."""
         its_frames, self.frames = Pipe(duplex=False)
-        """Frames to it."""
+        """Pipe end that sends frames to the process."""
         with its_pipe, its_frames:
             self.process = start_python(PROCESS, its_frames, its_pipe, name=name)
 

@@ -50,13 +50,13 @@ class LineFrame(NamedTuple):
     states: Mapping[str, bytes]
     """Newest serialized message of each topic but `events`."""
     passed: Sequence[bytes]
-    """Messages of topic `events` as they came; the oldest may be missing."""
+    """Serialized messages of topic `events`, for clients of raw messages; the oldest may be missing."""
     total: int
     """Events so far."""
     events: Sequence[Event]
-    """The newest of them; the oldest may be missing."""
+    """Decoded events since the previous frame; the oldest may be missing."""
     is_new: int
-    """1 if the line has a new state to show; 0: a sign of life."""
+    """1 if the line has a new state; 0 for a heartbeat frame."""
     run: RunState
     lost: str
     owner: str
@@ -92,7 +92,7 @@ class ServerStarted(NamedTuple):
 
 
 class ServerFailed(NamedTuple):
-    """Sent by the process, the last message: the sentence that says why it can't serve."""
+    """Last message of the process: the reason why it can't serve."""
 
     reason: str
 

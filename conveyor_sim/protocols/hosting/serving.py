@@ -51,7 +51,7 @@ class Serving(AbstractContextManager["Serving"]):
     def _host(
         self, kind: ServerKind, place: Any, logins: Logins, say: Callable[[str], object]
     ) -> ServerHost | ThreadHost:
-        """Start one protocol server: the only place that chooses where it runs."""
+        """Start one protocol server. Only this function chooses between process and thread."""
         if not kind.isolated or not isinstance(self._source, LineMirror):
             return ThreadHost(kind, place, self._settings, self._source, logins)
         ready = self._ready.get(kind.name)

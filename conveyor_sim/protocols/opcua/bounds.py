@@ -19,10 +19,10 @@ from conveyor_sim.protocols.server.quotas import share_of_guests
 Codes = ua.StatusCodes
 
 EVENTS_QUEUED = 100
-"""Events that an item queues at least."""
+"""Smallest queue size of a monitored item for events."""
 
 _BASE_SIZE = 8
-"""Assumed bytes of any other value."""
+"""Assumed size of a value that is no text, list or structure, bytes."""
 
 _STRUCTURE_SIZE = 1000
 """Bytes that a structure counts for: about that many bytes of text are encoded in the same time."""

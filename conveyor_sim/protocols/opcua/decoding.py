@@ -27,7 +27,7 @@ _OBJECT = 3
 
 @dataclass
 class Allowance:
-    """Remaining cost that one message may cause."""
+    """Limits on decoding one message, and the steps used so far."""
 
     steps: int
     """Elementary values that may be decoded, `_OBJECT` for each single byte."""

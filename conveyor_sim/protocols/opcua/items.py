@@ -58,7 +58,10 @@ class Items(OpenItems):
         return results
 
     async def datachange_callback(self, handle: int, value: ua.DataValue, error: ua.StatusCode | None = None) -> None:
-        """Queue a value if it has changed enough. The library would copy it first; the server never changes a value."""
+        """Queue a value if it has changed enough.
+
+        Queue a value if it has changed enough, without a copy, because values never change.
+        """
         if error is not None:
             await self.trigger_statuschange(error)
             return

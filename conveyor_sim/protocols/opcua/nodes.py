@@ -92,7 +92,10 @@ class Nodes:
     def property(
         self, name: str, parent: ua.NodeId, value: Any, data_type: int, kind: ua.VariantType, index: int = 0
     ) -> ua.NodeId:
-        """Add a property `name`; the last part is its browse name. index: namespace of that; 0: the standard's."""
+        """Add a property `name`; the last part is its browse name.
+
+        index: namespace index of the browse name; 0: that of the standard.
+        """
         browse = name.rpartition("/")[2]
         variant = ua.Variant(value, kind, is_array=isinstance(value, list))
         attributes = _variable(browse, browse, variant, ua.NodeId(data_type), READ)

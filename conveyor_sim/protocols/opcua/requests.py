@@ -94,7 +94,10 @@ class Requests:
         return [ua.StatusCode(code) for code in codes]
 
     def write_together(self, client: User, names: Sequence[str], values: Sequence[float]) -> int:
-        """Queue commands as one input, all or none. Return a status code, not counted. Each name occurs once."""
+        """Queue commands as one input, all or none.
+
+        Return a status code; the caller counts the request. Each name occurs once.
+        """
         tags = [self._commands[name] for name in names]
         codes = [self._judge_number(client, tag, value) for tag, value in zip(tags, values, strict=True)]
         bad = next((code for code in codes if code != Codes.Good), None)

@@ -40,7 +40,7 @@ class Connection(OpenProtocol):
     guests: Budget
     """Budget of all sessions without a user."""
     turn: asyncio.Lock
-    """Held by the session without a user whose request is next, until it is answered."""
+    """Lock held while a guest's request is answered, so that guests are served one at a time."""
     place: ConnectionSlot | None = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:

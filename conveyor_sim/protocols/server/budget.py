@@ -22,7 +22,7 @@ class Budget:
         return self._level >= 0.0
 
     def delay(self) -> float:
-        """Return the seconds until all units that were used are refilled."""
+        """Return the seconds until the balance is no longer negative."""
         self.spend(0.0)
         return max(0.0, -self._level / self._rate)
 

@@ -24,7 +24,7 @@ session of a user.
 
 @dataclass(frozen=True)
 class Quota:
-    """Places of one protocol server. All are positive integers."""
+    """Limits on the connections of one protocol server. All are positive integers."""
 
     connections: int = 64
     """Connections at once."""
@@ -87,7 +87,7 @@ class ConnectionSlots:
         return len(self._taken)
 
     def take(self, address: str, end: Callable[[], None]) -> ConnectionSlot | None:
-        """Return a place for a connection from an address; None: all are held by clients that keep theirs."""
+        """Return a place for a connection from an address; None: all slots are taken and none may be displaced."""
         own = self._of(address)
         if len(own) >= self._quota.connections_per_address and not self._drop_first(own):
             self.refused += 1

@@ -69,7 +69,7 @@ class HandshakeTagProvider(SteppedTagProvider):
         return ""
 
     def take(self, patience: float) -> tuple[Input, ...] | None:
-        """Wait for a target beyond the present tick and return the inputs for that tick; None after `patience` seconds.
+        """Wait for a target beyond the present tick; return the inputs for the present tick, None after `patience` s.
 
         Called by the stepping thread.
         """

@@ -256,7 +256,7 @@ class LineMirror:
         self._forget(self._run_id)
 
     def show(self, at: float | None = None) -> None:
-        """Publish a snapshot of all updates, unless no signals have come yet. It is no longer marked as lost.
+        """Publish a snapshot of all updates, unless no signals have come yet. The new snapshot has no reason in `lost`.
 
         at: wall time of its tick, s since 1970; None: now.
         """

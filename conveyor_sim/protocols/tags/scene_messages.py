@@ -48,7 +48,7 @@ class ControlRequest(NamedTuple):
 
 
 class TargetRequest(NamedTuple):
-    """Sent to a process in lockstep: the next target, and the inputs that act when the line leaves the previous one."""
+    """Sent to a process in lockstep: the next target, and the inputs to apply at the tick of the previous target."""
 
     target: int
     inputs: Sequence[Input]

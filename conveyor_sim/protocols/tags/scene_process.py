@@ -109,7 +109,10 @@ class Copies:
             self._now[topic] = data
 
     def cut(self, handed: int, waiting: int) -> None:
-        """Release the messages since the last call as one copy. Called by the stepping thread."""
+        """Pass messages stored since the last call to the sending thread as one update.
+
+        Called by the stepping thread.
+        """
         counts, now = (handed, waiting), time.monotonic()
         with self._wake:
             if "line" in self._now:  # another run

@@ -34,7 +34,7 @@ class ElasticLaw:
     """Lower bound of the duration of an undamped head-on impact, s, from k, reduced mass (kg), speed (m/s) and curves.
     """
     coefficient_text: Callable[[Any, Any], str]
-    """Its coefficient in words, after `at` or `on`."""
+    """Coefficient in words, as a phrase that begins with "at" or "on"."""
     none: float = 0.0
     """Value in the column of a contact that has another law."""
 

@@ -86,7 +86,7 @@ class Guard:
         if tick % self._every == 0:
             world.probe.due[0] = 1
         bad, _, _, weight, self._kinetic = self._look(world.bottles, world.spin)
-        # A rail of speed u that pushes a queue works against friction. A hit takes a bottle from v to v + 2 u.
+        # A rail of speed u does work against friction; its impact can raise a bottle's speed to v + 2 u.
         hits = 4.0 * rail_speed**2 * self._mass() if rail_speed > 0.0 else 0.0
         self._work = weight * (self._friction * (surface_speed + rail_speed) + self._noise) + hits
         return Words(model, world).put_in(bad) if bad >= 0 else None
@@ -160,7 +160,7 @@ class Guard:
         return (before, total) if total > GROWTH * before + self._work else None
 
     def _was_deep(self) -> bool:
-        """Return True if overlaps were as deep before the tick, because bottles were placed so; they may part."""
+        """Return True if overlaps exceeded DEEPEST before the tick already; bottles placed so may separate."""
         after, watch = WorldSnapshot(), self._state.world.probe
         bottle, other = watch.bottle.copy(), watch.other.copy()
         after.take(self._state.world)
@@ -182,7 +182,10 @@ class Guard:
         return squeeze_of(self._model, self._state.world, self._found, slot)
 
     def _words_before(self, slot: int = -1) -> Words:
-        """Put back the state at the beginning of the tick, and return its words. slot: the violating bottle."""
+        """Restore the state at the start of the tick; return the `Words` that describe it.
+
+        slot: the violating bottle.
+        """
         after = None if slot < 0 else self._squeeze(slot)
         self._put_back()
         # Once an axis has passed a rail, the rail pushes it further.

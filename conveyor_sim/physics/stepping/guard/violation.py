@@ -43,7 +43,7 @@ class Violation:
 
 
 class Words:
-    """Words for violations of one state, that at the beginning of a tick."""
+    """Builder of violation messages for the state at the beginning of a tick."""
 
     def __init__(self, model: Model, world: World, squeeze: Squeeze | None = None) -> None:
         """Describe a state. squeeze: moving rail that presses on the violating bottle at the end of the tick."""
@@ -121,7 +121,7 @@ class Words:
         return float(moving.vx[q] - moving.turn[q] * dy), float(moving.vy[q] + moving.turn[q] * dx)
 
     def _forced(self, pressed: bool = False) -> str:
-        """Return that a rail without force limit squeezes a bottle, "" without one. pressed: by a lasting force."""
+        """Return a clause on a squeezing rail without force limit, else "". pressed: True for a lasting force."""
         squeeze = self._squeeze
         if squeeze is None or squeeze.force is not None or not (squeeze.held or pressed):
             return ""
