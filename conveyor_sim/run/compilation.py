@@ -22,7 +22,7 @@ from conveyor_sim.engine.compiler.kernel_folder import NotCached, cached_only
 from conveyor_sim.physics.model import Model, build_model
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
-from conveyor_sim.support.child_process import die_with_parent, pipes_of_child, start_python
+from conveyor_sim.support.child_process import die_with_parent, end_with, pipes_of_child, start_python
 from conveyor_sim.support.garbage import collected_later
 
 BASE_SECONDS, EFFECT_SECONDS = 3.0, 0.75
@@ -157,6 +157,7 @@ def main() -> None:
         engine, folder, scene = pipe.recv()
     except EOFError:  # the parent was interrupted before it sent the task
         return
+    end_with(pipe)  # the parent sends nothing more; it may have died before `die_with_parent`
     if engine != ENGINE_HASH:  # the sources have changed in between
         return
     KERNELS.use(folder)

@@ -81,17 +81,17 @@ def test_what_cannot_be_told_is_said() -> None:
     noise = results_of(GRID, 5, lambda point, seed: float(draw.normal()))
     (verdict,) = verdicts(noise)
     assert verdict.startswith("y: ")
-    assert missing(verdict, ["no point", "5 seeds"]) == []
+    assert missing(verdict, ["no two points", "5 seeds"]) == []
     # Two that are told apart, and a third, the highest on average, that scatters too much to be told from either.
     scatter = [-300.0, 500.0, -100.0, 400.0, 100.0]
     wild = results_of(GRID[:3], 5, lambda p, s: scatter[s] if p["x"] == 2.0 else noisy(p, s % 3))
     lowest, highest = verdicts(wild)
     best, others = lowest.split(";", 1)
     assert best == "y: lowest at x 1, kind steel"
-    assert missing(others, ["not", "5 seeds", "x 2, kind steel"]) == []
+    assert missing(others, ["no significant difference", "5 seeds", "x 2, kind steel"]) == []
     best, others = highest.split(";", 1)
     assert best == "y: highest at x 2, kind steel"
-    assert missing(others, ["not", "5 seeds", "x 1, kind steel", "x 1, kind glass"]) == []
+    assert missing(others, ["no significant difference", "5 seeds", "x 1, kind steel", "x 1, kind glass"]) == []
 
 
 def test_what_is_not_compared_is_said() -> None:

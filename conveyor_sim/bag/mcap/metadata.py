@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -95,8 +96,8 @@ def bag_information(topics: Sequence[TopicInfo], files: Sequence[FileInfo], dist
     }
 
 
-class _Dumper(getattr(yaml, "CSafeDumper", yaml.SafeDumper)):  # type: ignore[misc]
-    """libyaml's writer, or PyYAML's own where it was built without libyaml."""
+class _Dumper(yaml.SafeDumper):  # type: ignore[misc]
+    """PyYAML's writer in Python: libyaml's (`CSafeDumper`) can't escape file names that are not UTF-8."""
 
     def ignore_aliases(self, data: Any) -> bool:
         """Return True: a value that occurs twice is written twice, because not every reader knows anchors."""
@@ -112,8 +113,10 @@ def to_yaml(value: Any) -> str:
 def from_yaml(text: str) -> Any:
     """Parse YAML. Return None for text that is not YAML. Callers share the result and must not change it."""
     try:
+        if "\\uDC" in text:  # a file name that is not UTF-8, which libyaml refuses
+            return yaml.load(text, Loader=yaml.SafeLoader)
         return Document(text, FILE_NAME).data
-    except SceneError:
+    except (SceneError, yaml.YAMLError):
         return None
 
 
@@ -154,7 +157,7 @@ def is_stated_in(file: Path) -> bool:
     stated = dedent(text.removeprefix(_HEAD)).encode()
     with file.open("rb") as stream:
         stream.seek(-min(len(stated) + _BEHIND, file.stat().st_size), SEEK_END)
-        alone = rb"\nrelative_file_paths:\n *- %b\nfiles:\n" % re.escape(file.name.encode())
+        alone = rb"\nrelative_file_paths:\n *- %b\nfiles:\n" % re.escape(os.fsencode(file.name))
         return re.search(alone, stated) is not None and stated in stream.read()
 
 

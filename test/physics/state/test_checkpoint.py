@@ -417,7 +417,7 @@ def test_a_header_with_odd_fields_is_refused(saved: Path, tmp_path: Path, change
         (("line", "bad"), ["one"], "line.bad[0] is not of its type"),
         (("line", "pending"), [["plc", "plc", "test", "set", ["a"]]], "line.pending[0][5] is missing"),
         (("line", "read_back", "values"), ["a"], "line.read_back.values[0] is not of its type"),
-        (("line", "read_back", "writers"), [], "line.read_back has other commands than the 4 of the scene"),
+        (("line", "read_back", "writers"), [], "line.read_back has another number of commands than the 4 of the scene"),
         (("line", "read_back", "since"), [0, 11, 0, 0], "line.read_back.since is not from 0 to 10"),
         (("line", "devices", "belts/feeder", "watchdog"), None, "watchdog has other entries than timeout_ticks"),
         (("line", "devices", "infeeds/packed", "due"), math.inf, "packed.due is not finite"),
