@@ -64,7 +64,7 @@ def served(command: Callable[..., Served], folder: Path, face: str, bag: str) ->
     plc = [sys.executable, str(PLC), str(SCANS)]
     subprocess.run(plc, env={**os.environ, **environment}, check=True, timeout=5 * PATIENCE)
     assert f"served up to {seconds} s; {face} " in line.end()
-    assert "in lockstep: the line stands until a client writes run/target_tick" in line.told
+    assert "in lockstep: simulated time advances only when a client writes run/target_tick" in line.told
 
 
 @pytest.mark.parametrize("face", ["modbus", "opcua"])
