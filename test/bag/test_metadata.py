@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from ruamel.yaml import YAML
 
-from conveyor_sim.bag.mcap.metadata import FILE_NAME, is_stated_in, read_metadata, to_yaml, write_metadata
+from conveyor_sim.bag.mcap.metadata import FILE_NAME, from_yaml, is_stated_in, read_metadata, to_yaml, write_metadata
 from conveyor_sim.bag.messages.qos import LATCHED
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recorder import Recorder
@@ -68,3 +68,13 @@ def test_a_changed_one_is_parsed(tmp_path: Path) -> None:
     write_metadata(file.parent, to_yaml({"relative_file_paths": ["else.mcap"], "files": []}))
     assert not is_stated_in(file)
     assert read_metadata(file.parent) == {"relative_file_paths": ["else.mcap"], "files": []}
+
+
+def test_a_file_name_that_is_not_utf8_is_read_as_it_was_written() -> None:
+    information = {"relative_file_paths": ["\udcff_0.mcap"], "count": 12}
+    assert from_yaml(to_yaml(information)) == information
+
+
+@pytest.mark.parametrize("rest", ["b: 2020-13-45", f"b: {'[' * 5000}", "b: [}"], ids=["date", "nested", "bracket"])
+def test_damaged_text_with_such_a_name_is_no_metadata(rest: str) -> None:
+    assert from_yaml(f'a: "\\uDCFF"\n{rest}\n') is None

@@ -116,7 +116,7 @@ def from_yaml(text: str) -> Any:
         if "\\uDC" in text:  # a file name that is not UTF-8, which libyaml refuses
             return yaml.load(text, Loader=yaml.SafeLoader)
         return Document(text, FILE_NAME).data
-    except (SceneError, yaml.YAMLError):
+    except (SceneError, yaml.YAMLError, ValueError, RecursionError):  # PyYAML raises the last two for odd text
         return None
 
 
