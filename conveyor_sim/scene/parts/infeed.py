@@ -11,7 +11,7 @@ from conveyor_sim.scene.types import Angle, Count, Name, NotNegative, Point, Pos
 from conveyor_sim.scene.words import shown
 
 
-class Infeed(BadBottles, Scattered, Entry):
+class Infeed(Scattered, BadBottles, Entry):
     """A place where bottles enter, one behind the other."""
 
     KIND: ClassVar[str] = "infeed"

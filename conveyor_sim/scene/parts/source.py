@@ -11,7 +11,7 @@ from conveyor_sim.scene.problems import Path, Problem
 from conveyor_sim.scene.types import Angle, Name, NotNegative, Point, quantity
 
 
-class Source(PackmlPart, BadBottles, Scattered, Entry):
+class Source(PackmlPart, Scattered, BadBottles, Entry):
     """A machine upstream, such as a filler. It gives bottles at a rate; without room it is blocked."""
 
     KIND: ClassVar[str] = "source"
