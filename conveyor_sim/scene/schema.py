@@ -15,6 +15,7 @@ from conveyor_sim.scene.belts import Belt
 from conveyor_sim.scene.contacts import Base, Contact
 from conveyor_sim.scene.drives import NamedDrive
 from conveyor_sim.scene.effect_names import EffectName, Forced
+from conveyor_sim.scene.layout.plan import LayoutPlan
 from conveyor_sim.scene.limits import Limits as DamageLimits
 from conveyor_sim.scene.machines import Machine
 from conveyor_sim.scene.part import Part
@@ -285,6 +286,7 @@ class Scene(Part):
     )
 
     _source: Origin = PrivateAttr(default=Origin())
+    _layout: LayoutPlan | None = PrivateAttr(default=None)
 
     @property
     def tick_ns(self) -> int:
@@ -334,6 +336,11 @@ class Scene(Part):
     def streams_by_index(self) -> bool:
         """True if random streams are keyed by places in lists, as in old recordings, and not by names of devices."""
         return self._source.streams_by_index
+
+    @property
+    def layout(self) -> LayoutPlan | None:
+        """Plan of the conveyors that the scene was expanded from; None without conveyors."""
+        return self._layout
 
     @property
     def source_text(self) -> str:
