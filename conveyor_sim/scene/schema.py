@@ -13,6 +13,7 @@ from pydantic import Discriminator, PrivateAttr, Tag
 from conveyor_sim.scene.accuracy import Accuracy
 from conveyor_sim.scene.belts import Belt
 from conveyor_sim.scene.contacts import Base, Contact
+from conveyor_sim.scene.drives import NamedDrive
 from conveyor_sim.scene.effect_names import EffectName, Forced
 from conveyor_sim.scene.layout.plan import LayoutPlan
 from conveyor_sim.scene.limits import Limits as DamageLimits
@@ -218,6 +219,9 @@ class Scene(Part):
     )
     bottle_types: Annotated[dict[Name, BottleType], Len(1), _named("bottle types, at least one")] = quantity(
         "Kinds of bottles."
+    )
+    drives: Annotated[dict[Name, NamedDrive], _named("drives")] = quantity(
+        "Drives that move several belts.", default={}
     )
     belts: Annotated[dict[Name, Belt], _named("belts")] = quantity(
         "Belts. Where they overlap, the last listed carries.", default={}
