@@ -10,8 +10,8 @@ from conveyor_sim.line.devices.region import most_inside
 from conveyor_sim.line.devices.setup import DeviceSetup
 from conveyor_sim.line.process_image import speed_command
 from conveyor_sim.line.tag import Tag, count, number
-from conveyor_sim.scene.belts import CurvedBelt, StraightBelt
-from conveyor_sim.scene.geometry import belt_shape
+from conveyor_sim.scene.belts import Belt
+from conveyor_sim.scene.geometry import shapes_of_belt
 
 
 @dataclass
@@ -49,7 +49,7 @@ class BeltDevice(Device):
     def __init__(
         self,
         name: str,
-        belt: StraightBelt | CurvedBelt,
+        belt: Belt,
         setup: DeviceSetup,
         more: Sequence[Tag] = (),
         backward: bool = False,
@@ -61,7 +61,8 @@ class BeltDevice(Device):
         short_name = name.rpartition("/")[2]
         setpoint, (low, high) = speed_command(short_name), belt.speed_limits
         reach = (low, high, -low, -high) if backward else (low, high)
-        most = most_inside(belt_shape(short_name, belt).outline(), float(setup.model.type_radius.min()))
+        radius = float(setup.model.type_radius.min())
+        most = sum(most_inside(shape.outline(), radius) for shape in shapes_of_belt(short_name, belt))
         super().__init__(
             name,
             [

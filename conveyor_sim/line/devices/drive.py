@@ -10,7 +10,7 @@ from conveyor_sim.line.devices.belt import BeltDevice
 from conveyor_sim.line.devices.edge import RisingEdge
 from conveyor_sim.line.devices.setup import DeviceSetup
 from conveyor_sim.line.tag import MOST_COUNT, count, switch
-from conveyor_sim.scene.belts import CurvedBelt, StraightBelt
+from conveyor_sim.scene.belts import Belt
 from conveyor_sim.scene.drives import Drive
 
 AT_SPEED = 1e-9
@@ -60,7 +60,7 @@ class DriveDevice(BeltDevice):
     A trip ramps it down; it runs again after the fault has ended and `reset` has had a rising edge.
     """
 
-    def __init__(self, name: str, belt: StraightBelt | CurvedBelt, drive: Drive, setup: DeviceSetup) -> None:
+    def __init__(self, name: str, belt: Belt, drive: Drive, setup: DeviceSetup) -> None:
         tags = [
             switch(f"{name}/running", "status", "Commanded to run, and not tripped.", 1.0, "state"),
             switch(
@@ -146,6 +146,6 @@ class DriveDevice(BeltDevice):
         return -setpoint if self.reverse else setpoint
 
 
-def belt_device(name: str, belt: StraightBelt | CurvedBelt, setup: DeviceSetup) -> BeltDevice:
+def belt_device(name: str, belt: Belt, setup: DeviceSetup) -> BeltDevice:
     """Build a belt, with a drive if the part has one."""
     return BeltDevice(name, belt, setup) if belt.drive is None else DriveDevice(name, belt, belt.drive, setup)

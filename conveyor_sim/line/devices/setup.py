@@ -13,6 +13,7 @@ import numpy as np
 from conveyor_sim.line.device import Device
 from conveyor_sim.line.devices.entry import BottleEntry
 from conveyor_sim.physics.model import Model
+from conveyor_sim.scene.geometry import shapes_of_belt
 from conveyor_sim.scene.schema import Scene
 
 JITTER, BAD, CHATTER = "jitter", "bad", "chatter"
@@ -62,10 +63,11 @@ class DeviceSetup:
         return BottleEntry(kind, float(self.model.type_radius[kind]), direction, speed)
 
     def fastest_flow(self, belt: str) -> float:
-        """Return the largest flow of a belt, 1/s: the smallest bottles, touching, in all lanes."""
-        shape = self.scene.belts[belt]
+        """Return the largest flow of a belt, 1/s: the smallest bottles, touching, in all lanes of all surfaces."""
+        part = self.scene.belts[belt]
         diameter = 2.0 * float(self.model.type_radius.min())
-        return max(map(abs, shape.speed_limits)) / diameter * max(1, int(shape.width / diameter))
+        lanes = (shape.ratio * max(1, int(shape.width / diameter)) for shape in shapes_of_belt(belt, part))
+        return max(map(abs, part.speed_limits)) / diameter * sum(lanes)
 
     def random(self, device: str, purpose: str) -> np.random.Generator:
         """Return the random stream of a device for one purpose."""
