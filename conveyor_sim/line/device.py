@@ -28,9 +28,9 @@ class ScanContext:
     length: float
     """Length of a tick, s."""
     setpoints: F8
-    """Commanded belt speeds, (belts,) m/s."""
+    """Commanded speeds of belts, then of named drives, (belts + drives,) m/s."""
     speeds: F8
-    """Belt speeds during a tick, (belts,) m/s; drives set them at the start of the tick."""
+    """Speeds of belts, then of named drives, during a tick, (belts + drives,) m/s; set at the start of the tick."""
     tick: int = 0
     by_hand: bool = False
     """True while a person's command is being applied."""
@@ -49,6 +49,16 @@ class ScanContext:
     def time(self) -> float:
         """Simulated time, s."""
         return self.tick * self.state.model.tick_ns * 1e-9
+
+    @property
+    def belt_setpoints(self) -> F8:
+        """Commanded speeds of belts, (belts,) m/s."""
+        return self.setpoints[: len(self.state.model.belts)]
+
+    @property
+    def belt_speeds(self) -> F8:
+        """Speeds of belts during a tick, (belts,) m/s."""
+        return self.speeds[: len(self.state.model.belts)]
 
     def attribute(self, bottle: int, name: str) -> float:
         """Return an attribute of a bottle, by its id."""
@@ -109,7 +119,7 @@ class ScanContext:
         plant = self.state.model.plant
         if plant.one_surface_per_belt:
             return carried
-        counts = [0] * self.speeds.size
+        counts = [0] * self.belt_speeds.size
         for shape, count in zip(plant.surfaces, carried, strict=True):
             if shape.belt is not None:
                 counts[shape.belt] += count

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from conveyor_sim.scene.driven import belt_speeds
 from conveyor_sim.scene.geometry import (
     ArcPiece,
     BeltShape,
@@ -112,8 +113,8 @@ class Plant:
         The fastest belt or entering bottle against something at rest, or the largest difference between initial
         velocities; plus the fastest moving rail.
         """
-        belts = list(self.scene.belts.values())
-        speeds = [abs(belts[shape.belt].speed) * shape.ratio for shape in self.surfaces if shape.belt is not None]
+        belts = list(belt_speeds(self.scene).values())
+        speeds = [abs(belts[shape.belt]) * shape.ratio for shape in self.surfaces if shape.belt is not None]
         speeds += [giver.heading[1] for _, giver in self.scene.givers()]
         single = (entry.velocity for entry in self.scene.bottles if isinstance(entry, Single))
         speeds.append(math.hypot(*np.ptp(np.array([(0.0, 0.0), *single]), axis=0)))

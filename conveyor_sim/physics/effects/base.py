@@ -9,6 +9,7 @@ from conveyor_sim.physics.plant import Plant
 from conveyor_sim.physics.timestep.bounds import Bound, base_friction_bound, slip_time
 from conveyor_sim.physics.timestep.methods import Share
 from conveyor_sim.physics.timestep.prediction import Term
+from conveyor_sim.scene.driven import belt_speeds
 
 MEETING = 0.2
 """Typical over fastest speed at which bottles meet, measured on the scenes of docs/accuracy.md."""
@@ -82,10 +83,10 @@ def _resting(terms: Terms, dt: float) -> list[Term]:
 
 def _turning(plant: Plant) -> float:
     """Return the largest initial angular velocity of a curved belt, rad/s; 0 without curved belts."""
-    belts = list(plant.scene.belts.values())
+    speeds = list(belt_speeds(plant.scene).values())
     return max(
         (
-            abs(belts[shape.belt].speed) * shape.ratio / shape.centre_radius
+            abs(speeds[shape.belt]) * shape.ratio / shape.centre_radius
             for shape in plant.surfaces
             if shape.kind == "curved" and shape.belt is not None
         ),
