@@ -18,7 +18,7 @@ from conveyor_sim.scene.geometry import shapes_of_belt
 from conveyor_sim.scene.schema import Scene
 
 JITTER, BAD, CHATTER = "jitter", "bad", "chatter"
-"""Purposes of random streams: times and positions of infeeds, bad bottles, chatter of photo-eyes."""
+"""Purposes of random streams: times, places and directions of new bottles, bad bottles, chatter of photo-eyes."""
 
 BRANCHES = {(JITTER, "infeeds"): (), (BAD, "infeeds"): (1,), (BAD, "machines"): (2,), (CHATTER, "photo_eyes"): (3,)}
 """Spawn keys of streams in recordings older than named streams, by purpose and field of the scene. They precede the
