@@ -73,7 +73,7 @@ class _Importer:
         texts: dict[str, list[DrawnText]] = defaultdict(list)
         for text in self._plan.texts:
             if self._rules.names(text.source.layer):
-                texts[text.source.layer.lower()].append(text)
+                texts[text.source.layer].append(text)
             else:
                 self._skip(text.source, _UNNAMED)
         entities: list[Stroke | Symbol] = [*self._plan.strokes, *self._plan.symbols]
@@ -88,8 +88,12 @@ class _Importer:
                 place = self._rules.rules.index(rule)
                 kept: list[Any] = self._symbols[place] if isinstance(entity, Symbol) else self._strokes[place]
                 kept.append(entity)
-        for place, strokes in self._strokes.items():
-            _give_names(strokes, texts[self._rules.rules[place].layer.lower()])
+        layers: dict[str, list[Stroke]] = defaultdict(list)
+        for strokes in self._strokes.values():
+            for stroke in strokes:
+                layers[stroke.source.layer].append(stroke)
+        for layer, strokes in layers.items():
+            _give_names(strokes, texts[layer])
 
     def _parts(self, rule: Rule, strokes: list[Stroke], symbols: list[Symbol]) -> None:
         shape = rule.target.shape

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any, Final, Literal
 
@@ -17,7 +18,7 @@ from conveyor_sim.support.files import FileError, read_file
 _MOST_BYTES = 1_000_000
 
 Shape = Literal["path", "belt", "rail", "line", "region", "place", "none"]
-"""What a kind is drawn as. line: from one point to another; region: a closed polyline; place: a point or a block."""
+"""Shape of a kind in a plan. line: from one point to another; region: a closed polyline; place: a point or a block."""
 
 
 @dataclass(frozen=True)
@@ -90,9 +91,10 @@ class LayerMap:
     def of(self, layer: str, block: str = "") -> Rule | None:
         """Return the rule of an entity; None without one. block: name of its block; "": it is no block.
 
-        Names of layers and blocks are compared without regard to case, as in DXF.
+        Names of layers and blocks are compared without regard to case, as in DXF. A name with * or ? is a pattern;
+        rules without come first.
         """
-        of_layer = [rule for rule in self.rules if rule.layer.lower() == layer.lower()]
+        of_layer = self._of_layer(layer)
         own = (rule for rule in of_layer if rule.block and rule.block.lower() == block.lower())
         general = (rule for rule in of_layer if not rule.block)
         return next(own, None) or next(general, None)
@@ -104,11 +106,15 @@ class LayerMap:
 
     def names(self, layer: str) -> bool:
         """Return True if the map names a layer."""
-        return any(rule.layer.lower() == layer.lower() for rule in self.rules)
+        return bool(self._of_layer(layer))
 
     def blocks_of(self, layer: str) -> list[str]:
         """Return the names of the blocks that rules of a layer expect."""
-        return [rule.block for rule in self.rules if rule.layer.lower() == layer.lower() and rule.block]
+        return [rule.block for rule in self._of_layer(layer) if rule.block]
+
+    def _of_layer(self, layer: str) -> list[Rule]:
+        exact = [rule for rule in self.rules if rule.layer.lower() == layer.lower()]
+        return exact or [rule for rule in self.rules if fnmatchcase(layer.lower(), rule.layer.lower())]
 
 
 def read_map(path: Path) -> LayerMap:

@@ -83,8 +83,8 @@ def plan_of(scene: Scene) -> list[DrawnShape]:
 
 
 def _belts(scene: Scene) -> Iterator[DrawnShape]:
-    conveyors = getattr(getattr(scene, "layout", None), "conveyors", {})
-    laid_out = {belt for conveyor in conveyors.values() for belt in conveyor.belts}
+    conveyors = scene.layout.conveyors if scene.layout is not None else {}
+    laid_out = {belt for conveyor in conveyors.values() for belt in (*conveyor.belts, *conveyor.surfaces)}
     yield from (_conveyor(conveyor) for conveyor in conveyors.values())
     yield from (_belt(shape) for shape in belt_shapes(scene) if shape.name not in laid_out)
 

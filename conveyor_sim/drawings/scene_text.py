@@ -12,8 +12,11 @@ from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.error import YAMLError
 
 from conveyor_sim.errors import ConveyorError
+from conveyor_sim.scene.words import in_yaml
 from conveyor_sim.scene.yaml_lines import LONGEST_TEXT, Document
 from conveyor_sim.support.files import FileError, read_file
+
+_LONGEST_LINE = 114
 
 Sections = Mapping[str, Mapping[str, Mapping[str, Any]]]
 """Parts by section of the scene and by name."""
@@ -32,7 +35,7 @@ def scene_text(sections: Sections, head: str, base: Path | None = None) -> str:
         for name, fields in parts.items():
             if name in present:
                 raise ConveyorError(f"{base}: {section}.{name} is there already, expected a name that the plan lacks")
-            present[name] = _flow(fields)
+            present[name] = _part(name, fields)
     yaml = _yaml()
     stream = io.StringIO()
     yaml.dump(content, stream)
@@ -41,7 +44,8 @@ def scene_text(sections: Sections, head: str, base: Path | None = None) -> str:
 
 def _yaml() -> YAML:
     yaml = YAML()
-    yaml.width = 120
+    yaml.width = 1_000_000  # a line never breaks between a name and its value
+    yaml.brace_single_entry_mapping_in_flow_sequence = True
     yaml.preserve_quotes = True
     return yaml
 
@@ -63,6 +67,13 @@ def _base(base: Path | None) -> Any:
     if not isinstance(content, dict):
         raise ConveyorError(f"{base}: no mapping, expected a scene file")
     return content
+
+
+def _part(name: str, fields: Mapping[str, Any]) -> Any:
+    """Return a part on one line, or with one line for each field if it is long."""
+    if len(name) + len(in_yaml(fields)) <= _LONGEST_LINE:
+        return _flow(fields)
+    return CommentedMap((key, _flow(value)) for key, value in fields.items())
 
 
 def _flow(value: Any) -> Any:
