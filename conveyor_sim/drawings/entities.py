@@ -97,6 +97,10 @@ def read_plan(
     name, scale = metres_per_unit(path, document, unit)
     reader = _Reader(path, document, scale, is_symbol, DrawnPlan(name))
     try:
+        for layout in document.blocks:
+            for insert in layout.query("INSERT"):
+                # LibreCAD writes a height scale of 0, by which nothing can be transformed.
+                insert.dxf.zscale = insert.dxf.get("zscale", 1.0) or 1.0
         for entity in document.modelspace():
             reader.read(entity, None, (), "")
     except (ArithmeticError, ValueError, TypeError, AttributeError, KeyError) as error:
@@ -146,6 +150,9 @@ class _Reader:
             return
         if len(blocks) >= _DEEPEST:
             raise ConveyorError(f"{self._path}: blocks in blocks beyond {_DEEPEST} levels, expected fewer")
+        if not (insert.dxf.get("xscale", 1.0) and insert.dxf.get("yscale", 1.0)):
+            self.plan.skipped.append((source, f"a scale of 0: {block}"))
+            return
         if insert.mcount > MOST_ENTITIES:
             raise ConveyorError(f"{self._path}: a block placed {insert.mcount} times, expected at most {MOST_ENTITIES}")
         for single in insert.multi_insert() if insert.mcount > 1 else [insert]:

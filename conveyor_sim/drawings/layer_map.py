@@ -100,9 +100,14 @@ class LayerMap:
         return next(own, None) or next(general, None)
 
     def is_symbol(self, layer: str, block: str) -> bool:
-        """Return True if a block stands for a device."""
+        """Return True if a block stands for a device.
+
+        Blocks of a layer with rules for blocks are taken apart if no rule names them.
+        """
         rule = self.of(layer, block)
-        return rule is not None and (bool(rule.block) or rule.target.shape in ("line", "region", "place"))
+        if rule is None or rule.block:
+            return rule is not None
+        return rule.target.shape in ("line", "region", "place") and not self.blocks_of(layer)
 
     def names(self, layer: str) -> bool:
         """Return True if the map names a layer."""
