@@ -113,7 +113,6 @@ NotNegativeAngle = Annotated[
     AllowInfNan(False),
     Ge(0),
     Le(math.pi),
-    BeforeValidator(parse_angle),
     Says('an angle from 0 to half a turn, a number or a text like "0.5 deg"'),
     _sound,
 ]
