@@ -17,6 +17,7 @@ from conveyor_sim.drawings.layer_map import LayerMap, Rule
 from conveyor_sim.drawings.numbers import degrees, number, point
 from conveyor_sim.drawings.pieces import DrawnPiece, length_of, nearest
 from conveyor_sim.errors import ConveyorError
+from conveyor_sim.scene.quantities import to_si
 from conveyor_sim.scene.types import TOUCH, XY
 
 _NAMED_WITHIN: Final = 0.5  # m; a text names the nearest curve of its layer within this distance
@@ -273,7 +274,7 @@ def _length(rule: Rule, name: str, value: Any) -> float | None:
     if value is None:
         return None
     try:
-        length = float(value)
+        length = to_si(value, "m") if isinstance(value, str) else float(value)
     except (ValueError, TypeError):
         length = math.nan
     if not 0.0 < length < math.inf:

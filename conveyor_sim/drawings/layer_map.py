@@ -22,7 +22,7 @@ Shape = Literal["path", "belt", "rail", "line", "region", "place", "none"]
 
 
 @dataclass(frozen=True)
-class Target:
+class ImportTarget:
     """Part of a scene that entities become."""
 
     section: str
@@ -34,25 +34,25 @@ class Target:
     """True if a part has a direction at its place."""
 
 
-TARGETS: Final[Mapping[str, Target]] = {
-    "conveyor": Target("conveyors", "path", {}),
-    "belt": Target("belts", "belt", {}),
-    "rail": Target("rails", "rail", {}),
-    "photo_eye": Target("photo_eyes", "line", {}),
-    "counter": Target("counters", "line", {}),
-    "inspection": Target("machines", "line", {"kind": "inspection"}),
-    "gate": Target("gates", "line", {}),
-    "pusher": Target("pushers", "line", {}),
-    "diverter": Target("diverters", "line", {}),
-    "zone": Target("zones", "region", {}),
-    "outfeed": Target("outfeeds", "region", {}),
-    "sink": Target("machines", "region", {"kind": "sink"}),
-    "station": Target("machines", "region", {"kind": "station"}),
-    "reject": Target("machines", "region", {"kind": "reject"}),
-    "infeed": Target("infeeds", "place", {}, has_direction=True),
-    "source": Target("machines", "place", {"kind": "source"}, has_direction=True),
-    "spill": Target("spills", "place", {}),
-    "ignore": Target("", "none", {}),
+TARGETS: Final[Mapping[str, ImportTarget]] = {
+    "conveyor": ImportTarget("conveyors", "path", {}),
+    "belt": ImportTarget("belts", "belt", {}),
+    "rail": ImportTarget("rails", "rail", {}),
+    "photo_eye": ImportTarget("photo_eyes", "line", {}),
+    "counter": ImportTarget("counters", "line", {}),
+    "inspection": ImportTarget("machines", "line", {"kind": "inspection"}),
+    "gate": ImportTarget("gates", "line", {}),
+    "pusher": ImportTarget("pushers", "line", {}),
+    "diverter": ImportTarget("diverters", "line", {}),
+    "zone": ImportTarget("zones", "region", {}),
+    "outfeed": ImportTarget("outfeeds", "region", {}),
+    "sink": ImportTarget("machines", "region", {"kind": "sink"}),
+    "station": ImportTarget("machines", "region", {"kind": "station"}),
+    "reject": ImportTarget("machines", "region", {"kind": "reject"}),
+    "infeed": ImportTarget("infeeds", "place", {}, has_direction=True),
+    "source": ImportTarget("machines", "place", {"kind": "source"}, has_direction=True),
+    "spill": ImportTarget("spills", "place", {}),
+    "ignore": ImportTarget("", "none", {}),
 }
 """Kinds by their names in a map."""
 
@@ -77,7 +77,7 @@ class Rule:
     """File and line, for errors."""
 
     @property
-    def target(self) -> Target:
+    def target(self) -> ImportTarget:
         """Part of a scene that the entities become."""
         return TARGETS[self.kind]
 
