@@ -100,7 +100,7 @@ class ConveyorExpansion:
             place: Path = path if section is None else (*path, "sections", number)
             fields = _fields(raw, {} if section is None else raw["sections"][number])
             laid.sources["belts", belt] = place
-            for name, (value, own) in fields.items():
+            for name, (_, own) in fields.items():
                 laid.sources["belts", belt, name] = (*(place if own else path), name)
             values = {name: value for name, (value, _) in fields.items()}
             if len(surfaces) == 1 and "ratio" not in surfaces[0]:
@@ -126,7 +126,7 @@ def _stretches(conveyor: Conveyor, plan: ConveyorPlan, path: Path) -> Iterator[t
         if section.name in names:
             raise LayoutFault(
                 (*path, "sections", index, "name"),
-                f"{shown(section.name)} given, expected a name that is not used twice",
+                f"{shown(section.name)} given, expected a name that no other section has",
             )
         names.add(section.name)
         end = _end(section, begin, length, index == len(conveyor.sections) - 1, (*path, "sections", index, "to"))

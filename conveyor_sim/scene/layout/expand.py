@@ -8,12 +8,12 @@ from conveyor_sim.scene.layout.conveyors import ConveyorExpansion, LaidConveyor
 from conveyor_sim.scene.layout.faults import LayoutFault
 from conveyor_sim.scene.layout.guides import GuideRail, rails_of_guide
 from conveyor_sim.scene.layout.named import KINDS, NamedParts, numbered
-from conveyor_sim.scene.layout.parts import Conveyor, Layout
+from conveyor_sim.scene.layout.parts import Conveyor, SceneLayout
 from conveyor_sim.scene.layout.plan import LayoutPlan
 from conveyor_sim.scene.part import validated
 from conveyor_sim.scene.problems import Path, Problem
 
-_FIELDS = tuple(Layout.model_fields)
+_FIELDS = tuple(SceneLayout.model_fields)
 
 
 @dataclass
@@ -34,7 +34,7 @@ def expand(data: dict[str, Any]) -> Expansion:
     """Return a scene without layout parts. Data without such parts are returned as they are."""
     if not isinstance(data, Mapping) or not any(name in data for name in _FIELDS):
         return Expansion(data)
-    layout = validated(Layout, {name: data[name] for name in _FIELDS if name in data})
+    layout = validated(SceneLayout, {name: data[name] for name in _FIELDS if name in data})
     if isinstance(layout, tuple):
         return Expansion(data, problems=layout[0], more=layout[1])
     conveyors = ConveyorExpansion(layout.conveyors, data.get("conveyors", {}))
@@ -58,7 +58,7 @@ def expand(data: dict[str, Any]) -> Expansion:
     return Expansion(parts.added_to(data, _FIELDS), plan, parts.sources, problems)
 
 
-def _rails(layout: Layout, plan: LayoutPlan, faults: list[LayoutFault]) -> dict[str, list[GuideRail]]:
+def _rails(layout: SceneLayout, plan: LayoutPlan, faults: list[LayoutFault]) -> dict[str, list[GuideRail]]:
     """Return the rails of each guide. Guides along a conveyor with a fault are left out."""
     rails = {}
     for name, guide in layout.guides.items():

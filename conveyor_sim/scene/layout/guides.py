@@ -129,7 +129,8 @@ def _stretch(guide: ConveyorGuides, first: float, length: float, path: Path) -> 
     if end - begin < _APART:
         field = "from" if guide.to is None and guide.from_ is not None else "to"
         raise LayoutFault(
-            (*path, field), f"the guide begins at {begin:.6g} m and ends at {end:.6g} m, expected a length"
+            (*path, field),
+            f"the guide begins at {begin:.6g} m and ends at {end:.6g} m, expected its end beyond its start",
         )
     return begin, end
 

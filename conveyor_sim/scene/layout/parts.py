@@ -75,7 +75,7 @@ class _Driven(Part):
         "Without a speed command for this long, the conveyor stops. Left out: it keeps its speed.", "s", default=None
     )
     drive: DriveOrName | None = quantity(
-        "What moves it: a drive of its own, or the name of one from `drives`, which then has the speed.", default=None
+        "What moves it: its own drive, or the name of one from `drives`, which then has the speed.", default=None
     )
     ratio: Ratio | None = quantity("Speed over that of the drive that it names. Left out: 1.", "1", default=None)
 
@@ -203,7 +203,7 @@ class Conveyor(_Driven):
     guides: ConveyorGuides | None = quantity("Guides along its path. Left out: none.", default=None)
 
 
-class Layout(Part):
+class SceneLayout(Part):
     """Conveyors and guides of a scene, by name."""
 
     conveyors: Annotated[dict[Name, Conveyor], Holds("a mapping of names to conveyors")] = quantity(
