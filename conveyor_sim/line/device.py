@@ -28,9 +28,9 @@ class ScanContext:
     length: float
     """Length of a tick, s."""
     setpoints: F8
-    """Commanded belt speeds, (belts,) m/s."""
+    """Commanded speeds of belts, then of named drives, (belts + drives,) m/s."""
     speeds: F8
-    """Belt speeds during a tick, (belts,) m/s; drives set them at the start of the tick."""
+    """Speeds of belts, then of named drives, during a tick, (belts + drives,) m/s; set at the start of the tick."""
     tick: int = 0
     by_hand: bool = False
     """True while a person's command is being applied."""
@@ -49,6 +49,16 @@ class ScanContext:
     def time(self) -> float:
         """Simulated time, s."""
         return self.tick * self.state.model.tick_ns * 1e-9
+
+    @property
+    def belt_setpoints(self) -> F8:
+        """Commanded speeds of belts, (belts,) m/s."""
+        return self.setpoints[: len(self.state.model.belts)]
+
+    @property
+    def belt_speeds(self) -> F8:
+        """Speeds of belts during a tick, (belts,) m/s."""
+        return self.speeds[: len(self.state.model.belts)]
 
     def attribute(self, bottle: int, name: str) -> float:
         """Return an attribute of a bottle, by its id."""
@@ -94,7 +104,7 @@ class ScanContext:
             world = self.state.world
             if self._carriers.size != world.bottles.id.size:
                 self._carriers = np.full(world.bottles.id.size, -1, dtype=np.int32)
-                self._carried = np.zeros(self.speeds.size, dtype=np.int32)
+                self._carried = np.zeros(self.belt_speeds.size, dtype=np.int32)
             if world.surface is not None:
                 arguments = world.bottles, world.belts, world.surface, self._carriers, self._carried
                 self._find = self._find or entry(find_carriers, *arguments)

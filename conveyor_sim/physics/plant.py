@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
+from conveyor_sim.scene.driven import belt_speeds
 from conveyor_sim.scene.geometry import (
     ArcPiece,
     BeltShape,
@@ -90,7 +91,7 @@ class Plant:
         The fastest belt or entering bottle against something at rest, or the largest difference between initial
         velocities; plus the fastest moving rail.
         """
-        speeds = [abs(belt.speed) for belt in self.scene.belts.values()]
+        speeds = [abs(speed) for speed in belt_speeds(self.scene).values()]
         speeds += [giver.heading[1] for _, giver in self.scene.givers()]
         single = (entry.velocity for entry in self.scene.bottles if isinstance(entry, Single))
         speeds.append(math.hypot(*np.ptp(np.array([(0.0, 0.0), *single]), axis=0)))

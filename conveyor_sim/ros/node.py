@@ -39,6 +39,7 @@ from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.resources import scene_path
 
 REPORT = 10.0  # s of wall time between two reports on compiling
+LINGER = 0.3  # s of wall time after a request to quit: its answer is lost if the process ends before DDS has sent it
 
 
 class SimNode:
@@ -100,7 +101,7 @@ class SimNode:
         self._reports = node.create_timer(REPORT, self._report, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
         def quit_soon() -> None:
-            executor.create_task(self._on_stop)  # runs after the answer to the request has been sent
+            node.create_timer(LINGER, self._on_stop, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
         self._services = Services(node, executor, waiting_for=lambda: self._compilation.progress, quit_soon=quit_soon)
 

@@ -1,53 +1,81 @@
 """Belts of a scene file: straight ones, and sectors of a ring with their rails."""
 
-from collections.abc import Iterator
-from typing import Annotated, ClassVar, Literal
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Tag
+from pydantic import Discriminator, SerializerFunctionWrapHandler, Tag, model_serializer
 
-from conveyor_sim.scene.drives import Drive
+from conveyor_sim.scene.drives import Drive, SpeedSetpoint
 from conveyor_sim.scene.part import Part, one_of
-from conveyor_sim.scene.parts.device_part import DevicePart, Others
+from conveyor_sim.scene.parts.device_part import Others, name_problems
 from conveyor_sim.scene.problems import Path, Problem
 from conveyor_sim.scene.types import (
     Angle,
     Flag,
-    Limits,
+    Holds,
     Name,
     NotNegative,
-    Number,
     Point,
     Positive,
     Span,
     quantity,
 )
-from conveyor_sim.scene.words import shown
+from conveyor_sim.scene.words import fields_of, shown
 
 
-class _Belt(DevicePart):
+def _drive_tag(data: Any) -> str | None:
+    if isinstance(data, str):
+        return "(name)"
+    return "(mapping)" if isinstance(data, (Mapping, Drive)) else None
+
+
+_Drive = Annotated[
+    Annotated[Drive, Tag("(mapping)")] | Annotated[Name, Tag("(name)")],
+    Discriminator(_drive_tag),
+    Holds(f"{fields_of(Drive)}, or a name from drives"),
+]
+
+_OF_DRIVE = ("speed", "speed_limits", "watchdog")
+"""Fields that belong to the drive if a belt names one."""
+
+
+class _Belt(SpeedSetpoint):
     KIND: ClassVar[str] = "belt"
 
-    speed: Number = quantity("Speed at the start, positive forward.", "m/s", default=0.0)
-    speed_limits: Limits = quantity("Least and greatest speed that a command may ask for.", "m/s", default=(-3.0, 3.0))
     material: Name = quantity("Material, as named in `base`.")
-    watchdog: Positive | None = quantity(
-        "Without a speed command for this long, the belt stops. Left out: it keeps its speed.", "s", default=None
+    drive: _Drive | None = quantity(
+        "What moves it: a drive of its own, or the name of one from `drives`, which then has the speed, the "
+        "speed_limits and the watchdog. Left out: it has the commanded speed from one tick to the next.",
+        default=None,
     )
-    drive: Drive | None = quantity(
-        "What moves it. Left out: it has the commanded speed from one tick to the next.", default=None
-    )
+    ratio: Positive = quantity("Speed of the belt over that of the drive that it names.", "1", default=1.0)
+
+    @property
+    def drive_name(self) -> str | None:
+        """Name of the drive from `drives` that moves it; None without one."""
+        return self.drive if isinstance(self.drive, str) else None
+
+    @model_serializer(mode="wrap")
+    def _without_foreign_fields(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave out the fields that this belt can't have, so that a scene can be read again from its fields."""
+        foreign = ("ratio",) if self.drive_name is None else _OF_DRIVE
+        return {name: value for name, value in handler(self).items() if name not in foreign}
 
     def problems(self, path: Path, others: Others) -> Iterator[Problem]:
-        """Yield a problem for a speed beyond its limits, or limits in the wrong order."""
-        least, greatest = self.speed_limits
-        if least > greatest:
-            text = f"{shown(self.speed_limits)} given, expected the smaller number first (m/s)"
-            yield Problem((*path, "speed_limits"), text)
-        elif not least <= self.speed <= greatest:
-            yield Problem(
-                (*path, "speed"),
-                f"{shown(self.speed)} given, expected a number from {least:g} to {greatest:g} (m/s), the speed_limits",
-            )
+        """Yield problems of speeds and limits, of an unknown drive, and of fields that belong to a drive."""
+        yield from super().problems(path, others)
+        yield from name_problems((*path, "drive"), self.drive_name, "drives", others)
+        if self.drive_name is None:
+            if "ratio" in self.model_fields_set:
+                text = f"{shown(self.ratio)} given, expected it only with the name of a drive from `drives`"
+                yield Problem((*path, "ratio"), text)
+            return
+        for field in _OF_DRIVE:
+            if field in self.model_fields_set:
+                value = getattr(self, field)
+                yield Problem(
+                    (*path, field), f"{shown(value)} given, expected none here: drives.{self.drive_name} has it"
+                )
 
 
 class StraightBelt(_Belt):

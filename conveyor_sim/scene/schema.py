@@ -13,7 +13,9 @@ from pydantic import Discriminator, PrivateAttr, Tag
 from conveyor_sim.scene.accuracy import Accuracy
 from conveyor_sim.scene.belts import Belt
 from conveyor_sim.scene.contacts import Base, Contact
+from conveyor_sim.scene.drives import NamedDrive
 from conveyor_sim.scene.effect_names import EffectName, Forced
+from conveyor_sim.scene.layout.plan import LayoutPlan
 from conveyor_sim.scene.limits import Limits as DamageLimits
 from conveyor_sim.scene.machines import Machine
 from conveyor_sim.scene.part import Part
@@ -218,6 +220,9 @@ class Scene(Part):
     bottle_types: Annotated[dict[Name, BottleType], Len(1), _named("bottle types, at least one")] = quantity(
         "Kinds of bottles."
     )
+    drives: Annotated[dict[Name, NamedDrive], _named("drives")] = quantity(
+        "Drives that move several belts.", default={}
+    )
     belts: Annotated[dict[Name, Belt], _named("belts")] = quantity(
         "Belts. Where they overlap, the last listed carries.", default={}
     )
@@ -281,6 +286,7 @@ class Scene(Part):
     )
 
     _source: Origin = PrivateAttr(default=Origin())
+    _layout: LayoutPlan | None = PrivateAttr(default=None)
 
     @property
     def tick_ns(self) -> int:
@@ -330,6 +336,11 @@ class Scene(Part):
     def streams_by_index(self) -> bool:
         """True if random streams are keyed by places in lists, as in old recordings, and not by names of devices."""
         return self._source.streams_by_index
+
+    @property
+    def layout(self) -> LayoutPlan | None:
+        """Plan of the conveyors that the scene was expanded from; None without conveyors."""
+        return self._layout
 
     @property
     def source_text(self) -> str:

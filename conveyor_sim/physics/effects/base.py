@@ -10,6 +10,7 @@ from conveyor_sim.physics.timestep.bounds import Bound, base_friction_bound, sli
 from conveyor_sim.physics.timestep.methods import Share
 from conveyor_sim.physics.timestep.prediction import Term
 from conveyor_sim.scene.belts import CurvedBelt
+from conveyor_sim.scene.driven import belt_speeds
 from conveyor_sim.scene.schema import Scene
 
 MEETING = 0.2
@@ -84,8 +85,9 @@ def _resting(terms: Terms, dt: float) -> list[Term]:
 
 def _turning(scene: Scene) -> float:
     """Return the largest initial angular velocity of a curved belt, rad/s; 0 without curved belts."""
-    curved = (belt for belt in scene.belts.values() if isinstance(belt, CurvedBelt))
-    return max((abs(belt.speed) / (belt.inner_radius + 0.5 * belt.width) for belt in curved), default=0.0)
+    speeds = belt_speeds(scene)
+    curved = ((speeds[name], belt) for name, belt in scene.belts.items() if isinstance(belt, CurvedBelt))
+    return max((abs(speed) / (belt.inner_radius + 0.5 * belt.width) for speed, belt in curved), default=0.0)
 
 
 def _braked(meeting: Meeting, terms: Terms) -> list[Share]:
