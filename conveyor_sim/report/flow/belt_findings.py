@@ -8,10 +8,11 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from conveyor_sim.report.flow.finding import Finding, at, in_mm
-from conveyor_sim.report.flow.surfaces import NONE, Surface, under
+from conveyor_sim.report.flow.surfaces import NONE, FlowSurface, under
 from conveyor_sim.report.flow.trace import Leg
 from conveyor_sim.scene.geometry import Array
 from conveyor_sim.scene.schema import Scene
+from conveyor_sim.scene.words import some_of
 
 NEXT_TO = (0.005, 0.02, 0.05, 0.1)
 """m beyond the end of a belt at which the next one is looked for."""
@@ -23,7 +24,7 @@ GAP_AHEAD = 0.5
 """m beyond a belt at which the far side of a transfer gap is looked for."""
 
 
-def opposed_belts(surfaces: Sequence[Surface]) -> Iterator[Finding]:
+def opposed_belts(surfaces: Sequence[FlowSurface]) -> Iterator[Finding]:
     """Yield a finding for each belt whose travel opposes that of the belt before or after it."""
     against: dict[int, set[int]] = {index: set() for index in range(len(surfaces))}
     for index in range(len(surfaces)):
@@ -39,7 +40,7 @@ def opposed_belts(surfaces: Sequence[Surface]) -> Iterator[Finding]:
             against[other].discard(fault)
 
 
-def _opposed(surfaces: Sequence[Surface], index: int) -> Iterator[int]:
+def _opposed(surfaces: Sequence[FlowSurface], index: int) -> Iterator[int]:
     """Yield the belts next to both ends of a belt that oppose it."""
     middle = surfaces[index].middle
     for end, before in ((middle[-1], middle[-2]), (middle[0], middle[1])):
@@ -56,24 +57,25 @@ def _opposed(surfaces: Sequence[Surface], index: int) -> Iterator[int]:
             yield other
 
 
-def backward_belts(surfaces: Sequence[Surface]) -> Iterator[Finding]:
+def backward_belts(surfaces: Sequence[FlowSurface]) -> Iterator[Finding]:
     """Yield a note that names the belts with a negative speed."""
     backwards = [surface for surface in surfaces if surface.speed < 0.0]
     if backwards:
-        names = ", ".join(dict.fromkeys(surface.name for surface in backwards))
-        text = f"{names}: negative speed, against the listed direction of travel"
+        names = some_of(dict.fromkeys(surface.name for surface in backwards))
+        text = f"negative speed: {names} run against the listed direction of travel"
         yield Finding((*backwards[0].path, "speed"), text, "note")
 
 
 def watchdogs(scene: Scene) -> Iterator[Finding]:
-    """Yield a finding for each watchdog, which stops its belt in a run without a controller."""
-    for name, belt in scene.belts.items():
-        if belt.watchdog is not None:
-            text = f"stops the belt after {belt.watchdog:g} s in runs without a controller that commands its speed"
-            yield Finding(("belts", name, "watchdog"), text)
+    """Yield a finding for each watchdog, which stops what it watches in a run without a controller."""
+    for field, parts in (("belts", scene.belts), ("drives", scene.drives)):
+        for name, part in parts.items():
+            if part.watchdog is not None:
+                text = f"stops it after {part.watchdog:g} s in runs without a controller that commands its speed"
+                yield Finding((field, name, "watchdog"), text)
 
 
-def transfer_gaps(scene: Scene, surfaces: Sequence[Surface], legs: Sequence[Leg]) -> Iterator[Finding]:
+def transfer_gaps(scene: Scene, surfaces: Sequence[FlowSurface], legs: Sequence[Leg]) -> Iterator[Finding]:
     """Yield a finding for each gap between two belts that is wider than half the base of a bottle that crosses it."""
     seen: set[tuple[int, int]] = set()
     for leg in legs:
@@ -89,7 +91,7 @@ def transfer_gaps(scene: Scene, surfaces: Sequence[Surface], legs: Sequence[Leg]
                 yield Finding(surfaces[second].path, text)
 
 
-def _gaps(surfaces: Sequence[Surface], leg: Leg) -> Iterator[tuple[int, int, float, tuple[float, float]]]:
+def _gaps(surfaces: Sequence[FlowSurface], leg: Leg) -> Iterator[tuple[int, int, float, tuple[float, float]]]:
     """Yield gaps on the way of a bottle: surfaces before and after, width (m), beginning (m)."""
     off = leg.carriers == NONE
     for place in np.flatnonzero(off[1:] & ~off[:-1]) + 1:
@@ -112,7 +114,7 @@ def _gaps(surfaces: Sequence[Surface], leg: Leg) -> Iterator[tuple[int, int, flo
         yield int(leg.carriers[place - 1]), second, gap, (float(before[0]), float(before[1]))
 
 
-def _edge(surfaces: Sequence[Surface], on: Array, off: Array) -> Array:
+def _edge(surfaces: Sequence[FlowSurface], on: Array, off: Array) -> Array:
     """Return the point between a point on the belts and one beside them where the belts end."""
     for _ in range(40):
         middle = 0.5 * (on + off)

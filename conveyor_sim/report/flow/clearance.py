@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from conveyor_sim.report.flow.guides import Guides, left_of
-from conveyor_sim.report.flow.surfaces import NONE, Surface, under
+from conveyor_sim.report.flow.surfaces import NONE, Indices, Mask, FlowSurface, under
 from conveyor_sim.report.flow.trace import Leg
 from conveyor_sim.scene.geometry import Array
 
@@ -36,7 +36,7 @@ class Clearance:
     """(k, 2), m"""
     directions: Array
     """(k, 2), unit vectors along the path."""
-    carriers: np.ndarray
+    carriers: Indices
     """(k,), index of the surface, or NONE."""
     guides: Array
     """(2, k), m from the point to the guide on each side; inf without one."""
@@ -44,22 +44,25 @@ class Clearance:
     """(2, k), m from the point to the edge of all belts side by side."""
 
     @property
-    def guided(self) -> np.ndarray:
+    def guided(self) -> Mask:
         """True where a guide keeps the bottle on the belts, (2, k)."""
-        return self.guides <= self.edges + self.radius
+        guided: Mask = self.guides <= self.edges + self.radius
+        return guided
 
     @property
     def width(self) -> Array:
         """Clear width for the outlines of bottles, (k,), m. Where no guide is, the axis reaches the edge."""
-        return np.where(self.guided, self.guides, self.edges + self.radius).sum(axis=0)
+        width: Array = np.where(self.guided, self.guides, self.edges + self.radius).sum(axis=0)
+        return width
 
     @property
-    def wide(self) -> np.ndarray:
+    def wide(self) -> Mask:
         """True where two rows of bottles fit side by side, (k,)."""
-        return self.width >= TWO_ROWS * self.radius
+        wide: Mask = self.width >= TWO_ROWS * self.radius
+        return wide
 
 
-def clearance(leg: Leg, surfaces: Sequence[Surface], guides: Guides) -> Clearance | None:
+def clearance(leg: Leg, surfaces: Sequence[FlowSurface], guides: Guides) -> Clearance | None:
     """Return the samples of a leg; None for a bottle that has not moved by its radius."""
     ways = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(leg.points, axis=0).T))])
     if ways[-1] < leg.radius:
@@ -69,10 +72,7 @@ def clearance(leg: Leg, surfaces: Sequence[Surface], guides: Guides) -> Clearanc
     ahead = np.minimum(marks + leg.radius, ways[-1])
     behind = np.maximum(marks - leg.radius, 0.0)
     along = np.column_stack(
-        [
-            np.interp(ahead, ways, leg.points[:, axis]) - np.interp(behind, ways, leg.points[:, axis])
-            for axis in (0, 1)
-        ]
+        [np.interp(ahead, ways, leg.points[:, axis]) - np.interp(behind, ways, leg.points[:, axis]) for axis in (0, 1)]
     )
     directions = along / np.maximum(np.hypot(*along.T), 1e-12)[:, None]
     left = left_of(directions)
@@ -88,7 +88,7 @@ def clearance(leg: Leg, surfaces: Sequence[Surface], guides: Guides) -> Clearanc
     )
 
 
-def _edges(points: Array, directions: Array, surfaces: Sequence[Surface], radius: float) -> Array:
+def _edges(points: Array, directions: Array, surfaces: Sequence[FlowSurface], radius: float) -> Array:
     """Return the distance (k,) from points along directions to the edge of the belts side by side, to half a radius."""
     reach = min(WIDEST, max((surface.shape.width for surface in surfaces), default=0.0) * 2.0)
     offsets = np.arange(0.0, reach + radius, SPACING * radius)

@@ -8,10 +8,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from conveyor_sim.report.flow.finding import Finding, at
-from conveyor_sim.report.flow.surfaces import NONE, Surface, under
+from conveyor_sim.report.flow.surfaces import NONE, FlowSurface, under
 from conveyor_sim.report.flow.trace import Leg
 from conveyor_sim.scene.geometry import Array
-from conveyor_sim.scene.moving import moving_shape, movers_of
+from conveyor_sim.scene.moving import movers_of, moving_shape
 from conveyor_sim.scene.parts.counter import Counter
 from conveyor_sim.scene.parts.device_part import Exit, Giver
 from conveyor_sim.scene.parts.inspection import Inspection
@@ -29,7 +29,7 @@ OPPOSED = -0.5
 """Largest cosine between a bottle's first direction and that of its belt at which they oppose each other."""
 
 
-def devices_beside(scene: Scene, surfaces: Sequence[Surface]) -> Iterator[Finding]:
+def devices_beside(scene: Scene, surfaces: Sequence[FlowSurface]) -> Iterator[Finding]:
     """Yield a finding for each device that stands on no belt. Scenes without belts have none."""
     if not surfaces:
         return
@@ -40,15 +40,15 @@ def devices_beside(scene: Scene, surfaces: Sequence[Surface]) -> Iterator[Findin
                 yield Finding(path, f"stands on no belt: none is at {at((middle[0], middle[1]))}")
                 break
     reach = max(kind.radius for kind in scene.bottle_types.values())
-    for path, mover in movers_of(scene):
-        shape = moving_shape(path, mover)
+    for place_of, mover in movers_of(scene):
+        shape = moving_shape(place_of, mover)
         ends = [_line(*shape.at(place).ends) for place in (0.0, 0.5 * shape.stroke, shape.stroke)]
         if not _near(surfaces, np.vstack(ends), reach):
             middle = ends[0].mean(axis=0)
-            yield Finding(path, f"stands beside all belts: none is at {at((middle[0], middle[1]))}")
+            yield Finding(place_of, f"stands beside all belts: none is at {at((middle[0], middle[1]))}")
 
 
-def devices_reversed(scene: Scene, surfaces: Sequence[Surface], legs: Sequence[Leg]) -> Iterator[Finding]:
+def devices_reversed(scene: Scene, surfaces: Sequence[FlowSurface], legs: Sequence[Leg]) -> Iterator[Finding]:
     """Yield a finding for each counter, inspection and entry against the direction of travel."""
     for path, part in scene.devices():
         if isinstance(part, (Counter, Inspection)):
@@ -61,7 +61,7 @@ def devices_reversed(scene: Scene, surfaces: Sequence[Surface], legs: Sequence[L
             yield from _entry_reversed(path, part, surfaces)
 
 
-def _entry_reversed(path: Path, part: Giver, surfaces: Sequence[Surface]) -> Iterator[Finding]:
+def _entry_reversed(path: Path, part: Giver, surfaces: Sequence[FlowSurface]) -> Iterator[Finding]:
     place = np.array([part.position])
     carrier = int(under(surfaces, place)[0])
     if carrier == NONE:
@@ -71,7 +71,7 @@ def _entry_reversed(path: Path, part: Giver, surfaces: Sequence[Surface]) -> Ite
         yield Finding((*path, "direction"), f"against the direction of travel of {surfaces[carrier].name}")
 
 
-def _travel(start: XY, end: XY, surfaces: Sequence[Surface], legs: Sequence[Leg]) -> Array | None:
+def _travel(start: XY, end: XY, surfaces: Sequence[FlowSurface], legs: Sequence[Leg]) -> Array | None:
     """Return the direction in which bottles cross a line: of the first leg that does, else of the belt below."""
     for leg in legs:
         crossing = _crossing(leg.points, np.array(start), np.array(end))
@@ -122,7 +122,7 @@ def _area(region: Sequence[XY]) -> Array:
     return np.vstack([*sides, grid[inside(grid, corners)]])
 
 
-def _near(surfaces: Sequence[Surface], points: Array, reach: float) -> bool:
+def _near(surfaces: Sequence[FlowSurface], points: Array, reach: float) -> bool:
     """Return True if a belt is at points (k, 2), or within reach of one."""
     turns = np.linspace(0.0, 2.0 * math.pi, 9)[:-1]
     around = reach * np.column_stack([np.cos(turns), np.sin(turns)])

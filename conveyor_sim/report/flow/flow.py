@@ -11,35 +11,34 @@ from conveyor_sim.report.flow.exit_findings import perfect_columns, unreached_ex
 from conveyor_sim.report.flow.finding import Finding
 from conveyor_sim.report.flow.guide_findings import guide_gaps, narrow_passages
 from conveyor_sim.report.flow.guides import Guides
-from conveyor_sim.report.flow.routes import Route, routes_of
+from conveyor_sim.report.flow.routes import TransitRoute, routes_of
 from conveyor_sim.report.flow.stretches import Bottleneck, Stretch, bottleneck, stretches_of
-from conveyor_sim.report.flow.surfaces import Surface, running, surfaces_of
+from conveyor_sim.report.flow.surfaces import FlowSurface, surfaces_of
 from conveyor_sim.report.flow.trace import trace
 from conveyor_sim.report.flow.trace_scene import guide_pieces
 from conveyor_sim.scene.schema import Scene
 
 
 @dataclass(frozen=True)
-class Flow:
+class LineFlow:
     """Flow of bottles through a scene."""
 
-    surfaces: tuple[Surface, ...]
-    routes: tuple[Route, ...]
+    surfaces: tuple[FlowSurface, ...]
+    routes: tuple[TransitRoute, ...]
     stretches: tuple[Stretch, ...]
     bottleneck: Bottleneck | None
     findings: tuple[Finding, ...]
     """Warnings in order of weight, then notes."""
 
 
-def flow_of(scene: Scene) -> Flow:
+def flow_of(scene: Scene) -> LineFlow:
     """Trace a lone bottle from every entry of a scene, and return routes, capacities and findings."""
     surfaces = surfaces_of(scene)
-    speeds = [running(surface, scene.belts[str(surface.path[1])].speed_limits) for surface in surfaces]
     guides = Guides(guide_pieces(scene))
-    legs = trace(scene, surfaces, speeds)
+    legs = trace(scene, surfaces)
     clearances = [clearance(leg, surfaces, guides) for leg in legs]
     routes = routes_of(scene, legs)
-    stretches = stretches_of(legs, clearances, surfaces, speeds)
+    stretches = stretches_of(legs, clearances, surfaces)
     findings = [
         *unreached_exits(scene, surfaces, routes),
         *opposed_belts(surfaces),
@@ -52,4 +51,4 @@ def flow_of(scene: Scene) -> Flow:
         *watchdogs(scene),
         *backward_belts(surfaces),
     ]
-    return Flow(surfaces, routes, stretches, bottleneck(scene, routes, stretches), tuple(findings))
+    return LineFlow(surfaces, routes, stretches, bottleneck(scene, routes, stretches), tuple(findings))

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 
 import numpy as np
 
 from conveyor_sim.report.flow.clearance import Clearance
 from conveyor_sim.report.flow.finding import Finding, at, in_mm
 from conveyor_sim.report.flow.guides import Guides, left_of
-from conveyor_sim.report.flow.surfaces import NONE, Surface, under
+from conveyor_sim.report.flow.surfaces import NONE, FlowSurface, under
 from conveyor_sim.report.flow.trace import Leg
 from conveyor_sim.scene.geometry import Array, RailShape, rail_shapes
-from conveyor_sim.scene.moving import moving_shape, movers_of
+from conveyor_sim.scene.moving import movers_of, moving_shape
 from conveyor_sim.scene.parts.reject import Reject
 from conveyor_sim.scene.problems import Path
 from conveyor_sim.scene.schema import Scene
@@ -36,7 +37,7 @@ PLAY = 1e-4
 
 def guide_gaps(
     scene: Scene,
-    surfaces: Sequence[Surface],
+    surfaces: Sequence[FlowSurface],
     guides: Guides,
     legs: Sequence[Leg],
     clearances: Sequence[Clearance | None],
@@ -48,7 +49,9 @@ def guide_gaps(
     rails, openings = rail_shapes(scene), _openings(scene)
     seen: list[Array] = []
     for leg, samples in zip(legs, clearances, strict=True):
-        for side in (0, 1) if samples is not None else ():
+        if samples is None:
+            continue
+        for side in (0, 1):
             for first, last in _unguided(samples, side):
                 start = _end_of_guide(samples, side, first - 1, first, guides)
                 end = _end_of_guide(samples, side, last, last - 1, guides)
@@ -57,7 +60,9 @@ def guide_gaps(
                 middle = 0.5 * (start + end)
                 along = float(samples.ways[last] - samples.ways[first - 1])
                 # Ends that are farther apart than along the path belong to a place that widens.
-                if not 2.0 * leg.radius < width < along + 2.0 * leg.radius or any(math.dist(middle, other) < width + leg.radius for other in near):
+                if not 2.0 * leg.radius < width < along + 2.0 * leg.radius or any(
+                    math.dist(middle, other) < width + leg.radius for other in near
+                ):
                     continue
                 seen.append(middle)
                 name = ("right", "left")[side]
@@ -69,7 +74,7 @@ def guide_gaps(
 
 
 def narrow_passages(
-    scene: Scene, surfaces: Sequence[Surface], guides: Guides, legs: Sequence[Leg]
+    scene: Scene, surfaces: Sequence[FlowSurface], guides: Guides, legs: Sequence[Leg]
 ) -> Iterator[Finding]:
     """Yield a finding for each passage in which a bottle stops because it is too narrow."""
     rails = rail_shapes(scene)
@@ -91,12 +96,12 @@ def _unguided(samples: Clearance, side: int) -> Iterator[tuple[int, int]]:
     """Yield first and last + 1 sample of gaps in the guide of a side, where no other belt begins."""
     guided, edges = samples.guided[side], samples.edges[side]
     changes = np.flatnonzero(guided[1:] != guided[:-1]) + 1
-    for first, last in zip(changes[:-1], changes[1:], strict=True):
+    for first, last in pairwise(changes.tolist()):
         if guided[first] or samples.ways[last] - samples.ways[first - 1] > LONGEST_GAP:
             continue
         beside = max(edges[first - 1], edges[last]) + samples.radius
         if edges[first:last].max() <= beside and (samples.carriers[first:last] != NONE).all():
-            yield int(first), int(last)
+            yield first, last
 
 
 def _end_of_guide(samples: Clearance, side: int, guided: int, open_: int, guides: Guides) -> Array:
@@ -112,7 +117,7 @@ def _end_of_guide(samples: Clearance, side: int, guided: int, open_: int, guides
     return end
 
 
-def _narrowest(leg: Leg, surfaces: Sequence[Surface], guides: Guides) -> tuple[float, Array, Array]:
+def _narrowest(leg: Leg, surfaces: Sequence[FlowSurface], guides: Guides) -> tuple[float, Array, Array]:
     """Return the least width (m) between guides ahead of a bottle that has stopped, its place and a point of a guide.
 
     The place follows the middle between the guides.

@@ -12,7 +12,7 @@ from conveyor_sim.scene.schema import Scene
 
 
 @dataclass(frozen=True)
-class Route:
+class TransitRoute:
     """Way of bottles from an entry to its end."""
 
     legs: tuple[Leg, ...]
@@ -45,12 +45,12 @@ class Route:
         return sum(leg.length for leg in self.legs)
 
 
-def routes_of(scene: Scene, legs: Sequence[Leg]) -> tuple[Route, ...]:
+def routes_of(scene: Scene, legs: Sequence[Leg]) -> tuple[TransitRoute, ...]:
     """Return a route from each entry, and from each station that no other route passes."""
     by_start = {leg.start.path: leg for leg in legs}
-    routes, passed = [], set()
-    stations = {("machines", name) for name, part in scene.machines.items() if isinstance(part, Station)}
-    ordered = sorted(legs, key=lambda leg: leg.start.path in stations)
+    routes: list[TransitRoute] = []
+    passed: set[Path] = set()
+    ordered = sorted(legs, key=lambda leg: leg.start.returned)
     for leg in ordered:
         if leg.start.path in passed:
             continue
@@ -61,5 +61,5 @@ def routes_of(scene: Scene, legs: Sequence[Leg]) -> tuple[Route, ...]:
             chain.append(following)
         passed.update(one.start.path for one in chain[1:])
         rates = [scene.machines[str(one.start.path[1])] for one in chain[1:]]
-        routes.append(Route(tuple(chain), sum(1.0 / part.rate for part in rates if isinstance(part, Station))))
+        routes.append(TransitRoute(tuple(chain), sum(1.0 / part.rate for part in rates if isinstance(part, Station))))
     return tuple(routes)

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from conveyor_sim.report.flow.clearance import SPACING, Clearance
-from conveyor_sim.report.flow.routes import Route
-from conveyor_sim.report.flow.surfaces import NONE, Surface
+from conveyor_sim.report.flow.routes import TransitRoute
+from conveyor_sim.report.flow.surfaces import NONE, Indices, Mask, FlowSurface
 from conveyor_sim.report.flow.trace import Leg
 from conveyor_sim.scene.parts.infeed import Infeed
 from conveyor_sim.scene.parts.machine import PackmlPart
@@ -57,20 +58,19 @@ class Bottleneck:
 def stretches_of(
     legs: Sequence[Leg],
     clearances: Sequence[Clearance | None],
-    surfaces: Sequence[Surface],
-    speeds: Sequence[float],
+    surfaces: Sequence[FlowSurface],
 ) -> tuple[Stretch, ...]:
-    """Return the stretches of all legs in order; of equal stretches on several legs the longest."""
+    """Return the stretches of all legs in order. Legs from entries share stretches: the longest stands for all."""
     longest: dict[tuple[str, bool], Stretch] = {}
     for leg, samples in zip(legs, clearances, strict=True):
-        for stretch in _along(leg, samples, surfaces, speeds) if samples is not None else ():
+        for stretch in _along(leg, samples, surfaces) if samples is not None else ():
             key = (stretch.name, stretch.single)
             if key not in longest or stretch.length > longest[key].length:
                 longest[key] = stretch
     return tuple(longest.values())
 
 
-def bottleneck(scene: Scene, routes: Sequence[Route], stretches: Sequence[Stretch]) -> Bottleneck | None:
+def bottleneck(scene: Scene, routes: Sequence[TransitRoute], stretches: Sequence[Stretch]) -> Bottleneck | None:
     """Return the lowest rate of stretches and machines on the way to an exit; None without one."""
     on_the_way = {stop for route in routes for stop in route.stops[1:]}
     limits = [
@@ -95,9 +95,7 @@ def feed_rate(scene: Scene, path: Path) -> float:
     return 0.0
 
 
-def _along(
-    leg: Leg, samples: Clearance, surfaces: Sequence[Surface], speeds: Sequence[float]
-) -> Iterator[Stretch]:
+def _along(leg: Leg, samples: Clearance, surfaces: Sequence[FlowSurface]) -> Iterator[Stretch]:
     spacing = SPACING * leg.radius
     wide = _steady(samples)
     for first, last in _equal(np.column_stack([samples.carriers, wide])):
@@ -106,16 +104,17 @@ def _along(
             continue
         surface, single = surfaces[index], not wide[first]
         length, width = (last - first) * spacing, samples.width[first:last]
-        speed = abs(speeds[index])
+        speed = abs(surface.running)
         if single:
             capacity, rate = length / (2.0 * leg.radius), speed / (2.0 * leg.radius)
         else:
             density = PACKING / (2.0 * math.sqrt(3.0) * leg.radius**2)
             capacity, rate = density * length * float(width.mean()), density * speed * float(width.min())
-        yield Stretch(surface.name, surface.path, length, float(width.mean()), single, capacity, rate)
+        name = f"{surface.name} after {leg.start.path[1]}" if leg.start.returned else surface.name
+        yield Stretch(name, surface.path, length, float(width.mean()), single, capacity, rate)
 
 
-def _steady(samples: Clearance) -> np.ndarray:
+def _steady(samples: Clearance) -> Mask:
     """Return True where two rows fit, without changes over less than SHORTEST on one belt, (k,)."""
     wide = samples.wide.copy()
     for first, last in _equal(np.column_stack([samples.carriers, wide])):
@@ -125,8 +124,8 @@ def _steady(samples: Clearance) -> np.ndarray:
     return wide
 
 
-def _equal(rows: np.ndarray) -> Iterator[tuple[int, int]]:
+def _equal(rows: Indices) -> Iterator[tuple[int, int]]:
     """Yield first and last + 1 of runs of equal rows."""
     changes = np.flatnonzero((rows[1:] != rows[:-1]).any(axis=1)) + 1
     bounds = [0, *changes.tolist(), len(rows)]
-    yield from zip(bounds[:-1], bounds[1:], strict=True)
+    yield from pairwise(bounds)

@@ -14,7 +14,7 @@ from conveyor_sim.line.devices.belt_surfaces import BeltSurfaces
 from conveyor_sim.physics.model import build_model
 from conveyor_sim.physics.state import State
 from conveyor_sim.physics.stepping.tick import Integration
-from conveyor_sim.report.flow.surfaces import NONE, Surface, under
+from conveyor_sim.report.flow.surfaces import NONE, Indices, FlowSurface, running_speeds, under
 from conveyor_sim.report.flow.trace_scene import trace_scene
 from conveyor_sim.scene.geometry import Array, initial_bottles
 from conveyor_sim.scene.parts.outfeed import Outfeed
@@ -49,7 +49,7 @@ End = Literal["exit", "station", "stopped", "off", "circulates", "cap", "failed"
 
 
 @dataclass(frozen=True)
-class Start:
+class Entrance:
     """Start of a leg: place, direction and speed of a bottle."""
 
     path: Path
@@ -59,19 +59,21 @@ class Start:
     """rad"""
     speed: float
     """m/s"""
+    returned: bool = False
+    """True for a bottle that a station returns."""
 
 
 @dataclass(frozen=True, eq=False)
 class Leg:
     """Path of a lone bottle from a start to its end."""
 
-    start: Start
+    start: Entrance
     radius: float
     times: Array
     """(k,), s since the start."""
     points: Array
     """(k, 2), m"""
-    carriers: np.ndarray
+    carriers: Indices
     """(k,), index of the surface under each point, or NONE."""
     end: End
     exit: Path | None = None
@@ -101,34 +103,32 @@ class Leg:
         return int(on[-1]) if on.size else NONE
 
 
-def starts_of(scene: Scene) -> list[Start]:
+def starts_of(scene: Scene) -> list[Entrance]:
     """Return all starts: infeeds, sources and stations, or else the first bottle of each entry of `bottles`."""
     starts = [
-        Start(path, _bottle_of(scene, part), part.position, *part.heading)
+        Entrance(path, _bottle_of(scene, part), part.position, *part.heading, isinstance(part, Station))
         for path, part in scene.givers()
         if not isinstance(part, Spill)
     ]
     return (starts or _initial(scene))[:MOST_LEGS]
 
 
-def trace(scene: Scene, surfaces: Sequence[Surface], speeds: Sequence[float]) -> list[Leg]:
+def trace(scene: Scene, surfaces: Sequence[FlowSurface]) -> list[Leg]:
     """Trace a lone bottle from every start with the engine at draft accuracy.
 
-    speeds: of the surfaces, m/s. The work is limited by MOST_WORK, so that the result does not depend on the machine.
+    The work is limited by MOST_WORK, so that the result does not depend on the machine.
     """
     starts = starts_of(scene)
     if not starts or not surfaces:
         return []
-    return _Tracer(scene, surfaces, speeds, starts).run()
+    return _Tracer(scene, surfaces, starts).run()
 
 
 class _Tracer:
-    def __init__(
-        self, scene: Scene, surfaces: Sequence[Surface], speeds: Sequence[float], starts: Sequence[Start]
-    ) -> None:
+    def __init__(self, scene: Scene, surfaces: Sequence[FlowSurface], starts: Sequence[Entrance]) -> None:
         self._surfaces, self._starts = surfaces, starts
         self._radius = [scene.bottle_types[start.bottle].radius for start in starts]
-        fastest = max([0.1, *map(abs, speeds), *(start.speed for start in starts)])
+        fastest = max([0.1, *(abs(surface.running) for surface in surfaces), *(start.speed for start in starts)])
         # A bottle moves by less than its radius in a tick, and is not lost between two ticks.
         tick = max(0.001, round(0.5 * min(self._radius) / fastest, 3))
         bottles = [
@@ -142,8 +142,8 @@ class _Tracer:
             self._state.add(model.bottle_types.index(kind), x, y, theta, vx, vy, omega)
         self._state.make_lists()
         self._belts = BeltSurfaces(self._state)
-        spare = len(model.plant.belts) - len(surfaces)
-        self._belts.move(np.array([*speeds, *([0.0] * spare)]))
+        speeds = [*running_speeds(scene).values()]
+        self._belts.move(np.array([*speeds, *([0.0] * (len(model.belts) - len(speeds)))]))
         self._integration = Integration(self._state, 1, True)
         self._exits = [(path, part.region) for path, part in scene.exits() if isinstance(part, (Outfeed, Sink))]
         self._stations = [(path, part.region) for path, part in scene.exits() if isinstance(part, Station)]
@@ -204,12 +204,12 @@ class _Tracer:
         first_off = int(on[-1]) + 1 if on.size else 0
         if math.dist(path[min(first_off, len(path) - 1)], path[-1]) > ASTRAY:
             return self._leg(index, path[: first_off + 1], "off")
-        if (place := _closed(path, radius)) is not None:
-            return self._leg(index, path[: place + 1], "circulates")
+        if (closed := _closed(path, radius)) is not None:
+            return self._leg(index, path[: closed + 1], "circulates")
         return None
 
     def _leg(self, index: int, path: Array, end: End, device: Path | None = None, reason: str = "") -> Leg:
-        times = self._tick * np.arange(len(path))
+        times = self._tick * np.arange(len(path), dtype=np.float64)
         carriers = under(self._surfaces, path)
         return Leg(self._starts[index], self._radius[index], times, path, carriers, end, device, reason)
 
@@ -231,7 +231,7 @@ def _closed(path: Array, radius: float) -> int | None:
     return None
 
 
-def _velocity(start: Start) -> XY:
+def _velocity(start: Entrance) -> XY:
     return start.speed * math.cos(start.direction), start.speed * math.sin(start.direction)
 
 
@@ -240,12 +240,12 @@ def _bottle_of(scene: Scene, part: object) -> str:
     return str(getattr(part, "bottle", None) or next(iter(scene.bottle_types)))
 
 
-def _initial(scene: Scene) -> list[Start]:
+def _initial(scene: Scene) -> list[Entrance]:
     """Return the first bottle of each entry of `bottles`."""
     starts, place = [], 0
     bottles = initial_bottles(scene)
     for index, entry in enumerate(scene.bottles):
         kind, x, y, _, vx, vy, _ = bottles[place]
-        starts.append(Start(("bottles", index), kind, (x, y), math.atan2(vy, vx), math.hypot(vx, vy)))
+        starts.append(Entrance(("bottles", index), kind, (x, y), math.atan2(vy, vx), math.hypot(vx, vy)))
         place += entry.grid.rows * entry.grid.columns if isinstance(entry, Grid) else 1
     return starts

@@ -13,7 +13,7 @@ from conveyor_sim.scene.belts import BeltRails, CurvedBelt, StraightBelt
 from conveyor_sim.scene.contacts import Base, Contact, Damping
 from conveyor_sim.scene.geometry import Piece, rail_shapes
 from conveyor_sim.scene.limits import Limits as DamageLimits
-from conveyor_sim.scene.moving import MovingShape, moving_shape, movers_of
+from conveyor_sim.scene.moving import MovingShape, movers_of, moving_shape
 from conveyor_sim.scene.parts.movers import SlidingGate, SwingingGate
 from conveyor_sim.scene.rails import ArcRail, SegmentRail
 from conveyor_sim.scene.schema import Outputs, Scene, Single
@@ -65,7 +65,9 @@ def trace_scene(scene: Scene, bottles: Sequence[Single], tick: float) -> Scene:
     materials = sorted({kind.material for kind in scene.bottle_types.values()})
     lightest = min(kind.mass for kind in scene.bottle_types.values())
     bases = [base.model_copy(update={"tangential": None}) for base in scene.base]
-    devices = {field: {} for field, parts in scene.named().items() if field not in _KEPT and parts}
+    devices: dict[str, dict[str, object]] = {
+        field: {} for field, parts in scene.named().items() if field not in _KEPT and parts
+    }
     return scene.model_copy(
         update={
             **devices,
@@ -88,7 +90,7 @@ def trace_scene(scene: Scene, bottles: Sequence[Single], tick: float) -> Scene:
             "belts": {**scene.belts, f"{_SPARE} straight": straight, f"{_SPARE} curved": curved},
             "rails": {**scene.rails, **rails, f"{_SPARE} arc": arc},
             "bottles": tuple(bottles),
-            "outputs": Outputs.model_construct(**dict.fromkeys(Scene.TOPICS, 0.0)),
+            "outputs": Outputs.model_validate(dict.fromkeys(Scene.TOPICS, 0.0)),
             "limits": DamageLimits.model_construct(),
             "effects": {
                 "bottle_contact": "off",
