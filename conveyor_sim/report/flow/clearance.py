@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from conveyor_sim.report.flow.guides import Guides, left_of
-from conveyor_sim.report.flow.surfaces import NONE, Indices, Mask, FlowSurface, under
+from conveyor_sim.report.flow.surfaces import NONE, FlowSurface, Indices, Mask, under
 from conveyor_sim.report.flow.trace import Leg
 from conveyor_sim.scene.geometry import Array
 

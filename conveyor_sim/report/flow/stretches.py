@@ -11,7 +11,7 @@ import numpy as np
 
 from conveyor_sim.report.flow.clearance import SPACING, Clearance
 from conveyor_sim.report.flow.routes import TransitRoute
-from conveyor_sim.report.flow.surfaces import NONE, Indices, Mask, FlowSurface
+from conveyor_sim.report.flow.surfaces import NONE, FlowSurface, Indices, Mask
 from conveyor_sim.report.flow.trace import Leg
 from conveyor_sim.scene.parts.infeed import Infeed
 from conveyor_sim.scene.parts.machine import PackmlPart

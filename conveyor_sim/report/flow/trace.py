@@ -14,7 +14,7 @@ from conveyor_sim.line.devices.belt_surfaces import BeltSurfaces
 from conveyor_sim.physics.model import build_model
 from conveyor_sim.physics.state import State
 from conveyor_sim.physics.stepping.tick import Integration
-from conveyor_sim.report.flow.surfaces import NONE, Indices, FlowSurface, running_speeds, under
+from conveyor_sim.report.flow.surfaces import NONE, FlowSurface, Indices, running_speeds, under
 from conveyor_sim.report.flow.trace_scene import trace_scene
 from conveyor_sim.scene.geometry import Array, initial_bottles
 from conveyor_sim.scene.parts.outfeed import Outfeed
