@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
-from conveyor_sim.drawings.entities import Source, Stroke
+from conveyor_sim.drawings.entities import EntityRef, Stroke
 from conveyor_sim.drawings.pieces import JOIN, SMOOTH, DrawnPiece, corner, reversed_curve
 from conveyor_sim.scene.types import XY
 
@@ -20,16 +20,16 @@ End = tuple[int, bool]
 class Chain:
     """A curve of one or more strokes."""
 
-    sources: list[Source]
+    sources: list[EntityRef]
     pieces: list[DrawnPiece]
     name: str = ""
     width: float = 0.0
     is_closed: bool = False
-    opposed: tuple[Source, ...] = ()
+    opposed: tuple[EntityRef, ...] = ()
     """Strokes that were drawn against the direction of the chain."""
 
     @property
-    def source(self) -> Source:
+    def source(self) -> EntityRef:
         """First entity of the chain."""
         return self.sources[0]
 

@@ -25,7 +25,7 @@ IsSymbol = Callable[[str, str], bool]
 
 
 @dataclass(frozen=True)
-class Source:
+class EntityRef:
     """Entity of the file that something was read from; of a block, the INSERT that places it."""
 
     entity: str
@@ -37,7 +37,7 @@ class Source:
 class Stroke:
     """A drawn curve."""
 
-    source: Source
+    source: EntityRef
     pieces: tuple[DrawnPiece, ...]
     is_closed: bool = False
     width: float = 0.0
@@ -52,7 +52,7 @@ class Stroke:
 class Symbol:
     """A block that stands for a device, or a point."""
 
-    source: Source
+    source: EntityRef
     block: str
     position: XY
     angle: float
@@ -66,7 +66,7 @@ class Symbol:
 class DrawnText:
     """A text at a place (m)."""
 
-    source: Source
+    source: EntityRef
     text: str
     position: XY
 
@@ -79,7 +79,7 @@ class DrawnPlan:
     strokes: list[Stroke] = field(default_factory=list)
     symbols: list[Symbol] = field(default_factory=list)
     texts: list[DrawnText] = field(default_factory=list)
-    skipped: list[tuple[Source, str]] = field(default_factory=list)
+    skipped: list[tuple[EntityRef, str]] = field(default_factory=list)
     """Entities that can't be used, each with the reason."""
 
 
@@ -114,7 +114,7 @@ class _Reader:
         self._path, self._document, self._scale, self._is_symbol = path, document, scale, is_symbol
         self._count = 0
 
-    def read(self, entity: Any, placed: Source | None, blocks: tuple[str, ...], name: str) -> None:
+    def read(self, entity: Any, placed: EntityRef | None, blocks: tuple[str, ...], name: str) -> None:
         """Read one entity. placed: INSERT that it belongs to. blocks: those it is in. name: attribute of its block."""
         self._count += 1
         if self._count > MOST_ENTITIES:
@@ -122,7 +122,7 @@ class _Reader:
         kind, layer = entity.dxftype(), entity.dxf.get("layer", "0")
         if placed is not None and layer == "0":
             layer = placed.layer  # as CAD programs draw it
-        source = Source(kind, layer, placed.handle if placed is not None else entity.dxf.get("handle") or "?")
+        source = EntityRef(kind, layer, placed.handle if placed is not None else entity.dxf.get("handle") or "?")
         if kind == "INSERT":
             self._insert(entity, source, blocks, name)
         elif kind in ("TEXT", "MTEXT"):
@@ -139,7 +139,7 @@ class _Reader:
                 stroke.name = name
                 self.plan.strokes.append(stroke)
 
-    def _insert(self, insert: Any, source: Source, blocks: tuple[str, ...], name: str) -> None:
+    def _insert(self, insert: Any, source: EntityRef, blocks: tuple[str, ...], name: str) -> None:
         block = insert.dxf.get("name", "")
         if block in blocks:
             raise ConveyorError(f"{self._path}: block {block} contains itself, expected blocks without a cycle")
@@ -164,16 +164,16 @@ class _Reader:
             for entity in self._content(single, source):
                 self.read(entity, source, (*blocks, block), inner)
 
-    def _content(self, insert: Any, source: Source) -> Iterator[Any]:
+    def _content(self, insert: Any, source: EntityRef) -> Iterator[Any]:
         def skip(entity: Any, reason: str) -> None:
-            self.plan.skipped.append((Source(entity.dxftype(), source.layer, source.handle), reason))
+            self.plan.skipped.append((EntityRef(entity.dxftype(), source.layer, source.handle), reason))
 
         for entity in insert.virtual_entities(skipped_entity_callback=skip):
             if entity.dxftype() != "ATTDEF":
                 yield entity
 
     def _symbol(
-        self, insert: Any, source: Source, block: str, blocks: tuple[str, ...], attributes: dict[str, str]
+        self, insert: Any, source: EntityRef, block: str, blocks: tuple[str, ...], attributes: dict[str, str]
     ) -> Symbol:
         """Return a block that stands for a device, with the curves in it."""
         plan = self.plan
@@ -188,7 +188,7 @@ class _Reader:
         at = self._flat(source, insert.ocs(), insert.dxf.insert)
         return Symbol(source, block, at, math.atan2(ahead.y, ahead.x), attributes, strokes)
 
-    def _stroke(self, entity: Any, source: Source) -> Stroke | str:
+    def _stroke(self, entity: Any, source: EntityRef) -> Stroke | str:
         """Return the curve of an entity, or the reason why there is none."""
         kind = entity.dxftype()
         if kind == "LINE":
@@ -208,7 +208,7 @@ class _Reader:
             return self._round(entity, source, ocs, side)
         return self._polyline(entity, source, ocs, side)
 
-    def _round(self, entity: Any, source: Source, ocs: Any, side: float) -> Stroke | str:
+    def _round(self, entity: Any, source: EntityRef, ocs: Any, side: float) -> Stroke | str:
         first, last = (0.0, 360.0) if entity.dxftype() == "CIRCLE" else (entity.dxf.start_angle, entity.dxf.end_angle)
         turn = math.radians((last - first) % 360.0 or 360.0)
         centre, radius = entity.dxf.center, entity.dxf.radius
@@ -224,7 +224,7 @@ class _Reader:
             made.has_direction = False
         return made
 
-    def _polyline(self, entity: Any, source: Source, ocs: Any, side: float) -> Stroke | str:
+    def _polyline(self, entity: Any, source: EntityRef, ocs: Any, side: float) -> Stroke | str:
         if entity.dxftype() == "LWPOLYLINE":
             rows = [(x, y, 0.0, float(bulge), float(width)) for x, y, width, _, bulge in entity.get_points("xyseb")]
             common = entity.dxf.get("const_width", 0.0)
@@ -249,11 +249,11 @@ class _Reader:
             made.width = abs(next(iter(widths))) * self._scale
         return made
 
-    def _made(self, source: Source, pieces: list[DrawnPiece], is_closed: bool = False) -> Stroke | str:
+    def _made(self, source: EntityRef, pieces: list[DrawnPiece], is_closed: bool = False) -> Stroke | str:
         kept = tuple(piece for piece in pieces if piece.chord > TOUCH)
         return Stroke(source, kept, is_closed) if kept else "it has no length"
 
-    def _flat(self, source: Source, ocs: Any, point: Any) -> XY:
+    def _flat(self, source: EntityRef, ocs: Any, point: Any) -> XY:
         """Return a point of the file in m. Raise ConveyorError if it is not finite or too far away."""
         x, y, _ = ocs.to_wcs(point) if ocs is not None else point
         at = float(x) * self._scale, float(y) * self._scale
@@ -262,7 +262,7 @@ class _Reader:
             raise ConveyorError(f"{self._where(source)} {text}; move the plan to the origin of the drawing")
         return at
 
-    def _where(self, source: Source) -> str:
+    def _where(self, source: EntityRef) -> str:
         return f"{self._path}: {source.entity} {source.handle} on layer {source.layer}"
 
 

@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from conveyor_sim.drawings.chains import Chain, joined
 from conveyor_sim.drawings.conveyor_path import path_of
-from conveyor_sim.drawings.entities import DrawnPlan, DrawnText, Source, Stroke, Symbol
+from conveyor_sim.drawings.entities import DrawnPlan, DrawnText, EntityRef, Stroke, Symbol
 from conveyor_sim.drawings.layer_map import LayerMap, Rule
 from conveyor_sim.drawings.numbers import degrees, number, point
 from conveyor_sim.drawings.pieces import DrawnPiece, length_of, nearest
@@ -33,7 +33,7 @@ class Imported:
     """Parts of a scene by section and name, and what the user should know of them."""
 
     sections: dict[str, dict[str, dict[str, Any]]] = field(default_factory=lambda: defaultdict(dict))
-    skipped: list[tuple[Source, str]] = field(default_factory=list)
+    skipped: list[tuple[EntityRef, str]] = field(default_factory=list)
     """Entities that became no part, each with the reason."""
     notes: list[str] = field(default_factory=list)
 
@@ -241,7 +241,7 @@ class _Importer:
         taken.add(name)
         return name
 
-    def _skip(self, source: Source, reason: str) -> None:
+    def _skip(self, source: EntityRef, reason: str) -> None:
         self._result.skipped.append((source, reason))
 
     def _note(self, text: str) -> None:

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 
-from conveyor_sim.drawings.entities import Source
+from conveyor_sim.drawings.entities import EntityRef
 from conveyor_sim.support.printable import printable
 
 _HANDLES = 8
 """Largest number of handles on one line."""
 
 
-def skipped_lines(skipped: Sequence[tuple[Source, str]]) -> Iterator[str]:
+def skipped_lines(skipped: Sequence[tuple[EntityRef, str]]) -> Iterator[str]:
     """Yield one line for each type, layer and reason, with the handles of the entities."""
     groups: dict[tuple[str, str, str], list[str]] = defaultdict(list)
     for source, reason in skipped:
