@@ -81,11 +81,23 @@ def test_mirroring_a_layout_mirrors_its_simulation(layout: Data) -> None:
     np.testing.assert_allclose(other, plain * [1, -1, -1], atol=1e-8)
 
 
-@settings(max_examples=100, deadline=None, derandomize=True, suppress_health_check=SLACK)
+@settings(max_examples=60, deadline=None, derandomize=True, suppress_health_check=SLACK)
 @given(layouts())
-def test_mirroring_twice_gives_the_same_layout(layout: Data) -> None:
-    twice = mirrored(mirrored(layout))
-    assert expanded(**twice).data == expanded(**layout).data
+def test_mirroring_a_layout_mirrors_its_surfaces_and_rails(layout: Data) -> None:
+    plain, other = expanded(**layout), expanded(**mirrored(layout))
+    for name, plan in plain.plan.conveyors.items():
+        for s in np.linspace(0.0, plan.route.length, 7).tolist():
+            (x, y), beside = plan.route.point(s, 0.1), other.plan.conveyors[name].route.point(s, -0.1)
+            assert beside == pytest.approx((x, -y), abs=1e-12)
+            right, left = plan.clear(s)
+            assert other.plan.conveyors[name].clear(s) == pytest.approx((-left, -right), abs=1e-12)
+    swapped = {"left": "right", "right": "left"}
+    for name, rail in plain.data["rails"].items():
+        beside = other.data["rails"]["_".join(swapped.get(word, word) for word in name.split("_"))]
+        points = np.array(rail.get("points", [rail.get("centre")])) * [1, -1]
+        assert np.array(beside.get("points", [beside.get("centre")])) == pytest.approx(points, abs=1e-12)
+        assert [beside.get(key) for key in ("radius", "span")] == [rail.get(key) for key in ("radius", "span")]
+    assert len(plain.data["rails"]) == len(other.data["rails"])
 
 
 @settings(max_examples=100, deadline=None, derandomize=True, suppress_health_check=SLACK)
