@@ -1,6 +1,6 @@
 """Provenance of a scene's data: the file and line that each field of the read scene comes from."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -53,7 +53,7 @@ class Provenance:
         return (*source, *rest)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SourceFile:
     """A file that a scene was read from."""
 
@@ -62,24 +62,37 @@ class SourceFile:
     document: Document
     cell: str = ""
     """Name of the cell that the file was read for."""
+    key: str = ""
+    """Path from the scene's folder."""
 
 
 class Sources:
     """Files of a scene and its overrides: the place of each field of the composed data."""
 
-    def __init__(self, document: Document, name: str, changes: Any = None) -> None:
-        """Start with the scene's own file. changes: overrides."""
-        self.main = SourceFile(name, document)
+    def __init__(self, main: SourceFile, changes: Any = None) -> None:
+        """Start with one file, from which all fields without another origin come. changes: overrides."""
+        self.main = main
         self.changes = changes or {}
         self._origins: dict[Path, tuple[SourceFile, Path]] = {}
+        self._below: dict[Path, list[Path]] = {}
+
+    def empty(self) -> "Sources":
+        """Return the same file and overrides without other origins."""
+        return Sources(self.main, self.changes)
 
     def add(self, path: Path, file: SourceFile, source: Path) -> None:
         """Set the file of a path and of all paths below it, and its path in this file."""
+        if path not in self._origins:
+            for length in (1, 2) if len(path) > 2 else range(1, len(path)):
+                self._below.setdefault(path[:length], []).append(path)
         self._origins[path] = file, source
 
-    def items(self) -> Iterable[tuple[Path, tuple[SourceFile, Path]]]:
-        """Return the origins that differ from the scene's own file, by path."""
-        return self._origins.items()
+    def adopt(self, path: Path, other: "Sources", old: Path) -> None:
+        """Take over the origins of a path of other data, which has one or two parts, and of all paths below it."""
+        if (origin := other.origin_of(old)) != (self.main, path):
+            self.add(path, *origin)
+        for deeper in other._below.get(old, ()):
+            self.add((*path, *deeper[len(old) :]), *other._origins[deeper])
 
     def place_of(self, path: Path) -> Place:
         """Return the place of a field of the composed data, or of the nearest one above it."""

@@ -15,7 +15,7 @@ def test_the_longest_prefix_decides() -> None:
 
 
 def test_a_field_has_the_line_of_its_file() -> None:
-    sources = Sources(Document(SCENE, "plant.yaml"), "plant.yaml", {"conveyors": {"lane": {"speed": 5}}})
+    sources = Sources(SourceFile("plant.yaml", Document(SCENE, "plant.yaml")), {"conveyors": {"lane": {"speed": 5}}})
     cell = SourceFile("cell.yaml", Document(CELL, "cell.yaml"), "block")
     sources.add(("conveyors", "block_a"), cell, ("conveyors", "a"))
     assert str(sources.place_of(("conveyors", "lane", "width"))) == "plant.yaml:3"
