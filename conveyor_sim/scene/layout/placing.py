@@ -1,103 +1,139 @@
-"""Placing of a cell: its coordinates, turned and shifted to where the cell stands in the scene."""
+"""Places of conveyors: by coordinates, at the end of another, or beside it."""
 
 from collections.abc import Iterator, Mapping
-from typing import Any
 
-from conveyor_sim.scene.angles import unit_vector
-from conveyor_sim.scene.layout.fragments import SHARED
+from conveyor_sim.scene.layout.faults import LayoutFault
+from conveyor_sim.scene.layout.frames import PathFrame
+from conveyor_sim.scene.layout.parts import Conveyor
+from conveyor_sim.scene.layout.paths import route_by_moves, route_by_points
+from conveyor_sim.scene.layout.plan import ConveyorPlan, Lane
+from conveyor_sim.scene.layout.routes import Bend, Route
 from conveyor_sim.scene.problems import Path
-from conveyor_sim.scene.quantities import to_si
-from conveyor_sim.scene.types import XY
+from conveyor_sim.scene.types import COORDINATE_LIMIT, TOUCH
+from conveyor_sim.scene.words import listed, shown
 
-POINTS = ("centre", "from", "origin", "position", "start", "to")
-"""Fields that hold a point [x, y]; one number in such a field is a time or a station."""
-POINT_LISTS = ("points", "region")
-"""Fields that hold a list of points."""
-DIRECTIONS = ("angle", "direction", "heading", "start_angle")
-"""Fields that hold a direction in the plan."""
-VECTORS = ("velocity",)
-"""Fields that hold a vector [vx, vy]."""
-RELATIVE = ("diverters", "gates")
-"""Fields of a scene whose parts have an `angle` by which they swing, not a direction."""
-_WITHOUT = ("after", "along", "beside")
-"""Fields of parts that are placed by another part. Their lists of points are not coordinates."""
+_PLACED_BY: Mapping[str, tuple[str, ...]] = {
+    "start": ("heading",),
+    "after": ("back", "gap", "offset", "plate"),
+    "beside": ("side", "from", "gap", "plate"),
+    "points": ("radius",),
+}
+"""Fields that place a conveyor, each with the fields that go with it."""
 
 
-def coordinates(data: Mapping[Any, Any]) -> Iterator[tuple[Path, str, Any]]:
-    """Yield the path, kind ("point", "direction" or "vector") and value of each coordinate of a cell's data."""
-    for field, parts in data.items():
-        if field == SHARED:
-            continue
-        items = parts.items() if isinstance(parts, dict) else enumerate(parts) if isinstance(parts, list) else ()
-        for name, part in items:
-            yield from _of_part((field, name), part)
+def dependency(conveyor: Conveyor) -> str | None:
+    """Return the name of the conveyor that this one is placed by; None if it is placed by coordinates."""
+    return conveyor.after if conveyor.after is not None else conveyor.beside
 
 
-def _of_part(path: Path, part: Any) -> Iterator[tuple[Path, str, Any]]:
-    if not isinstance(part, dict):
-        return
-    placed = any(key in part for key in _WITHOUT)
-    for key, value in part.items():
-        at = (*path, key)
-        if key in POINTS and _is_pair(value):
-            yield at, "point", value
-        elif key in POINT_LISTS and isinstance(value, list) and not placed:
-            yield from (((*at, index), "point", item) for index, item in enumerate(value) if _is_pair(item))
-        elif key in DIRECTIONS and not isinstance(value, (dict, list)):
-            if not (key == "angle" and path[0] in RELATIVE):
-                yield at, "direction", value
-        elif key in VECTORS and _is_pair(value):
-            yield at, "vector", value
-        elif isinstance(value, dict):
-            yield from _of_part(at, value)
-        elif isinstance(value, list):
-            for index, item in enumerate(value):
-                yield from _of_part((*at, index), item)
+def in_order(conveyors: Mapping[str, Conveyor]) -> Iterator[str]:
+    """Yield names so that each follows the one that it is placed by. Those of circles come first."""
+    done: set[str] = set()
+    for first in conveyors:
+        chain: dict[str, None] = {}
+        name: str | None = first
+        while name is not None and name in conveyors and name not in done and name not in chain:
+            chain[name] = None
+            name = dependency(conveyors[name])
+        yield from reversed(chain)
+        done.update(chain)
 
 
-def _is_pair(value: Any) -> bool:
-    return isinstance(value, list) and len(value) == 2 and not any(isinstance(item, (dict, list)) for item in value)
+def circle(name: str, conveyors: Mapping[str, Conveyor]) -> list[str]:
+    """Return the names of a circle of conveyors that are placed by each other, from `name` on; empty without one."""
+    names = {name: None}
+    after = dependency(conveyors[name])
+    while after is not None and after in conveyors and after not in names:
+        names[after] = None
+        after = dependency(conveyors[after])
+    return [*names, name] if after == name else []
 
 
-def placed(data: dict[Any, Any], start: XY, heading: float) -> dict[Any, Any]:
-    """Return the data of a cell whose origin is at `start` (m), turned by `heading` (rad).
-
-    Coordinates that are no quantities stay as they are; they are refused with the other fields of their part.
-    """
-    if start == (0.0, 0.0) and heading == 0.0:
-        return data
-    cos, sin = unit_vector(heading)
-    data = _copied(data)
-    for path, kind, value in list(coordinates(data)):
-        try:
-            if kind == "direction":
-                _set(data, path, si(value, "rad") + heading)
-                continue
-            x, y = (si(item, "m" if kind == "point" else "m/s") for item in value)
-        except ValueError:
-            continue
-        turned = x * cos - y * sin, x * sin + y * cos
-        origin = start if kind == "point" else (0.0, 0.0)
-        _set(data, path, [turned[0] + origin[0], turned[1] + origin[1]])
-    return data
+def lanes_of(conveyor: Conveyor, path: Path) -> tuple[Lane, ...]:
+    """Return the lanes of a conveyor from right to left, both edges equally far from its path. Raise LayoutFault."""
+    if (conveyor.width is None) == (conveyor.lanes is None):
+        if conveyor.width is None:
+            raise LayoutFault((*path, "width"), "missing, expected a number greater than 0 (m), or lanes")
+        raise LayoutFault((*path, "width"), f"{shown(conveyor.width)} given, expected either width or lanes")
+    if conveyor.lanes is None:
+        return (Lane(-0.5 * conveyor.width, conveyor.width, 1.0),) if conveyor.width is not None else ()
+    total = 0.0
+    for lane in conveyor.lanes:
+        total += lane.width
+    lanes, right = [], -0.5 * total
+    for lane in conveyor.lanes:
+        lanes.append(Lane(right, lane.width, lane.ratio))
+        right = lanes[-1].left
+    return tuple(lanes)
 
 
-def si(value: Any, unit: str) -> float:
-    """Return a number in SI units. Raise ValueError."""
-    if isinstance(value, str):
-        return to_si(value, unit)
-    if isinstance(value, (int, float)) and not isinstance(value, bool):
-        return value
-    raise ValueError("expected a number or a quantity with its unit")
+def route_of_conveyor(
+    conveyor: Conveyor, lanes: tuple[Lane, ...], plans: Mapping[str, ConveyorPlan], path: Path
+) -> Route:
+    """Return the path of a conveyor that is placed by coordinates, or by one in `plans`. Raise LayoutFault."""
+    _check_fields(conveyor, path)
+    if conveyor.points is not None:
+        route = route_by_points(conveyor.points, conveyor.radius, path)
+    else:
+        if conveyor.path is None:
+            raise LayoutFault((*path, "path"), "missing, expected a list of pieces, or points with a radius")
+        route = route_by_moves(_start(conveyor, lanes, plans, path), conveyor.path, (*path, "path"))
+    half = 0.5 * (lanes[-1].left - lanes[0].right)
+    for index, piece in enumerate(route.pieces):
+        if isinstance(piece, Bend) and piece.radius < half - TOUCH:
+            field: Path = ("radius",) if conveyor.points is not None else ("path", index, "radius")
+            text = f"{shown(piece.radius)} given, expected at least half the width, {half:.6g} (m)"
+            raise LayoutFault((*path, *field), text)
+    return route
 
 
-def _copied(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _copied(item) for key, item in value.items()}
-    return [_copied(item) for item in value] if isinstance(value, list) else value
+def _check_fields(conveyor: Conveyor, path: Path) -> None:
+    """Raise LayoutFault unless the fields say in exactly one way where a conveyor is."""
+    given = conveyor.model_dump(by_alias=True, exclude_none=True, include={*_FIELDS, "from_"})
+    ways = [field for field in _PLACED_BY if field in given]
+    if len(ways) != 1:
+        text = f"{' and '.join(ways) or 'no place'} given, expected one of {listed(list(_PLACED_BY))}"
+        raise LayoutFault(path, text)
+    for field in given:
+        if field not in (*ways, *_PLACED_BY[ways[0]]):
+            places = [way for way, fields in _PLACED_BY.items() if field in fields]
+            text = f"{shown(given[field])} given, expected it only with {listed(places)}"
+            raise LayoutFault((*path, field), text)
+    if conveyor.points is not None and conveyor.path is not None:
+        raise LayoutFault((*path, "path"), "given with points, expected one of them")
+    if conveyor.beside is not None and conveyor.side is None:
+        raise LayoutFault((*path, "side"), 'missing, expected "left" or "right"')
+    if conveyor.back and conveyor.gap:
+        raise LayoutFault((*path, "gap"), f"{shown(conveyor.gap)} given, expected none with back")
+    if conveyor.plate is not None and not conveyor.gap:
+        raise LayoutFault((*path, "gap"), "missing, expected the length of the gap that the plate fills (m)")
 
 
-def _set(data: Any, path: Path, value: Any) -> None:
-    for key in path[:-1]:
-        data = data[key]
-    data[path[-1]] = value
+_FIELDS = {*_PLACED_BY, *(field for fields in _PLACED_BY.values() for field in fields)}
+
+
+def _start(conveyor: Conveyor, lanes: tuple[Lane, ...], plans: Mapping[str, ConveyorPlan], path: Path) -> PathFrame:
+    if conveyor.start is not None:
+        return PathFrame(*conveyor.start, conveyor.heading or 0.0)
+    way = "after" if conveyor.after is not None else "beside"
+    other = plans[str(dependency(conveyor))]
+    route, gap = other.route, conveyor.gap or 0.0
+    if way == "after":
+        back, offset = conveyor.back or 0.0, conveyor.offset or 0.0
+        if back > route.length:
+            text = f"{shown(back)} given, expected at most the length of {other.name}, {route.length:.6g} (m)"
+            raise LayoutFault((*path, "back"), text)
+        frame = (route.frame(route.length - back) if back else route.end).moved(gap, offset)
+        return _within(frame, (*path, "gap" if gap else "offset"))
+    station = conveyor.from_ or 0.0
+    if station > route.length:
+        text = f"{shown(station)} given, expected at most the length of {other.name}, {route.length:.6g} (m)"
+        raise LayoutFault((*path, "from"), text)
+    left = other.edges[1] + gap - lanes[0].right if conveyor.side == "left" else other.edges[0] - gap - lanes[-1].left
+    return _within(route.frame(station).moved(0.0, left), (*path, "gap"))
+
+
+def _within(frame: PathFrame, path: Path) -> PathFrame:
+    if not max(map(abs, frame.xy)) <= COORDINATE_LIMIT:
+        raise LayoutFault(path, f"leads to {shown(frame.xy)}, expected a place within +-{COORDINATE_LIMIT:.0f} (m)")
+    return frame
