@@ -11,7 +11,7 @@ OUTSIDE = "the option --outside-tables, or the parameter outside_tables of the n
 
 @dataclass
 class Beside:
-    """Place of the files that a scene names."""
+    """FieldPlace of the files that a scene names."""
 
     folder: FilePath | None
     """Folder of the scene, where paths start; None: no file can be read."""

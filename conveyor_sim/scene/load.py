@@ -63,7 +63,7 @@ def parse_scene(
         raise refused(unread, composition.sources.place_of, name)
     reading = Reading(composition, data)
     if reading.expansion.problems:
-        raise refused(reading.expansion.problems, composition.sources.place_of, name)
+        raise refused(reading.expansion.problems, composition.sources.place_of, name, reading.expansion.more)
     scene = validated(Scene, reading.expansion.data)
     if isinstance(scene, tuple):
         raise reading.refused(*scene)

@@ -5,9 +5,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from conveyor_sim.scene.layout.cell_coordinates import coordinates, placed, si
 from conveyor_sim.scene.layout.fragments import SINGLE, Fragment
 from conveyor_sim.scene.layout.naming import Prefix
-from conveyor_sim.scene.layout.cell_coordinates import coordinates, placed, si
 from conveyor_sim.scene.problems import Path
 from conveyor_sim.scene.provenance import Sources
 from conveyor_sim.scene.types import XY

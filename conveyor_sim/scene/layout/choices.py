@@ -18,17 +18,22 @@ def with_choices(fragment: Fragment, changes: Mapping[str, Any], report: Report)
         if not isinstance(entries, dict):
             report(fragment.place_of((field,)), f"{shown(entries)} given, expected a mapping of names to {field}")
             return
+        for name in entries:
+            if not isinstance(name, str):
+                report(fragment.place_of((field, name)), f"{shown(name)} given as a name, expected a text")
     variant = _choice(fragment, changes, "variant", report)
     if variant is not None:
         _lay_variant(fragment, variant, report)
     # A variant may choose a format.
     kind = _choice(fragment, changes, "format", report)
-    for name in fragment.data.get("formats", {}):
-        _check_format(fragment, name, report)
     if kind is not None and isinstance(entry := fragment.data["formats"][kind], dict):
         source = ("formats", kind, "set")
-        _lay_over(fragment, {"parameters": entry.get("set", {})}, report, lambda path: (*source, *path[1:]))
+        if isinstance(values := entry.get("set", {}), dict):
+            known = {name: value for name, value in values.items() if name in _named(fragment.data, "parameters")}
+            _lay_over(fragment, {"parameters": known}, report, lambda path: (*source, *path[1:]))
     _lay_over(fragment, changes, report)
+    for name in fragment.data.get("formats", {}):
+        _check_format(fragment, name, report)
 
 
 def _choice(fragment: Fragment, changes: Mapping[str, Any], field: str, report: Report) -> str | None:

@@ -17,12 +17,13 @@ from conveyor_sim.scene.layout.cells import (
     ports_of,
 )
 from conveyor_sim.scene.layout.choices import set_bottle, with_choices
+from conveyor_sim.scene.layout.expanded_parts import expanded_parts
 from conveyor_sim.scene.layout.files import MOST_NESTED, Files
 from conveyor_sim.scene.layout.fragments import Fragment
 from conveyor_sim.scene.layout.parameters import Scope, scope_of, scoped, unknown, with_value
 from conveyor_sim.scene.overrides import holds, merged
 from conveyor_sim.scene.problems import Path, Problem, dotted
-from conveyor_sim.scene.provenance import Place, SourceFile, Sources
+from conveyor_sim.scene.provenance import FieldPlace, SceneFile, Sources, inside
 from conveyor_sim.scene.quantities import Scoped
 from conveyor_sim.scene.refusal import refused
 from conveyor_sim.scene.words import did_you_mean, shown
@@ -32,6 +33,8 @@ LANGUAGE = ("include", "parameters", "cells", "ports", "variants", "formats", "v
 """Fields of a scene file that a composed scene no longer has."""
 _UNSCOPED = ("parameters", "ports", "variants", "formats", "variant", "format")
 """Fields whose texts do not refer to the parameters of the file, or do so before the others."""
+_FIRST = ("include", "variants", "formats")
+"""Fields whose overrides decide which others there are."""
 _MOST_VALUES = 1_000_000
 """Largest number of values in all cells of a scene."""
 
@@ -55,8 +58,12 @@ def compose(document: Document, name: str, changes: dict[str, Any], beside: Besi
         composer = _Composer(name, changes, beside)
         fragment = composer.scene(document)
         return Composition(fragment.data, fragment.sources, True)
-    data = merged(document.data, changes) if changes else document.data
-    return Composition(data, Sources(SourceFile(name, document), changes))
+    data, sources = document.data, Sources(SceneFile(name, document), changes)
+    if changes:
+        if refusals := [Problem(path, text) for path, text in expanded_parts(data, changes)]:
+            raise refused(refusals, sources.place_of, name)
+        data = merged(data, changes)
+    return Composition(data, sources)
 
 
 def uses_language(data: Any, changes: Mapping[str, Any]) -> bool:
@@ -81,14 +88,14 @@ class _Composer:
         self._name = name
         self._changes = changes
         self._files = Files(beside, name)
-        self._problems: list[tuple[Place, str]] = []
+        self._problems: list[tuple[FieldPlace, str]] = []
         self._size = 0
 
     def scene(self, document: Document) -> Fragment:
         """Return the composed data of a scene. Raise SceneError."""
         fragment = self.chosen(document)
         composed, _ = self._composed(
-            fragment, (self._files.main,), {}, lambda path: fragment.place_of(("parameters", *path))
+            fragment, (self._files.main,), {}, lambda path: self._parameter_place(fragment, path)
         )
         for field in ("format", "formats"):
             if field in fragment.data:
@@ -100,14 +107,17 @@ class _Composer:
 
     def chosen(self, document: Document) -> Fragment:
         """Return the data of a scene with includes, variant, format and overrides. Raise SceneError."""
-        file = SourceFile(self._name, document, key=self._files.main)
-        written = merged(document.data, {key: value for key, value in self._changes.items() if key == "include"})
+        file = SceneFile(self._name, document, key=self._files.main)
+        written = merged(document.data, {key: value for key, value in self._changes.items() if key in _FIRST})
         fragment = self._with_includes(Fragment(Sources(file, self._changes), written), {file.key}, (file.key,))
+        self._raise_problems()
+        for path, text in expanded_parts(fragment.data, self._changes):
+            self._report(fragment.place_of(path), text)
         with_choices(fragment, self._changes, self._report)
         self._raise_problems()
         return fragment
 
-    def _report(self, place: Place, text: str) -> None:
+    def _report(self, place: FieldPlace, text: str) -> None:
         self._problems.append((place, text))
 
     def _raise_problems(self) -> None:
@@ -145,7 +155,7 @@ class _Composer:
 
     def _file(
         self, own: Fragment, at: Path, path: Any, stack: tuple[str, ...], kind: str, cell: str = ""
-    ) -> SourceFile | None:
+    ) -> SceneFile | None:
         """Return a file that a field names; None after a report. stack: files that name each other."""
         place = own.place_of(at)
         if not isinstance(path, str):
@@ -161,15 +171,17 @@ class _Composer:
             self._report(place, f"{shown(path)} given, expected at most {MOST_NESTED} files that name each other")
             return None
         try:
-            return SourceFile(
-                self._files.name(key), self._files.document(key, kind), cell or own.sources.main.cell, key
-            )
+            return SceneFile(self._files.name(key), self._files.document(key, kind), cell or own.sources.main.cell, key)
         except ValueError as error:
             self._report(place, f"{shown(path)} given, {error}")
             return None
 
     def _composed(
-        self, fragment: Fragment, stack: tuple[str, ...], values: Mapping[str, Any], place_of: Callable[[Path], Place]
+        self,
+        fragment: Fragment,
+        stack: tuple[str, ...],
+        values: Mapping[str, Any],
+        place_of: Callable[[Path], FieldPlace],
     ) -> tuple[Fragment, dict[str, Port]]:
         """Return the data of a file with parameters in scope and with its cells, and its ports.
 
@@ -196,6 +208,13 @@ class _Composer:
         except CellFault as fault:
             self._report(fragment.place_of(fault.path), fault.text)
             return result, {}
+
+    def _parameter_place(self, fragment: Fragment, path: Path) -> FieldPlace:
+        """Return the place of a path in `parameters`. A value in place of a default has no field `default`."""
+        at = ("parameters", *path)
+        file, source = fragment.sources.origin_of(at)
+        written = self._changes if holds(self._changes, at) else file.document.data
+        return fragment.place_of(at if inside(written, at if written is self._changes else source) else at[:2])
 
     def _cells(self, own: Fragment, scope: Scope, stack: tuple[str, ...]) -> dict[str, "_Cell | None"]:
         """Return the cells of a file by name; None for invalid ones, which are reported."""
@@ -232,7 +251,7 @@ class _Composer:
             else:
                 values[parameter] = Scoped(value, scope) if isinstance(value, str) else value
 
-        def place_of(path: Path) -> Place:
+        def place_of(path: Path) -> FieldPlace:
             if path and path[0] in values and path[1:] in ((), ("default",)):
                 return own.place_of(("cells", name, "set", path[0]))
             return fragment.place_of(("parameters", *path))
@@ -261,18 +280,12 @@ class _Composer:
         cell = cells.get(name)
         if name in cells and cell is None:
             return value  # reported
-        if cell is None:
-            known = [f"{one.name}.{other}" for one in cells.values() if one is not None for other in one.ports]
-            self._report(own.place_of(path), f"{shown(value)} given, {did_you_mean(value, known)}: ports of cells")
-        elif port not in cell.ports:
-            known = [f"{name}.{one}" for one in cell.ports]
-            self._report(own.place_of(path), f"{shown(value)} given, {did_you_mean(value, known)}: ports of the cell")
-        elif fields[-1] == "after" and cell.ports[port].end == "start":
-            ends = [f"{name}.{one}" for one, other in cell.ports.items() if other.end == "end"]
-            text = f"{shown(value)} given, the start of a conveyor, {did_you_mean(value, ends)}"
-            self._report(own.place_of(path), text)
-        else:
+        ends = ("end",) if fields[-1] == "after" else ("start", "end")
+        if cell is not None and port in cell.ports and cell.ports[port].end in ends:
             return cell.outer_ports[port].conveyor
+        others = [cell] if cell is not None else [one for one in cells.values() if one is not None]
+        known = [f"{one.name}.{name}" for one in others for name, joint in one.ports.items() if joint.end in ends]
+        self._report(own.place_of(path), f"{shown(value)} given, {did_you_mean(value, known)}: ports of cells")
         return value
 
     def _join(self, result: Fragment, own: Fragment, name: str, cell: "_Cell | None") -> None:
@@ -289,7 +302,7 @@ class _Composer:
             for field in part.data:
                 result.join(part, field, self._report)
 
-    def _data_of(self, file: SourceFile) -> dict[Any, Any]:
+    def _data_of(self, file: SceneFile) -> dict[Any, Any]:
         """Return the data of a file, with paths of tables from the scene's folder."""
         data: dict[Any, Any] = file.document.data
         contacts = data.get("contacts")

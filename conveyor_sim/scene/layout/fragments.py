@@ -5,7 +5,7 @@ from typing import Any, get_origin
 
 from conveyor_sim.scene.layout.parameters import names_in
 from conveyor_sim.scene.problems import Path
-from conveyor_sim.scene.provenance import Place, Sources
+from conveyor_sim.scene.provenance import FieldPlace, Sources
 from conveyor_sim.scene.schema import Scene
 
 LISTS = ("contacts", "base", "bottles")
@@ -13,7 +13,9 @@ LISTS = ("contacts", "base", "bottles")
 SHARED = "bottle_types"
 """Named parts without a prefix. Equal ones may be given several times."""
 
-Report = Callable[[Place, str], None]
+_TWICE = "given twice, first at {}, expected one of them"
+
+Report = Callable[[FieldPlace, str], None]
 """Called with the place of a problem, and the words that follow its path."""
 
 
@@ -33,7 +35,7 @@ class Fragment:
         self.data = data
         self._equal: dict[str, set[str]] = {}
 
-    def place_of(self, path: Path) -> Place:
+    def place_of(self, path: Path) -> FieldPlace:
         """Return the place of a field, or of the nearest one above it."""
         return self.sources.place_of(path)
 
@@ -47,6 +49,7 @@ class Fragment:
                 self.sources.adopt((field,), other.sources, (field,))
                 return
             self.data[field] = type(value)()
+            self.sources.add((field,), *other.sources.origin_of((field,)))
         present = self.data[field]
         if field in LISTS and isinstance(present, list) and isinstance(value, list):
             self._extend(other, field, present, value)
@@ -54,7 +57,7 @@ class Fragment:
             for name, part in value.items():
                 self._add(other, field, name, part, report)
         else:
-            report(other.place_of((field,)), f"given twice, first at {self.place_of((field,))}")
+            report(other.place_of((field,)), _TWICE.format(self.place_of((field,))))
 
     def _extend(self, other: "Fragment", field: str, present: list[Any], new: list[Any]) -> None:
         equal = self._equal.setdefault(field, set())
@@ -72,8 +75,9 @@ class Fragment:
             present[name] = part
             self.sources.adopt((field, name), other.sources, (field, name))
         elif field != SHARED or _key(present[name]) != _key(part):
-            another = "another definition" if field == SHARED else "given twice"
-            report(other.place_of((field, name)), f"{another}, first at {self.place_of((field, name))}")
+            first = self.place_of((field, name))
+            text = f"another definition given, expected that of {first}" if field == SHARED else _TWICE.format(first)
+            report(other.place_of((field, name)), text)
 
 
 def _key(value: Any) -> str:
@@ -83,4 +87,5 @@ def _key(value: Any) -> str:
     if isinstance(value, list):
         return "[" + ",".join(map(_key, value)) + "]"
     scope = getattr(value, "scope", {})
-    return repr((str(value), [scope[name] for name in names_in(value) if name in scope])) if scope else repr(value)
+    values = [scope[name] for name in names_in(value) if name in scope] if scope else []
+    return repr((str(value), values)) if values else repr(str(value) if isinstance(value, str) else value)

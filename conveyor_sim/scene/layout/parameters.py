@@ -123,8 +123,9 @@ def _check_bounds(name: str, entry: Mapping[str, Any], scope: Scope, report: Cal
     for field, word, sign in (("min", "least", 1), ("max", "most", -1)):
         if field not in entry or (bound := _value(entry[field], scope, (name, field), report)) is None:
             continue
-        if bound.dimension != value.dimension:
-            report((name, field), f"{shown(entry[field])} is {bound}, expected {value}, as default is")
+        if None not in (bound.dimension, value.dimension) and bound.dimension != value.dimension:
+            report((name, "default"), f"{shown(entry['default'])} given, expected {bound}, as {field} is")
         elif sign * (value.value - bound.value) < 0:
-            at = f"at {word} {entry[field]}, its {field}"
-            report((name, "default"), f"{shown(entry['default'])} given, expected {at}")
+            report(
+                (name, "default"), f"{shown(entry['default'])} given, expected at {word} {entry[field]}, its {field}"
+            )
