@@ -80,7 +80,7 @@ def scope_of(entries: Any, report: Callable[[Path, str], None]) -> dict[str, Qua
 
 
 def _words(value: Any) -> Iterator[str]:
-    """Yield the names in a value; none for a value with a scope of its own."""
+    """Yield the names in a value; none for a value with a scope that it carries."""
     if isinstance(value, str) and not isinstance(value, Scoped):
         yield from names_in(value)
 
