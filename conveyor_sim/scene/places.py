@@ -1,4 +1,4 @@
-"""Place of a scene's field in its file."""
+"""FieldPlace of a scene's field in its file."""
 
 from conveyor_sim.scene.load import reread
 from conveyor_sim.scene.problems import Path
