@@ -6,7 +6,6 @@ import math
 from typing import Any, cast
 
 import pytest
-
 from scenes import DRIVEN_LINE
 
 from conveyor_sim.protocols.tags.line_mirror import DrawableProvider
