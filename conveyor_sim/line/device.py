@@ -91,9 +91,10 @@ class ScanContext:
         self._counts = None
 
     def carriers(self) -> NDArray[np.int32]:
-        """Return the belt index of each slot, (slots,); -1 for floor and free slots. Valid until the next scan."""
+        """Return the belt index of each slot, (slots,); -1 for free slots and what rests. Valid until the next scan."""
         self._count()
-        return self._carriers
+        plant = self.state.model.plant
+        return self._carriers if plant.one_surface_per_belt else plant.belt_of_surface[self._carriers]
 
     def carried(self, belt: int) -> int:
         """Return the number of bottles on a belt, by its index."""
@@ -104,13 +105,25 @@ class ScanContext:
             world = self.state.world
             if self._carriers.size != world.bottles.id.size:
                 self._carriers = np.full(world.bottles.id.size, -1, dtype=np.int32)
-                self._carried = np.zeros(self.belt_speeds.size, dtype=np.int32)
+                self._carried = np.zeros(len(self.state.model.plant.surfaces), dtype=np.int32)
             if world.surface is not None:
                 arguments = world.bottles, world.belts, world.surface, self._carriers, self._carried
                 self._find = self._find or entry(find_carriers, *arguments)
                 self._find(*arguments)
-            self._counts = self._carried.tolist()
+            self._counts = self._per_belt()
         return self._counts
+
+    def _per_belt(self) -> list[int]:
+        """Return the number of bottles on each belt, from those on each surface."""
+        carried: list[int] = self._carried.tolist()
+        plant = self.state.model.plant
+        if plant.one_surface_per_belt:
+            return carried
+        counts = [0] * self.belt_speeds.size
+        for shape, count in zip(plant.surfaces, carried, strict=True):
+            if shape.belt is not None:
+                counts[shape.belt] += count
+        return counts
 
 
 class Device:

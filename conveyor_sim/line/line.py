@@ -318,7 +318,7 @@ class Line:
         return eyes
 
     def carriers(self) -> NDArray[np.int32]:
-        """Return the index of the belt under each slot, (slots,); -1 for the floor and for free slots."""
+        """Return the index of the belt under each slot, (slots,); -1 for floor, plates and free slots."""
         self.now.begin_scan()
         return self.now.carriers()
 

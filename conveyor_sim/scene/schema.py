@@ -29,6 +29,7 @@ from conveyor_sim.scene.parts.outfeed import Outfeed
 from conveyor_sim.scene.parts.photo_eye import PhotoEye
 from conveyor_sim.scene.parts.spill import Spill
 from conveyor_sim.scene.parts.zone import Zone
+from conveyor_sim.scene.plates import Plate
 from conveyor_sim.scene.rails import Rail
 from conveyor_sim.scene.types import (
     Angle,
@@ -215,7 +216,7 @@ class Scene(Part):
         "What happens between materials that touch.", default=()
     )
     base: Annotated[tuple[Base, ...], Holds("a list of base frictions")] = quantity(
-        "Friction of bottles on belts.", default=()
+        "Friction of bottles on belts and plates.", default=()
     )
     bottle_types: Annotated[dict[Name, BottleType], Len(1), _named("bottle types, at least one")] = quantity(
         "Kinds of bottles."
@@ -225,6 +226,9 @@ class Scene(Part):
     )
     belts: Annotated[dict[Name, Belt], _named("belts")] = quantity(
         "Belts. Where they overlap, the last listed carries.", default={}
+    )
+    plates: Annotated[dict[Name, Plate], _named("plates")] = quantity(
+        "Surfaces at rest, over belts where they overlap.", default={}
     )
     rails: Annotated[dict[Name, Rail], _named("rails")] = quantity(
         "Rails. Those that join end to end, or end on another, are one surface.", default={}

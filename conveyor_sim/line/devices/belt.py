@@ -10,9 +10,9 @@ from conveyor_sim.line.devices.region import most_inside
 from conveyor_sim.line.devices.setpoint import SetpointDevice, SpeedDevice
 from conveyor_sim.line.devices.setup import DeviceSetup
 from conveyor_sim.line.tag import Tag, count, number
-from conveyor_sim.scene.belts import CurvedBelt, StraightBelt
+from conveyor_sim.scene.belts import Belt
 from conveyor_sim.scene.drives import Drive
-from conveyor_sim.scene.geometry import belt_shape
+from conveyor_sim.scene.geometry import shapes_of_belt
 
 
 class DrivenBelt(SpeedDevice):
@@ -34,10 +34,11 @@ class DrivenBelt(SpeedDevice):
         return now.speeds[self._index], now.carried(self._index)
 
 
-def belt_device(name: str, belt: StraightBelt | CurvedBelt, setup: DeviceSetup) -> Device:
+def belt_device(name: str, belt: Belt, setup: DeviceSetup) -> Device:
     """Build a belt, with a drive of its own, moved by a named drive, or without a drive."""
     short_name = name.rpartition("/")[2]
-    most = most_inside(belt_shape(short_name, belt).outline(), float(setup.model.type_radius.min()))
+    radius = float(setup.model.type_radius.min())
+    most = sum(most_inside(shape.outline(), radius) for shape in shapes_of_belt(short_name, belt))
     bottles = count(f"{name}/bottles", "actual", "Bottles whose axis is on the belt.", high=most)
     if isinstance(belt.drive, str):
         drive = setup.device(NamedDriveDevice, f"drives/{belt.drive}")
