@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from conveyor_sim.scene.layout.plan import Side
 from conveyor_sim.scene.part import Part
-from conveyor_sim.scene.types import Angle, Name, NotNegative, Number, Positive, Says, quantity
+from conveyor_sim.scene.types import Angle, Name, Number, Positive, Says, quantity
 
 Station = Annotated[Number | Literal["end"], Says('a number, negative from the end, or "end"')]
 
@@ -27,12 +27,6 @@ class AlongPoint(_At):
     """A point along a conveyor."""
 
     offset: Number = quantity("Distance from the middle of the path, positive to the left.", "m", default=0.0)
-
-
-class AlongExit(AlongPoint):
-    """`out` of a station: the point along a conveyor where it gives bottles back, instead of `position` and
-    `direction`.
-    """
 
 
 class _Across(_At):
@@ -118,7 +112,8 @@ class AlongPusher(_Stretch):
 
     side: Side = quantity("Side on which it is while it is retracted.")
     offset: Number | None = quantity(
-        "Distance of its face from the middle of the path, positive to the left. Left out: the edge of the clear width.",
+        "Distance of its face from the middle of the path, positive to the left. Left out: the edge of the clear "
+        "width.",
         "m",
         default=None,
     )

@@ -50,9 +50,7 @@ def swinging_gate(site: Site[AlongSwing]) -> list[Coordinate]:
 def pusher(site: Site[AlongPusher]) -> list[Coordinate]:
     """Return a pusher beside the path. Raise LayoutFault."""
     (begin, end, field), place = site.stretch(), site.place
-    ends = [
-        site.point(s, site.edge(s, place.side) if place.offset is None else place.offset) for s in (begin, end)
-    ]
+    ends = [site.point(s, site.edge(s, place.side) if place.offset is None else place.offset) for s in (begin, end)]
     away: Side = "right" if place.side == "left" else "left"
     return [
         Coordinate("from", ends[0], field),
@@ -64,12 +62,10 @@ def pusher(site: Site[AlongPusher]) -> list[Coordinate]:
 def diverter(site: Site[AlongDiverter]) -> list[Coordinate]:
     """Return a diverter beside the path. Raise LayoutFault."""
     s, place = site.station(), site.place
-    pivot = site.conveyor.route.frame(s).moved(
-        0.0, site.edge(s, place.side) if place.offset is None else place.offset
-    )
+    pivot = site.conveyor.route.frame(s).moved(0.0, site.edge(s, place.side) if place.offset is None else place.offset)
     return [
-        Coordinate("from", list(pivot.xy), "at"),
-        Coordinate("to", list(pivot.point(place.length, 0.0)), "length"),
+        Coordinate("from", site.within_limits(pivot.xy), "at"),
+        Coordinate("to", site.within_limits(pivot.point(place.length, 0.0)), "length"),
         Coordinate("angle", -place.angle if place.side == "left" else place.angle, "angle"),
     ]
 
@@ -92,6 +88,8 @@ def rails(site: Site[AlongRail]) -> Iterator[tuple[dict[str, Any], str]]:
     for name in ("width", "extend"):
         if name in site.raw:
             raise LayoutFault((*site.path, name), f"{shown(site.raw[name])} given, expected at beside it")
+    if "from" not in site.raw and "to" not in site.raw:
+        raise LayoutFault(site.path, "no station given, expected either at, or from and to")
     begin, end, field = site.stretch()
     profile = GuideProfile("left", ((begin, place.offset),), begin, end)
     for rail in rails_along(site.conveyor.route, profile, [(begin, end)], (*site.path, "offset")):

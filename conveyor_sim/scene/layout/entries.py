@@ -1,17 +1,17 @@
 """Places along a conveyor where bottles come onto the line: point, direction, speed and scatter."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from typing import Any
 
-from conveyor_sim.scene.layout.along import AlongExit, AlongPoint
+from conveyor_sim.scene.layout.along import AlongPoint
 from conveyor_sim.scene.layout.plan import ConveyorPlan
 from conveyor_sim.scene.layout.site import Coordinate, Site
 from conveyor_sim.scene.quantities import to_si
 
 LATERAL_SCATTER = 5e-4
-"""Scatter to each side of bottles placed along a conveyor (m). It breaks perfect columns, and is less than guides leave."""
+"""Default scatter to each side of bottles placed along a conveyor (m): less than guides usually leave."""
 ANGULAR_SCATTER = math.radians(0.5)
 
 
@@ -34,6 +34,13 @@ def entry(site: Site[AlongPoint], device: Mapping[str, Any]) -> list[Coordinate]
         Coordinate("lateral_jitter", min(LATERAL_SCATTER, free), "along"),
         Coordinate("angular_jitter", ANGULAR_SCATTER if free else 0.0, "along"),
     ]
+
+
+def grid(site: Site[AlongPoint]) -> list[Coordinate]:
+    """Return first bottle and direction of a grid of bottles at a point. Raise LayoutFault."""
+    s = site.station()
+    heading = site.conveyor.route.heading(s)
+    return [Coordinate("origin", site.point(s, site.place.offset), "at"), Coordinate("angle", heading, "at")]
 
 
 def _free(conveyor: ConveyorPlan, s: float, offset: float, radius: float) -> float:

@@ -22,15 +22,16 @@ def region(site: Site[AlongRegion]) -> list[Coordinate]:
     for piece in part.pieces:
         if isinstance(piece, Bend) and not _reaches(piece, right + place.offset, left + place.offset):
             text = f"reaches beyond the centre of a bend of radius {piece.radius:.6g} m, expected a narrower region"
-            raise LayoutFault(site.path, text)
-    return [Coordinate("region", polygon(part, right + place.offset, left + place.offset), field)]
+            raise LayoutFault(site.path if place.width is None else (*site.path, "width"), text)
+    corners = polygon(part, right + place.offset, left + place.offset)
+    return [Coordinate("region", [site.within_limits(corner) for corner in corners], field)]
 
 
-def polygon(route: Route, right: float, left: float) -> list[list[float]]:
+def polygon(route: Route, right: float, left: float) -> list[XY]:
     """Return the corners, counter-clockwise, of the area between two offsets (m) from a route."""
     stations = list(_stations(route))
     corners = [route.point(s, right) for s in stations] + [route.point(s, left) for s in reversed(stations)]
-    return [list(corner) for corner in _apart(corners)]
+    return list(_apart(corners))
 
 
 def _reaches(bend: Bend, right: float, left: float) -> bool:

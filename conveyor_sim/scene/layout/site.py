@@ -9,10 +9,12 @@ from conveyor_sim.scene.layout.along import Along
 from conveyor_sim.scene.layout.faults import LayoutFault
 from conveyor_sim.scene.layout.plan import ConveyorPlan, Side
 from conveyor_sim.scene.problems import Path
-from conveyor_sim.scene.types import TOUCH, XY
+from conveyor_sim.scene.types import COORDINATE_LIMIT, TOUCH, XY
 from conveyor_sim.scene.words import shown
 
-_NEGATIVE = re.compile(r"\s*[-\u2212]\s*[0-9.][0-9. \u00a0\u2009\u202f]*(?:[eE][-+]?[0-9]+)?\s*[A-Za-z\u00b5\u03bc]*\s*")
+_NEGATIVE = re.compile(
+    r"\s*[-\u2212]\s*[0-9.][0-9. \u00a0\u2009\u202f]*(?:[eE][-+]?[0-9]+)?\s*[A-Za-z\u00b5\u03bc]*\s*"
+)
 """A negative number with or without a unit. Other texts are expressions."""
 
 A = TypeVar("A", bound=Along)
@@ -45,19 +47,19 @@ class Site(Generic[A]):
         A negative number counts from the end, the negative result of an expression does not.
         """
         raw = self.raw[field]
-        value = getattr(self.place, "from_" if field == "from" else field)
+        value: Any = getattr(self.place, "from_" if field == "from" else field)
         length = self.conveyor.route.length
         if value == "end":
             return length
         s = length + value if value < 0.0 and _is_literal(raw) else value
         if not -TOUCH <= s <= length + TOUCH:
-            result = f", which is {value:.6g} m," if isinstance(raw, str) else ""
+            result = f", which is {value:.6g} m" if isinstance(raw, str) else ""
             raise LayoutFault(
                 (*self.path, field),
-                f"{shown(raw)} given{result} expected a station from 0 to {length:.6g} m, "
+                f"{shown(raw)} given{result}, expected a station from 0 to {length:.6g} m, "
                 f"the length of conveyor {self.conveyor.name}",
             )
-        return min(max(s, 0.0), length)
+        return float(min(max(s, 0.0), length))
 
     def stretch(self) -> tuple[float, float, str]:
         """Return first and last station (m) of a place by `at` and `length` or by `from` and `to`, and its first field.
@@ -69,7 +71,7 @@ class Site(Generic[A]):
             end = self.station("at")
             length: float = self.place.length  # type: ignore[attr-defined]
             if length > end + TOUCH:
-                text = f"{shown(self.raw['length'])} given, expected at most {end:.6g} m, from the start of the conveyor"
+                text = f"{shown(self.raw['length'])} given, expected at most {end:.6g} m, the station of its end"
                 raise LayoutFault((*self.path, "length"), text)
             return max(end - length, 0.0), end, "at"
         if not names or not set(names) <= {"from", "to"}:
@@ -83,8 +85,15 @@ class Site(Generic[A]):
         return begin, end, names[0]
 
     def point(self, s: float, offset: float) -> list[float]:
-        """Return the point at a station and an offset (m)."""
-        return list(self.conveyor.route.point(s, offset))
+        """Return the point at a station and an offset (m). Raise LayoutFault if it is too far away for a scene."""
+        return self.within_limits(self.conveyor.route.point(s, offset))
+
+    def within_limits(self, point: XY) -> list[float]:
+        """Return a point (m). Raise LayoutFault if it is too far away for a scene."""
+        if max(map(abs, point)) <= COORDINATE_LIMIT:
+            return list(point)
+        text = f"lies at {shown(point)}, expected a place within +-{COORDINATE_LIMIT:.0f} (m)"
+        raise LayoutFault(self.path, text)
 
     def across(self, s: float) -> XY:
         """Return the signed offsets (m) of the right and the left end of a line across. Raise LayoutFault."""
