@@ -1,8 +1,8 @@
-"""FieldPlace of a scene's field in its file."""
+"""Place of a scene's field in its file."""
 
 from conveyor_sim.scene.load import reread
 from conveyor_sim.scene.problems import Path
-from conveyor_sim.scene.provenance import Place
+from conveyor_sim.scene.provenance import FieldPlace
 from conveyor_sim.scene.schema import Scene
 
 
@@ -20,7 +20,7 @@ class Places:
         """Return the place such as `plant.yaml:7`, or `plant.yaml (override)`."""
         return str(self._reading.place_of(path))
 
-    def place_of(self, path: Path) -> Place:
+    def place_of(self, path: Path) -> FieldPlace:
         """Return the place of a field of the expanded scene, or of the nearest one above it."""
         return self._reading.place_of(path)
 
