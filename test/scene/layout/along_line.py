@@ -45,7 +45,8 @@ def devices(side: str = "left") -> Data:
         "machines": {
             "source": {"kind": "source", "bottle": "bottle", **along, "at": 0.3, "rate": 1.0},
             "sink": {"kind": "sink", **along, "from": 2.0, "to": 2.2, "rate": 1.0},
-            "station": {"kind": "station", **along, "at": 1.3, "length": 0.1, "out": {**along, "at": 1.45}, "rate": 1.0},
+            "station": {"kind": "station", **along, "at": 1.3, "length": 0.1, "rate": 1.0,
+                        "out": {**along, "at": 1.45}},
             "camera": {"kind": "inspection", **along, "at": 0.8},
             "reject": {"kind": "reject", **along, "from": 1.6, "to": 1.9, "offset": sign * 0.01, "width": 0.05},
         },

@@ -180,7 +180,7 @@ def test_counters_and_inspections_count_with_travel(turn: str) -> None:
     assert sim.counts.removed == 4
     for name in ("bend", "behind"):
         assert (values[f"counters/{name}/forward"], values[f"counters/{name}/backward"]) == (4.0, 0.0)
-    assert values["machines/camera/inspected"] == 4.0
+    assert values["machines/camera/count"] == 4.0
 
 
 @pytest.mark.parametrize(
@@ -249,7 +249,11 @@ def test_lines_span_the_clear_width() -> None:
 
 def test_scenes_without_places_are_returned_as_they_are() -> None:
     """No copy is made of data without layout."""
-    data: Data = {"rails": {"r": {"kind": "segment"}}, "photo_eyes": {"e": {"from": [0, 0]}}, "bottles": [{"type": "b"}]}
+    data: Data = {
+        "rails": {"r": {"kind": "segment"}},
+        "photo_eyes": {"e": {"from": [0, 0]}},
+        "bottles": [{"type": "b"}],
+    }
     assert expand(data).data is data
 
 

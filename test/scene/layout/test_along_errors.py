@@ -13,7 +13,7 @@ from conveyor_sim.scene import parse_scene
 from conveyor_sim.scene.layout.expand import expand
 
 LINE = 40
-"""Line of the first field of the device."""
+"""Line of the first field of the device; its name is on the line before."""
 
 
 def refused(kind: str, fields: Data) -> list[str]:
@@ -48,11 +48,11 @@ RAIL: Data = {"material": "steel", "along": "lane"}
         ("photo_eyes", {**EYE, "at": None}, 1, ["it.at", "nothing", '"end"']),
         ("photo_eyes", {**EYE, "at": True}, 1, ["it.at", "true", '"end"']),
         ("photo_eyes", {**EYE, "extend": -0.04}, 2, ["it.extend", "-0.04", "longer than 0"]),
-        ("photo_eyes", {**EYE, "extend": 1e19}, 0, ["photo_eyes.it", "1e+19", "100000"]),
+        ("photo_eyes", {**EYE, "extend": 1e19}, -1, ["photo_eyes.it", "1e+19", "100000"]),
         ("photo_eyes", {**EYE, "from": [0, 1]}, 2, ["it.from", "[0, 1]", "either along or from"]),
         ("counters", {**EYE, "length": 1}, 2, ["it.length", "no such field"]),
-        ("zones", {"along": "lane"}, 0, ["zones.it", "no station", "at and length", "from and to"]),
-        ("zones", {**REGION, "from": 0.1}, 0, ["zones.it", "at and length and from", "from and to"]),
+        ("zones", {"along": "lane"}, -1, ["zones.it", "no station", "at and length", "from and to"]),
+        ("zones", {**REGION, "from": 0.1}, -1, ["zones.it", "at and length and from", "from and to"]),
         ("zones", {**REGION, "length": 0.5}, 2, ["it.length", "0.5", "0.4 m"]),
         ("zones", {"along": "lane", "from": 1, "to": 0.5}, 2, ["it.to", "0.5", "beyond its start, 1 m"]),
         ("zones", {**REGION, "width": 2, "at": 1.3}, 3, ["it.width", "bend of radius 0.5 m"]),
@@ -61,22 +61,22 @@ RAIL: Data = {"material": "steel", "along": "lane"}
         ("infeeds", {**FEED, "direction": 0}, 4, ["it.direction", "0", "either along or direction"]),
         ("infeeds", {**FEED, "offset": 0.02}, 2, ["it.at", "[0.4, 0.02]", "rail lane_left"]),
         ("infeeds", {**FEED, "rate": -1}, 3, ["it.rate", "-1", "greater than 0"]),
-        ("gates", GATE, 0, ["it.side", "missing", '"left" or "right"']),
+        ("gates", GATE, -1, ["it.side", "missing", '"left" or "right"']),
         ("gates", {**GATE, "side": "up"}, 6, ["it.side", '"up"', '"left" or "right"']),
         ("gates", {**GATE, "side": "left", "direction": 0}, 7, ["it.direction", "either along or direction"]),
         ("pushers", {**PUSHER, "acceleration": 5000}, 6, ["it.acceleration", "5000", "294.5"]),
-        ("machines", STATION, 0, ["it.out", "missing", "along and at"]),
+        ("machines", STATION, -1, ["it.out", "missing", "along and at"]),
         ("machines", {**STATION, "out": {"at": 1}}, 5, ["it.out.along", "missing", "a name"]),
         ("machines", {**STATION, "out": {"along": "lane", "at": 9}}, 5, ["it.out.at", "9", "3.7854 m"]),
         ("machines", {**STATION, "out": {"along": "lane", "at": 0.35}}, 5, ["it.out.at", "outside its region"]),
         ("machines", {**STATION, "out": {**EYE}, "position": [0, 0]}, 6, ["it.position", "either out or position"]),
-        ("machines", {"rate": 1, **REGION}, 0, ["it.kind", "missing", '"station"']),
-        ("rails", RAIL, 0, ["rails.it", "no station", "from and to"]),
+        ("machines", {"rate": 1, **REGION}, -1, ["it.kind", "missing", '"station"']),
+        ("rails", RAIL, -1, ["rails.it", "no station", "from and to"]),
         ("rails", {**RAIL, "at": 1, "from": 0.5}, 3, ["it.from", "0.5", "either at, or from and to"]),
         ("rails", {**RAIL, "at": 1, "kind": "segment"}, 3, ["it.kind", "segment", "either along or kind"]),
         ("rails", {**RAIL, "from": 0.5, "to": 2, "offset": 0.6}, 4, ["it.offset", "0.6 m", "radius 0.5 m"]),
         ("rails", {**RAIL, "from": 0.5, "extend": 0.1}, 3, ["it.extend", "0.1", "at"]),
-        ("rails", {"along": "lane", "at": 1}, 0, ["it.material", "missing", "a name"]),
+        ("rails", {"along": "lane", "at": 1}, -1, ["it.material", "missing", "a name"]),
     ],
 )
 def test_an_error_names_the_line_of_its_field(kind: str, fields: Data, number: int, facts: list[str]) -> None:
@@ -112,7 +112,7 @@ def test_names_of_rails_do_not_collide(name: str) -> None:
     rails = {"beside": {**RAIL, "from": 0.8, "to": 2}, name + "_1" * (name == "beside"): {**RAIL, "at": 1}}
     (problem,) = expand(line(rails=rails)).problems
     assert problem.path[0] == "rails"
-    assert "expected another name" in problem.text
+    assert "as a name of rails" in problem.text
 
 
 def test_coordinates_lead_to_the_fields_of_their_place() -> None:
