@@ -33,7 +33,7 @@ def feed(conveyor: Data | None = None, scene: Data | None = None, **fields: Any)
     ],
 )
 def test_bottles_have_the_speed_of_the_belt(conveyor: Data, at: float, speed: float) -> None:
-    """Of the section at the station, and of a named drive times the ratio."""
+    """The section at the station counts, and a named drive times the ratio."""
     fields = {name: value for name, value in lane(**conveyor).items() if value is not None}
     scene = {"drives": {"m1": {"speed": "12 m/min", "acceleration": 1.0}}}
     assert feed(fields, scene, at=at).speed == speed
