@@ -13,7 +13,7 @@ from conveyor_sim.report.flow.guide_findings import guide_gaps, narrow_passages
 from conveyor_sim.report.flow.guides import Guides
 from conveyor_sim.report.flow.routes import TransitRoute, routes_of
 from conveyor_sim.report.flow.stretches import Bottleneck, Stretch, bottleneck, stretches_of
-from conveyor_sim.report.flow.surfaces import FlowSurface, surfaces_of
+from conveyor_sim.report.flow.surfaces import SurfaceMap, surfaces_of
 from conveyor_sim.report.flow.trace import trace
 from conveyor_sim.report.flow.trace_scene import guide_pieces
 from conveyor_sim.scene.schema import Scene
@@ -23,7 +23,7 @@ from conveyor_sim.scene.schema import Scene
 class LineFlow:
     """Flow of bottles through a scene."""
 
-    surfaces: tuple[FlowSurface, ...]
+    surfaces: SurfaceMap
     routes: tuple[TransitRoute, ...]
     stretches: tuple[Stretch, ...]
     bottleneck: Bottleneck | None
@@ -35,7 +35,7 @@ def flow_of(scene: Scene) -> LineFlow:
     """Trace a lone bottle from every entry of a scene, and return routes, capacities and findings."""
     surfaces = surfaces_of(scene)
     guides = Guides(guide_pieces(scene))
-    legs = trace(scene, surfaces)
+    legs = trace(scene, surfaces, guides)
     clearances = [clearance(leg, surfaces, guides) for leg in legs]
     routes = routes_of(scene, legs)
     stretches = stretches_of(legs, clearances, surfaces)
@@ -49,6 +49,6 @@ def flow_of(scene: Scene) -> LineFlow:
         *guide_gaps(scene, surfaces, guides, legs, clearances),
         *perfect_columns(scene, surfaces, legs, clearances),
         *watchdogs(scene),
-        *backward_belts(surfaces),
+        *backward_belts(scene, surfaces),
     ]
     return LineFlow(surfaces, routes, stretches, bottleneck(scene, routes, stretches), tuple(findings))
