@@ -5,12 +5,12 @@ A scene is read with `load_scene`; `docs/scene.md` is generated from the fields 
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, get_args
 
 from annotated_types import Len
 from pydantic import Discriminator, PrivateAttr, Tag
 
-from conveyor_sim.scene.accuracy import Accuracy
+from conveyor_sim.scene.accuracy import Accuracy, Preset
 from conveyor_sim.scene.belts import Belt
 from conveyor_sim.scene.contacts import Base, Contact
 from conveyor_sim.scene.drives import NamedDrive
@@ -38,6 +38,7 @@ from conveyor_sim.scene.types import (
     Name,
     NotNegative,
     Number,
+    OrText,
     Point,
     Positive,
     Seed,
@@ -157,6 +158,8 @@ class Origin:
     """Overrides and the content of other files, as YAML. With the text, it gives the scene without these files."""
     streams_by_index: bool = False
     """True if random streams are keyed by places in lists, as in old recordings, and not by names."""
+    files: Mapping[str, str] = field(default_factory=dict, compare=False)
+    """Texts of the files that the scene includes or uses, by path from its folder."""
 
 
 def _bottle_tag(data: Any) -> str:
@@ -190,7 +193,9 @@ class Scene(Part):
         "Scan cycle, in whole nanoseconds: commands act and outputs appear at ticks.", "s", default=0.01
     )
     accuracy: Annotated[
-        Accuracy, Holds('"draft", "standard", "fine", or a mapping with the fields ' + ", ".join(Accuracy.model_fields))
+        Accuracy,
+        OrText(get_args(Preset)),
+        Holds('"draft", "standard", "fine", or a mapping with the fields ' + ", ".join(Accuracy.model_fields)),
     ] = quantity(
         "Accuracy of the integration of a tick: a preset such as `fine`, or a mapping.",
         default=Accuracy.model_construct(),
@@ -355,6 +360,11 @@ class Scene(Part):
     def source_name(self) -> str:
         """Name of the scene's file, as given."""
         return self._source.name
+
+    @property
+    def source_files(self) -> Mapping[str, str]:
+        """Texts of the files that a composed scene includes or uses, by path from its folder."""
+        return self._source.files
 
     @property
     def overrides_text(self) -> str:
