@@ -283,7 +283,7 @@ class Simulation:
 
     def belts(self) -> BeltColumns:
         """Return commanded and actual belt speeds, m/s."""
-        return BeltColumns(self._line.now.setpoints.copy(), self._line.now.speeds.copy())
+        return BeltColumns(self._line.now.belt_setpoints.copy(), self._line.now.belt_speeds.copy())
 
     def moving_rails(self) -> tuple[RailShape, ...]:
         """Return gates, pushers and diverters at their present places; they are the last rails by number."""

@@ -29,7 +29,7 @@ class BottleColumns:
     omega: F8
     """rad/s"""
     belt: NDArray[np.int32]
-    """Index of the carrying belt; -1 on the floor."""
+    """Index of the carrying belt; -1 on the floor and on plates."""
     peak_force: F8
     """Largest normal force of one contact since the last output of bottles, N."""
     impulse: F8

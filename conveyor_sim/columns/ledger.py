@@ -27,7 +27,7 @@ class Ledger:
     removed: float
     """Energy of bottles as they left."""
     belt_work: F8
-    """Work of each belt in scene order, then of the floor, which rests (0); (H + 1,)."""
+    """Work of each belt in scene order, then of floor and plates, which rest (0); (H + 1,)."""
     base_friction: float
     """Energy dissipated by friction under the bottles."""
     contact_friction: float

@@ -28,9 +28,9 @@ class ScanContext:
     length: float
     """Length of a tick, s."""
     setpoints: F8
-    """Commanded belt speeds, (belts,) m/s."""
+    """Commanded speeds of belts, then of named drives, (belts + drives,) m/s."""
     speeds: F8
-    """Belt speeds during a tick, (belts,) m/s; drives set them at the start of the tick."""
+    """Speeds of belts, then of named drives, during a tick, (belts + drives,) m/s; set at the start of the tick."""
     tick: int = 0
     by_hand: bool = False
     """True while a person's command is being applied."""
@@ -49,6 +49,16 @@ class ScanContext:
     def time(self) -> float:
         """Simulated time, s."""
         return self.tick * self.state.model.tick_ns * 1e-9
+
+    @property
+    def belt_setpoints(self) -> F8:
+        """Commanded speeds of belts, (belts,) m/s."""
+        return self.setpoints[: len(self.state.model.belts)]
+
+    @property
+    def belt_speeds(self) -> F8:
+        """Speeds of belts during a tick, (belts,) m/s."""
+        return self.speeds[: len(self.state.model.belts)]
 
     def attribute(self, bottle: int, name: str) -> float:
         """Return an attribute of a bottle, by its id."""
@@ -81,9 +91,10 @@ class ScanContext:
         self._counts = None
 
     def carriers(self) -> NDArray[np.int32]:
-        """Return the belt index of each slot, (slots,); -1 for floor and free slots. Valid until the next scan."""
+        """Return the belt index of each slot, (slots,); -1 for free slots and what rests. Valid until the next scan."""
         self._count()
-        return self._carriers
+        plant = self.state.model.plant
+        return self._carriers if plant.one_surface_per_belt else plant.belt_of_surface[self._carriers]
 
     def carried(self, belt: int) -> int:
         """Return the number of bottles on a belt, by its index."""
@@ -94,13 +105,25 @@ class ScanContext:
             world = self.state.world
             if self._carriers.size != world.bottles.id.size:
                 self._carriers = np.full(world.bottles.id.size, -1, dtype=np.int32)
-                self._carried = np.zeros(self.speeds.size, dtype=np.int32)
+                self._carried = np.zeros(len(self.state.model.plant.surfaces), dtype=np.int32)
             if world.surface is not None:
                 arguments = world.bottles, world.belts, world.surface, self._carriers, self._carried
                 self._find = self._find or entry(find_carriers, *arguments)
                 self._find(*arguments)
-            self._counts = self._carried.tolist()
+            self._counts = self._per_belt()
         return self._counts
+
+    def _per_belt(self) -> list[int]:
+        """Return the number of bottles on each belt, from those on each surface."""
+        carried: list[int] = self._carried.tolist()
+        plant = self.state.model.plant
+        if plant.one_surface_per_belt:
+            return carried
+        counts = [0] * self.belt_speeds.size
+        for shape, count in zip(plant.surfaces, carried, strict=True):
+            if shape.belt is not None:
+                counts[shape.belt] += count
+        return counts
 
 
 class Device:

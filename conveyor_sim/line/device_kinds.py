@@ -4,12 +4,13 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from conveyor_sim.line.device import Device
+from conveyor_sim.line.devices.belt import belt_device
 from conveyor_sim.line.devices.counter import CounterDevice
-from conveyor_sim.line.devices.drive import belt_device
 from conveyor_sim.line.devices.indicator import IndicatorDevice
 from conveyor_sim.line.devices.infeed import InfeedDevice
 from conveyor_sim.line.devices.inspection import InspectionDevice
 from conveyor_sim.line.devices.mover import Mover
+from conveyor_sim.line.devices.named_drive import NamedDriveDevice
 from conveyor_sim.line.devices.outfeed import OutfeedDevice
 from conveyor_sim.line.devices.photo_eye import PhotoEyeDevice
 from conveyor_sim.line.devices.reject import RejectDevice
@@ -23,6 +24,7 @@ from conveyor_sim.physics.model import Model
 from conveyor_sim.scene.schema import Scene
 
 DEVICES: Mapping[str, Callable[[str, Any, DeviceSetup], Device]] = {
+    "drive": NamedDriveDevice,
     "belt": belt_device,
     "gate": Mover,
     "pusher": Mover,

@@ -22,9 +22,9 @@ from conveyor_sim.line.commands.read_back import ReadBack
 from conveyor_sim.line.commands.refusal import refusal, shown
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.device_kinds import build_devices
-from conveyor_sim.line.devices.belt import BeltDevice
 from conveyor_sim.line.devices.belt_surfaces import BeltSurfaces
 from conveyor_sim.line.devices.photo_eye import PhotoEyeDevice
+from conveyor_sim.line.devices.setpoint import SetpointDevice
 from conveyor_sim.line.event_log import EventLog
 from conveyor_sim.line.machines.counters import RESET_COUNTERS, ProductionCounters
 from conveyor_sim.line.process_image import ProcessImage
@@ -34,6 +34,7 @@ from conveyor_sim.physics.model import build_model
 from conveyor_sim.physics.state import State
 from conveyor_sim.physics.state.snapshot import entries, restore, snapshot, typed
 from conveyor_sim.physics.state.state import FIRST_SLOTS
+from conveyor_sim.scene.driven import belt_speeds
 from conveyor_sim.scene.schema import Scene
 
 _Outcome = tuple[int, Input, bool, str, bool, bool, bool]
@@ -54,7 +55,8 @@ class Line:
 
     def __init__(self, scene: Scene, state: State) -> None:
         """Build the devices of a scene in their initial state."""
-        speeds = np.array([belt.speed for belt in scene.belts.values()], dtype=np.float64)
+        drives = (drive.speed for drive in scene.drives.values())
+        speeds = np.array([*belt_speeds(scene).values(), *drives], dtype=np.float64)
         self.now = ScanContext(state, scene.tick, speeds, speeds.copy())
         devices = build_devices(scene, state.model)
         self._log = EventLog(devices, self.now)
@@ -64,8 +66,8 @@ class Line:
         self._alarms = AlarmSystem(scene, devices, self.modes, self._log.note_alarm)
         devices = (*devices, self._alarms.device) if devices else devices
         self._devices = devices
-        belts = [device for device in devices if isinstance(device, BeltDevice)]
-        self._watched = [belt for belt in belts if belt.watchdog is not None]
+        movers = [device for device in devices if isinstance(device, SetpointDevice)]
+        self._watched = [mover for mover in movers if mover.watchdog is not None]
         self._eyes = [device for device in devices if isinstance(device, PhotoEyeDevice)]
         self._reading = [device.read for device in devices]
         # Only overridden methods are called.
@@ -148,8 +150,8 @@ class Line:
         return self._surfaces.fastest
 
     def move_belts(self) -> None:
-        """Set the surface speeds of all belts to the speeds of their drives."""
-        self._surfaces.move(self.now.speeds)
+        """Set the surface speeds of all belts to the present speeds."""
+        self._surfaces.move(self.now.belt_speeds)
 
     def queue(self, request: Input) -> None:
         """Queue an input for the start of the next tick."""
@@ -226,8 +228,8 @@ class Line:
                 self._note(CommandOutcome(tick, rest, not reason, reason))
             if request.operation == SET and request.writer_kind in MAY[SET].writers:  # even if refused
                 self._alarms.report(tick, request.names, request.values)
-        for belt in self._watched:
-            if name := belt.watch(self.now):
+        for mover in self._watched:
+            if name := mover.watch(self.now):
                 stopped = Input(WATCHDOG, WATCHDOG, "line", SET, (name,), (0.0,))
                 self._outcomes.append(CommandOutcome(tick, stopped, True, ""))
                 self.read_back.note(stopped, tick)
@@ -314,7 +316,7 @@ class Line:
         return eyes
 
     def carriers(self) -> NDArray[np.int32]:
-        """Return the index of the belt under each slot, (slots,); -1 for the floor and for free slots."""
+        """Return the index of the belt under each slot, (slots,); -1 for floor, plates and free slots."""
         self.now.begin_scan()
         return self.now.carriers()
 
@@ -347,7 +349,7 @@ class Line:
         ]
         speeds = {"setpoints": self.now.setpoints, "speeds": self.now.speeds}
         restore(speeds, {name: memory[name] for name in speeds}, "line")
-        self._surfaces.note(self.now.speeds)
+        self._surfaces.note(self.now.belt_speeds)
         self.now.bad = set(typed(list[int], memory["bad"], "line.bad"))
         attributes = typed(dict[str, list[tuple[int, float]]], memory["attributes"], "line.attributes")
         self.now.attributes = {name: dict(values) for name, values in attributes.items()}

@@ -18,6 +18,7 @@ contacts:
   - {between: [glass, glass], stiffness: 5000}
   - {between: [glass, rail], stiffness: 5000}
 base: [{between: [glass, chain], friction: 0.4}]
+drives: {m: {acceleration: 1.0, pulses_per_metre: 1000}}
 belts:
   b:
     {kind: straight, start: [0, 0], angle: 0, length: 10, width: 1, material: chain,
@@ -49,6 +50,7 @@ indicators: {i: {counter: c, zone: z, belt: b, backup: z, jam_time: 5}}
 
 SECTIONS = {
     "belts": ("belts",),
+    "drives": ("drives",),
     "feeds": ("infeeds", "outfeeds"),
     "machines": ("machines",),
     "movers": ("gates", "pushers", "diverters"),

@@ -6,20 +6,23 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
+from conveyor_sim.scene.driven import belt_speeds
 from conveyor_sim.scene.geometry import (
     ArcPiece,
     BeltShape,
     InitialBottle,
     Piece,
     RailShape,
-    belt_shapes,
     initial_bottles,
     is_full_turn,
     rail_shapes,
+    surface_shapes,
 )
 from conveyor_sim.scene.moving import MovingShape, moving_shapes
 from conveyor_sim.scene.overlaps import near_pieces
+from conveyor_sim.scene.problems import Path
 from conveyor_sim.scene.schema import Scene, Single
 
 JOINT_TOLERANCE = 1e-6
@@ -34,7 +37,8 @@ class Plant:
     """A scene with its geometry. Build it with `Plant.of`."""
 
     scene: Scene
-    belts: tuple[BeltShape, ...]
+    surfaces: tuple[BeltShape, ...]
+    """Surfaces of belts, in the order of the belts, then plates."""
     rails_at_rest: tuple[RailShape, ...]
     """Rails in the scene's order, then those of curved belts; arcs with narrow mouths are cut in halves."""
     moving: tuple[MovingShape, ...]
@@ -48,11 +52,30 @@ class Plant:
         largest = max(kind.radius for kind in scene.bottle_types.values())
         return cls(
             scene=scene,
-            belts=tuple(belt_shapes(scene)),
+            surfaces=tuple(surface_shapes(scene)),
             rails_at_rest=tuple(cut_at_mouths(rail_shapes(scene), largest)),
             moving=tuple(moving_shapes(scene)),
             bottles=tuple(initial_bottles(scene)),
         )
+
+    @cached_property
+    def surface_paths(self) -> tuple[Path, ...]:
+        """Path in the scene of the belt or plate of each surface."""
+        belts = list(self.scene.belts)
+        return tuple(
+            ("plates", shape.name) if shape.belt is None else ("belts", belts[shape.belt]) for shape in self.surfaces
+        )
+
+    @cached_property
+    def belt_of_surface(self) -> NDArray[np.int32]:
+        """Index of the belt of each surface, and of the floor at the end, (H + 1,); -1 for plates and the floor."""
+        belts = (-1 if shape.belt is None else shape.belt for shape in self.surfaces)
+        return np.array([*belts, -1], dtype=np.int32)
+
+    @cached_property
+    def one_surface_per_belt(self) -> bool:
+        """True if the index of a surface is that of its belt: no belt has several surfaces, and there is no plate."""
+        return len(self.surfaces) == len(self.scene.belts)
 
     @cached_property
     def rails(self) -> tuple[RailShape, ...]:
@@ -90,7 +113,8 @@ class Plant:
         The fastest belt or entering bottle against something at rest, or the largest difference between initial
         velocities; plus the fastest moving rail.
         """
-        speeds = [abs(belt.speed) for belt in self.scene.belts.values()]
+        belts = list(belt_speeds(self.scene).values())
+        speeds = [abs(belts[shape.belt]) * shape.ratio for shape in self.surfaces if shape.belt is not None]
         speeds += [giver.heading[1] for _, giver in self.scene.givers()]
         single = (entry.velocity for entry in self.scene.bottles if isinstance(entry, Single))
         speeds.append(math.hypot(*np.ptp(np.array([(0.0, 0.0), *single]), axis=0)))

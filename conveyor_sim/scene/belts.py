@@ -1,65 +1,79 @@
-"""Belts of a scene file: straight ones, and sectors of a ring with their rails."""
+"""Belts of a scene file: straight ones, sectors of a ring with their rails, and paths of several surfaces."""
 
-from collections.abc import Iterator
-from typing import Annotated, ClassVar, Literal
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Tag
+from annotated_types import Len
+from pydantic import Discriminator, SerializerFunctionWrapHandler, Tag, model_serializer
 
-from conveyor_sim.scene.drives import Drive
+from conveyor_sim.scene.areas import TURN_TEXT, CurvedArea, StraightArea, Turn
+from conveyor_sim.scene.drives import Drive, SpeedSetpoint
 from conveyor_sim.scene.part import Part, one_of
-from conveyor_sim.scene.parts.device_part import DevicePart, Others
+from conveyor_sim.scene.parts.device_part import Others, name_problems
 from conveyor_sim.scene.problems import Path, Problem
-from conveyor_sim.scene.types import (
-    Angle,
-    Flag,
-    Limits,
-    Name,
-    NotNegative,
-    Number,
-    Point,
-    Positive,
-    Span,
-    quantity,
-)
-from conveyor_sim.scene.words import shown
+from conveyor_sim.scene.types import Flag, Holds, Name, Positive, quantity
+from conveyor_sim.scene.words import fields_of, shown
+
+_RATIO_TEXT = "Speed of the surface over that of the belt."
 
 
-class _Belt(DevicePart):
+def _drive_tag(data: Any) -> str | None:
+    if isinstance(data, str):
+        return "(name)"
+    return "(mapping)" if isinstance(data, (Mapping, Drive)) else None
+
+
+_Drive = Annotated[
+    Annotated[Drive, Tag("(mapping)")] | Annotated[Name, Tag("(name)")],
+    Discriminator(_drive_tag),
+    Holds(f"{fields_of(Drive)}, or a name from drives"),
+]
+
+_OF_DRIVE = ("speed", "speed_limits", "watchdog")
+"""Fields that belong to the drive if a belt names one."""
+
+
+class _Belt(SpeedSetpoint):
     KIND: ClassVar[str] = "belt"
 
-    speed: Number = quantity("Speed at the start, positive forward.", "m/s", default=0.0)
-    speed_limits: Limits = quantity("Least and greatest speed that a command may ask for.", "m/s", default=(-3.0, 3.0))
     material: Name = quantity("Material, as named in `base`.")
-    watchdog: Positive | None = quantity(
-        "Without a speed command for this long, the belt stops. Left out: it keeps its speed.", "s", default=None
+    drive: _Drive | None = quantity(
+        "What moves it: a drive of its own, or the name of one from `drives`, which then has the speed, the "
+        "speed_limits and the watchdog. Left out: it has the commanded speed from one tick to the next.",
+        default=None,
     )
-    drive: Drive | None = quantity(
-        "What moves it. Left out: it has the commanded speed from one tick to the next.", default=None
-    )
+    ratio: Positive = quantity("Speed of the belt over that of the drive that it names.", "1", default=1.0)
+
+    @property
+    def drive_name(self) -> str | None:
+        """Name of the drive from `drives` that moves it; None without one."""
+        return self.drive if isinstance(self.drive, str) else None
+
+    @model_serializer(mode="wrap")
+    def _without_foreign_fields(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave out the fields that this belt can't have, so that a scene can be read again from its fields."""
+        foreign = ("ratio",) if self.drive_name is None else _OF_DRIVE
+        return {name: value for name, value in handler(self).items() if name not in foreign}
 
     def problems(self, path: Path, others: Others) -> Iterator[Problem]:
-        """Yield a problem for a speed beyond its limits, or limits in the wrong order."""
-        least, greatest = self.speed_limits
-        if least > greatest:
-            text = f"{shown(self.speed_limits)} given, expected the smaller number first (m/s)"
-            yield Problem((*path, "speed_limits"), text)
-        elif not least <= self.speed <= greatest:
-            yield Problem(
-                (*path, "speed"),
-                f"{shown(self.speed)} given, expected a number from {least:g} to {greatest:g} (m/s), the speed_limits",
-            )
+        """Yield problems of speeds and limits, of an unknown drive, and of fields that belong to a drive."""
+        yield from super().problems(path, others)
+        yield from name_problems((*path, "drive"), self.drive_name, "drives", others)
+        if self.drive_name is None:
+            if "ratio" in self.model_fields_set:
+                text = f"{shown(self.ratio)} given, expected it only with the name of a drive from `drives`"
+                yield Problem((*path, "ratio"), text)
+            return
+        for field in _OF_DRIVE:
+            if field in self.model_fields_set:
+                value = getattr(self, field)
+                yield Problem(
+                    (*path, field), f"{shown(value)} given, expected none here: drives.{self.drive_name} has it"
+                )
 
 
-class StraightBelt(_Belt):
+class StraightBelt(StraightArea, _Belt):
     """A rectangle that runs along its length."""
-
-    kind: Literal["straight"] = quantity("The kind of belt.")
-    start: Point = quantity(
-        "Corner where the belt begins, on the right-hand side seen along travel; the width grows to the left.", "m"
-    )
-    angle: Angle = quantity("Direction of travel at positive speed, from the x-axis, counter-clockwise.", "rad")
-    length: Positive = quantity("Length along travel.", "m")
-    width: Positive = quantity("Width across travel.", "m")
 
 
 class BeltRails(Part):
@@ -70,29 +84,53 @@ class BeltRails(Part):
     material: Name | None = quantity("Material of these rails; needed if there is one.", default=None)
 
 
-class CurvedBelt(_Belt):
-    """A sector of a ring that turns about its centre; speed holds at the centre line, positive counter-clockwise.
+class CurvedBelt(CurvedArea, _Belt):
+    """A sector of a ring that turns about its centre; its speed holds at the centre line.
 
     Given either by `centre`, `start_angle` and `span`, or by `from`, `to` and `side`.
     """
 
-    kind: Literal["curved"] = quantity("The kind of belt.")
-    inner_radius: NotNegative = quantity("Radius R of the inner arc.", "m")
-    width: Positive = quantity("Width, from the inner to the outer arc.", "m")
-    centre: Point | None = quantity("Centre of the arcs.", "m", default=None)
-    start_angle: Angle | None = quantity("Where the sector begins, seen from the centre.", "rad", default=None)
-    span: Span | None = quantity("Angle of the sector, counter-clockwise.", "rad", default=None)
-    from_: Point | None = quantity("One end of the inner arc.", "m", default=None, alias="from")
-    to: Point | None = quantity("The other end of the inner arc.", "m", default=None)
-    side: Literal["left", "right"] | None = quantity(
-        "Side of the line from `from` to `to` on which the centre lies; the shorter arc is meant. "
-        "Positive speed runs from `from` to `to` if left, from `to` to `from` if right.",
-        default=None,
-    )
+    turn: Turn = quantity(TURN_TEXT, default="left")
     rails: BeltRails = quantity("Rails along the arcs.", default=BeltRails.model_construct())
 
 
-Belt = Annotated[
-    Annotated[StraightBelt, Tag("(straight)")] | Annotated[CurvedBelt, Tag("(curved)")],
+class StraightSurface(StraightArea):
+    """A rectangular surface of a path belt."""
+
+    ratio: Positive = quantity(_RATIO_TEXT, "1", default=1.0)
+
+
+class CurvedSurface(CurvedArea):
+    """A surface of a path belt that turns about a centre; its speed holds at the centre line.
+
+    Given either by `centre`, `start_angle` and `span`, or by `from`, `to` and `side`.
+    """
+
+    turn: Turn = quantity(TURN_TEXT, default="left")
+    ratio: Positive = quantity(_RATIO_TEXT, "1", default=1.0)
+
+
+BeltSurface = Annotated[
+    Annotated[StraightSurface, Tag("(straight)")] | Annotated[CurvedSurface, Tag("(curved)")],
     one_of({"straight": "(straight)", "curved": "(curved)"}),
+]
+
+
+class PathBelt(_Belt):
+    """Several surfaces that move together: pieces one behind the other, or lanes side by side.
+
+    It is one device with one speed. Figures name its surfaces `<belt>_1`, `<belt>_2` and so on.
+    """
+
+    kind: Literal["path"] = quantity("The kind of belt.")
+    surfaces: Annotated[tuple[BeltSurface, ...], Len(1), Holds("a list of surfaces, at least one")] = quantity(
+        "Its surfaces, along travel. Where they overlap, the last listed carries."
+    )
+
+
+Belt = Annotated[
+    Annotated[StraightBelt, Tag("(straight)")]
+    | Annotated[CurvedBelt, Tag("(curved)")]
+    | Annotated[PathBelt, Tag("(path)")],
+    one_of({"straight": "(straight)", "curved": "(curved)", "path": "(path)"}),
 ]

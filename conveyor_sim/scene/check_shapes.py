@@ -7,13 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.scene.belts import CurvedBelt
+from conveyor_sim.scene.areas import CurvedArea, StraightArea
+from conveyor_sim.scene.belts import CurvedBelt, PathBelt
 from conveyor_sim.scene.check_machines import machine_problems
 from conveyor_sim.scene.geometry import (
     Array,
     RailShape,
     arc_centre,
-    curved_shape,
+    area_shape,
     grid_points,
     rail_pieces,
     rails_of_curved,
@@ -31,15 +32,15 @@ _MOST_BOTTLES = 1_000_000  # of one grid
 
 
 def shape_problems(scene: Scene) -> list[Problem]:
-    """Return problems of belts, of rails, and of the places of new bottles."""
-    belts = list(_curved_belts(scene))
+    """Return problems of belts, plates, rails, and of the places of new bottles."""
+    areas = list(_curved_areas(scene))
     rails = list(_rails(scene))
-    wrong = {problem.path[:2] for problem in belts + rails}
+    wrong = {problem.path[:2] for problem in areas + rails}
     resting = _valid_rails(scene, wrong)
     shapes = [*resting, *_valid_moving(scene)]
     groups = list(_groups(scene))
     return [
-        *belts,
+        *areas,
         *rails,
         *_grids(scene),
         *_in_rails(groups, shapes),
@@ -49,18 +50,24 @@ def shape_problems(scene: Scene) -> list[Problem]:
     ]
 
 
-def _curved_belts(scene: Scene) -> Iterator[Problem]:
+def _areas(scene: Scene) -> Iterator[tuple[Path, StraightArea | CurvedArea]]:
+    """Yield the areas of belts and plates with their paths."""
     for name, belt in scene.belts.items():
-        if not isinstance(belt, CurvedBelt):
+        if isinstance(belt, PathBelt):
+            yield from ((("belts", name, "surfaces", index), part) for index, part in enumerate(belt.surfaces))
+        else:
+            yield ("belts", name), belt
+    yield from ((("plates", name), plate) for name, plate in scene.plates.items())
+
+
+def _curved_areas(scene: Scene) -> Iterator[Problem]:
+    for path, area in _areas(scene):
+        if not isinstance(area, CurvedArea):
             continue
-        path: Path = ("belts", name)
-        rails = belt.rails
-        if (rails.inner or rails.outer) and rails.material is None:
-            yield Problem((*path, "rails", "material"), "missing, expected the material of the belt's rails")
-        if rails.inner and belt.inner_radius == 0:
-            yield Problem((*path, "rails", "inner"), "true given, expected false, as the inner radius is 0")
-        by_centre = {"centre": belt.centre, "start_angle": belt.start_angle, "span": belt.span}
-        by_points = {"from": belt.from_, "to": belt.to, "side": belt.side}
+        if isinstance(area, CurvedBelt):
+            yield from _belt_rails(path, area)
+        by_centre = {"centre": area.centre, "start_angle": area.start_angle, "span": area.span}
+        by_points = {"from": area.from_, "to": area.to, "side": area.side}
         given = [field for field, value in (by_centre | by_points).items() if value is not None]
         if given not in (list(by_centre), list(by_points)):
             yield Problem(
@@ -68,21 +75,29 @@ def _curved_belts(scene: Scene) -> Iterator[Problem]:
                 f"{', '.join(given) or 'no place'} given, "
                 "expected either centre, start_angle and span, or from, to and side",
             )
-        elif belt.from_ is not None and belt.to is not None:
-            yield from _two_points(path, belt.from_, belt.to, belt)
+        elif area.from_ is not None and area.to is not None:
+            yield from _two_points(path, area.from_, area.to, area)
 
 
-def _two_points(path: Path, start: XY, end: XY, belt: CurvedBelt) -> Iterator[Problem]:
+def _belt_rails(path: Path, belt: CurvedBelt) -> Iterator[Problem]:
+    rails = belt.rails
+    if (rails.inner or rails.outer) and rails.material is None:
+        yield Problem((*path, "rails", "material"), "missing, expected the material of the belt's rails")
+    if rails.inner and belt.inner_radius == 0:
+        yield Problem((*path, "rails", "inner"), "true given, expected false, as the inner radius is 0")
+
+
+def _two_points(path: Path, start: XY, end: XY, area: CurvedArea) -> Iterator[Problem]:
     chord = math.dist(start, end)
     if chord <= TOUCH:
         yield Problem((*path, "to"), f"{shown(end)} given, expected a point away from `from`")
         return
     try:
-        arc_centre(start, end, belt.inner_radius, str(belt.side))
+        arc_centre(start, end, area.inner_radius, str(area.side))
     except ValueError:
         yield Problem(
             (*path, "inner_radius"),
-            f"{shown(belt.inner_radius)} given, expected at least half the chord between `from` and `to`, "
+            f"{shown(area.inner_radius)} given, expected at least half the chord between `from` and `to`, "
             f"{chord / 2:.6g} (m)",
         )
 
@@ -112,7 +127,7 @@ def _valid_rails(scene: Scene, wrong: set[Path]) -> list[RailShape]:
     ]
     for name, belt in scene.belts.items():
         if isinstance(belt, CurvedBelt) and ("belts", name) not in wrong:
-            shapes.extend(rails_of_curved(curved_shape(name, belt), belt))
+            shapes.extend(rails_of_curved(area_shape(name, belt), belt))
     return shapes
 
 

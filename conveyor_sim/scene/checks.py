@@ -108,18 +108,20 @@ def _touching(scene: Scene) -> Iterator[tuple[frozenset[str], str]]:
 
 
 def _missing_base(scene: Scene) -> Iterator[Problem]:
-    """Yield a problem for each pair of bottle and belt materials without base friction."""
+    """Yield a problem for each pair of bottle and belt or plate materials without base friction."""
     known = {base.between for base in scene.base}
     first: dict[str, str] = {}
     for name, belt in scene.belts.items():
-        first.setdefault(belt.material, name)
-    for material, name in first.items():
+        first.setdefault(belt.material, f"belt {name}")
+    for name, plate in scene.plates.items():
+        first.setdefault(plate.material, f"plate {name}")
+    for material, surface in first.items():
         for one in _bottle_materials(scene):
             if (one, material) not in known:
                 known.add((one, material))
                 yield Problem(
                     ("base",),
-                    f"no entry for bottle of {one} on belt {name} of {material}, "
+                    f"no entry for bottle of {one} on {surface} of {material}, "
                     f"expected one with between: [{one}, {material}]",
                 )
 

@@ -121,10 +121,10 @@ class BaseSpring(Part):
 
 
 class Base(Part):
-    """Friction of bottles that stand on a belt."""
+    """Friction of bottles that stand on a belt or a plate."""
 
-    between: Pair = quantity("The bottle's material, then the belt's.")
-    friction: NotNegative = quantity("Coefficient of friction of the bottle's base on the belt.", "1")
+    between: Pair = quantity("The bottle's material, then that of the belt or plate.")
+    friction: NotNegative = quantity("Coefficient of friction of the bottle's base on the belt or plate.", "1")
     tangential: BaseSpring | None = quantity(
         "Static friction: a tangential spring with history between base and belt, in place of the friction curve, on "
         "which bottles creep; needs friction, and bottles that stand on points. Left out: none.",

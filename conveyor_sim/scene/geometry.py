@@ -1,15 +1,17 @@
-"""Shapes of a scene: belts, rails and initial bottles. Pure functions; m and rad."""
+"""Shapes of a scene: surfaces of belts and plates, rails and initial bottles. Pure functions; m and rad."""
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.scene.belts import Belt, CurvedBelt
+from conveyor_sim.scene.angles import unit_vector
+from conveyor_sim.scene.areas import CurvedArea, StraightArea
+from conveyor_sim.scene.belts import Belt, CurvedBelt, CurvedSurface, PathBelt, StraightSurface
 from conveyor_sim.scene.rails import ArcRail, PolylineRail, Rail
 from conveyor_sim.scene.schema import Grid, GridOfBottles, Scene
 from conveyor_sim.scene.types import TOUCH, XY
@@ -20,9 +22,10 @@ InitialBottle = tuple[str, float, float, float, float, float, float]
 
 @dataclass(frozen=True)
 class BeltShape:
-    """An area: straight (corner, angle, length, width), or curved (centre, inner_radius, start_angle, span, width).
+    """A surface: straight (corner, angle, length, width), or curved (centre, inner_radius, start_angle, span, width).
 
-    The numbers of the other kind are 0. A straight belt's `corner` is xi = eta = 0, xi along `angle`, eta to its left.
+    The numbers of the other kind are 0. A straight surface's `corner` is xi = eta = 0, xi along `angle`, eta to its
+    left.
     """
 
     name: str
@@ -35,16 +38,30 @@ class BeltShape:
     inner_radius: float = 0.0
     start_angle: float = 0.0
     span: float = 0.0
+    material: str = ""
+    belt: int | None = None
+    """Index of the belt that moves it; None for a plate, which rests."""
+    ratio: float = 1.0
+    """Speed along travel over that of the belt."""
+    clockwise: bool = False
+    """True if a curved surface turns clockwise at positive speed."""
 
     @property
     def centre_radius(self) -> float:
-        """Radius of a curved belt's centre line (m), where its speed holds."""
+        """Radius of a curved surface's centre line (m), where its speed holds."""
         return self.inner_radius + self.width / 2
 
     @property
+    def running_length(self) -> float:
+        """Length along the centre line, m."""
+        return self.length if self.kind == "straight" else self.span * self.centre_radius
+
+    @property
     def outermost(self) -> float:
-        """Speed of the fastest point of the surface, over that of the belt."""
-        return 1.0 if self.kind == "straight" else (self.inner_radius + self.width) / self.centre_radius
+        """Speed of the fastest point of the surface, over that of the belt; 0 for a plate."""
+        if self.belt is None:
+            return 0.0
+        return self.ratio * (1.0 if self.kind == "straight" else (self.inner_radius + self.width) / self.centre_radius)
 
     def outline(self, n: int = 64) -> Array:
         """Return the corners of the area, (k, 2), counter-clockwise, first not repeated; an arc has n points.
@@ -53,20 +70,37 @@ class BeltShape:
         """
         if self.kind == "straight":
             return self._point([0.0, self.length, self.length, 0.0], [0.0, 0.0, self.width, self.width])
-        outer = arc_points(self.centre, self.inner_radius + self.width, self.start_angle, self.span, n)
+        outer = self._arc(self.inner_radius + self.width, n)
         if self.inner_radius > 0:
-            return np.vstack([outer, arc_points(self.centre, self.inner_radius, self.start_angle, self.span, n)[::-1]])
+            return np.vstack([outer, self._arc(self.inner_radius, n)[::-1]])
         return outer[:-1] if is_full_turn(self.span) else np.vstack([outer, [self.centre]])
+
+    def edges(self, n: int = 64) -> tuple[Array, Array]:
+        """Return points of the right and of the left edge, (k, 2) each, along positive speed; an arc has n points."""
+        if self.kind == "straight":
+            ends = [0.0, self.length]
+            return self._point(ends, [0.0, 0.0]), self._point(ends, [self.width, self.width])
+        outer, inner = self._arc(self.inner_radius + self.width, n), self._arc(self.inner_radius, n)
+        return (inner[::-1], outer[::-1]) if self.clockwise else (outer, inner)
 
     def centre_line(self, n: int = 64) -> Array:
         """Return points along the middle, (n, 2), in the direction of positive speed."""
         if self.kind == "straight":
             return self._point(np.linspace(0.0, self.length, n), np.full(n, self.width / 2))
-        return arc_points(self.centre, self.centre_radius, self.start_angle, self.span, n)
+        points = self._arc(self.centre_radius, n)
+        return points[::-1] if self.clockwise else points
+
+    def _arc(self, radius: float, n: int) -> Array:
+        """Return points of an arc of the sector, (n, 2), counter-clockwise, with exact ends at quarter turns."""
+        points = arc_points(self.centre, radius, self.start_angle, self.span, n)
+        for place, angle in ((0, self.start_angle), (-1, self.start_angle + self.span)):
+            cos, sin = unit_vector(angle)
+            points[place] = self.centre[0] + radius * cos, self.centre[1] + radius * sin
+        return points
 
     def _point(self, xi: list[float] | Array, eta: list[float] | Array) -> Array:
-        """Return global coordinates (k, 2) of belt coordinates (11)-(13)."""
-        cos, sin = math.cos(self.angle), math.sin(self.angle)
+        """Return global coordinates (k, 2) of surface coordinates (11)-(13)."""
+        cos, sin = unit_vector(self.angle)
         xi, eta = np.asarray(xi), np.asarray(eta)
         return np.column_stack([self.corner[0] + cos * xi - sin * eta, self.corner[1] + sin * xi + cos * eta])
 
@@ -180,35 +214,65 @@ def arc_centre(p1: XY, p2: XY, radius: float, side: str) -> XY:
     return p1[0] + chord_x / 2 - shift * chord_y, p1[1] + chord_y / 2 + shift * chord_x
 
 
-def curved_shape(name: str, belt: CurvedBelt) -> BeltShape:
-    """Return the area of a curved belt. Two points on the inner race mean the shorter arc between them.
+def area_shape(name: str, area: StraightArea | CurvedArea) -> BeltShape:
+    """Return the shape of an area, at rest. Two points on the inner arc mean the shorter arc between them.
 
     Raise ValueError as in `arc_centre`.
     """
-    if belt.centre is not None and belt.start_angle is not None and belt.span is not None:
-        centre, start, span = belt.centre, belt.start_angle, belt.span
-    elif belt.from_ is not None and belt.to is not None and belt.side is not None:
-        centre = arc_centre(belt.from_, belt.to, belt.inner_radius, belt.side)
-        first, last = (belt.from_, belt.to) if belt.side == "left" else (belt.to, belt.from_)
+    if isinstance(area, StraightArea):
+        return BeltShape(name, "straight", area.width, corner=area.start, angle=area.angle, length=area.length)
+    if area.centre is not None and area.start_angle is not None and area.span is not None:
+        centre, start, span = area.centre, area.start_angle, area.span
+    elif area.from_ is not None and area.to is not None and area.side is not None:
+        centre = arc_centre(area.from_, area.to, area.inner_radius, area.side)
+        first, last = (area.from_, area.to) if area.side == "left" else (area.to, area.from_)
         start = math.atan2(first[1] - centre[1], first[0] - centre[0])
         span = (math.atan2(last[1] - centre[1], last[0] - centre[0]) - start) % (2 * math.pi)
     else:
         raise ValueError("neither centre, start_angle and span nor from, to and side are given")
     return BeltShape(
-        name, "curved", belt.width, centre=centre, inner_radius=belt.inner_radius, start_angle=start, span=span
+        name, "curved", area.width, centre=centre, inner_radius=area.inner_radius, start_angle=start, span=span
     )
 
 
-def belt_shape(name: str, belt: Belt) -> BeltShape:
-    """Return the area of a belt. Raise ValueError as in `curved_shape`."""
-    if isinstance(belt, CurvedBelt):
-        return curved_shape(name, belt)
-    return BeltShape(name, "straight", belt.width, corner=belt.start, angle=belt.angle, length=belt.length)
+def shapes_of_belt(name: str, belt: Belt, index: int = 0) -> tuple[BeltShape, ...]:
+    """Return the surfaces of a belt, which has an index among belts. Raise ValueError as in `arc_centre`."""
+    surfaces: list[tuple[str, StraightArea | CurvedArea]] = (
+        [(name, belt)]
+        if not isinstance(belt, PathBelt)
+        else [(f"{name}_{number}", surface) for number, surface in enumerate(belt.surfaces, 1)]
+    )
+    return tuple(
+        replace(
+            area_shape(label, surface),
+            material=belt.material,
+            belt=index,
+            ratio=surface.ratio if isinstance(surface, StraightSurface | CurvedSurface) else 1.0,
+            clockwise=isinstance(surface, CurvedBelt | CurvedSurface) and surface.turn == "right",
+        )
+        for label, surface in surfaces
+    )
 
 
 def belt_shapes(scene: Scene) -> list[BeltShape]:
-    """Return the areas of the belts, in the scene's order."""
-    return [belt_shape(name, belt) for name, belt in scene.belts.items()]
+    """Return the surfaces of the belts, belt by belt in the scene's order."""
+    return [
+        shape for index, (name, belt) in enumerate(scene.belts.items()) for shape in shapes_of_belt(name, belt, index)
+    ]
+
+
+def surface_shapes(scene: Scene) -> list[BeltShape]:
+    """Return all surfaces: those of belts, then plates. The index is the number of a surface."""
+    plates = (replace(area_shape(name, plate), material=plate.material) for name, plate in scene.plates.items())
+    return [*belt_shapes(scene), *plates]
+
+
+def surface_materials(scene: Scene) -> list[str]:
+    """Return the material of each surface, in the order of `surface_shapes`."""
+    materials: list[str] = []
+    for belt in scene.belts.values():
+        materials += [belt.material] * (len(belt.surfaces) if isinstance(belt, PathBelt) else 1)
+    return [*materials, *(plate.material for plate in scene.plates.values())]
 
 
 def rail_pieces(rail: Rail) -> tuple[Piece, ...]:
@@ -237,7 +301,7 @@ def rail_shapes(scene: Scene) -> list[RailShape]:
     shapes = [RailShape(name, rail.material, rail_pieces(rail)) for name, rail in scene.rails.items()]
     for name, belt in scene.belts.items():
         if isinstance(belt, CurvedBelt):
-            shapes.extend(rails_of_curved(curved_shape(name, belt), belt))
+            shapes.extend(rails_of_curved(area_shape(name, belt), belt))
     return shapes
 
 

@@ -28,7 +28,7 @@ problem is one line that names the file, the line, the field, the value and what
 - Numbers must be finite; what is not 0 has a size from 1e-20 to 1e20.
 - Unknown fields and keys given twice are refused. YAML anchors and `<<` can be used.
 - Each pair of materials that can touch needs one entry in `contacts` (bottle and bottle, bottle and rail), each pair of
-  bottle and belt one in `base`.
+  bottle and belt, or bottle and plate, one in `base`.
 - Where a rail ends on another (within 1e-6 m), both are one surface. Rails of curved belts follow those under
   `rails` in the order of indices, then come gates, pushers and diverters.
 - Gates, pushers and diverters are straight rails that move on command, each a separate surface: where one ends on
@@ -57,7 +57,12 @@ WITHIN: dict[str, list[tuple[str, type[BaseModel]]]] = {
 """Sections of fields other than mappings of names to parts, by field."""
 
 BEHIND: dict[str, list[tuple[str, type[BaseModel]]]] = {
-    "belts": [("`rails` of a curved belt", belts.BeltRails), ("`drive` of a belt", drives.Drive)],
+    "belts": [
+        ("`rails` of a curved belt", belts.BeltRails),
+        ("An entry of `surfaces` of a path belt: `kind: straight`", belts.StraightSurface),
+        ("An entry of `surfaces` of a path belt: `kind: curved`", belts.CurvedSurface),
+        ("`drive` of a belt", drives.Drive),
+    ],
     "machines": [
         ("`acting_times` of a machine", machine.ActingTimes),
         ("An entry of `failures` of a machine", failures.Failure),

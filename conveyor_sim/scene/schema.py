@@ -13,7 +13,9 @@ from pydantic import Discriminator, PrivateAttr, Tag
 from conveyor_sim.scene.accuracy import Accuracy
 from conveyor_sim.scene.belts import Belt
 from conveyor_sim.scene.contacts import Base, Contact
+from conveyor_sim.scene.drives import NamedDrive
 from conveyor_sim.scene.effect_names import EffectName, Forced
+from conveyor_sim.scene.layout.plan import LayoutPlan
 from conveyor_sim.scene.limits import Limits as DamageLimits
 from conveyor_sim.scene.machines import Machine
 from conveyor_sim.scene.part import Part
@@ -27,6 +29,7 @@ from conveyor_sim.scene.parts.outfeed import Outfeed
 from conveyor_sim.scene.parts.photo_eye import PhotoEye
 from conveyor_sim.scene.parts.spill import Spill
 from conveyor_sim.scene.parts.zone import Zone
+from conveyor_sim.scene.plates import Plate
 from conveyor_sim.scene.rails import Rail
 from conveyor_sim.scene.types import (
     Angle,
@@ -213,13 +216,19 @@ class Scene(Part):
         "What happens between materials that touch.", default=()
     )
     base: Annotated[tuple[Base, ...], Holds("a list of base frictions")] = quantity(
-        "Friction of bottles on belts.", default=()
+        "Friction of bottles on belts and plates.", default=()
     )
     bottle_types: Annotated[dict[Name, BottleType], Len(1), _named("bottle types, at least one")] = quantity(
         "Kinds of bottles."
     )
+    drives: Annotated[dict[Name, NamedDrive], _named("drives")] = quantity(
+        "Drives that move several belts.", default={}
+    )
     belts: Annotated[dict[Name, Belt], _named("belts")] = quantity(
         "Belts. Where they overlap, the last listed carries.", default={}
+    )
+    plates: Annotated[dict[Name, Plate], _named("plates")] = quantity(
+        "Surfaces at rest, over belts where they overlap.", default={}
     )
     rails: Annotated[dict[Name, Rail], _named("rails")] = quantity(
         "Rails. Those that join end to end, or end on another, are one surface.", default={}
@@ -281,6 +290,7 @@ class Scene(Part):
     )
 
     _source: Origin = PrivateAttr(default=Origin())
+    _layout: LayoutPlan | None = PrivateAttr(default=None)
 
     @property
     def tick_ns(self) -> int:
@@ -330,6 +340,11 @@ class Scene(Part):
     def streams_by_index(self) -> bool:
         """True if random streams are keyed by places in lists, as in old recordings, and not by names of devices."""
         return self._source.streams_by_index
+
+    @property
+    def layout(self) -> LayoutPlan | None:
+        """Plan of the conveyors that the scene was expanded from; None without conveyors."""
+        return self._layout
 
     @property
     def source_text(self) -> str:

@@ -121,6 +121,16 @@ Span = Annotated[
     Says(_span_words),
     _sound,
 ]
+NotNegativeAngle = Annotated[
+    float,
+    Strict(),
+    AllowInfNan(False),
+    Ge(0),
+    Le(math.pi),
+    BeforeValidator(parse_angle),
+    Says('an angle from 0 to half a turn, a number or a text like "0.5 deg"'),
+    _sound,
+]
 
 _coordinate = Annotated[float, Strict(), AllowInfNan(False), Ge(-COORDINATE_LIMIT), Le(COORDINATE_LIMIT)]
 Component = Annotated[float, Strict(), AllowInfNan(False)]

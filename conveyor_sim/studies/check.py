@@ -7,9 +7,10 @@ from typing import Any
 
 from conveyor_sim.errors import ConveyorError, StudyError
 from conveyor_sim.scene import Scene
-from conveyor_sim.scene.load import refused
 from conveyor_sim.scene.part import Part
 from conveyor_sim.scene.problems import Path, Problem
+from conveyor_sim.scene.provenance import Sources
+from conveyor_sim.scene.refusal import refused
 from conveyor_sim.scene.words import field_names, shown, unit_of
 from conveyor_sim.scene.yaml_lines import Document
 from conveyor_sim.simulation import Simulation
@@ -32,7 +33,12 @@ def check_study(setup: Setup, first: Point | None = None) -> None:
                 found = next(_problems(setup, {**first, name: value}), None)
                 problems += [Problem(place, f"{shown(value)} given, but {found.text}")] if found else []
     if problems:
-        raise StudyError(str(refused(problems, Document(setup.source, setup.path), setup.path, {})))
+        raise _refused(setup, problems)
+
+
+def _refused(setup: Setup, problems: list[Problem]) -> StudyError:
+    places = Sources(Document(setup.source, setup.path), setup.path)
+    return StudyError(str(refused(problems, places.place_of, setup.path)))
 
 
 def units_of(setup: Setup, scene: Scene) -> dict[str, str]:
@@ -47,7 +53,7 @@ def units_of(setup: Setup, scene: Scene) -> dict[str, str]:
             continue
         units[name] = metric.unit or str(getattr(gauge, "unit", "1"))
     if problems:
-        raise StudyError(str(refused(problems, Document(setup.source, setup.path), setup.path, {})))
+        raise _refused(setup, problems)
     return units
 
 

@@ -13,7 +13,7 @@ from conveyor_sim.control.scan import ControlError, Controller
 from conveyor_sim.control.st.load import load
 from conveyor_sim.errors import ConveyorError, StudyError
 from conveyor_sim.scene import Scene, parse_overrides, parse_scene
-from conveyor_sim.scene.load import merged
+from conveyor_sim.scene.overrides import merged
 from conveyor_sim.scene.problems import Path
 from conveyor_sim.scene.words import listed
 from conveyor_sim.studies.code import function

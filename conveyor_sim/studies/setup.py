@@ -10,7 +10,7 @@ from typing import Any
 
 from conveyor_sim.errors import StudyError
 from conveyor_sim.physics.sources_hash import version_hashes
-from conveyor_sim.scene.load import merged
+from conveyor_sim.scene.overrides import merged
 from conveyor_sim.studies.code import digest_of
 from conveyor_sim.studies.metrics import Metric, metric_of
 from conveyor_sim.studies.study import Study

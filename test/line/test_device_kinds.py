@@ -13,8 +13,8 @@ from conveyor_sim.support.resources import scene_path
 
 BY_SHAPE = {"belt", "gate", "pusher", "diverter"}
 """Kinds that are drawn as belts and rails."""
-PLACELESS = {"indicator"}
-"""Kinds without a place. An indicator uses a counter and a zone, which are drawn."""
+PLACELESS = {"drive", "indicator"}
+"""Kinds without a place. A drive moves belts, an indicator uses a counter and a zone, which are drawn."""
 
 
 def kinds(part: type[DevicePart] = DevicePart) -> Iterator[str]:

@@ -169,7 +169,7 @@ _ROWS = (
         "once a run, latched",
         LATCHED,
         once=True,
-        state=lambda now: (now.sim.model.plant.belts, now.sim.model.plant.rails_at_rest, marks_of(now.sim.scene)),
+        state=lambda now: (now.sim.model.plant.surfaces, now.sim.model.plant.rails_at_rest, marks_of(now.sim.scene)),
         write=lambda data, header: plant_markers(data[0], data[1], data[2], header),
     ),
     Topic(

@@ -1,46 +1,49 @@
-"""`BeltSurfaces`: surface velocity fields of the belts, set from the speeds of the drives."""
-
-import math
+"""`BeltSurfaces`: velocity fields of the surfaces, set from the speeds of the belts. Plates rest."""
 
 import numpy as np
 
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.engine.support.footing import refresh_footing
 from conveyor_sim.physics.state import State
+from conveyor_sim.scene.angles import unit_vector
 
 
 class BeltSurfaces:
-    """Surfaces of all belts. Straight belts translate, curved belts and turn-tables rotate."""
+    """Surfaces of all belts. Straight surfaces translate, curved ones and turn-tables rotate."""
 
     def __init__(self, state: State) -> None:
         self._state = state
-        shapes = state.model.plant.belts
-        straight = [index for index, shape in enumerate(shapes) if shape.kind == "straight"]
-        self._straight = np.array(straight, dtype=np.int64)
-        self._along_x = np.array([math.cos(shapes[index].angle) for index in straight])
-        self._along_y = np.array([math.sin(shapes[index].angle) for index in straight])
-        self._turning = [(index, shape) for index, shape in enumerate(shapes) if shape.kind != "straight"]
-        self._centre_radius = [shape.centre_radius if shape.kind == "curved" else math.inf for shape in shapes]
-        self._outermost = np.array([shape.outermost for shape in shapes])
+        surfaces = enumerate(state.model.plant.surfaces)
+        moved = [(index, shape.belt, shape) for index, shape in surfaces if shape.belt is not None]
+        straight = [entry for entry in moved if entry[2].kind == "straight"]
+        along = np.array([unit_vector(shape.angle) for *_, shape in straight]).reshape(-1, 2)
+        self._straight = np.array([index for index, *_ in straight], dtype=np.int64)
+        self._straight_belt = np.array([belt for _, belt, _ in straight], dtype=np.int64)
+        self._ratio = np.array([shape.ratio for *_, shape in straight])
+        self._along_x, self._along_y = along.T.copy()
+        self._turning = [entry for entry in moved if entry[2].kind == "curved"]
+        self._moved_belt = np.array([belt for _, belt, _ in moved], dtype=np.int64)
+        self._outermost = np.array([shape.outermost for *_, shape in moved])
         self.fastest = 0.0
-        """Speed of the fastest point of any belt, m/s."""
+        """Speed of the fastest point of any surface, m/s."""
 
     def note(self, speeds: F8) -> None:
         """Take over speeds that the belts already have along their centre lines, (belts,) m/s."""
-        self.fastest = float(np.max(np.abs(speeds) * self._outermost)) if self._state.model.belts else 0.0
+        self.fastest = float(np.max(np.abs(speeds[self._moved_belt]) * self._outermost, initial=0.0))
 
     def move(self, speeds: F8) -> None:
-        """Set each belt's speed along the centre line, (belts,) m/s, and update the bottles on it."""
+        """Set the surfaces to each belt's speed along its centre line, (belts,) m/s, and update the bottles on them."""
         self.note(speeds)
         world, surface = self._state.world, self._state.world.surface
-        if surface is None or not self._state.model.belts:
+        if surface is None or not self._moved_belt.size:
             return
-        along = speeds[self._straight]
+        along = speeds[self._straight_belt] * self._ratio
         surface.ux[self._straight] = along * self._along_x
         surface.uy[self._straight] = along * self._along_y
-        for index, shape in self._turning:
+        for index, belt, shape in self._turning:
             if surface.turn is not None:
-                turn = speeds[index] / self._centre_radius[index]
+                ratio = -shape.ratio if shape.clockwise else shape.ratio
+                turn = speeds[belt] * ratio / shape.centre_radius
                 surface.turn[index] = turn
                 surface.ux[index], surface.uy[index] = turn * shape.centre[1], -turn * shape.centre[0]
         refresh_footing(world.bottles, world.belts, surface, world.footing, world.ring)

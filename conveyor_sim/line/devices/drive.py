@@ -1,4 +1,4 @@
-"""Drives of belts: ramps, running, reversing, trips and reset, and travel of an encoder."""
+"""Drives: ramps, running, reversing, trips and reset, and travel of an encoder."""
 
 import math
 from collections.abc import Sequence
@@ -6,12 +6,11 @@ from dataclasses import dataclass
 
 from conveyor_sim.line.alarms.declaration import Declared, error
 from conveyor_sim.line.device import ScanContext
-from conveyor_sim.line.devices.belt import BeltDevice
 from conveyor_sim.line.devices.edge import RisingEdge
+from conveyor_sim.line.devices.setpoint import SetpointDevice
 from conveyor_sim.line.devices.setup import DeviceSetup
-from conveyor_sim.line.tag import MOST_COUNT, count, switch
-from conveyor_sim.scene.belts import CurvedBelt, StraightBelt
-from conveyor_sim.scene.drives import Drive
+from conveyor_sim.line.tag import MOST_COUNT, Tag, count, switch
+from conveyor_sim.scene.drives import Drive, NamedDrive, SpeedSetpoint
 
 AT_SPEED = 1e-9
 """Tolerance between setpoint and speed, m/s."""
@@ -29,13 +28,16 @@ class Ramp:
     acceleration: float = 0.0
     """Acceleration in the last interval, m/s^2."""
 
-    def approach(self, setpoint: float, limit: float, jerk: float | None, interval: float) -> float:
+    def approach(self, setpoint: float, limit: float | None, jerk: float | None, interval: float) -> float:
         """Return the speed (m/s) after an interval (s).
 
-        limit: m/s^2. jerk: m/s^3, None for no limit.
+        limit: m/s^2. jerk: m/s^3. None for no limit; there is no jerk limit without an acceleration limit.
         """
         left = setpoint - self.value
         if left == 0.0 and self.acceleration == 0.0:
+            return self.value
+        if limit is None:
+            self.value = setpoint
             return self.value
         wanted = min(limit, abs(left) / interval)
         if jerk is not None:
@@ -54,13 +56,21 @@ class Ramp:
         return self.value
 
 
-class DriveDevice(BeltDevice):
-    """Belt with a drive. It runs at the start, at the speed of the scene.
+class DriveDevice(SetpointDevice):
+    """Belt with a drive of its own, or named drive. It runs at the start, at the speed of the scene.
 
     A trip ramps it down; it runs again after the fault has ended and `reset` has had a rising edge.
     """
 
-    def __init__(self, name: str, belt: StraightBelt | CurvedBelt, drive: Drive, setup: DeviceSetup) -> None:
+    def __init__(
+        self,
+        name: str,
+        part: SpeedSetpoint,
+        drive: Drive | NamedDrive,
+        setup: DeviceSetup,
+        bottles: Tag | None = None,
+    ) -> None:
+        """Build the tags. bottles: signal of the number of bottles on a belt."""
         tags = [
             switch(f"{name}/running", "status", "Commanded to run, and not tripped.", 1.0, "state"),
             switch(
@@ -78,10 +88,10 @@ class DriveDevice(BeltDevice):
         if drive.pulses_per_metre is not None:
             text = "Pulses of the encoder, counted down in reverse."
             tags.append(count(f"{name}/pulses", "counter", text, low=-MOST_COUNT))
-        super().__init__(name, belt, setup, tags, backward=True)
+        super().__init__(name, part, setup, bottles, tags, backward=True)
         self._drive = drive
         self._tripped = f"{name}/tripped"
-        self.ramp = Ramp(belt.speed)
+        self.ramp = Ramp(part.speed)
         self.run = True
         self.reverse = False
         self.reset = RisingEdge()
@@ -92,8 +102,9 @@ class DriveDevice(BeltDevice):
 
     @property
     def alarms(self) -> Sequence[Declared]:
-        """Alarm of a trip, and those of a belt."""
-        return (error(self._tripped, f"the drive of {self.name} has tripped", f"{self.name}/fault"), *super().alarms)
+        """Alarm of a trip, and that of the watchdog."""
+        what = f"the drive of {self.name}" if self._carries else self.name
+        return (error(self._tripped, f"{what} has tripped", f"{self.name}/fault"), *super().alarms)
 
     def command(self, name: str, value: float, now: ScanContext) -> None:
         """Apply a setpoint (m/s), run, reverse, reset, or the fault `trip`."""
@@ -126,10 +137,10 @@ class DriveDevice(BeltDevice):
             self.travel += self.ramp.value * now.length
 
     def values(self, now: ScanContext) -> Sequence[float]:
-        """Return the values of a belt, then running, at_speed, fault, and pulses."""
-        index, tripped = self._index, self.tripped
+        """Return the speed and the bottles of a belt, then running, at_speed, fault, and pulses."""
+        tripped = self.tripped
         at_speed = abs(self.ramp.value - self.wanted(now)) <= AT_SPEED
-        values = [now.speeds[index], now.carried(index), self.run and not tripped, at_speed, tripped]
+        values = [*super().values(now), self.run and not tripped, at_speed, tripped]
         if self._drive.pulses_per_metre is not None:
             values.append(math.floor(self.travel * self._drive.pulses_per_metre + 1e-9))
         return values
@@ -144,8 +155,3 @@ class DriveDevice(BeltDevice):
             return 0.0
         setpoint = float(now.setpoints[self._index])
         return -setpoint if self.reverse else setpoint
-
-
-def belt_device(name: str, belt: StraightBelt | CurvedBelt, setup: DeviceSetup) -> BeltDevice:
-    """Build a belt, with a drive if the part has one."""
-    return BeltDevice(name, belt, setup) if belt.drive is None else DriveDevice(name, belt, belt.drive, setup)

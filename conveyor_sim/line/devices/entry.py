@@ -1,6 +1,7 @@
 """Entry of bottles: free space for them, and bad bottles among them."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,6 +9,8 @@ import numpy as np
 from conveyor_sim.line.device import ScanContext
 from conveyor_sim.physics.state import State
 from conveyor_sim.scene.parts.bad import BadBottles
+from conveyor_sim.scene.parts.scatter import Scattered
+from conveyor_sim.scene.types import XY
 
 CLEAR = 1e-9
 """Tolerance against rounding, m: bottles with a gap of 0 touch, and must not block each other."""
@@ -30,10 +33,14 @@ class BottleEntry:
         """Return True if a bottle at (x, y) m would touch neither a bottle nor a moving rail in its present place."""
         return has_room(state, x, y, self.radius)
 
-    def enter(self, state: State, x: float, y: float) -> int:
-        """Add a bottle at (x, y) m, and return its id."""
-        vx, vy = self.speed * math.cos(self.direction), self.speed * math.sin(self.direction)
-        return state.add(self.kind, x, y, 0.0, vx, vy, 0.0)
+    def enter(self, state: State, x: float, y: float, turn: float = 0.0) -> int:
+        """Add a bottle at (x, y) m, its direction turned by `turn` (rad), and return its id."""
+        return state.add(self.kind, x, y, 0.0, *velocity(self.speed, self.direction + turn), 0.0)
+
+
+def velocity(speed: float, direction: float) -> XY:
+    """Return the components of a velocity (m/s) from speed (m/s) and direction (rad)."""
+    return speed * math.cos(direction), speed * math.sin(direction)
 
 
 def has_room(state: State, x: float, y: float, radius: float) -> bool:
@@ -44,6 +51,44 @@ def has_room(state: State, x: float, y: float, radius: float) -> bool:
         return False
     place, moving = np.array([[x, y]]), [piece for rail in state.moving_rails() for piece in rail.pieces]
     return all(float(piece.distance(place)[0]) >= radius - CLEAR for piece in moving)
+
+
+class Scattering:
+    """Scatter of the next bottle of a device.
+
+    Without scatter nothing is drawn, and no instance attributes are set: states of such devices are those of scenes
+    older than scatter.
+    """
+
+    offset = 0.0
+    """Distance of the next bottle to the left of the middle of its places, m."""
+    deflection = 0.0
+    """Turn of the velocity of the next bottle to the left, rad."""
+
+    def scatter(self, part: Scattered, random: Callable[[], np.random.Generator]) -> None:
+        """Store amplitudes and middle of the places, and draw the first bottle.
+
+        random: builds the random stream. It is called only with scatter.
+        """
+        self._lateral, self._angular = part.lateral_jitter, part.angular_jitter
+        self._middle, self._direction = part.position, (math.cos(part.direction), math.sin(part.direction))
+        if self._lateral or self._angular:
+            self.random = random()
+            self.draw_scatter()
+
+    def draw_scatter(self) -> None:
+        """Draw the scatter of the next bottle."""
+        if self._lateral:
+            self.offset = float(self.random.uniform(-self._lateral, self._lateral))
+        if self._angular:
+            self.deflection = float(self.random.uniform(-self._angular, self._angular))
+
+    def place(self, ahead: float = 0.0) -> XY:
+        """Return the position (m) of the next bottle, moved ahead by a distance (m)."""
+        along, across = self._direction, (-self._direction[1], self._direction[0])
+        x = self._middle[0] + ahead * along[0] + self.offset * across[0]
+        y = self._middle[1] + ahead * along[1] + self.offset * across[1]
+        return x, y
 
 
 class Quality:

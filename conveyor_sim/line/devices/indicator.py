@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 from conveyor_sim.line.alarms.declaration import Declared, error
 from conveyor_sim.line.device import Device, ScanContext
-from conveyor_sim.line.devices.belt import BeltDevice
 from conveyor_sim.line.devices.counter import CounterDevice
+from conveyor_sim.line.devices.setpoint import SpeedDevice
 from conveyor_sim.line.devices.setup import DeviceSetup
 from conveyor_sim.line.devices.zone import ZoneDevice
 from conveyor_sim.line.tag import number, switch
@@ -39,8 +39,8 @@ class IndicatorDevice(Device):
         super().__init__(name, tags)
         self._counter = setup.device(CounterDevice, f"counters/{indicator.counter}")
         self._zone = setup.device(ZoneDevice, f"zones/{indicator.zone}")
-        self._belt = setup.device(BeltDevice, f"belts/{indicator.belt}")
-        self._downstream = None if downstream is None else setup.device(BeltDevice, f"belts/{downstream}")
+        self._belt = setup.device(SpeedDevice, f"belts/{indicator.belt}")
+        self._downstream = None if downstream is None else setup.device(SpeedDevice, f"belts/{downstream}")
         self._backup = None if backup is None else setup.device(ZoneDevice, f"zones/{backup}")
         starved_time = indicator.jam_time if indicator.starved_time is None else indicator.starved_time
         self._jam_ticks, self._starved_ticks = setup.ticks(indicator.jam_time), setup.ticks(starved_time)
@@ -89,5 +89,5 @@ class IndicatorDevice(Device):
         return flow, self.jam, self.starved, *((self.blocked,) if self._can_block else ())
 
 
-def _runs(belt: BeltDevice, now: ScanContext) -> bool:
+def _runs(belt: SpeedDevice, now: ScanContext) -> bool:
     return abs(belt.speed(now)) >= STANDS

@@ -1,13 +1,11 @@
 """Infeeds: bottles enter from a tightly packed in-line (`gap`) or at a rate, always into free space."""
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.line.device import Device, ScanContext
-from conveyor_sim.line.devices.entry import CLEAR, Quality
+from conveyor_sim.line.devices.entry import CLEAR, Quality, Scattering
 from conveyor_sim.line.devices.setup import BAD, JITTER, DeviceSetup
 from conveyor_sim.line.tag import MOST_COUNT, count, switch
 from conveyor_sim.physics.state import State
@@ -21,7 +19,7 @@ LATE = 2.0
 is blocked."""
 
 
-class InfeedDevice(Device):
+class InfeedDevice(Device, Scattering):
     """Infeed of a running line."""
 
     def __init__(self, name: str, infeed: Infeed, setup: DeviceSetup) -> None:
@@ -35,7 +33,6 @@ class InfeedDevice(Device):
         )
         self._infeed, self._entry = infeed, setup.entry(infeed.bottle, infeed.direction, infeed.speed)
         self._radius = self._entry.radius
-        self._direction = (math.cos(infeed.direction), math.sin(infeed.direction))
         self.random = setup.random(name, JITTER)
         self.quality = Quality(infeed, setup.random(name, BAD))
         self.fed = 0
@@ -47,9 +44,9 @@ class InfeedDevice(Device):
         """Time when the next bottle is due (rate), or when the last one entered (gap), s."""
         self.extra = 0.0
         """Timing jitter of the next bottle, s."""
-        self.offset = 0.0
-        """Lateral jitter of the next bottle, m."""
-        self._draw()
+        self.offset = 0.0  # a part of the state of every infeed, with scatter or without
+        self._draw_delay()
+        self.scatter(infeed, lambda: self.random)
 
     def feed(self, now: ScanContext) -> None:
         """Feed the bottles that are due."""
@@ -113,19 +110,12 @@ class InfeedDevice(Device):
 
     def _clear_of_rails(self, state: State, distances: F8) -> NDArray[np.bool_]:
         """Return whether a bottle at distances ahead (n,), m, touches no rail."""
-        places = np.array([self._place(float(distance)) for distance in distances])
+        places = np.array([self.place(float(distance)) for distance in distances])
         clear = np.ones(distances.size, dtype=bool)
         for rail in state.rails():
             for piece in rail.pieces:
                 clear &= piece.distance(places) >= self._radius - CLEAR
         return clear
-
-    def _place(self, ahead: float) -> tuple[float, float]:
-        """Return the position of the next bottle at a distance along the in-line, m."""
-        along, across = self._direction, (-self._direction[1], self._direction[0])
-        x = self._infeed.position[0] + ahead * along[0] + self.offset * across[0]
-        y = self._infeed.position[1] + ahead * along[1] + self.offset * across[1]
-        return x, y
 
     def _late(self, time: float, pitch: float) -> bool:
         if self._infeed.speed == 0.0:
@@ -145,22 +135,21 @@ class InfeedDevice(Device):
         return True
 
     def _enter(self, now: ScanContext, ahead: float) -> bool:
-        x, y = self._place(ahead)
+        x, y = self.place(ahead)
         if not self._entry.has_room(now.state, x, y):
             return False
-        self.last = self._entry.enter(now.state, x, y)
+        self.last = self._entry.enter(now.state, x, y, self.deflection)
         self.quality.judge(self.last, now)
         self.fed += 1
-        self._draw()
+        self._draw_delay()
+        self.draw_scatter()
         return True
 
-    def _draw(self) -> None:
-        """Draw the jitter of the next bottle. Packed bottles can only be late; timed ones may also be early."""
-        timing, lateral = self._infeed.timing_jitter, self._infeed.lateral_jitter
+    def _draw_delay(self) -> None:
+        """Draw the timing jitter of the next bottle. Packed bottles can only be late; timed ones may also be early."""
+        timing = self._infeed.timing_jitter
         if timing:
             self.extra = float(self.random.uniform(0.0 if self._infeed.gap is not None else -timing, timing))
-        if lateral:
-            self.offset = float(self.random.uniform(-lateral, lateral))
 
     def counts(self) -> tuple[int, int, int]:
         """Return fed bottles and bad ones among them."""

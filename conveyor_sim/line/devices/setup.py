@@ -13,10 +13,12 @@ import numpy as np
 from conveyor_sim.line.device import Device
 from conveyor_sim.line.devices.entry import BottleEntry
 from conveyor_sim.physics.model import Model
+from conveyor_sim.scene.driven import speed_limits
+from conveyor_sim.scene.geometry import shapes_of_belt
 from conveyor_sim.scene.schema import Scene
 
 JITTER, BAD, CHATTER = "jitter", "bad", "chatter"
-"""Purposes of random streams: times and positions of infeeds, bad bottles, chatter of photo-eyes."""
+"""Purposes of random streams: times, places and directions of new bottles, bad bottles, chatter of photo-eyes."""
 
 BRANCHES = {(JITTER, "infeeds"): (), (BAD, "infeeds"): (1,), (BAD, "machines"): (2,), (CHATTER, "photo_eyes"): (3,)}
 """Spawn keys of streams in recordings older than named streams, by purpose and field of the scene. They precede the
@@ -52,6 +54,11 @@ class DeviceSetup:
         """Return the index of a part in its field of the scene, from 0."""
         return list(getattr(self.scene, field)).index(name)
 
+    def speed_index(self, device: str) -> int:
+        """Return the index of a belt ("belts/main") or a named drive in the speeds of a ScanContext."""
+        field, _, name = device.partition("/")
+        return self.index(field, name) + (len(self.scene.belts) if field == "drives" else 0)
+
     def ticks(self, seconds: float) -> int:
         """Return the first tick at which `seconds` have passed."""
         return math.ceil(seconds / self.scene.tick - 1e-9)
@@ -62,10 +69,11 @@ class DeviceSetup:
         return BottleEntry(kind, float(self.model.type_radius[kind]), direction, speed)
 
     def fastest_flow(self, belt: str) -> float:
-        """Return the largest flow of a belt, 1/s: the smallest bottles, touching, in all lanes."""
-        shape = self.scene.belts[belt]
+        """Return the largest flow of a belt, 1/s: the smallest bottles, touching, in all lanes of all surfaces."""
         diameter = 2.0 * float(self.model.type_radius.min())
-        return max(map(abs, shape.speed_limits)) / diameter * max(1, int(shape.width / diameter))
+        shapes = shapes_of_belt(belt, self.scene.belts[belt])
+        lanes = sum(shape.ratio * max(1, int(shape.width / diameter)) for shape in shapes)
+        return max(map(abs, speed_limits(self.scene, belt))) / diameter * lanes
 
     def random(self, device: str, purpose: str) -> np.random.Generator:
         """Return the random stream of a device for one purpose."""

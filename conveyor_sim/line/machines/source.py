@@ -3,15 +3,15 @@
 from collections.abc import Sequence
 
 from conveyor_sim.line.device import ScanContext
-from conveyor_sim.line.devices.entry import Quality
-from conveyor_sim.line.devices.setup import BAD, DeviceSetup
+from conveyor_sim.line.devices.entry import Quality, Scattering
+from conveyor_sim.line.devices.setup import BAD, JITTER, DeviceSetup
 from conveyor_sim.line.machines.machine import MachineDevice
 from conveyor_sim.line.machines.stop_reason import BLOCKED, NONE
 from conveyor_sim.line.tag import count, seconds, switch
 from conveyor_sim.scene.parts.source import Source
 
 
-class SourceDevice(MachineDevice):
+class SourceDevice(MachineDevice, Scattering):
     """Source of a running line. Blocked: a bottle is due, and there is no room for it."""
 
     def __init__(self, name: str, source: Source, setup: DeviceSetup) -> None:
@@ -21,9 +21,9 @@ class SourceDevice(MachineDevice):
             seconds(f"{name}/blocked_time", "counter", "Total time blocked."),
         ]
         super().__init__(name, source, setup, signals)
-        self._position = source.position
         self._entry = setup.entry(source.bottle, source.direction, source.speed)
         self.quality = Quality(source, setup.random(name, BAD))
+        self.scatter(source, lambda: setup.random(name, JITTER))
         self.fed = 0
         self.blocked_ticks = 0
 
@@ -33,12 +33,14 @@ class SourceDevice(MachineDevice):
             self.advance(now)
         cause = NONE
         if self.turn(now):
-            if not self._entry.has_room(now.state, *self._position):
+            place = self.place()
+            if not self._entry.has_room(now.state, *place):
                 cause = BLOCKED
                 self.blocked_ticks += 1
                 self.wait()
             elif self.goes_on():
-                self.quality.judge(self._entry.enter(now.state, *self._position), now)
+                self.quality.judge(self._entry.enter(now.state, *place, self.deflection), now)
+                self.draw_scatter()
                 self.fed += 1
                 self.cycle -= 1.0
         self.conclude(cause, now)

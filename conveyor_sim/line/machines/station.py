@@ -1,14 +1,13 @@
 """Stations: machines that take a bottle, work on it for one cycle, and give it back at another place."""
 
-import math
 from collections.abc import Sequence
 from types import SimpleNamespace
 
 import numpy as np
 
 from conveyor_sim.line.device import ScanContext
-from conveyor_sim.line.devices.entry import has_room
-from conveyor_sim.line.devices.setup import DeviceSetup
+from conveyor_sim.line.devices.entry import Scattering, has_room, velocity
+from conveyor_sim.line.devices.setup import JITTER, DeviceSetup
 from conveyor_sim.line.machines.stop_reason import BLOCKED, NONE, STARVED
 from conveyor_sim.line.machines.taking import TakingDevice
 from conveyor_sim.line.tag import count, seconds, switch
@@ -17,7 +16,7 @@ from conveyor_sim.scene.parts.station import BAD, Acceptance, AttributeRule, Sta
 EMPTY = -1
 
 
-class StationDevice(TakingDevice):
+class StationDevice(TakingDevice, Scattering):
     """Station of a running line.
 
     Starved: it is empty, and no bottle waits. Blocked: it is done, and there is no room for the bottle.
@@ -44,9 +43,8 @@ class StationDevice(TakingDevice):
             seconds(f"{name}/blocked_time", "counter", "Total time blocked."),
         ]
         super().__init__(name, station, setup, signals)
-        self._position = station.position
-        speed, direction = station.speed, station.direction
-        self._velocity = speed * math.cos(direction), speed * math.sin(direction)
+        self._heading = station.heading
+        self.scatter(station, lambda: setup.random(name, JITTER))
         self._radii = setup.model.type_radius.tolist()
         self._sets = [
             AttributeSetting(what, setting, setup.random(name, f"sets/{what}"))
@@ -95,13 +93,16 @@ class StationDevice(TakingDevice):
                 cause = STARVED
                 self.starved_ticks += 1
         elif now.tick > self.begun and self.turn(now):
-            if not has_room(now.state, *self._position, self._radii[now.state.held[self.holding][0]]):
+            place = self.place()
+            if not has_room(now.state, *place, self._radii[now.state.held[self.holding][0]]):
                 cause = BLOCKED
                 self.blocked_ticks += 1
                 self.wait()
             elif self.goes_on():
                 self._finish(self.holding, now)
-                now.state.give(self.holding, *self._position, *self._velocity)
+                direction, speed = self._heading
+                now.state.give(self.holding, *place, *velocity(speed, direction + self.deflection))
+                self.draw_scatter()
                 self.holding = EMPTY
                 self.cycle = 0.0 if self.cause == BLOCKED else min(self.cycle - 1.0, 1.0)
         self.conclude(cause, now)

@@ -52,7 +52,7 @@ class EnergyAccount:
     def ledger(self) -> Ledger:
         """Return the ledger at present."""
         stored, work = self._stored(), self._work().sum(axis=0)
-        surfaces = len(self._state.model.belts) + 1
+        surfaces = len(self._state.model.plant.surfaces) + 1
         # Springs store a part of the friction work, which is dissipated when they are released.
         held = float(stored[SPRINGS]) - self.springs
         held_by_base = float(stored[BASE_SPRINGS]) - self.base_springs
@@ -60,12 +60,20 @@ class EnergyAccount:
             stored,
             self.fed,
             self.removed,
-            work[BELTS : BELTS + surfaces],
+            self._by_belt(work[BELTS : BELTS + surfaces]),
             work[BELTS + surfaces :],
             float(work[BASE_FRICTION]) - held_by_base,
             float(work[CONTACT_FRICTION]) - held,
             float(work[DAMPING]),
         )
+
+    def _by_belt(self, work: F8) -> F8:
+        """Return the work of belts and, last, of what rests, from that of surfaces and the floor."""
+        plant = self._state.model.plant
+        if plant.one_surface_per_belt:
+            return work
+        belts = len(plant.scene.belts)
+        return np.bincount(plant.belt_of_surface % (belts + 1), work, belts + 1).astype(np.float64)
 
     def _gained(self, before: F8) -> F8:
         if not self._state.world.neighbourhood.stale[0]:

@@ -9,8 +9,7 @@ from conveyor_sim.physics.plant import Plant
 from conveyor_sim.physics.timestep.bounds import Bound, base_friction_bound, slip_time
 from conveyor_sim.physics.timestep.methods import Share
 from conveyor_sim.physics.timestep.prediction import Term
-from conveyor_sim.scene.belts import CurvedBelt
-from conveyor_sim.scene.schema import Scene
+from conveyor_sim.scene.driven import belt_speeds
 
 MEETING = 0.2
 """Typical over fastest speed at which bottles meet, measured on the scenes of docs/accuracy.md."""
@@ -20,9 +19,9 @@ def _friction(plant: Plant, on: Collection[str]) -> Cause | None:
     table = base_friction(plant.scene)
     if plant.scene.gravity == 0.0 or not table.any():
         return None
-    for row, name in enumerate(plant.scene.belts):
+    for row, path in enumerate(plant.surface_paths):
         if table[row].any():
-            return Cause(("belts", name), f"friction {table[row].max():g}")
+            return Cause(path, f"friction {table[row].max():g}")
     return Cause(("floor",), f"friction {table[-1].max():g}")
 
 
@@ -77,15 +76,22 @@ def _resting(terms: Terms, dt: float) -> list[Term]:
     error of the creep. The lag is an outward slip of Omega^2 r dt / 2: a friction of m mu g Omega^2 r dt / v_lim.
     """
     turns = terms.laws.base_friction is not None and "curved_belts" in terms.on
-    behind = terms.method.turned * _turning(terms.scene) * dt if turns else 0.0
+    behind = terms.method.turned * _turning(terms.plant) * dt if turns else 0.0
     late = [Term("load on turning belts", behind, "half a step's turn of the belt")] if behind > 0.0 else []
     return [*_lag("load on turning belts", terms.method.creep_off, terms, dt), *late]
 
 
-def _turning(scene: Scene) -> float:
+def _turning(plant: Plant) -> float:
     """Return the largest initial angular velocity of a curved belt, rad/s; 0 without curved belts."""
-    curved = (belt for belt in scene.belts.values() if isinstance(belt, CurvedBelt))
-    return max((abs(belt.speed) / (belt.inner_radius + 0.5 * belt.width) for belt in curved), default=0.0)
+    speeds = list(belt_speeds(plant.scene).values())
+    return max(
+        (
+            abs(speeds[shape.belt]) * shape.ratio / shape.centre_radius
+            for shape in plant.surfaces
+            if shape.kind == "curved" and shape.belt is not None
+        ),
+        default=0.0,
+    )
 
 
 def _braked(meeting: Meeting, terms: Terms) -> list[Share]:
@@ -129,13 +135,13 @@ def _ring_bounds(terms: Terms) -> list[Bound]:
 
 
 def _belts(plant: Plant, on: Collection[str]) -> Cause | None:
-    return Cause(("belts", next(iter(plant.scene.belts)))) if plant.scene.belts and "base_friction" in on else None
+    return Cause(plant.surface_paths[0]) if plant.surfaces and "base_friction" in on else None
 
 
 def _curved_belts(plant: Plant, on: Collection[str]) -> Cause | None:
-    for name, belt in plant.scene.belts.items():
-        if isinstance(belt, CurvedBelt) and "belts" in on:
-            return Cause(("belts", name))
+    for shape, path in zip(plant.surfaces, plant.surface_paths, strict=True):
+        if shape.kind == "curved" and shape.belt is not None and "belts" in on:
+            return Cause(path)
     return None
 
 
@@ -145,7 +151,7 @@ BASE_FRICTION = Effect(
     source="(7)-(10), (15)",
     called_for=_friction,
     absent="no friction under the bottles",
-    needs="mu by belt and bottle type, velocity of each surface",
+    needs="mu by surface and bottle type, velocity of each surface",
     bounds=_friction_bounds,
     bound="half of v_lim / (mu g); with leapfrog and semi-implicit Euler 2 / sqrt(tolerance) steps in it, 20 at 1 %, "
     "and with the latter 1 / tolerance where a belt turns, 100 at 1 %; with the linearly implicit method 4 steps in "
@@ -173,11 +179,11 @@ RING_BASE = Effect(
 )
 BELTS = Effect(
     name="belts",
-    law="the last listed belt under the axis carries",
+    law="the last listed belt or plate under the axis carries; plates follow belts",
     source="(11)-(15)",
     called_for=_belts,
-    absent="no belt with friction",
-    needs="outlines of the belts, a grid over them, belts near each bottle",
+    absent="no belt or plate with friction",
+    needs="outlines of the surfaces, a grid over them, surfaces near each bottle",
 )
 CURVED_BELTS = Effect(
     name="curved_belts",

@@ -28,9 +28,9 @@ def _riding(plant: Plant, on: Collection[str]) -> Cause | None:
     if _prevented(plant, on) or "belts" not in on:
         return None
     table = base_friction(plant.scene)
-    for row, (name, belt) in enumerate(plant.scene.belts.items()):
-        if belt.kind == "straight" and table[row].any():
-            return Cause(("belts", name))
+    for row, (shape, path) in enumerate(zip(plant.surfaces, plant.surface_paths, strict=True)):
+        if shape.kind == "straight" and table[row].any():
+            return Cause(path)
     return None
 
 

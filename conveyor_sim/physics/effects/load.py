@@ -14,7 +14,6 @@ from dataclasses import dataclass
 
 from conveyor_sim.physics.laws.coefficients import Laws
 from conveyor_sim.physics.plant import Plant
-from conveyor_sim.scene.geometry import BeltShape
 
 NARROW = 1.25
 """Largest width, in diameters, of a belt on which bottles stand in single file."""
@@ -51,28 +50,24 @@ def contact_load(plant: Plant, laws: Laws) -> Load:
     friction, most = laws.friction_under_bottles, plant.supply
     if friction is None or not most:
         return Load(0.0, "no friction under the bottles")
-    drags = [  # N per bottle on each belt, the floor last
+    drags = [  # N per bottle on each surface, the floor last
         (friction[:, index] * kind.mass * plant.scene.gravity, kind, most[name])
         for index, (name, kind) in enumerate(plant.scene.bottle_types.items())
         if name in most
     ]
     count = sum(number for *_, number in drags)
-    if not plant.belts:
+    belts = [(row, shape) for row, shape in enumerate(plant.surfaces) if shape.belt is not None]
+    if not belts:
         heaviest = max(float(drag.max()) for drag, *_ in drags)
         count = count if math.isfinite(count) else ENDLESS_QUEUE
         return Load(count * heaviest, f"a single-file queue of {count:.0f}")
     narrow = NARROW * 2.0 * min(kind.radius for _, kind, _ in drags)
-    crowded = any(shape.width > narrow for shape in plant.belts)
+    crowded = any(shape.width > narrow for _, shape in belts)
     every = (WEDGED if crowded else FILE) * sum(number * float(drag.max()) for drag, _, number in drags)
     along = max(float(drag.max()) for drag, *_ in drags)
-    for row, shape in enumerate(plant.belts):
+    for row, shape in belts:
         per_metre = max(float(drag[row]) / (2.0 * kind.radius) for drag, kind, _ in drags)
-        along += (PILE if shape.width > narrow else FILE) * _running_length(shape) * per_metre
+        along += (PILE if shape.width > narrow else FILE) * shape.running_length * per_metre
     if every <= along:
         return Load(every, f"all {count:.0f} bottles")
-    return Load(along, f"bottles on all {sum(map(_running_length, plant.belts)):.3g} m of belts")
-
-
-def _running_length(shape: BeltShape) -> float:
-    """Return the length along the middle of a belt, m."""
-    return shape.length if shape.kind == "straight" else shape.span * shape.centre_radius
+    return Load(along, f"bottles on all {sum(shape.running_length for _, shape in belts):.3g} m of belts")

@@ -17,9 +17,9 @@ def _springs(plant: Plant, on: Collection[str]) -> Cause | None:
     if "base_friction" not in on or springs is None:
         return None
     bottles = {kind.material for kind in plant.scene.bottle_types.values()}
-    belts = {belt.material for belt in plant.scene.belts.values()}
+    surfaces = {shape.material for shape in plant.surfaces}
     for index, base in enumerate(plant.scene.base):
-        if base.tangential is not None and base.between[0] in bottles and base.between[1] in belts:
+        if base.tangential is not None and base.between[0] in bottles and base.between[1] in surfaces:
             return Cause(("base", index, "tangential"), f"{base.tangential.stiffness:g} N/m")
     return None
 

@@ -12,13 +12,14 @@ from conveyor_sim.engine.contact.laws import DAMPING, ELASTIC, DampingLaw, Elast
 from conveyor_sim.engine.contact.laws.table import TABLE
 from conveyor_sim.physics.laws.damping import damping_coefficient, damping_law
 from conveyor_sim.scene.contacts import Contact
+from conveyor_sim.scene.geometry import surface_materials
 from conveyor_sim.scene.schema import Floor, Scene
 
 NO_CURVE = int(TABLE.none)
 
 
 class BaseSprings(NamedTuple):
-    """Springs between belts and bases, (H + 1, T) each, the floor last; 0 where a friction curve acts."""
+    """Springs between surfaces and bases, (H + 1, T) each, the floor last; 0 where a friction curve acts."""
 
     stiffness: F8
     """N/m"""
@@ -29,7 +30,7 @@ class BaseSprings(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Laws:
-    """Coefficients of the present laws. T bottle types, M rail materials, H belts."""
+    """Coefficients of the present laws. T bottle types, M rail materials, H surfaces."""
 
     pair: ContactLaw | None
     """(T * T,), bottle and bottle; None if bottles do not touch bottles."""
@@ -76,12 +77,13 @@ def build_laws(scene: Scene, rail_materials: Sequence[str], on: Collection[str])
 
 
 def base_friction(scene: Scene) -> F8:
-    """Return the friction coefficients of belts and bottle types, (H + 1, T), the floor last."""
+    """Return the friction coefficients of surfaces and bottle types, (H + 1, T), the floor last."""
     friction = {base.between: base.friction for base in scene.base}
     types = list(scene.bottle_types.values())
-    table = np.zeros((len(scene.belts) + 1, len(types)))
-    for row, belt in enumerate(scene.belts.values()):
-        table[row] = [friction[kind.material, belt.material] for kind in types]
+    materials = surface_materials(scene)
+    table = np.zeros((len(materials) + 1, len(types)))
+    for row, material in enumerate(materials):
+        table[row] = [friction[kind.material, material] for kind in types]
     if isinstance(scene.floor, Floor):
         if scene.floor.friction is not None:
             table[-1] = scene.floor.friction
@@ -91,17 +93,17 @@ def base_friction(scene: Scene) -> F8:
 
 
 def base_springs(scene: Scene) -> BaseSprings | None:
-    """Return the springs under the bottles; None if no belt or floor has one."""
+    """Return the springs under the bottles; None if no surface has one."""
     tangential = {base.between: base.tangential for base in scene.base}
     types = list(scene.bottle_types.values())
     friction = base_friction(scene)
     stiffness, damping = np.zeros((2, *friction.shape))
-    for row, belt in enumerate(scene.belts.values()):
+    for row, material in enumerate(surface_materials(scene)):
         for column, kind in enumerate(types):
-            spring = tangential[kind.material, belt.material]
+            spring = tangential[kind.material, material]
             if spring is not None:
                 stiffness[row, column], damping[row, column] = spring.stiffness, spring.damping
-    if isinstance(scene.floor, Floor) and scene.floor.friction is None:
+    if isinstance(scene.floor, Floor) and scene.floor.friction is None and scene.belts:
         stiffness[-1], damping[-1] = stiffness[0], damping[0]
     if not stiffness.any():
         return None
@@ -109,7 +111,7 @@ def base_springs(scene: Scene) -> BaseSprings | None:
 
 
 def _by_curve(friction: F8, springs: BaseSprings | None) -> F8 | None:
-    """Return the friction coefficients without springs; None if springs act on all belts and the floor."""
+    """Return the friction coefficients without springs; None if springs act on all surfaces."""
     if springs is None:
         return friction
     rest = np.where(springs.stiffness > 0.0, 0.0, friction)

@@ -40,7 +40,7 @@ SKIN = 0.2
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """Everything about a scene that is constant during a run. T types, H belts, M rail materials."""
+    """Everything about a scene that is constant during a run. T types, H surfaces, M rail materials."""
 
     name: str
     dt: float
@@ -160,7 +160,7 @@ def build_model(scene: Scene) -> Model:
         arcs=arcs if "arc_rails" in on else None,
         grid=plant_grid(
             plant.rails_at_rest,
-            plant.belts if "belts" in on else (),
+            plant.surfaces if "belts" in on else (),
             float(radius.max()),
             _largest(laws.base_radius),
             skin,

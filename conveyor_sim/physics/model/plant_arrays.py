@@ -1,4 +1,4 @@
-"""Constant arrays of the plant for the engine: rail pieces with their joints, belts, the static grid."""
+"""Constant arrays of the plant for the engine: rail pieces with their joints, surfaces, the static grid."""
 
 import math
 from collections.abc import Sequence
@@ -14,6 +14,7 @@ from conveyor_sim.engine.lists.static_grid import build_static_grid
 from conveyor_sim.engine.support.sector import BEYOND_HALF, FULL_CIRCLE, UP_TO_HALF
 from conveyor_sim.engine.threads.workers import UNIT
 from conveyor_sim.physics.model.surfaces import Joints, find_joints
+from conveyor_sim.scene.angles import unit_vector
 from conveyor_sim.scene.geometry import ArcPiece, BeltShape, Piece, RailShape, SegmentPiece, is_full_turn
 
 STRAIGHT = -1
@@ -77,16 +78,16 @@ def rail_arrays(rails: Sequence[RailShape], materials: Sequence[str]) -> tuple[S
 
 
 def belt_arrays(shapes: Sequence[BeltShape], slots: int, candidates: int) -> Belts | None:
-    """Return the areas of the belts, with room for the belt under each of `slots` bottles; None without belts."""
+    """Return the areas of surfaces, with room for the one under each of `slots` bottles; None without surfaces."""
     if not shapes:
         return None
-    angle = np.array([shape.angle for shape in shapes])
+    along = np.array([unit_vector(shape.angle) for shape in shapes])
     corner = np.array([shape.corner for shape in shapes])
     return Belts(
         x=corner[:, 0].copy(),
         y=corner[:, 1].copy(),
-        ax=np.cos(angle),
-        ay=np.sin(angle),
+        ax=along[:, 0].copy(),
+        ay=along[:, 1].copy(),
         length=np.array([shape.length for shape in shapes]),
         width=np.array([shape.width for shape in shapes]),
         sectors=_sectors(shapes) if any(shape.kind == "curved" for shape in shapes) else None,
@@ -104,19 +105,19 @@ def listed(slots: int) -> BottleList:
 
 def plant_grid(
     rails: Sequence[RailShape],
-    belts: Sequence[BeltShape],
+    surfaces: Sequence[BeltShape],
     largest_radius: float,
     largest_base_radius: float,
     skin: float,
 ) -> StaticGrid | None:
-    """Build the static grid over all rails and belts; return None without any."""
-    if not rails and not belts:
+    """Build the static grid over all rails and surfaces; return None without any."""
+    if not rails and not surfaces:
         return None
     pieces = [piece for rail in rails for piece in rail.pieces]
     return build_static_grid(
         _boxes([piece.points(2) for piece in pieces if isinstance(piece, SegmentPiece)]),
         _boxes([_arc_extremes(piece) for piece in pieces if isinstance(piece, ArcPiece)]),
-        _boxes([_belt_extremes(shape) for shape in belts]),
+        _boxes([_surface_extremes(shape) for shape in surfaces]),
         rail_reach=largest_radius + skin,
         belt_reach=skin + largest_base_radius,
         cell=4.0 * largest_radius,
@@ -126,18 +127,18 @@ def plant_grid(
 def _sectors(shapes: Sequence[BeltShape]) -> Sectors:
     centre = np.array([shape.centre for shape in shapes])
     inner = np.array([shape.inner_radius for shape in shapes])
-    start_angle = np.array([shape.start_angle for shape in shapes])
-    end_angle = start_angle + np.array([shape.span for shape in shapes])
+    start = np.array([unit_vector(shape.start_angle) for shape in shapes])
+    end = np.array([unit_vector(shape.start_angle + shape.span) for shape in shapes])
     reach = [reach_code(shape.span) if shape.kind == "curved" else STRAIGHT for shape in shapes]
     return Sectors(
         x=centre[:, 0].copy(),
         y=centre[:, 1].copy(),
         inner=inner,
         outer=inner + np.array([shape.width for shape in shapes]),
-        start_x=np.cos(start_angle),
-        start_y=np.sin(start_angle),
-        end_x=np.cos(end_angle),
-        end_y=np.sin(end_angle),
+        start_x=start[:, 0].copy(),
+        start_y=start[:, 1].copy(),
+        end_x=end[:, 0].copy(),
+        end_y=end[:, 1].copy(),
         reach=np.array(reach, dtype=np.int8),
     )
 
@@ -171,7 +172,7 @@ def _arc_extremes(piece: ArcPiece) -> F8:
     return np.array(piece.centre) + piece.radius * np.column_stack([np.cos(angle), np.sin(angle)])
 
 
-def _belt_extremes(shape: BeltShape) -> F8:
+def _surface_extremes(shape: BeltShape) -> F8:
     if shape.kind == "straight":
         return shape.outline()
     outer = ArcPiece(shape.centre, shape.inner_radius + shape.width, shape.start_angle, shape.span)

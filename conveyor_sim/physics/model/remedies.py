@@ -15,7 +15,8 @@ from conveyor_sim.physics.timestep.bounds import Bound, fewest_steps
 from conveyor_sim.physics.timestep.presets import DEFAULT
 from conveyor_sim.scene.accuracy import MANY_STEPS, MOST_STEPS
 from conveyor_sim.scene.contacts import DAMPING_CHOICES
-from conveyor_sim.scene.load import parse_overrides, parse_scene
+from conveyor_sim.scene.load import parse_scene
+from conveyor_sim.scene.overrides import parse_overrides
 from conveyor_sim.scene.schema import Scene
 
 WORTH = 0.8

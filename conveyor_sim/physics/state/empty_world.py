@@ -113,7 +113,7 @@ def empty_world(model: Model, slots: int) -> World:
         moving=_moving(model, slots),
         railed=listed(slots) if model.rail_law is not None else None,
         rail_law=model.rail_law,
-        belts=belt_arrays(model.plant.belts, slots, entries) if model.has("belts") else None,
+        belts=belt_arrays(model.plant.surfaces, slots, entries) if model.has("belts") else None,
         surface=_surface(model),
         footing=_footing(model, slots),
         ring=Ring(reals()) if model.has("ring_base") else None,
@@ -142,7 +142,7 @@ def _has_springs(model: Model) -> bool:
 def _surface(model: Model) -> Surface | None:
     if model.base_friction is None:
         return None
-    surfaces = len(model.belts) + 1
+    surfaces = len(model.plant.surfaces) + 1
     return Surface(
         ux=np.zeros(surfaces),
         uy=np.zeros(surfaces),
@@ -155,7 +155,7 @@ def _footing(model: Model, slots: int) -> Footing | None:
     if model.base_friction is None:
         return None
     return Footing(
-        carrier=np.full(slots, len(model.belts), dtype=np.int32),
+        carrier=np.full(slots, len(model.plant.surfaces), dtype=np.int32),
         ux=np.zeros(slots),
         uy=np.zeros(slots),
         turn=np.zeros(slots) if model.has("curved_belts") else None,
@@ -232,7 +232,7 @@ def _riding(model: Model, slots: int) -> Riding:
 
 
 def _ledger(slots: int, model: Model) -> LedgerArrays:
-    units, surfaces, rails = slots // UNIT + 1, len(model.belts) + 1, len(model.plant.moving)
+    units, surfaces, rails = slots // UNIT + 1, len(model.plant.surfaces) + 1, len(model.plant.moving)
     return LedgerArrays(
         damping=_triple(slots),
         friction=_triple(slots),

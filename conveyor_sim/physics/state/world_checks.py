@@ -60,7 +60,7 @@ def _alike(world: World, model: Model) -> World:
 
 def ranges(world: World, model: Model, next_id: int) -> dict[str, tuple[int, int]]:
     """Return the smallest and largest values of arrays of indices and counts, by name."""
-    slots, belts = world.bottles.id.size, len(model.belts)
+    slots, surfaces = world.bottles.id.size, len(model.plant.surfaces)
     limits: dict[str, tuple[int, int]] = {
         "bottles.type": (0, len(model.bottle_types) - 1),
         "bottles.id": (-1, next_id - 1),
@@ -72,14 +72,14 @@ def ranges(world: World, model: Model, next_id: int) -> dict[str, tuple[int, int
         "probe.due": (0, 1),
         "railed.bottle": (0, slots - 1),
         "railed.first": (0, slots),
-        "belts.certain": (-1, belts),
-        "belts.candidate": (0, max(0, belts - 1)),
+        "belts.certain": (-1, surfaces),
+        "belts.candidate": (0, max(0, surfaces - 1)),
         "belts.uncertain.bottle": (0, slots - 1),
         "belts.uncertain.first": (0, slots),
-        "footing.carrier": (0, belts),
+        "footing.carrier": (0, surfaces),
         "moving.actuators.mode": (ON_PROFILE, HELD),
         "moving.actuators.left": (0, 1),
-        "static_friction.belt": (-1, belts),
+        "static_friction.belt": (-1, surfaces),
         "riding.rides": (0, 1),
         "riding.first": (0, slots),
         "riding.end": (0, slots),

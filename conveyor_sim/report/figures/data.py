@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conveyor_sim.columns.damage import RailWearColumns
+from conveyor_sim.scene.driven import belt_speeds
 from conveyor_sim.scene.geometry import BeltShape, RailShape, belt_shapes, initial_bottles, rail_shapes
 from conveyor_sim.scene.marks import marks_of
 from conveyor_sim.scene.moving import moving_shapes
@@ -37,7 +38,7 @@ class StaticGeometry:
         """Return the static geometry of `scene`."""
         return cls(
             belts=tuple(belt_shapes(scene)),
-            speeds=np.array([belt.speed for belt in scene.belts.values()], dtype=np.float64),
+            speeds=np.array([*belt_speeds(scene).values()], dtype=np.float64),
             rails=(*rail_shapes(scene), *(shape.shape(shape.first) for shape in moving_shapes(scene))),
             marks=tuple(marks_of(scene)),
         )
@@ -107,7 +108,7 @@ class PlantFrame:
             theta=state[:, 2],
             radius=np.array([scene.bottle_types[row[0]].radius for row in born], dtype=np.float64),
             speed=np.hypot(state[:, 3], state[:, 4]),
-            belt_speeds=np.array([belt.speed for belt in scene.belts.values()], dtype=np.float64),
+            belt_speeds=np.array([*belt_speeds(scene).values()], dtype=np.float64),
         )
 
     def within(self, box: tuple[float, float, float, float]) -> PlantFrame:

@@ -1,17 +1,17 @@
 """Infeeds of a scene file."""
 
-import math
 from collections.abc import Iterator
 from typing import ClassVar
 
 from conveyor_sim.scene.parts.bad import BadBottles
 from conveyor_sim.scene.parts.device_part import Entry, Others
+from conveyor_sim.scene.parts.scatter import Scattered
 from conveyor_sim.scene.problems import Path, Problem
-from conveyor_sim.scene.types import XY, Angle, Count, Name, NotNegative, Point, Positive, quantity
+from conveyor_sim.scene.types import Angle, Count, Name, NotNegative, Point, Positive, quantity
 from conveyor_sim.scene.words import shown
 
 
-class Infeed(BadBottles, Entry):
+class Infeed(Scattered, BadBottles, Entry):
     """A place where bottles enter, one behind the other."""
 
     KIND: ClassVar[str] = "infeed"
@@ -31,25 +31,11 @@ class Infeed(BadBottles, Entry):
         "s",
         default=0.0,
     )
-    lateral_jitter: NotNegative = quantity(
-        "Each bottle is to the left or right by up to this, drawn evenly from the seed.", "m", default=0.0
-    )
 
     @property
     def most(self) -> int | None:
         """Number of bottles that enter; None without limit."""
         return self.count
-
-    @property
-    def heading(self) -> tuple[float, float]:
-        """Direction (rad) and speed (m/s) of new bottles."""
-        return self.direction, self.speed
-
-    def births(self) -> tuple[XY, ...]:
-        """Middle and both ends of the places of new bottles, m."""
-        (x, y), left = self.position, (-math.sin(self.direction), math.cos(self.direction))
-        sideways = (self.lateral_jitter * left[0], self.lateral_jitter * left[1])
-        return (x - sideways[0], y - sideways[1]), (x, y), (x + sideways[0], y + sideways[1])
 
     def problems(self, path: Path, others: Others) -> Iterator[Problem]:
         """Yield problems of feeding rules that exclude each other, and of jitter that would change the order."""

@@ -6,11 +6,12 @@ from typing import ClassVar, Literal
 from conveyor_sim.scene.parts.bad import BadBottles
 from conveyor_sim.scene.parts.device_part import Entry, Others
 from conveyor_sim.scene.parts.machine import PackmlPart
+from conveyor_sim.scene.parts.scatter import Scattered
 from conveyor_sim.scene.problems import Path, Problem
 from conveyor_sim.scene.types import Angle, Name, NotNegative, Point, quantity
 
 
-class Source(PackmlPart, BadBottles, Entry):
+class Source(PackmlPart, Scattered, BadBottles, Entry):
     """A machine upstream, such as a filler. It gives bottles at a rate; without room it is blocked."""
 
     KIND: ClassVar[str] = "source"
@@ -20,11 +21,6 @@ class Source(PackmlPart, BadBottles, Entry):
     position: Point = quantity("Where a bottle's axis appears.", "m")
     direction: Angle = quantity("Direction of its velocity.", "rad")
     speed: NotNegative = quantity("Its speed at first, along `direction`.", "m/s")
-
-    @property
-    def heading(self) -> tuple[float, float]:
-        """Direction (rad) and speed (m/s) of new bottles."""
-        return self.direction, self.speed
 
     def problems(self, path: Path, others: Others) -> Iterator[Problem]:
         """Yield problems of a rate beyond its limit, and of bad bottles given in two ways."""

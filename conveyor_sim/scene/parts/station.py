@@ -6,8 +6,9 @@ from typing import Annotated, ClassVar, Literal
 from annotated_types import Len
 
 from conveyor_sim.scene.part import Part
-from conveyor_sim.scene.parts.device_part import Giver, Mark, Others
+from conveyor_sim.scene.parts.device_part import Mark, Others
 from conveyor_sim.scene.parts.machine import TakingPart
+from conveyor_sim.scene.parts.scatter import Scattered
 from conveyor_sim.scene.problems import Path, Problem
 from conveyor_sim.scene.types import Angle, Count, Holds, Name, NotNegative, Number, Point, Share, quantity
 from conveyor_sim.scene.words import shown, some_of
@@ -61,7 +62,7 @@ class Acceptance(Part):
             yield Problem((*path, "low"), f"{shown(self.low)} given, expected at most {self.high:g}, as high is")
 
 
-class Station(TakingPart, Giver):
+class Station(TakingPart, Scattered):
     """A machine such as a capper, a labeller or a checkweigher. It takes a bottle out of a region, holds it for a cycle
     of 1 / rate, works on it, and returns it elsewhere on the line, with its accumulated loads.
 
@@ -84,11 +85,6 @@ class Station(TakingPart, Giver):
         Len(0, MOST_ATTRIBUTES),
         Holds(f"a mapping of at most {MOST_ATTRIBUTES} names of attributes to tests"),
     ] = quantity("What it looks at, after that; bottles that it finds defective become bad.", default={})
-
-    @property
-    def heading(self) -> tuple[float, float]:
-        """Direction (rad) and speed (m/s) of returned bottles."""
-        return self.direction, self.speed
 
     def marks(self, name: str) -> Sequence[Mark]:
         """Return the marks of the places where it takes and returns bottles."""

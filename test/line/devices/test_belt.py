@@ -2,7 +2,7 @@
 
 from scenes import base, belt, bottle, simulation
 
-from conveyor_sim.line.devices.belt import Watchdog
+from conveyor_sim.line.devices.setpoint import Watchdog
 from conveyor_sim.simulation import Simulation
 
 NAME = "belts/watched/cmd_speed"

@@ -313,7 +313,7 @@ def test_the_same_scene_may_be_given_and_last_longer(saved: Path) -> None:
         ({"effects": {}}, ['effects.peaks: "on"', "nothing"]),
         (
             {"infeeds": {}, "outfeeds": {}},
-            ['infeeds.packed: {"bad_share": 0.0, "bad_every": null, "bad_at": [], "bott...', "nothing"],
+            ['infeeds.packed: {"bad_share": 0.0, "bad_every": null, "bad_at": [], "late...', "nothing"],
         ),
     ],
 )

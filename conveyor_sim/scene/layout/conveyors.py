@@ -1,0 +1,165 @@
+"""Conveyors of a layout: belts, plates, rails of their guides, and the plan."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from conveyor_sim.scene.layout.faults import LayoutFault
+from conveyor_sim.scene.layout.guides import GuideRail, rails_of_conveyor
+from conveyor_sim.scene.layout.parts import Conveyor, ConveyorSection
+from conveyor_sim.scene.layout.paths import SHORTEST
+from conveyor_sim.scene.layout.placing import circle, dependency, in_order, lanes_of, route_of_conveyor
+from conveyor_sim.scene.layout.plan import ConveyorPlan
+from conveyor_sim.scene.layout.plates import plates_of
+from conveyor_sim.scene.layout.surfaces import surface
+from conveyor_sim.scene.problems import Path
+from conveyor_sim.scene.types import TOUCH
+from conveyor_sim.scene.words import shown, some_of
+
+_MOST_SURFACES = 20_000
+_OWN = ("speed", "speed_limits", "watchdog")
+"""Fields of a belt that a named drive has instead."""
+_DRIVEN = (*_OWN, "drive", "ratio")
+
+
+@dataclass
+class LaidConveyor:
+    """A conveyor in expanded form. Each piece of data comes with the path of its source."""
+
+    plan: ConveyorPlan
+    belts: dict[str, dict[str, Any]] = field(default_factory=dict)
+    plates: list[dict[str, Any]] = field(default_factory=list)
+    rails: list[GuideRail] = field(default_factory=list)
+    sources: dict[Path, Path] = field(default_factory=dict)
+    """Sources by paths of the expanded data."""
+
+
+@dataclass
+class ConveyorExpansion:
+    """Expansion of the conveyors of a layout, one after the other."""
+
+    conveyors: Mapping[str, Conveyor]
+    raw: Mapping[str, Mapping[str, Any]]
+    """Conveyors as written."""
+    laid: dict[str, LaidConveyor] = field(default_factory=dict)
+    faults: list[LayoutFault] = field(default_factory=list)
+    surfaces: int = 0
+
+    def expand(self) -> None:
+        """Expand all conveyors. Those that are placed by one with a fault are left out."""
+        in_circles: set[str] = set()
+        for name in in_order(self.conveyors):
+            conveyor, path = self.conveyors[name], ("conveyors", name)
+            other = dependency(conveyor)
+            way = "after" if conveyor.after is not None else "beside"
+            try:
+                if other is not None and other not in self.conveyors:
+                    text = f"{shown(other)} given, expected a name from conveyors: {some_of(self.conveyors)}"
+                    raise LayoutFault((*path, way), text)
+                if other is not None and other not in self.laid:
+                    if name not in in_circles and (names := circle(name, self.conveyors)):
+                        in_circles.update(names)
+                        text = f"{shown(other)} given, expected no circle: {some_of(names)}"
+                        raise LayoutFault((*path, way), text)
+                    continue
+                self.laid[name] = self._lay(name, conveyor, path)
+            except LayoutFault as fault:
+                self.faults.append(fault)
+        self.laid = {name: self.laid[name] for name in self.conveyors if name in self.laid}
+
+    def _lay(self, name: str, conveyor: Conveyor, path: Path) -> LaidConveyor:
+        lanes = lanes_of(conveyor, path)
+        plans = {other: laid.plan for other, laid in self.laid.items()}
+        route = route_of_conveyor(conveyor, lanes, plans, path)
+        self.surfaces += len(lanes) * (len(route.pieces) + len(conveyor.sections or ()))
+        if self.surfaces > _MOST_SURFACES:
+            text = f"surface number {self.surfaces} given, expected at most {_MOST_SURFACES} of all conveyors"
+            raise LayoutFault(path, text)
+        laid = LaidConveyor(ConveyorPlan(name, route, lanes, conveyor.material))
+        self._belts(laid, conveyor, path)
+        if conveyor.plate is not None:
+            laid.plates = list(plates_of(conveyor, laid.plan, plans[str(dependency(conveyor))]))
+        laid.rails = list(rails_of_conveyor(conveyor, laid.plan, (*path, "guides")))
+        return laid
+
+    def _belts(self, laid: LaidConveyor, conveyor: Conveyor, path: Path) -> None:
+        """Enter the belts of a conveyor: one, or one per section."""
+        plan, raw = laid.plan, self.raw[laid.plan.name]
+        stretches = list(_stretches(conveyor, plan, path))
+        plan.belts = tuple(belt for belt, _, _ in stretches)
+        plan.starts = tuple(begin for _, begin, _ in stretches)
+        names: list[str] = []
+        for number, (belt, begin, end) in enumerate(stretches):
+            surfaces, pieces = [], []
+            for index, piece in plan.route.parts(begin, end):
+                for lane in plan.lanes:
+                    ratio = {} if lane.ratio == 1.0 else {"ratio": lane.ratio}
+                    surfaces.append({**surface(piece, lane.right, lane.width), **ratio})
+                    pieces.append(index)
+            section = None if conveyor.sections is None else conveyor.sections[number]
+            place: Path = path if section is None else (*path, "sections", number)
+            fields = _fields(raw, {} if section is None else raw["sections"][number])
+            laid.sources["belts", belt] = place
+            for name, (_, own) in fields.items():
+                laid.sources["belts", belt, name] = (*(place if own else path), name)
+            values = {name: value for name, (value, _) in fields.items()}
+            if len(surfaces) == 1 and "ratio" not in surfaces[0]:
+                laid.belts[belt] = {**surfaces[0], **values}
+                names.append(belt)
+                continue
+            laid.belts[belt] = {"kind": "path", **values, "surfaces": surfaces}
+            names += [f"{belt}_{index + 1}" for index in range(len(surfaces))]
+            for index, piece_index in enumerate(pieces):
+                source: Path = ("points",) if conveyor.points is not None else ("path", piece_index)
+                laid.sources["belts", belt, "surfaces", index] = (*path, *source)
+        plan.surfaces = tuple(names)
+
+
+def _stretches(conveyor: Conveyor, plan: ConveyorPlan, path: Path) -> Iterator[tuple[str, float, float]]:
+    """Yield name, first and last station (m) of each belt of a conveyor."""
+    length = plan.route.length
+    if conveyor.sections is None:
+        yield plan.name, 0.0, length
+        return
+    begin, names = 0.0, set()
+    for index, section in enumerate(conveyor.sections):
+        if section.name in names:
+            raise LayoutFault(
+                (*path, "sections", index, "name"),
+                f"{shown(section.name)} given, expected a name that no other section has",
+            )
+        names.add(section.name)
+        end = _end(section, begin, length, index == len(conveyor.sections) - 1, (*path, "sections", index, "to"))
+        yield f"{plan.name}_{section.name}", begin, end
+        begin = end
+
+
+def _end(section: ConveyorSection, begin: float, length: float, last: bool, path: Path) -> float:
+    """Return the station (m) where a section ends."""
+    if last:
+        if section.to is not None and abs(section.to - length) > TOUCH:
+            text = f"{shown(section.to)} given, expected none: the last section ends with the path, at {length:.6g} m"
+            raise LayoutFault(path, text)
+        return length
+    expected = f"a station between {begin:.6g} and {length:.6g} (m)"
+    if section.to is None:
+        raise LayoutFault(path, f"missing, expected {expected}")
+    if not begin + SHORTEST <= section.to <= length - SHORTEST:
+        raise LayoutFault(path, f"{shown(section.to)} given, expected {expected}")
+    return section.to
+
+
+def _fields(raw: Mapping[str, Any], section: Mapping[str, Any]) -> dict[str, tuple[Any, bool]]:
+    """Return the fields of a belt as written, each with True if it is the section's, False if the conveyor's.
+
+    A section with a speed or a drive is not moved by the conveyor's drive, and a section with a named drive doesn't
+    take the conveyor's speed.
+    """
+    own = {name: section[name] for name in ("material", *_DRIVEN) if section.get(name) is not None}
+    inherited = {name: raw[name] for name in ("material", *_DRIVEN) if raw.get(name) is not None}
+    if isinstance(own.get("drive"), str):
+        inherited = {name: value for name, value in inherited.items() if name not in _DRIVEN}
+    elif isinstance(inherited.get("drive"), str) and any(name in own for name in (*_OWN, "drive")):
+        inherited = {name: value for name, value in inherited.items() if name not in ("drive", "ratio")}
+    fields = {name: (value, False) for name, value in inherited.items()}
+    return fields | {name: (value, True) for name, value in own.items()}

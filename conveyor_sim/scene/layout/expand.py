@@ -1,0 +1,86 @@
+"""Expansion of a layout: conveyors, guides and devices along them become belts, rails and coordinates."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from conveyor_sim.scene.layout.conveyors import ConveyorExpansion, LaidConveyor
+from conveyor_sim.scene.layout.faults import LayoutFault
+from conveyor_sim.scene.layout.guides import GuideRail, rails_of_guide
+from conveyor_sim.scene.layout.named import KINDS, NamedParts, numbered
+from conveyor_sim.scene.layout.parts import Conveyor, SceneLayout
+from conveyor_sim.scene.layout.plan import LayoutPlan
+from conveyor_sim.scene.part import validated
+from conveyor_sim.scene.problems import Path, Problem
+
+_FIELDS = tuple(SceneLayout.model_fields)
+
+
+@dataclass
+class Expansion:
+    """An expanded scene: plain data, and the way back to the data that it was expanded from."""
+
+    data: dict[str, Any]
+    plan: LayoutPlan | None = None
+    sources: dict[Path, Path] = field(default_factory=dict)
+    """Paths of the data before expansion by paths of the expanded data; the longest prefix counts."""
+    problems: list[Problem] = field(default_factory=list)
+    """Problems, with paths of the data before expansion. With any, the data are incomplete."""
+    more: int = 0
+    """Number of problems that were only counted."""
+
+
+def expand(data: dict[str, Any]) -> Expansion:
+    """Return a scene without layout parts. Data without such parts are returned as they are."""
+    if not isinstance(data, Mapping) or not any(name in data for name in _FIELDS):
+        return Expansion(data)
+    layout = validated(SceneLayout, {name: data[name] for name in _FIELDS if name in data})
+    if isinstance(layout, tuple):
+        return Expansion(data, problems=layout[0], more=layout[1])
+    conveyors = ConveyorExpansion(layout.conveyors, data.get("conveyors", {}))
+    conveyors.expand()
+    plan = LayoutPlan({name: laid.plan for name, laid in conveyors.laid.items()})
+    faults = list(conveyors.faults)
+    rails = _rails(layout, plan, faults)
+    parts = NamedParts()
+    # A dictionary's order is that of the file, and the order of belts and rails is that of their indices.
+    for name in data:
+        if name == "conveyors":
+            for conveyor, laid in conveyors.laid.items():
+                _add_conveyor(parts, conveyor, layout.conveyors[conveyor], laid)
+        elif name == "guides":
+            for guide, own in rails.items():
+                parts.add_rails(guide, layout.guides[guide].material, own)
+        elif name in KINDS and isinstance(data[name], Mapping):
+            for each, content in data[name].items():
+                parts.add(name, each, content, (name, each))
+    problems = [fault.problem for fault in faults] + parts.problems
+    return Expansion(parts.added_to(data, _FIELDS), plan, parts.sources, problems)
+
+
+def _rails(layout: SceneLayout, plan: LayoutPlan, faults: list[LayoutFault]) -> dict[str, list[GuideRail]]:
+    """Return the rails of each guide. Guides along a conveyor with a fault are left out."""
+    rails = {}
+    for name, guide in layout.guides.items():
+        if any(conveyor in layout.conveyors and conveyor not in plan.conveyors for conveyor in guide.conveyors):
+            continue
+        try:
+            rails[name] = list(rails_of_guide(guide, plan.conveyors, ("guides", name)))
+        except LayoutFault as fault:
+            faults.append(fault)
+    return rails
+
+
+def _add_conveyor(parts: NamedParts, name: str, conveyor: Conveyor, laid: LaidConveyor) -> None:
+    path = ("conveyors", name)
+    parts.reserve("belts", name, path)
+    for belt, content in laid.belts.items():
+        parts.add("belts", belt, content, path if belt == name else laid.sources["belts", belt])
+    for surface in laid.plan.surfaces:
+        if surface not in laid.belts:
+            parts.reserve("belts", surface, path)
+    parts.sources |= laid.sources
+    for plate, content in zip(numbered(f"{name}_plate", len(laid.plates)), laid.plates, strict=True):
+        parts.add("plates", plate, {**content, "material": conveyor.plate}, (*path, "plate"))
+    if conveyor.guides is not None:
+        parts.add_rails(name, conveyor.guides.material, laid.rails)

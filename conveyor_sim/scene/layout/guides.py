@@ -1,0 +1,179 @@
+"""Guides of a layout: rails on both sides of conveyors or of a line through points."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from conveyor_sim.scene.layout.faults import LayoutFault
+from conveyor_sim.scene.layout.frames import PathFrame
+from conveyor_sim.scene.layout.guide_line import GuideLine, guide_line
+from conveyor_sim.scene.layout.joined import JoinedRoute, joined
+from conveyor_sim.scene.layout.parts import Conveyor, ConveyorGuides, Guide
+from conveyor_sim.scene.layout.plan import SIDES, ConveyorPlan, GuideProfile, Side
+from conveyor_sim.scene.layout.profile_rails import rails_along
+from conveyor_sim.scene.layout.routes import Bend, Route, Straight
+from conveyor_sim.scene.problems import Path
+from conveyor_sim.scene.types import TOUCH, XY
+from conveyor_sim.scene.words import shown, some_of
+
+
+@dataclass(frozen=True)
+class GuideRail:
+    """A rail of a guide, without its name and material."""
+
+    side: Side
+    data: dict[str, Any]
+    source: Path
+    """Path of the field that it comes from."""
+
+
+def rails_of_conveyor(conveyor: Conveyor, plan: ConveyorPlan, path: Path) -> Iterator[GuideRail]:
+    """Yield the rails of a conveyor's own guides, and enter the guides in its plan. path: of the guides.
+
+    Guides at a clearance also cover the gap in front of the conveyor. Raise LayoutFault.
+    """
+    guides = conveyor.guides
+    if guides is None:
+        return
+    route, gap = plan.route, conveyor.gap or 0.0
+    before = gap if conveyor.after is not None and guides.clearance is not None and not guides.from_ else 0.0
+    if before:
+        start = route.start.moved(-before)
+        route = Route((Straight(start, route.start, before), *route.pieces))
+    places = ((plan, before, route.length),)
+    yield from _rails_along(guides, JoinedRoute(route, places), before, path)
+
+
+def rails_of_guide(guide: Guide, plans: Mapping[str, ConveyorPlan], path: Path) -> Iterator[GuideRail]:
+    """Yield the rails of a guide, and enter it in the plans of its conveyors. Raise LayoutFault."""
+    if (guide.along is None) == (guide.points is None):
+        text = "neither" if guide.along is None else "both"
+        raise LayoutFault(path, f"{text} given, expected either along or points")
+    if guide.points is not None:
+        yield from _rails_by_points(guide, guide.points, plans, path)
+        return
+    for index, name in enumerate(guide.conveyors):
+        if name not in plans:
+            place: Path = ("along",) if isinstance(guide.along, str) else ("along", index)
+            text = f"{shown(name)} given, expected a name from conveyors: {some_of(plans) or 'none'}"
+            raise LayoutFault((*path, *place), text)
+    yield from _rails_along(guide, joined([plans[name] for name in guide.conveyors], (*path, "along")), 0.0, path)
+
+
+def _rails_along(guide: ConveyorGuides, way: JoinedRoute, shift: float, path: Path) -> Iterator[GuideRail]:
+    """Yield the rails of a guide along a path. shift: station of the path where stations of the guide begin (m)."""
+    for side in _sides(guide, path):
+        corners = guide.corners(side)
+        field: Path = ("clearance",) if corners is None else (side,)
+        if corners is None:
+            half = 0.5 * (guide.clearance or 0.0)
+            corners = ((-shift, half if side == "left" else -half),)
+        else:
+            _check_corners(corners, way.route.length, (*path, side))
+        first, last = _stretch(guide, corners[0][0], way.route.length - shift, path)
+        moved = tuple((s + shift, offset) for s, offset in corners)
+        profile = GuideProfile(side, moved, first + shift, last + shift)
+        parts = [(begin + shift, end + shift) for begin, end in _closed(guide, side, first, last, path)]
+        for data in rails_along(way.route, profile, parts, (*path, *field)):
+            yield GuideRail(side, data, (*path, *field))
+        for plan, begin, end in way.places:
+            within = replace(profile, begin=max(profile.begin, begin), end=min(profile.end, end), shift=begin)
+            if within.begin < within.end:
+                plan.guides.append(within)
+
+
+def _rails_by_points(
+    guide: Guide, points: tuple[XY, ...], plans: Mapping[str, ConveyorPlan], path: Path
+) -> Iterator[GuideRail]:
+    for side in SIDES:
+        if guide.corners(side) is not None:
+            raise LayoutFault((*path, side), "given with points, expected clearance only")
+    if guide.clearance is None:
+        raise LayoutFault((*path, "clearance"), "missing, expected a number greater than 0 (m)")
+    for side in SIDES:
+        line = guide_line(points, side, 0.5 * guide.clearance, (*path, "points"))
+        first, last = _stretch(guide, 0.0, line.stations[-1], path)
+        for data in line.rails(_closed(guide, side, first, last, path)):
+            yield GuideRail(side, data, (*path, "points"))
+        for plan in plans.values():
+            if _meet(line, plan):
+                plan.guides.append(line)
+
+
+def _sides(guide: ConveyorGuides, path: Path) -> Sequence[Side]:
+    """Return the sides that a guide has."""
+    given = [side for side in SIDES if guide.corners(side) is not None]
+    if bool(given) == (guide.clearance is not None):
+        text = "clearance given" if given else "no place given"
+        raise LayoutFault(path, f"{text}, expected either clearance, or corners of left, of right or of both")
+    return given or SIDES
+
+
+def _check_corners(corners: Sequence[XY], length: float, path: Path) -> None:
+    """Raise LayoutFault unless the stations of corners grow, from 0 to the length of the path (m)."""
+    least = 0.0
+    for index, (s, offset) in enumerate(corners):
+        if not least <= s <= length + TOUCH:
+            text = f"{shown((s, offset))} given, expected a station from {least:.6g} to {length:.6g} (m)"
+            raise LayoutFault((*path, index), text)
+        least = s + _APART
+
+
+def _stretch(guide: ConveyorGuides, first: float, length: float, path: Path) -> XY:
+    """Return the stations where a guide begins and ends (m)."""
+    if guide.to is not None and not guide.to <= length + TOUCH:
+        text = f"{shown(guide.to)} given, expected at most the length of the path, {length:.6g} (m)"
+        raise LayoutFault((*path, "to"), text)
+    begin = first if guide.from_ is None else max(first, guide.from_)
+    end = length if guide.to is None else min(guide.to, length)
+    if end - begin < _APART:
+        field = "from" if guide.to is None and guide.from_ is not None else "to"
+        raise LayoutFault(
+            (*path, field),
+            f"the guide begins at {begin:.6g} m and ends at {end:.6g} m, expected its end beyond its start",
+        )
+    return begin, end
+
+
+def _closed(guide: ConveyorGuides, side: Side, first: float, last: float, path: Path) -> list[XY]:
+    """Return the parts of a side without its openings, each first and last station (m)."""
+    openings = guide.open.left if side == "left" else guide.open.right
+    parts, begin = [], first
+    for index, (low, high) in enumerate(sorted(openings)):
+        if not (first - TOUCH <= low < high <= last + TOUCH):
+            index = openings.index((low, high))
+            text = f"{shown((low, high))} given, expected two stations from {max(first, 0.0):.6g} to {last:.6g} (m)"
+            raise LayoutFault((*path, "open", side, index), f"{text}, the smaller one first")
+        if low - begin >= _APART:
+            parts.append((begin, low))
+        begin = max(begin, high)
+    if last - begin >= _APART:
+        parts.append((begin, last))
+    if not parts:
+        raise LayoutFault((*path, "open", side), "leaves nothing of the guide, expected none of it open")
+    return parts
+
+
+def _meet(line: GuideLine, plan: ConveyorPlan) -> bool:
+    """Return True if the boxes of a guide and of a conveyor overlap."""
+    (low, high), (first, last) = _box(line.points, 0.0), _box(*_extent(plan))
+    return all(low[k] <= last[k] and first[k] <= high[k] for k in (0, 1))
+
+
+def _extent(plan: ConveyorPlan) -> tuple[list[XY], float]:
+    """Return points of a conveyor, and the distance (m) within which it is from their box."""
+    points = [plan.route.start.xy, *(piece.end.xy for piece in plan.route.pieces)]
+    for piece in plan.route.pieces:
+        if isinstance(piece, Bend):
+            centre = PathFrame(*piece.centre, 0.0)
+            points += [centre.point(-piece.radius, -piece.radius), centre.point(piece.radius, piece.radius)]
+    return points, plan.width
+
+
+def _box(points: Sequence[XY], margin: float) -> tuple[XY, XY]:
+    x, y = zip(*points, strict=True)
+    return (min(x) - margin, min(y) - margin), (max(x) + margin, max(y) + margin)
+
+
+_APART = 1e-6
+"""Least distance of two corners, and least length of a rail (m)."""

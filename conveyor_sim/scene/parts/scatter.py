@@ -1,0 +1,35 @@
+"""Scatter of bottles about the place where a device puts them onto the line."""
+
+import math
+from typing import TYPE_CHECKING
+
+from conveyor_sim.scene.parts.device_part import Giver
+from conveyor_sim.scene.types import XY, NotNegative, NotNegativeAngle, quantity
+
+
+class Scattered(Giver):
+    """A part that puts bottles onto the line with scatter; it has the fields `direction` and `speed`."""
+
+    if TYPE_CHECKING:
+        direction: float
+        speed: float
+
+    lateral_jitter: NotNegative = quantity(
+        "Each bottle is to the left or right by up to this, drawn evenly from the seed.", "m", default=0.0
+    )
+    angular_jitter: NotNegativeAngle = quantity(
+        "The velocity of each bottle is turned to the left or right by up to this, drawn evenly from the seed.",
+        "rad",
+        default=0.0,
+    )
+
+    @property
+    def heading(self) -> tuple[float, float]:
+        """Mean direction (rad) and speed (m/s) of bottles."""
+        return self.direction, self.speed
+
+    def births(self) -> tuple[XY, ...]:
+        """Middle and both ends of the places of bottles, m."""
+        (x, y), left = self.position, (-math.sin(self.direction), math.cos(self.direction))
+        sideways = (self.lateral_jitter * left[0], self.lateral_jitter * left[1])
+        return (x - sideways[0], y - sideways[1]), (x, y), (x + sideways[0], y + sideways[1])
