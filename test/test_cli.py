@@ -36,7 +36,7 @@ def assert_refused(result: Result, words: str) -> None:
 
 
 def test_check_tells_and_draws(command: Command, tmp_path: Path) -> None:
-    result = command("check", SMALL_LINE)
+    result = command("check", SMALL_LINE, "--details")
     assert result.exit_code == 0, result.output
     words = " ".join(result.output.split())
     for phrase in (
@@ -54,7 +54,7 @@ def test_check_tells_and_draws(command: Command, tmp_path: Path) -> None:
 
 
 def test_check_takes_the_name_of_a_shipped_scene(command: Command, tmp_path: Path) -> None:
-    result = command("check", "two_bottles", "--out", "pictures")
+    result = command("check", "two_bottles", "--details", "--out", "pictures")
     assert result.exit_code == 0, result.output
     speed, bound, change, _ = result.output.splitlines()[-4:]
     assert re.match(r"speed: about \d+ x real time on one core with 2 bottles, an estimate", speed)
@@ -203,7 +203,7 @@ def test_scene_that_is_not_there_is_refused(command: Command) -> None:
 def test_a_description_does_not_command_the_terminal(command: Command, tmp_path: Path) -> None:
     text = SMALL_LINE.read_text(encoding="utf-8")
     (tmp_path / "evil.yaml").write_text(re.sub("description: .*", r'description: "red \\e[31m"', text))
-    output = command("check", "evil.yaml").output
+    output = command("check", "evil.yaml", "--details").output
     assert r"red \x1b[31m" in output
     assert "\x1b" not in output
 

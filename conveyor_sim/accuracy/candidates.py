@@ -11,7 +11,7 @@ from conveyor_sim.physics.model import build_model
 from conveyor_sim.physics.timestep.presets import PRESETS
 from conveyor_sim.scene import Scene, parse_overrides, parse_scene
 from conveyor_sim.scene.accuracy import Preset, explicit
-from conveyor_sim.scene.belts import CurvedBelt
+from conveyor_sim.scene.geometry import belt_shapes
 
 STEPS = {
     "leapfrog": (4.0, 2.0, 1.0, 0.5, 0.25, 0.125),
@@ -68,7 +68,7 @@ def forbidden(scene: Scene, **fields: Any) -> dict[str, str]:
 def compared(scene: Scene) -> list[str]:
     """Return the integrators that can run the scene, without semi_implicit_euler where leapfrog gives the same bits."""
     banned = forbidden(scene)
-    same = not any(isinstance(belt, CurvedBelt) for belt in scene.belts.values())
+    same = not any(shape.kind == "curved" for shape in belt_shapes(scene))
     return [name for name in INTEGRATORS if name not in banned and not (same and name == "semi_implicit_euler")]
 
 

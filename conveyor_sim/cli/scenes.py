@@ -18,15 +18,19 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("scene")
 @click.option("--out", type=click.Path(path_type=Path), default=Path(), help="Folder for the picture (default: here).")
+@click.option("--details", is_flag=True, help="List routes, stretches, effects, bounds and their reasons as well.")
 @click.option("--outside-tables", is_flag=True, help=OUTSIDE_TABLES)
-def check(scene: str, out: Path, outside_tables: bool) -> None:
-    """Validate SCENE and draw it.
+def check(scene: str, out: Path, details: bool, outside_tables: bool) -> None:
+    """Validate SCENE, trace a bottle through it, and draw it.
 
-    SCENE is a file, or the name of a shipped scene. Its effects and its time step are listed with their reasons.
+    SCENE is a file, or the name of a shipped scene. Faults of its layout are listed with file and line.
     """
     from conveyor_sim.physics.model import build_model
     from conveyor_sim.physics.model.remedies import step_limit
     from conveyor_sim.report.explain.account import account
+    from conveyor_sim.report.flow.details import flow_table
+    from conveyor_sim.report.flow.flow import flow_of
+    from conveyor_sim.report.flow.overview import finding_lines, overview
     from conveyor_sim.report.report import can_draw
     from conveyor_sim.report.tags import tag_rows
     from conveyor_sim.run.speed import expected
@@ -37,17 +41,27 @@ def check(scene: str, out: Path, outside_tables: bool) -> None:
     checked = load_scene(path, outside_tables=outside_tables)
     model = build_model(checked)
     tag_rows(checked)  # which finds alarms of tags that there are not
-    show(account(checked, model))
-    for line in expected(step_limit(checked)):
+    flow = flow_of(checked)
+    if details:
+        show(account(checked, model))
+        show(flow_table(checked, flow))
+        lines = [*finding_lines(checked, model, flow), *expected(step_limit(checked))]
+    else:
+        lines = overview(checked, model, step_limit(checked), flow)
+    for line in lines:
         click.echo(line)
-    if can_draw():
-        from conveyor_sim.report.figures.draw import plot_scene
+    lists = f"--details lists {len(model.effects)} effects, {len(model.bounds)} bounds and their reasons"
+    if not can_draw():
+        click.echo(lists)
+        return
+    from conveyor_sim.report.figures.draw import plot_scene
 
-        try:
-            out.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise ConveyorError(f"{out}: can't be made ({error.strerror}), expected a folder to draw into") from error
-        click.echo(f"drawn to {plot_scene(checked, out / f'{path.stem}.png')}")
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ConveyorError(f"{out}: can't be made ({error.strerror}), expected a folder to draw into") from error
+    drawn = f"drawn to {plot_scene(checked, out / f'{path.stem}.png')}"
+    click.echo(drawn if details else f"{drawn}; {lists}")
 
 
 @click.command()

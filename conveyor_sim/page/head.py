@@ -10,7 +10,7 @@ import numpy as np
 from conveyor_sim.page.block import FORCE_FRAMES, LEAST_FORCE, LEVELS, MM, SIGNAL_STEPS, UNKNOWN
 from conveyor_sim.page.story import fields
 from conveyor_sim.scene import Scene
-from conveyor_sim.scene.geometry import BeltShape, belt_shapes, rail_shapes
+from conveyor_sim.scene.geometry import BeltShape, named_surfaces, rail_shapes, surface_shapes
 from conveyor_sim.scene.marks import marks_of
 from conveyor_sim.scene.moving import moving_shapes
 
@@ -21,7 +21,8 @@ _DIGITS = 5
 
 def head(line: Any, scene: Scene) -> dict[str, Any]:
     """Return the constant data of the page and the scales of the changing data, from a decoded Line message."""
-    signals = list(line.signal_names)
+    signals, shapes = list(line.signal_names), surface_shapes(scene)
+    named = list(named_surfaces(shapes).values())
     return {
         "scene": scene.name,
         "description": scene.description,
@@ -29,7 +30,7 @@ def head(line: Any, scene: Scene) -> dict[str, Any]:
         "seed": int(line.seed),
         "where": getattr(line, "where", ""),
         "tick": float(line.tick_ns * 1e-9),
-        "belts": [_belt(shape) for shape in belt_shapes(scene)],
+        "surfaces": [{**_surface(shape), "named": shape in named} for shape in shapes],
         "rails": [_points(shape.outline(_ARC_POINTS)) for shape in rail_shapes(scene)],
         "movers": [
             {
@@ -72,9 +73,13 @@ def head(line: Any, scene: Scene) -> dict[str, Any]:
     }
 
 
-def _belt(shape: BeltShape) -> dict[str, Any]:
+def _surface(shape: BeltShape) -> dict[str, Any]:
+    """Return a surface. belt: index of its belt, None for a plate; named: True if its belt's name is drawn on it."""
     return {
-        "name": shape.name,
+        "belt": shape.belt,
+        "name": shape.belt_name,
+        "ratio": shape.ratio,
+        "clockwise": shape.clockwise,
         "kind": shape.kind,
         "outline": _points(shape.outline(_ARC_POINTS)),
         "corner": shape.corner,

@@ -61,9 +61,8 @@ class Plant:
     @cached_property
     def surface_paths(self) -> tuple[Path, ...]:
         """Path in the scene of the belt or plate of each surface."""
-        belts = list(self.scene.belts)
         return tuple(
-            ("plates", shape.name) if shape.belt is None else ("belts", belts[shape.belt]) for shape in self.surfaces
+            ("plates", shape.name) if shape.belt is None else ("belts", shape.belt_name) for shape in self.surfaces
         )
 
     @cached_property

@@ -41,14 +41,16 @@ MANY = 100
 
 def expected(limit: StepLimit) -> list[str]:
     """Return the lines for a run that was not made yet."""
+    return [f"speed: {expected_factor(limit)}; `run` measures it", *_by_steps(limit)]
+
+
+def expected_factor(limit: StepLimit) -> str:
+    """Return the estimated speed of a run that was not made yet, in words."""
     bottles = MANY if limit.bottles is None else max(1, limit.bottles)
     factor = 1.0 / limit.seconds(bottles)
     times = f"{factor:.2g}" if factor < 100.0 else f"{factor:.0f}"
     on_line = "1 bottle" if bottles == 1 else f"{bottles} bottles"
-    return [
-        f"speed: about {times} x real time on one core with {on_line}, an estimate; `run` measures it",
-        *_by_steps(limit),
-    ]
+    return f"about {times} x real time on one core with {on_line}, an estimate"
 
 
 def measured(

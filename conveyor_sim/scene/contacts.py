@@ -57,7 +57,9 @@ class Damping(Part):
         default="none",
     )
     coefficient: NotNegative = quantity(
-        "Damping coefficient c; for onset in s/m, for viscoelastic in kg/(s m^0.5).", "kg/s", default=0.0
+        "Damping coefficient c; for onset in s/m, for viscoelastic in kg/(s m^0.5).",
+        "kg/s or s/m or kg/(s m^0.5)",
+        default=0.0,
     )
     restitution: Restitution | None = quantity(
         "Instead of the coefficient: speed after over speed before a head-on impact.", "1", default=None

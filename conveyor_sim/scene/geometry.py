@@ -1,7 +1,7 @@
 """Shapes of a scene: surfaces of belts and plates, rails and initial bottles. Pure functions; m and rad."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Literal
@@ -41,6 +41,8 @@ class BeltShape:
     material: str = ""
     belt: int | None = None
     """Index of the belt that moves it; None for a plate, which rests."""
+    belt_name: str = ""
+    """Name of this belt."""
     ratio: float = 1.0
     """Speed along travel over that of the belt."""
     clockwise: bool = False
@@ -78,8 +80,9 @@ class BeltShape:
     def edges(self, n: int = 64) -> tuple[Array, Array]:
         """Return points of the right and of the left edge, (k, 2) each, along positive speed; an arc has n points."""
         if self.kind == "straight":
-            ends = [0.0, self.length]
-            return self._point(ends, [0.0, 0.0]), self._point(ends, [self.width, self.width])
+            along = np.array(unit_vector(self.angle))
+            right = np.array(self.corner) + np.outer([0.0, self.length], along)
+            return right, right + self.width * np.array([-along[1], along[0]])
         outer, inner = self._arc(self.inner_radius + self.width, n), self._arc(self.inner_radius, n)
         return (inner[::-1], outer[::-1]) if self.clockwise else (outer, inner)
 
@@ -247,6 +250,7 @@ def shapes_of_belt(name: str, belt: Belt, index: int = 0) -> tuple[BeltShape, ..
             area_shape(label, surface),
             material=belt.material,
             belt=index,
+            belt_name=name,
             ratio=surface.ratio if isinstance(surface, StraightSurface | CurvedSurface) else 1.0,
             clockwise=isinstance(surface, CurvedBelt | CurvedSurface) and surface.turn == "right",
         )
@@ -265,6 +269,20 @@ def surface_shapes(scene: Scene) -> list[BeltShape]:
     """Return all surfaces: those of belts, then plates. The index is the number of a surface."""
     plates = (replace(area_shape(name, plate), material=plate.material) for name, plate in scene.plates.items())
     return [*belt_shapes(scene), *plates]
+
+
+def named_surfaces(shapes: Sequence[BeltShape]) -> dict[int, BeltShape]:
+    """Return the surface on which figures name each belt, by its index: the longest, of equal ones the middle one."""
+    surfaces: dict[int, list[BeltShape]] = {}
+    for shape in shapes:
+        if shape.belt is not None:
+            surfaces.setdefault(shape.belt, []).append(shape)
+    named = {}
+    for belt, own in surfaces.items():
+        longest = max(shape.running_length for shape in own)
+        equal = [shape for shape in own if shape.running_length > longest - TOUCH]
+        named[belt] = equal[len(equal) // 2]
+    return named
 
 
 def surface_materials(scene: Scene) -> list[str]:

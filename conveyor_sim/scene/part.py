@@ -5,13 +5,14 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Discriminator, ModelWrapValidatorHandler, ValidationError, model_validator
 
+from conveyor_sim.scene.conversion import in_si_units
 from conveyor_sim.scene.problem_count import counting, present_count
 from conveyor_sim.scene.problems import Path, Problem, dotted
 from conveyor_sim.scene.words import in_words, listed
 
 
 class Part(BaseModel):
-    """A mapping in a scene file: frozen, no unknown fields, its errors in plain words."""
+    """A mapping in a scene file: frozen, no unknown fields, texts with units as numbers, its errors in plain words."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True, defer_build=True)
 
@@ -21,13 +22,13 @@ class Part(BaseModel):
         count = present_count()
         before = count.said if count is not None else 0
         try:
-            return handler(data)
+            return handler(in_si_units(cls, data))
         except ValidationError as error:
             if count is not None and count.is_full and count.said == before:
                 # All its problems are new and only counted. The scene is refused for the problems before them.
                 count.more += error.error_count()
                 return cls.model_construct()
-            raise in_words(cls, error, count) from None
+            raise in_words(cls, data, error, count) from None
 
 
 P = TypeVar("P", bound=Part)

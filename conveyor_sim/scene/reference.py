@@ -10,6 +10,7 @@ from pydantic.fields import FieldInfo
 
 from conveyor_sim.scene import accuracy, belts, contacts, drives, failures, limits, schema
 from conveyor_sim.scene.parts import machine, station
+from conveyor_sim.scene.units import UNITS
 from conveyor_sim.scene.words import expectation, field_names, in_yaml
 
 INTRODUCTION = """\
@@ -21,8 +22,8 @@ A scene is a YAML file that says what is in a line, what it is made of, and how 
 The files in `config/` are made to be copied from. `conveyor-sim check SCENE` validates a file and draws it; every
 problem is one line that names the file, the line, the field, the value and what was expected.
 
-- Units are SI: m, kg, s, N, rad. A point is `[x, y]`. An angle is a number (rad) or a text such as `90 deg`, `0.5 rad`;
-  angles run counter-clockwise from the x-axis.
+- A number has the SI unit of its field: m, kg, s, N, rad. A text such as `33 mm` has its own, see [Units](#units).
+- A point is `[x, y]`. Angles run counter-clockwise from the x-axis.
 - Names begin with a letter and take letters, digits and underscores: they become parts of ROS topics.
 - The order of belts, rails and bottle types in the file is the order of their indices in messages.
 - Numbers must be finite; what is not 0 has a size from 1e-20 to 1e20.
@@ -35,6 +36,21 @@ problem is one line that names the file, the line, the field, the value and what
   another rail, a bottle that slides past touches both. They take `leapfrog`, `semi_implicit_euler` or
   `velocity_verlet`.
 - No bottle may be born inside a rail or another bottle; touching is allowed.
+
+## Units
+
+Every number that has a unit below can be a text with a unit: `33 mm`, `90 deg`, `24 000 /h`, `30 m/min`, `5 kN/m`,
+`250 ms`, `350 g`. Points take such texts, too: `[0, 33 mm]`. The units are {units}.
+
+- Units are multiplied by a space, `*` or `·`, divided by `/` and raised by `^`: `15 N m`, `m/s^2`, `kg m²`.
+- A space may separate thousands: `24 000`.
+- Texts are expressions of `+`, `-`, `*`, `/` and parentheses: `2 * (33 mm + 0.5 mm)`. A unit binds first, so
+  `1/2 s` is 1/(2 s).
+- A number without a unit takes that of the field: `0.1 + 5 mm` for a length is 0.105 m.
+- An angle is a dimension of its own: divide by `1 rad` to get a plain number.
+- A value of a wrong dimension is refused: `33 mm` for a speed. So is a number without a unit beyond a full turn
+  for an angle: `-90` asks whether `-90 deg` was meant.
+- `33 mm` and `0.033` are the same number to the last bit.
 """
 
 WITHIN: dict[str, list[tuple[str, type[BaseModel]]]] = {
@@ -104,7 +120,8 @@ def _models(annotation: Any) -> Iterator[type[BaseModel]]:
 
 def reference() -> str:
     """Return the text of docs/scene.md."""
-    return "\n".join([INTRODUCTION, *(_section(title, model) for title, model in sections())])
+    introduction = INTRODUCTION.replace("{units}", ", ".join(f"`{name}`" for name in UNITS if name.isascii()))
+    return "\n".join([introduction, *(_section(title, model) for title, model in sections())])
 
 
 def _section(title: str, model: type[BaseModel]) -> str:

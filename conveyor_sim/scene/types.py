@@ -27,10 +27,6 @@ LEAST, MOST = 1e-20, 1e20  # in SI units; products and quotients of several quan
 
 XY = tuple[float, float]
 
-_LONGEST_ANGLE = 100
-"""Characters. The time of the expression below grows with the square of their number."""
-_ANGLE = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(deg|rad)\s*")
-
 
 @dataclass(frozen=True)
 class Holds:
@@ -51,15 +47,6 @@ class Says(Holds):
                 raise PydanticCustomError("expected", "{text}", {"text": self.text}) from None
 
         return core_schema.no_info_wrap_validator_function(in_words, handler(source))
-
-
-def parse_angle(value: Any) -> Any:
-    """Return the angle in rad from a number (rad) or a text such as "90 deg" or "0.5 rad"; other values unchanged."""
-    match = _ANGLE.fullmatch(value) if isinstance(value, str) and len(value) <= _LONGEST_ANGLE else None
-    if match is None:
-        return value
-    number = float(match[1])
-    return math.radians(number) if match[2] == "deg" else number
 
 
 def parse_start_time(value: Any) -> str:
@@ -110,14 +97,13 @@ _span_words = 'an angle greater than 0 and at most a full turn, a number or a te
 Unchecked = Annotated[float, AllowInfNan(True)]
 """A number that may be non-finite, in snapshots."""
 
-Angle = Annotated[float, Strict(), AllowInfNan(False), BeforeValidator(parse_angle), Says(_angle_words), _small]
+Angle = Annotated[float, Strict(), AllowInfNan(False), Says(_angle_words), _small]
 Span = Annotated[
     float,
     Strict(),
     AllowInfNan(False),
     Gt(0),
     Le(2 * math.pi),
-    BeforeValidator(parse_angle),
     Says(_span_words),
     _sound,
 ]
@@ -127,7 +113,6 @@ NotNegativeAngle = Annotated[
     AllowInfNan(False),
     Ge(0),
     Le(math.pi),
-    BeforeValidator(parse_angle),
     Says('an angle from 0 to half a turn, a number or a text like "0.5 deg"'),
     _sound,
 ]

@@ -12,6 +12,8 @@ from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 
 from conveyor_sim.scene.problem_count import ProblemCount
+from conveyor_sim.scene.problems import Path
+from conveyor_sim.scene.quantities import Unconverted, example_of
 from conveyor_sim.scene.types import Holds
 
 _LONGEST_VALUE = 60
@@ -54,7 +56,7 @@ def _pieces(value: Any) -> Iterator[str]:
             yield from _pieces(item)
         yield "]" if value else "[]"
     else:
-        yield _scalar(value)
+        yield _scalar(value.value if isinstance(value, Unconverted) else value)
 
 
 def _scalar(value: Any) -> str:
@@ -122,10 +124,12 @@ def fields_of(model: type[BaseModel]) -> str:
     return "a mapping with the fields " + ", ".join(names)
 
 
-def in_words(model: type[BaseModel], error: ValidationError, count: ProblemCount | None = None) -> ValidationError:
+def in_words(
+    model: type[BaseModel], data: Any, error: ValidationError, count: ProblemCount | None = None
+) -> ValidationError:
     """Return the error with problems of the model's fields in words (error type "said"); others pass unchanged.
 
-    count: bounds the problems in words; None: no bound.
+    data: of the model, before texts of quantities became numbers. count: bounds the problems in words; None: no bound.
     """
     details: list[InitErrorDetails] = []
     for problem in error.errors(include_url=False):
@@ -134,13 +138,13 @@ def in_words(model: type[BaseModel], error: ValidationError, count: ProblemCount
                 count.more += 1
                 continue
             count.said += 1
-        details.append(_said(model, problem))
+        details.append(_said(model, data, problem))
     return ValidationError.from_exception_data(error.title, details)
 
 
-def _said(model: type[BaseModel], problem: ErrorDetails) -> InitErrorDetails:
+def _said(model: type[BaseModel], data: Any, problem: ErrorDetails) -> InitErrorDetails:
     loc, value = problem["loc"], problem["input"]
-    text = _sentence(model, problem)
+    text = _sentence(model, data, problem)
     if problem["type"] == "kind" and isinstance(value, Mapping):
         loc = (*loc, "kind")
     if loc and loc[-1] == "[key]":
@@ -148,7 +152,7 @@ def _said(model: type[BaseModel], problem: ErrorDetails) -> InitErrorDetails:
     return {"type": PydanticCustomError("said", "{text}", {"text": text}), "loc": loc, "input": value}
 
 
-def _sentence(model: type[BaseModel], problem: ErrorDetails) -> str:
+def _sentence(model: type[BaseModel], data: Any, problem: ErrorDetails) -> str:
     kind, loc, value = problem["type"], problem["loc"], problem["input"]
     if kind == "said":
         return str(problem["ctx"]["text"])
@@ -164,16 +168,48 @@ def _sentence(model: type[BaseModel], problem: ErrorDetails) -> str:
         return _wrong_kind(value, str(problem["ctx"]["text"]))
     if loc[-1] == "[key]":
         return f"{shown(value)} given as a name, expected {problem['ctx']['text']}"
+    given = _given(data, loc, value)
+    text = expectation(field)
     if kind == "size" or (kind == "expected" and len(loc) > 1):
         unit = unit_of(field)
-        text = str(problem["ctx"]["text"])
-        return f"{shown(value)} given, expected {text}" + (f" ({unit})" if unit not in ("", "1") else "")
-    return f"{shown(value)} given, expected {expectation(field)}"
+        text = str(problem["ctx"]["text"]) + (f" ({unit})" if unit not in ("", "1") else "")
+    unconverted = _first_unconverted(value)
+    if unconverted is None:
+        return f"{shown(given)} given, expected {text}"
+    example = example_of(unit_of(field).partition(", ")[0])
+    such = f", such as {example}" if example and example not in text else ""
+    return f"{shown(given)} given, expected {text}{such}; found {unconverted.reason}"
+
+
+def _given(data: Any, loc: Path, value: Any) -> Any:
+    """Return the value at a place in the data; `value` if there is no such place."""
+    for part in loc:
+        inside = (
+            part in data if isinstance(data, Mapping) else isinstance(part, int) and isinstance(data, (list, tuple))
+        )
+        if not inside:
+            return value
+        data = data[part]
+    return data
+
+
+def _first_unconverted(value: Any) -> Unconverted | None:
+    """Return the first refused quantity in the value of a field."""
+    if isinstance(value, (list, tuple)):
+        return next((one for item in value if (one := _first_unconverted(item)) is not None), None)
+    return value if isinstance(value, Unconverted) else None
 
 
 def _unknown(name: str, names: list[str]) -> str:
+    return f"no such field, {did_you_mean(name, names)}"
+
+
+def did_you_mean(name: str, names: list[str]) -> str:
+    """Return the expectation for an unknown name: the one that it resembles, or all of them."""
     close = difflib.get_close_matches(name, names, n=1) if len(name) <= _LONGEST_NAME else []
-    return "no such field, " + (f"did you mean {close[0]}?" if close else "expected " + listed(names))
+    if close:
+        return f"did you mean {close[0]}?"
+    return f"expected {listed(names)}" if len(names) <= _LISTED and names else f"expected {some_of(names) or 'none'}"
 
 
 def _wrong_kind(value: Any, kinds: str) -> str:

@@ -286,7 +286,9 @@ def _energy_kept(first: BottleColumns, last: BottleColumns) -> float:
 def slips(simulation: Simulation, bottles: BottleColumns) -> F8:
     """Speed of each bottle relative to the surface under it, (bottles,), m/s."""
     ux, uy = np.zeros(bottles.x.size), np.zeros(bottles.x.size)
-    for index, (shape, speed) in enumerate(zip(simulation.model.plant.belts, simulation.belts().actual, strict=True)):
+    for index, (shape, speed) in enumerate(
+        zip(simulation.model.plant.surfaces, simulation.belts().actual, strict=True)
+    ):
         on = bottles.belt == index
         if shape.kind == "straight":
             ux[on], uy[on] = speed * math.cos(shape.angle), speed * math.sin(shape.angle)

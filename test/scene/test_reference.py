@@ -8,7 +8,6 @@ from pydantic import BaseModel
 
 from conveyor_sim.scene.part import Part
 from conveyor_sim.scene.reference import sections
-from conveyor_sim.scene.types import parse_angle
 from conveyor_sim.scene.words import expectation, field_names, unit_of
 
 DOCS = Path(__file__).parents[2] / "docs" / "scene.md"
@@ -38,8 +37,3 @@ def test_every_field_says_what_it_is_what_it_takes_and_in_which_unit(model: type
         assert takes, name
         numeric = any(word in takes for word in ("number", "an angle", "points [", "a point [", "a velocity ["))
         assert bool(unit_of(field)) == numeric, name
-
-
-def test_other_things_are_no_angles() -> None:
-    assert parse_angle([1]) == [1]
-    assert parse_angle("ninety deg") == "ninety deg"

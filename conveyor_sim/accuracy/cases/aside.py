@@ -11,7 +11,7 @@ import numpy as np
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.accuracy.trajectory import variant
 from conveyor_sim.engine.arrays.types import F8
-from conveyor_sim.scene import Scene, belt_shapes, rail_shapes
+from conveyor_sim.scene import Scene, rail_shapes, surface_shapes
 from conveyor_sim.simulation import Simulation
 
 PHASES = 64
@@ -33,8 +33,8 @@ def phases(root: float = 5.0) -> F8:
 
 
 def corner(scene: Scene) -> tuple[float, float]:
-    """Return a point (m) to the upper right of all belts and rails, at least two of the largest diameters away."""
-    points = [np.zeros((1, 2)), *(shape.outline() for shape in belt_shapes(scene))]
+    """Return a point (m) to the upper right of all surfaces and rails, at least two of the largest diameters away."""
+    points = [np.zeros((1, 2)), *(shape.outline() for shape in surface_shapes(scene))]
     points += [np.array(piece.box) for rail in rail_shapes(scene) for piece in rail.pieces]
     x, y = np.vstack(points).max(axis=0)
     clear = 4.0 * max(kind.radius for kind in scene.bottle_types.values())

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from conveyor_sim.bag.messages.cdr import CdrWriter, xyz_rows
 from conveyor_sim.bag.messages.encode import Header
 from conveyor_sim.columns.bottles import BottleColumns
+from conveyor_sim.scene.geometry import named_surfaces
 
 if TYPE_CHECKING:
     from conveyor_sim.scene.geometry import BeltShape, RailShape
@@ -149,44 +150,32 @@ def bottles_markers(
 
 
 def plant_markers(
-    belts: Sequence[BeltShape], rails: Sequence[RailShape], marks: Sequence[Mark], header: Header
+    surfaces: Sequence[BeltShape], rails: Sequence[RailShape], marks: Sequence[Mark], header: Header
 ) -> bytes:
-    """Return the markers of the plant: belt surfaces, arrows along positive speed, fixed rails, device marks, names."""
-    markers = [*_belt_surfaces(belts), *_arrows(belts), *_rails("rails", rails), *_names(belts), *_marks(marks)]
+    """Return the markers of the plant: surfaces, arrows along positive speed, fixed rails, device marks, names."""
+    markers = [*_surfaces(surfaces), *_arrows(surfaces), *_rails("rails", rails), *_names(surfaces), *_marks(marks)]
     return marker_array(markers, header)
 
 
-def _belt_surfaces(belts: Sequence[BeltShape]) -> Iterator[Marker]:
-    for index, belt in enumerate(belts):
-        # The last listed belt carries, so it lies on top; a tenth of a millimetre keeps surfaces from flickering.
+def _surfaces(surfaces: Sequence[BeltShape]) -> Iterator[Marker]:
+    for index, surface in enumerate(surfaces):
+        # The last listed surface carries, so it lies on top; a tenth of a millimetre keeps surfaces from flickering.
         height = -0.01 + 1e-4 * index
-        right, left = _edges(belt)
+        right, left = surface.edges(1 + math.ceil(surface.span / ARC_STEP))
         corners = np.stack((right[:-1], right[1:], left[:-1], left[:-1], right[1:], left[1:]), axis=1)
         colour = BELT_COLOURS[index % len(BELT_COLOURS)]
         yield Marker("belts", index, TRIANGLE_LIST, (1.0, 1.0, 1.0), colour, xyz_rows(corners.reshape(-1, 2), height))
 
 
-def _edges(belt: BeltShape) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the right and left edge of a belt, seen along positive speed: (n, 2) each."""
-    if belt.kind == "straight":
-        along = np.array([math.cos(belt.angle), math.sin(belt.angle)])
-        left = np.array([-along[1], along[0]])
-        right_edge = np.array(belt.corner) + np.outer([0.0, belt.length], along)
-        return right_edge, right_edge + belt.width * left
-    angles = belt.start_angle + np.linspace(0.0, belt.span, 1 + math.ceil(belt.span / ARC_STEP))
-    radial = np.column_stack((np.cos(angles), np.sin(angles)))
-    centre = np.array(belt.centre)
-    # Counter-clockwise travel has the outer race on its right.
-    return centre + (belt.inner_radius + belt.width) * radial, centre + belt.inner_radius * radial
-
-
-def _arrows(belts: Sequence[BeltShape]) -> Iterator[Marker]:
+def _arrows(surfaces: Sequence[BeltShape]) -> Iterator[Marker]:
     number = 0
-    for belt in belts:
-        line = belt.centre_line(33)
+    for surface in surfaces:
+        if surface.belt is None:
+            continue
+        line = surface.centre_line(33)
         length = float(np.sum(np.hypot(*np.diff(line, axis=0).T)))
         count = max(1, round(length / ARROW_SPACING))
-        reach = min(0.6 * length / count, belt.width)
+        reach = min(0.6 * length / count, surface.width)
         size = (0.08 * reach, 0.2 * reach, 0.3 * reach)
         for place in (np.arange(count) + 0.5) / count * length:
             ends = _along(line, np.array([place - 0.5 * reach, place + 0.5 * reach]))
@@ -207,11 +196,13 @@ def _rails(space: str, rails: Sequence[RailShape]) -> Iterator[Marker]:
         yield Marker(space, index, LINE_STRIP, (RAIL_THICKNESS, 0.0, 0.0), RAIL_COLOUR, points)
 
 
-def _names(belts: Sequence[BeltShape]) -> Iterator[Marker]:
-    for index, belt in enumerate(belts):
-        x, y = belt.centre_line(3)[1]
-        size = (0.0, 0.0, min(0.12, 0.4 * belt.width))
-        yield Marker("names", index, TEXT_VIEW_FACING, size, ARROW_COLOUR, position=(x, y, 0.2), text=belt.name)
+def _names(surfaces: Sequence[BeltShape]) -> Iterator[Marker]:
+    for belt, surface in named_surfaces(surfaces).items():
+        x, y = surface.centre_line(3)[1]
+        size = (0.0, 0.0, min(0.12, 0.4 * surface.width))
+        yield Marker(
+            "names", belt, TEXT_VIEW_FACING, size, ARROW_COLOUR, position=(x, y, 0.2), text=surface.belt_name
+        )  # fmt: skip
 
 
 def _marks(marks: Sequence[Mark]) -> Iterator[Marker]:

@@ -1,6 +1,6 @@
 // The plan: the line at a moment, drawn in one pass over the canvas.
 
-import { Belts } from "./belts.js";
+import { Surfaces } from "./surfaces.js";
 import { COLOURINGS, palette } from "./colours.js";
 import { Crowd, MANY } from "./crowd.js";
 import { drawAreas, drawLines, drawMovers } from "./devices.js";
@@ -14,7 +14,7 @@ export class Plan {
     this.canvas = canvas;
     this.context = canvas.getContext("2d");
     this.view = view;
-    this.belts = new Belts(view.recording.head.belts);
+    this.surfaces = new Surfaces(view.recording.head.surfaces);
     this.labels = view.labels = new Labels();
     this.sprites = [];
     this.crowd = new Crowd();
@@ -50,16 +50,16 @@ export class Plan {
 
   draw() {
     const { view, context, frame } = this, { camera, clock, recording } = view, colours = palette();
-    const speeds = recording.head.belts.map((_, i) => recording.at("belts", i, clock.time) ?? 0);
+    const speeds = recording.head.surfaces.map(({ belt }) => (belt === null ? 0 : recording.at("belts", belt, clock.time) ?? 0)); // of their belts
     const gone = this.last === null ? 0 : clock.time - this.last;
-    if (Math.abs(gone) < 1) this.belts.advance(speeds, gone);
+    if (Math.abs(gone) < 1) this.surfaces.advance(speeds, gone);
     this.last = clock.time;
     context.setTransform(this.ratio, 0, 0, this.ratio, 0, 0);
     context.fillStyle = colours.paper;
     context.fillRect(0, 0, camera.width, camera.height);
     this.labels.clear();
     if (this.said !== byId("notice").textContent) this.cover();
-    this.belts.draw(context, camera, colours, speeds);
+    this.surfaces.draw(context, camera, colours, speeds);
     drawAreas(context, camera, colours, view);
     this._rails(colours);
     view.wear.draw(context, camera);
@@ -171,7 +171,8 @@ export class Plan {
 
   _beltNames(colours, speeds) {
     const { camera, recording: { head } } = this.view;
-    head.belts.forEach((belt, i) => {
+    head.surfaces.forEach((belt, i) => {
+      if (!belt.named) return;
       const angle = belt.start + belt.span / 2, radius = belt.inner + belt.width / 2;
       const [x, y] = belt.kind === "straight"
         ? [0, 1].map((k) => (belt.outline[0][k] + belt.outline[2][k]) / 2)

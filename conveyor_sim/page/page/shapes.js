@@ -2,7 +2,7 @@
 
 // Returns the least x and y, and the greatest, of all drawn parts of recordings.
 export function boundsOf(recordings) {
-  const points = recordings.filter(Boolean).flatMap(({ head }) => [...head.belts.flatMap(({ outline }) => outline), ...head.rails.flat(), ...head.marks.flatMap(({ points: all }) => all)]);
+  const points = recordings.filter(Boolean).flatMap(({ head }) => [...head.surfaces.flatMap(({ outline }) => outline), ...head.rails.flat(), ...head.marks.flatMap(({ points: all }) => all)]);
   const [xs, ys] = [0, 1].map((k) => points.map((point) => point[k]));
   const least = (list) => list.reduce((a, b) => Math.min(a, b), Infinity), most = (list) => list.reduce((a, b) => Math.max(a, b), -Infinity);
   return points.length ? [least(xs), least(ys), most(xs), most(ys)] : [-1, -1, 1, 1];

@@ -139,7 +139,9 @@ export class View {
 
   measure(block) {
     block.measured = true;
-    for (const column of block.belts.columns) for (const value of column.values) this.fastest = Math.max(this.fastest, Math.abs(value));
+    for (const { belt, ratio } of this.recording.head.surfaces) {
+      for (const value of block.belts.columns[belt]?.values ?? []) this.fastest = Math.max(this.fastest, ratio * Math.abs(value));
+    }
     const every = Math.ceil(block.contacts.reduce((sum, { force }) => sum + force.length, 0) / MEASURED);
     const forces = block.contacts.flatMap(({ force }) => Array.from(force).filter((_, i) => i % every === 0)).sort((a, b) => a - b);
     this.strongest = Math.max(this.strongest, forces[Math.floor(0.99 * forces.length)] ?? 0);
@@ -265,8 +267,8 @@ export class View {
     }
     const [x, y] = this.camera.at(px, py), near = 12 / this.camera.scale;
     const mark = head.marks.find(({ points }) => inside(points, x, y) || points.some((point, k) => awayFrom(point, points[(k + 1) % points.length], x, y) < near));
-    const belt = mark ? null : [...head.belts].reverse().find(({ outline }) => inside(outline, x, y));
-    const device = mark ? deviceOf(mark) : belt ? `belts/${belt.name}` : null;
+    const surface = mark ? null : [...head.surfaces].reverse().find(({ outline }) => inside(outline, x, y));
+    const device = mark ? deviceOf(mark) : surface?.name ? `belts/${surface.name}` : null;
     if (device) {
       this.faceplate.show(device);
       this.tabs.show("device");

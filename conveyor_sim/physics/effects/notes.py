@@ -13,24 +13,29 @@ LEAST, MOST = 0.65, 1.8
 
 
 def notes(plant: Plant, on: Collection[str]) -> list[str]:
-    """Return a sentence about bottles on points that may rub along rails, in a list; an empty list without such.
+    """Return a sentence about bottles on points that may rub along rails, in a list; an empty list without such."""
+    on_points = bottles_on_points(plant, on)
+    if not on_points:
+        return []
+    name = on_points[0]
+    others = "" if len(on_points) == 1 else f", and {len(on_points) - 1} more,"
+    return [
+        f"bottle_types.{name}{others} stands on a point: its spin is free, and along rails it rolls; on rings "
+        f"scuffing was {LEAST:g} to {MOST:g} times that on shipped scenes (docs/base.md); give base_radius, of a can "
+        f"{CAN:g} of the radius: {CAN * plant.scene.bottle_types[name].radius:.3g} m"
+    ]
+
+
+def bottles_on_points(plant: Plant, on: Collection[str]) -> list[str]:
+    """Return the types of bottles on points that may rub along rails.
 
     Only the rail turns these bottles, so they roll along it (docs/base.md).
     """
     if not {"base_friction", "contact_friction", "rotation"} <= set(on) or "static_friction" in on:
         return []
     rub = [set(contact.between) for _, contact in contacts_in_use(plant, on) if contact.friction > 0.0]
-    on_points = {
-        name: kind
+    return [
+        name
         for name, kind in plant.scene.bottle_types.items()
         if kind.base_radius is None and any({kind.material, rail} in rub for rail in plant.rail_materials)
-    }
-    if not on_points:
-        return []
-    name, kind = next(iter(on_points.items()))
-    others = "" if len(on_points) == 1 else f", and {len(on_points) - 1} more,"
-    return [
-        f"bottle_types.{name}{others} stands on a point: its spin is free, and along rails it rolls; on rings "
-        f"scuffing was {LEAST:g} to {MOST:g} times that on shipped scenes (docs/base.md); give base_radius, of a can "
-        f"{CAN:g} of the radius: {CAN * kind.radius:.3g} m"
     ]

@@ -24,7 +24,7 @@ from conveyor_sim.bag.messages.typestore import default_distro
 from conveyor_sim.protocols.server.interface import ServerError, Status
 from conveyor_sim.protocols.tags.line_mirror import DRAWING_TOPICS, STATE_TOPICS, DrawableProvider
 from conveyor_sim.scene import parse_overrides, parse_scene
-from conveyor_sim.scene.geometry import belt_shapes, rail_shapes
+from conveyor_sim.scene.geometry import rail_shapes, surface_shapes
 from conveyor_sim.scene.marks import marks_of
 from conveyor_sim.scene.moving import moving_shapes
 
@@ -181,7 +181,7 @@ class FoxgloveServer:
         """Publish static objects if a client subscribes to them."""
         if self._looks[PLANT]:
             scene = self._scene()
-            shapes = belt_shapes(scene), rail_shapes(scene), marks_of(scene)
+            shapes = surface_shapes(scene), rail_shapes(scene), marks_of(scene)
             self._channels[PLANT].log(plant_markers(*shapes, Header(0, 0, FRAME)))
 
     def _scene(self) -> Any:

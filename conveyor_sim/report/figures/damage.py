@@ -54,7 +54,7 @@ def rails_figure(plant: StaticGeometry, damage: Damage, title: str) -> Figure:
         ("scuffing", "Sliding work on the rails", "J/m", wear.scuffing_work / wear.length),
     )
     for ax, (gid, what, unit, values) in zip(axes, maps, strict=True):
-        draw_belts(ax, plant, np.zeros(len(plant.belts)), Normalize(0.0, 1.0))
+        draw_belts(ax, plant, np.zeros(len(plant.speeds)), Normalize(0.0, 1.0))
         draw_travel(ax, plant, plant.speeds, 13.0 * width / (72.0 * panel))
         draw_rails(ax, plant).set_linewidth(0.8)
         draw_exits(ax, plant)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from conveyor_sim.columns.damage import RailWearColumns
 from conveyor_sim.scene.driven import belt_speeds
-from conveyor_sim.scene.geometry import BeltShape, RailShape, belt_shapes, initial_bottles, rail_shapes
+from conveyor_sim.scene.geometry import BeltShape, RailShape, initial_bottles, rail_shapes, surface_shapes
 from conveyor_sim.scene.marks import marks_of
 from conveyor_sim.scene.moving import moving_shapes
 from conveyor_sim.scene.parts.device_part import Look, Mark
@@ -26,9 +26,9 @@ _OUTLINE_POINTS = 96
 
 @dataclass(frozen=True)
 class StaticGeometry:
-    """Static geometry: belts with initial speeds (m/s), rails in listing order, device markers."""
+    """Static geometry: surfaces, initial speeds of belts (m/s), rails in listing order, device markers."""
 
-    belts: tuple[BeltShape, ...]
+    surfaces: tuple[BeltShape, ...]
     speeds: Floats
     rails: tuple[RailShape, ...]
     marks: tuple[Mark, ...] = ()
@@ -37,7 +37,7 @@ class StaticGeometry:
     def of(cls, scene: Scene) -> StaticGeometry:
         """Return the static geometry of `scene`."""
         return cls(
-            belts=tuple(belt_shapes(scene)),
+            surfaces=tuple(surface_shapes(scene)),
             speeds=np.array([*belt_speeds(scene).values()], dtype=np.float64),
             rails=(*rail_shapes(scene), *(shape.shape(shape.first) for shape in moving_shapes(scene))),
             marks=tuple(marks_of(scene)),
@@ -51,17 +51,21 @@ class StaticGeometry:
         """Return a copy with the moving rails, which come last, at other positions."""
         return replace(self, rails=(*self.rails[: len(self.rails) - len(moving)], *moving))
 
-    def belt_outline(self, index: int) -> Floats:
-        """Outline (k, 2) of belt `index`, m."""
-        return np.asarray(self.belts[index].outline(_OUTLINE_POINTS), dtype=np.float64)
+    def surface_speeds(self, speeds: Floats) -> Floats:
+        """Speeds (surfaces,) along travel in m/s at speeds (belts,) of the belts; 0 for plates."""
+        return np.array([0.0 if shape.belt is None else shape.ratio * speeds[shape.belt] for shape in self.surfaces])
+
+    def surface_outline(self, index: int) -> Floats:
+        """Outline (k, 2) of surface `index`, m."""
+        return np.asarray(self.surfaces[index].outline(_OUTLINE_POINTS), dtype=np.float64)
 
     def rail_line(self, index: int) -> Floats:
         """Course (k, 2) of rail `index`, m."""
         return np.asarray(self.rails[index].outline(_OUTLINE_POINTS), dtype=np.float64)
 
     def bounds(self) -> tuple[float, float, float, float]:
-        """Smallest box (x0, y0, x1, y1) in m around belts, rails and marks."""
-        parts = [self.belt_outline(i) for i in range(len(self.belts))]
+        """Smallest box (x0, y0, x1, y1) in m around surfaces, rails and marks."""
+        parts = [self.surface_outline(i) for i in range(len(self.surfaces))]
         parts += [self.rail_line(i) for i in range(len(self.rails))]
         parts += [mark.points for mark in self.marks]
         return box_around(np.concatenate(parts)) if parts else (math.inf, math.inf, -math.inf, -math.inf)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from conveyor_sim.report.figures import style
 from conveyor_sim.report.figures.data import Floats, StaticGeometry
 from conveyor_sim.report.figures.marks import COLOURS
-from conveyor_sim.scene.geometry import BeltShape
+from conveyor_sim.scene.geometry import BeltShape, named_surfaces
 
 _Z: Final = 8.0
 _CELL: Final = 4.0  # pixels of the map of what is taken
@@ -43,15 +43,15 @@ class Label:
 def belt_labels(plant: StaticGeometry, speeds: Floats) -> list[Label]:
     """Name and speed of every belt, beside it."""
     labels = []
-    for shape, speed in zip(plant.belts, speeds, strict=True):
+    for belt, shape in named_surfaces(plant.surfaces).items():
         anchors, outward = _sides(shape)
-        labels.append(Label(f"{shape.name}\n{speed:.3g} m/s", style.INK, 9.0, anchors, outward))
+        labels.append(Label(f"{shape.belt_name}\n{speeds[belt]:.3g} m/s", style.INK, 9.0, anchors, outward))
     return labels
 
 
 def rail_labels(plant: StaticGeometry) -> list[Label]:
     """Names of the rails that the scene lists; those of curved belts carry their belt's name already."""
-    derived = {f"{belt.name}_{side}" for belt in plant.belts for side in ("inner", "outer")}
+    derived = {f"{surface.belt_name}_{side}" for surface in plant.surfaces for side in ("inner", "outer")}
     labels = []
     for index, rail in enumerate(plant.rails):
         if rail.name in derived:
@@ -149,7 +149,7 @@ def place(ax: Axes, labels: Sequence[Label], plant: StaticGeometry, circles: Flo
 
 
 def _sides(shape: BeltShape) -> tuple[Floats, Floats]:
-    """Points (k, 2) on both long edges of a belt and the directions (k, 2) away from it."""
+    """Points (k, 2) on both long edges of a surface and the directions (k, 2) away from it."""
     anchors, outward = [], []
     for along in _ALONG:
         if shape.kind == "straight":
@@ -170,11 +170,11 @@ def _sides(shape: BeltShape) -> tuple[Floats, Floats]:
 def _taken(
     ax: Axes, plant: StaticGeometry, circles: Floats | None, columns: int, rows: int, x0: float, y0: float
 ) -> tuple[Floats, Floats]:
-    """Two maps (rows, columns) of cells of the axes: 1 where a line, a mark or a bottle is, and 1 where a belt is."""
+    """Two maps (rows, columns) of cells of the axes: 1 where a line, mark or bottle is, and 1 where a surface is."""
     x, y = np.meshgrid(x0 + (np.arange(columns) + 0.5) * _CELL, y0 + (np.arange(rows) + 0.5) * _CELL)
     cells = np.stack([x.ravel(), y.ravel()], axis=1)
     exits = [mark.points for mark in plant.drawn_as("exit")]
-    outlines = [plant.belt_outline(i) for i in range(len(plant.belts))] + exits
+    outlines = [plant.surface_outline(i) for i in range(len(plant.surfaces))] + exits
     areas = np.zeros(len(cells))
     for outline in outlines:
         areas[Outline(ax.transData.transform(outline)).contains_points(cells)] = 1.0

@@ -1,4 +1,4 @@
-"""Static parts of a figure: belts as areas with chevrons along their motion, rails as bold lines, devices."""
+"""Static parts of a figure: surfaces as areas with chevrons along their motion, rails as bold lines, devices."""
 
 from __future__ import annotations
 
@@ -36,10 +36,13 @@ def draw_plant(ax: Axes, plant: StaticGeometry, speeds: Floats, norm: Normalize,
 
 
 def draw_belts(ax: Axes, plant: StaticGeometry, speeds: Floats, norm: Normalize) -> PolyCollection:
-    """One area a belt, in listing order, tinted with its speed: a bottle of stronger tint than its belt slides."""
+    """One area a surface, in listing order, tinted with its speed: a bottle of stronger tint than its surface slides.
+
+    `speeds` (belts,) in m/s.
+    """
     collection = PolyCollection(
-        [plant.belt_outline(i) for i in range(len(plant.belts))],
-        facecolors=style.pale(np.asarray(style.SPEED(norm(np.abs(speeds)))).reshape(-1, 4), 0.45),
+        [plant.surface_outline(i) for i in range(len(plant.surfaces))],
+        facecolors=style.pale(np.asarray(style.SPEED(norm(np.abs(plant.surface_speeds(speeds))))).reshape(-1, 4), 0.45),
         edgecolors=style.BELT_EDGE,
         linewidths=0.8,
         zorder=Z_BELT,
@@ -50,13 +53,13 @@ def draw_belts(ax: Axes, plant: StaticGeometry, speeds: Floats, norm: Normalize)
 
 
 def draw_travel(ax: Axes, plant: StaticGeometry, speeds: Floats, size: float) -> LineCollection:
-    """Chevrons that point where the surface of each belt travels; a belt at rest gets none.
+    """Chevrons that point where each surface travels; one at rest gets none. `speeds` (belts,) in m/s.
 
-    Where belts overlap, only the one that carries shows its travel.
+    Where surfaces overlap, only the one that carries shows its travel.
     """
-    outlines = [Outline(plant.belt_outline(i)) for i in range(len(plant.belts))]
+    outlines = [Outline(plant.surface_outline(i)) for i in range(len(plant.surfaces))]
     chevrons: list[Floats] = []
-    for index, (shape, speed) in enumerate(zip(plant.belts, speeds, strict=True)):
+    for index, (shape, speed) in enumerate(zip(plant.surfaces, plant.surface_speeds(speeds), strict=True)):
         if speed == 0.0:
             continue
         height = min(size, 0.5 * shape.width)
@@ -77,7 +80,7 @@ def draw_travel(ax: Axes, plant: StaticGeometry, speeds: Floats, size: float) ->
 
 
 def travel(shape: BeltShape, spacing: float) -> tuple[Floats, Floats]:
-    """Points (n, 2) spread over a belt, about `spacing` m apart, and the direction (n, 2) of positive speed there."""
+    """Points (n, 2) of a surface, about `spacing` m apart, and the direction (n, 2) of positive speed there."""
     rows = max(1, round(shape.width / spacing))
     across = (np.arange(rows) + 0.5) / rows * shape.width
     if shape.kind == "straight":
@@ -92,7 +95,8 @@ def travel(shape: BeltShape, spacing: float) -> tuple[Floats, Floats]:
     arcs = [_spread(shape.span * radius, most) / radius for radius in radii]
     angle, radius = shape.start_angle + np.concatenate(arcs), np.repeat(radii, [len(arc) for arc in arcs])
     outward = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    return np.asarray(shape.centre) + radius[:, None] * outward, np.stack([-outward[:, 1], outward[:, 0]], axis=1)
+    ahead = np.stack([-outward[:, 1], outward[:, 0]], axis=1)
+    return np.asarray(shape.centre) + radius[:, None] * outward, -ahead if shape.clockwise else ahead
 
 
 def _spread(length: float, spacing: float) -> Floats:

@@ -98,12 +98,12 @@ def scene_figure(plant: StaticGeometry, frame: PlantFrame, title: str) -> Figure
 
 
 def table_region(plant: StaticGeometry, frames: Sequence[PlantFrame]) -> Box:
-    """Return the box around the widest belt plus one bottle width; the complete plant if that is nearly as large."""
-    if not plant.belts:
+    """Return the box around the widest surface plus one bottle width; the complete plant if that is nearly as large."""
+    if not plant.surfaces:
         return whole_region(plant, frames)
-    widest = int(np.argmax([belt.width for belt in plant.belts]))
+    widest = int(np.argmax([surface.width for surface in plant.surfaces]))
     diameter = 2.0 * max((float(frame.radius.max(initial=0.0)) for frame in frames), default=0.0)
-    x0, y0, x1, y1 = box_around(plant.belt_outline(widest))
+    x0, y0, x1, y1 = box_around(plant.surface_outline(widest))
     margin = max(diameter, 0.06 * max(x1 - x0, y1 - y0))
     box = (x0 - margin, y0 - margin, x1 + margin, y1 + margin)
     px0, py0, px1, py1 = plant.bounds()
@@ -130,7 +130,7 @@ def draw_view(
         draw_orientation(ax, frame, norm, float(np.clip(0.12 * radius, 0.25, 0.8)))
     if forces is not None:
         draw_forces(ax, frame, forces)
-    if not (plant.belts or plant.rails or plant.marks or len(frame.x)):
+    if not (plant.surfaces or plant.rails or plant.marks or len(frame.x)):
         said = "nothing to draw:\nno belts, rails, devices or bottles"
         ax.text(0.5, 0.5, said, transform=ax.transAxes, ha="center", va="center", gid="nothing")
     ax.set_xlim(box[0], box[2])

@@ -43,11 +43,12 @@ class ConveyorExpansion:
     """Conveyors as written."""
     laid: dict[str, LaidConveyor] = field(default_factory=dict)
     faults: list[LayoutFault] = field(default_factory=list)
+    plans: dict[str, ConveyorPlan] = field(default_factory=dict)
     surfaces: int = 0
 
     def expand(self) -> None:
         """Expand all conveyors. Those that are placed by one with a fault are left out."""
-        in_circles: set[str] = set()
+        left_out: set[str] = set()
         for name in in_order(self.conveyors):
             conveyor, path = self.conveyors[name], ("conveyors", name)
             other = dependency(conveyor)
@@ -56,21 +57,25 @@ class ConveyorExpansion:
                 if other is not None and other not in self.conveyors:
                     text = f"{shown(other)} given, expected a name from conveyors: {some_of(self.conveyors)}"
                     raise LayoutFault((*path, way), text)
-                if other is not None and other not in self.laid:
-                    if name not in in_circles and (names := circle(name, self.conveyors)):
-                        in_circles.update(names)
-                        text = f"{shown(other)} given, expected no circle: {some_of(names)}"
-                        raise LayoutFault((*path, way), text)
+                if other in left_out:
+                    left_out.add(name)
                     continue
+                if other is not None and other not in self.plans:
+                    # Others come before those that are placed by them, unless they form a circle.
+                    names = circle(name, self.conveyors)
+                    left_out.update(names)
+                    text = f"{shown(other)} given, expected conveyors that are not placed by each other in a circle"
+                    raise LayoutFault((*path, way), f"{text}: {some_of(names)}")
                 self.laid[name] = self._lay(name, conveyor, path)
+                self.plans[name] = self.laid[name].plan
             except LayoutFault as fault:
+                left_out.add(name)
                 self.faults.append(fault)
         self.laid = {name: self.laid[name] for name in self.conveyors if name in self.laid}
 
     def _lay(self, name: str, conveyor: Conveyor, path: Path) -> LaidConveyor:
         lanes = lanes_of(conveyor, path)
-        plans = {other: laid.plan for other, laid in self.laid.items()}
-        route = route_of_conveyor(conveyor, lanes, plans, path)
+        route = route_of_conveyor(conveyor, lanes, self.plans, path)
         self.surfaces += len(lanes) * (len(route.pieces) + len(conveyor.sections or ()))
         if self.surfaces > _MOST_SURFACES:
             text = f"surface number {self.surfaces} given, expected at most {_MOST_SURFACES} of all conveyors"
@@ -78,8 +83,8 @@ class ConveyorExpansion:
         laid = LaidConveyor(ConveyorPlan(name, route, lanes, conveyor.material))
         self._belts(laid, conveyor, path)
         if conveyor.plate is not None:
-            laid.plates = list(plates_of(conveyor, laid.plan, plans[str(dependency(conveyor))]))
-        laid.rails = list(rails_of_conveyor(conveyor, laid.plan, (*path, "guides")))
+            laid.plates = list(plates_of(conveyor, laid.plan, self.plans[str(dependency(conveyor))]))
+        laid.rails = list(rails_of_conveyor(conveyor, laid.plan, self.raw[name].get("guides", ()), (*path, "guides")))
         return laid
 
     def _belts(self, laid: LaidConveyor, conveyor: Conveyor, path: Path) -> None:

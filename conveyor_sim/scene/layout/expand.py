@@ -41,7 +41,7 @@ def expand(data: dict[str, Any]) -> Expansion:
     conveyors.expand()
     plan = LayoutPlan({name: laid.plan for name, laid in conveyors.laid.items()})
     faults = list(conveyors.faults)
-    rails = _rails(layout, plan, faults)
+    rails = _rails(layout, data.get("guides", {}), plan, faults)
     parts = NamedParts()
     # A dictionary's order is that of the file, and the order of belts and rails is that of their indices.
     for name in data:
@@ -58,14 +58,16 @@ def expand(data: dict[str, Any]) -> Expansion:
     return Expansion(parts.added_to(data, _FIELDS), plan, parts.sources, problems)
 
 
-def _rails(layout: SceneLayout, plan: LayoutPlan, faults: list[LayoutFault]) -> dict[str, list[GuideRail]]:
+def _rails(
+    layout: SceneLayout, raw: Mapping[str, Any], plan: LayoutPlan, faults: list[LayoutFault]
+) -> dict[str, list[GuideRail]]:
     """Return the rails of each guide. Guides along a conveyor with a fault are left out."""
     rails = {}
     for name, guide in layout.guides.items():
         if any(conveyor in layout.conveyors and conveyor not in plan.conveyors for conveyor in guide.conveyors):
             continue
         try:
-            rails[name] = list(rails_of_guide(guide, plan.conveyors, ("guides", name)))
+            rails[name] = list(rails_of_guide(guide, plan.conveyors, raw[name], ("guides", name)))
         except LayoutFault as fault:
             faults.append(fault)
     return rails

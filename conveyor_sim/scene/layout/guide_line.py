@@ -8,7 +8,7 @@ from typing import Any
 
 from conveyor_sim.scene.layout.faults import LayoutFault
 from conveyor_sim.scene.layout.paths import SHORTEST
-from conveyor_sim.scene.layout.plan import ConveyorPlan, Side
+from conveyor_sim.scene.layout.plan import Box, ConveyorPlan, Side, box_of
 from conveyor_sim.scene.problems import Path
 from conveyor_sim.scene.types import COORDINATE_LIMIT, TOUCH, XY
 from conveyor_sim.scene.words import shown
@@ -21,6 +21,11 @@ class GuideLine:
     side: Side
     stations: tuple[float, ...]
     points: tuple[XY, ...]
+
+    @property
+    def box(self) -> Box:
+        """Box that holds it."""
+        return box_of(self.points)
 
     def point(self, s: float) -> XY:
         """Return the point at a station (m); beyond the ends, the end."""

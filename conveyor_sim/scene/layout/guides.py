@@ -1,19 +1,18 @@
 """Guides of a layout: rails on both sides of conveyors or of a line through points."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 from conveyor_sim.scene.layout.faults import LayoutFault
-from conveyor_sim.scene.layout.frames import PathFrame
-from conveyor_sim.scene.layout.guide_line import GuideLine, guide_line
+from conveyor_sim.scene.layout.guide_line import guide_line
 from conveyor_sim.scene.layout.joined import JoinedRoute, joined
 from conveyor_sim.scene.layout.parts import Conveyor, ConveyorGuides, Guide
 from conveyor_sim.scene.layout.plan import SIDES, ConveyorPlan, GuideProfile, Side
 from conveyor_sim.scene.layout.profile_rails import rails_along
-from conveyor_sim.scene.layout.routes import Bend, Route, Straight
+from conveyor_sim.scene.layout.routes import Route, Straight
 from conveyor_sim.scene.problems import Path
-from conveyor_sim.scene.types import TOUCH, XY
+from conveyor_sim.scene.types import COORDINATE_LIMIT, TOUCH, XY
 from conveyor_sim.scene.words import shown, some_of
 
 
@@ -27,8 +26,10 @@ class GuideRail:
     """Path of the field that it comes from."""
 
 
-def rails_of_conveyor(conveyor: Conveyor, plan: ConveyorPlan, path: Path) -> Iterator[GuideRail]:
+def rails_of_conveyor(conveyor: Conveyor, plan: ConveyorPlan, order: Iterable[str], path: Path) -> Iterator[GuideRail]:
     """Yield the rails of a conveyor's own guides, and enter the guides in its plan. path: of the guides.
+
+    order: names of the guides' fields as written, because the sides follow the file.
 
     Guides at a clearance also cover the gap in front of the conveyor. Raise LayoutFault.
     """
@@ -41,11 +42,16 @@ def rails_of_conveyor(conveyor: Conveyor, plan: ConveyorPlan, path: Path) -> Ite
         start = route.start.moved(-before)
         route = Route((Straight(start, route.start, before), *route.pieces))
     places = ((plan, before, route.length),)
-    yield from _rails_along(guides, JoinedRoute(route, places), before, path)
+    yield from _rails_along(guides, JoinedRoute(route, places), before, order, path)
 
 
-def rails_of_guide(guide: Guide, plans: Mapping[str, ConveyorPlan], path: Path) -> Iterator[GuideRail]:
-    """Yield the rails of a guide, and enter it in the plans of its conveyors. Raise LayoutFault."""
+def rails_of_guide(
+    guide: Guide, plans: Mapping[str, ConveyorPlan], order: Iterable[str], path: Path
+) -> Iterator[GuideRail]:
+    """Yield the rails of a guide, and enter it in the plans of its conveyors. Raise LayoutFault.
+
+    order: names of its fields as written, because the sides follow the file.
+    """
     if (guide.along is None) == (guide.points is None):
         text = "neither" if guide.along is None else "both"
         raise LayoutFault(path, f"{text} given, expected either along or points")
@@ -53,21 +59,30 @@ def rails_of_guide(guide: Guide, plans: Mapping[str, ConveyorPlan], path: Path) 
         yield from _rails_by_points(guide, guide.points, plans, path)
         return
     for index, name in enumerate(guide.conveyors):
+        if name in guide.conveyors[:index]:
+            raise LayoutFault((*path, "along", index), f"{shown(name)} given, expected each conveyor once")
         if name not in plans:
             place: Path = ("along",) if isinstance(guide.along, str) else ("along", index)
             text = f"{shown(name)} given, expected a name from conveyors: {some_of(plans) or 'none'}"
             raise LayoutFault((*path, *place), text)
-    yield from _rails_along(guide, joined([plans[name] for name in guide.conveyors], (*path, "along")), 0.0, path)
+    yield from _rails_along(
+        guide, joined([plans[name] for name in guide.conveyors], (*path, "along")), 0.0, order, path
+    )
 
 
-def _rails_along(guide: ConveyorGuides, way: JoinedRoute, shift: float, path: Path) -> Iterator[GuideRail]:
+def _rails_along(
+    guide: ConveyorGuides, way: JoinedRoute, shift: float, order: Iterable[str], path: Path
+) -> Iterator[GuideRail]:
     """Yield the rails of a guide along a path. shift: station of the path where stations of the guide begin (m)."""
-    for side in _sides(guide, path):
+    for side in sorted(_sides(guide, path), key=[*(name for name in order if name in SIDES), *SIDES].index):
         corners = guide.corners(side)
         field: Path = ("clearance",) if corners is None else (side,)
         if corners is None:
             half = 0.5 * (guide.clearance or 0.0)
-            corners = ((-shift, half if side == "left" else -half),)
+            if half > COORDINATE_LIMIT:
+                text = f"{shown(guide.clearance)} given, expected at most {2 * COORDINATE_LIMIT:.0f} (m)"
+                raise LayoutFault((*path, "clearance"), text)
+            corners = ((0.0 - shift, half if side == "left" else -half),)
         else:
             _check_corners(corners, way.route.length, (*path, side))
         first, last = _stretch(guide, corners[0][0], way.route.length - shift, path)
@@ -96,7 +111,7 @@ def _rails_by_points(
         for data in line.rails(_closed(guide, side, first, last, path)):
             yield GuideRail(side, data, (*path, "points"))
         for plan in plans.values():
-            if _meet(line, plan):
+            if plan.near(line.box):
                 plan.guides.append(line)
 
 
@@ -113,6 +128,9 @@ def _check_corners(corners: Sequence[XY], length: float, path: Path) -> None:
     """Raise LayoutFault unless the stations of corners grow, from 0 to the length of the path (m)."""
     least = 0.0
     for index, (s, offset) in enumerate(corners):
+        if abs(offset) > COORDINATE_LIMIT:
+            text = f"{shown((s, offset))} given, expected an offset within +-{COORDINATE_LIMIT:.0f} (m)"
+            raise LayoutFault((*path, index), text)
         if not least <= s <= length + TOUCH:
             text = f"{shown((s, offset))} given, expected a station from {least:.6g} to {length:.6g} (m)"
             raise LayoutFault((*path, index), text)
@@ -152,27 +170,6 @@ def _closed(guide: ConveyorGuides, side: Side, first: float, last: float, path: 
     if not parts:
         raise LayoutFault((*path, "open", side), "leaves nothing of the guide, expected none of it open")
     return parts
-
-
-def _meet(line: GuideLine, plan: ConveyorPlan) -> bool:
-    """Return True if the boxes of a guide and of a conveyor overlap."""
-    (low, high), (first, last) = _box(line.points, 0.0), _box(*_extent(plan))
-    return all(low[k] <= last[k] and first[k] <= high[k] for k in (0, 1))
-
-
-def _extent(plan: ConveyorPlan) -> tuple[list[XY], float]:
-    """Return points of a conveyor, and the distance (m) within which it is from their box."""
-    points = [plan.route.start.xy, *(piece.end.xy for piece in plan.route.pieces)]
-    for piece in plan.route.pieces:
-        if isinstance(piece, Bend):
-            centre = PathFrame(*piece.centre, 0.0)
-            points += [centre.point(-piece.radius, -piece.radius), centre.point(piece.radius, piece.radius)]
-    return points, plan.width
-
-
-def _box(points: Sequence[XY], margin: float) -> tuple[XY, XY]:
-    x, y = zip(*points, strict=True)
-    return (min(x) - margin, min(y) - margin), (max(x) + margin, max(y) + margin)
 
 
 _APART = 1e-6

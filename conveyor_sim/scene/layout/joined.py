@@ -13,7 +13,7 @@ from conveyor_sim.scene.types import TOUCH
 
 _TOLERANCE = 1e-6
 """Largest distance (m) and angle (rad) between paths that meet."""
-_MOST_PIECES = 20_000
+_MOST_PIECES = 5_000
 
 
 @dataclass(frozen=True)
@@ -30,21 +30,21 @@ def joined(plans: Sequence[ConveyorPlan], path: Path) -> JoinedRoute:
 
     A gap between two conveyors is part of the path. Where the next one begins before the end, the path changes to it.
     """
-    route, places = plans[0].route, [(plans[0], 0.0, plans[0].route.length)]
+    pieces: list[PathPiece] = []
+    places: list[tuple[ConveyorPlan, float, float]] = []
+    before, begun = plans[0], 0.0
     for index, plan in enumerate(plans[1:], start=1):
-        before, begun, _ = places[-1]
-        station = begun + _meeting(before, plan, (*path, index))
-        pieces = _up_to(route, station, plan)
-        start = Route(pieces).length
-        overlap = begun + before.route.length - station
-        first = plan.route.pieces[0]
-        if overlap > 0.0:
-            places[-1] = (before, begun, start + min(overlap, first.length if isinstance(first, Straight) else 0.0))
-        route = Route((*pieces, *plan.route.pieces))
-        if len(route.pieces) > _MOST_PIECES:
-            raise LayoutFault(path, f"{len(route.pieces)} pieces given, expected at most {_MOST_PIECES}")
-        places.append((plan, start, start + plan.route.length))
-    return JoinedRoute(route, tuple(places))
+        station = _meeting(before, plan, (*path, index))
+        pieces += _up_to(before.route, station, plan)
+        if len(pieces) > _MOST_PIECES:
+            raise LayoutFault(path, f"{len(pieces)} pieces given, expected at most {_MOST_PIECES}")
+        start = Route(tuple(pieces)).length
+        overlap, first = before.route.length - station, plan.route.pieces[0]
+        beyond = min(max(overlap, 0.0), first.length if isinstance(first, Straight) else 0.0)
+        places.append((before, begun, start + beyond))
+        before, begun = plan, start
+    route = Route((*pieces, *before.route.pieces))
+    return JoinedRoute(route, (*places, (before, begun, route.length)))
 
 
 def _meeting(before: ConveyorPlan, plan: ConveyorPlan, path: Path) -> float:

@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from conveyor_sim.scene.layout.guides import GuideRail
-from conveyor_sim.scene.layout.plan import SIDES
 from conveyor_sim.scene.problems import Path, Problem, dotted
 
 KINDS = ("belts", "plates", "rails")
@@ -25,8 +24,9 @@ class NamedParts:
         """Enter a name. A name with another source as well is a problem."""
         first = self._origins.setdefault((kind, name), source)
         if first != source:
-            text = f"gives {kind} the name {name}, expected another name: {dotted(first)} gives it as well"
-            self.problems.append(Problem(source, text))
+            text = f"{name} given as a name of {kind}, expected another one: {dotted(first)} gives it as well"
+            if (problem := Problem(source, text)) not in self.problems[-1:]:
+                self.problems.append(problem)
 
     def add(self, kind: str, name: str, data: Any, source: Path) -> None:
         """Enter a part."""
@@ -37,7 +37,7 @@ class NamedParts:
 
     def add_rails(self, guide: str, material: str, rails: Sequence[GuideRail]) -> None:
         """Enter the rails of a guide by their sides."""
-        for side in SIDES:
+        for side in dict.fromkeys(rail.side for rail in rails):
             some = [rail for rail in rails if rail.side == side]
             for name, rail in zip(numbered(f"{guide}_{side}", len(some)), some, strict=True):
                 self.add("rails", name, {**rail.data, "material": material}, rail.source)

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Annotated, Any
 
 from annotated_types import Len
-from pydantic import Discriminator, Tag
+from pydantic import AfterValidator, Discriminator, Tag
 
 from conveyor_sim.scene.drives import Drive
 from conveyor_sim.scene.layout.plan import Side
@@ -30,6 +30,13 @@ MOST_PIECES = 1000
 """Largest number of entries of one list of a conveyor or guide."""
 
 
+def _bounded(value: tuple[Any, ...]) -> tuple[Any, ...]:
+    """Return a list. Raise ValueError if it is empty or too long; `Len` would do so for wrong entries as well."""
+    if not 1 <= len(value) <= MOST_PIECES:
+        raise ValueError("out of bounds")
+    return value
+
+
 def _by_type(data: Any) -> str | None:
     if isinstance(data, str):
         return "(name)"
@@ -41,13 +48,13 @@ DriveOrName = Annotated[
     Discriminator(_by_type),
     Holds(f"{fields_of(Drive)}, or a name from drives"),
 ]
-Names = Annotated[tuple[Name, ...], Len(1, MOST_PIECES), Holds(f"a list of 1 to {MOST_PIECES} names of conveyors")]
+MorePoints = Annotated[PointList, AfterValidator(_bounded)]
+Names = Annotated[tuple[Name, ...], AfterValidator(_bounded), Holds(f"a list of 1 to {MOST_PIECES} names of conveyors")]
 NameOrNames = Annotated[
     Annotated[Names, Tag("(more)")] | Annotated[Name, Tag("(name)")],
     Discriminator(_by_type),
     Holds("a name of a conveyor or a list of names"),
 ]
-Ratio = Positive
 
 
 class Move(Part):
@@ -63,7 +70,7 @@ class ConveyorLane(Part):
     """A lane of a conveyor: a surface with a width and a speed."""
 
     width: Positive = quantity("Width.", "m")
-    ratio: Ratio = quantity("Speed of the lane over that of the conveyor.", "1", default=1.0)
+    ratio: Positive = quantity("Speed of the lane over that of the conveyor.", "1", default=1.0)
 
 
 class _Driven(Part):
@@ -77,7 +84,7 @@ class _Driven(Part):
     drive: DriveOrName | None = quantity(
         "What moves it: its own drive, or the name of one from `drives`, which then has the speed.", default=None
     )
-    ratio: Ratio | None = quantity("Speed over that of the drive that it names. Left out: 1.", "1", default=None)
+    ratio: Positive | None = quantity("Speed over that of the drive that it names. Left out: 1.", "1", default=None)
 
 
 class ConveyorSection(_Driven):
@@ -94,7 +101,7 @@ Range = Annotated[tuple[Component, Component], Says("two stations [from, to]")]
 Ranges = Annotated[tuple[Range, ...], Len(0, MOST_PIECES), Holds(f"a list of at most {MOST_PIECES} ranges [from, to]")]
 Corner = Annotated[tuple[Component, Component], Says("a station and an offset [station, offset]")]
 Corners = Annotated[
-    tuple[Corner, ...], Len(1, MOST_PIECES), Holds(f"a list of 1 to {MOST_PIECES} corners [station, offset]")
+    tuple[Corner, ...], AfterValidator(_bounded), Holds(f"a list of 1 to {MOST_PIECES} corners [station, offset]")
 ]
 
 
@@ -141,7 +148,7 @@ class Guide(ConveyorGuides):
     along: NameOrNames | None = quantity(
         "Conveyor that it follows, or several that follow each other: stations count along all of them.", default=None
     )
-    points: PointList | None = quantity(
+    points: MorePoints | None = quantity(
         "Corners of the line halfway between both sides, instead of `along`; needs `clearance`.", "m", default=None
     )
 
@@ -149,6 +156,13 @@ class Guide(ConveyorGuides):
     def conveyors(self) -> tuple[str, ...]:
         """Names of the conveyors that it follows."""
         return (self.along,) if isinstance(self.along, str) else self.along or ()
+
+
+Moves = Annotated[tuple[Move, ...], AfterValidator(_bounded), Holds(f"a list of 1 to {MOST_PIECES} pieces")]
+Lanes = Annotated[tuple[ConveyorLane, ...], AfterValidator(_bounded), Holds(f"a list of 1 to {MOST_PIECES} lanes")]
+Sections = Annotated[
+    tuple[ConveyorSection, ...], AfterValidator(_bounded), Holds(f"a list of 1 to {MOST_PIECES} sections")
+]
 
 
 class Conveyor(_Driven):
@@ -185,21 +199,16 @@ class Conveyor(_Driven):
         default=None,
     )
     plate: Name | None = quantity("Material of a plate at rest that fills the gap. Left out: no plate.", default=None)
-    path: Annotated[tuple[Move, ...], Len(1, MOST_PIECES), Holds(f"a list of 1 to {MOST_PIECES} pieces")] | None = (
-        quantity("Pieces in the direction of travel.", default=None)
-    )
-    points: PointList | None = quantity("Corners of its path, instead of `path`.", "m", default=None)
+    path: Moves | None = quantity("Pieces in the direction of travel.", default=None)
+    points: MorePoints | None = quantity("Corners of its path, instead of `path`.", "m", default=None)
     radius: Positive | None = quantity(
         "Radius of the middle of the bends at the corners in `points`.", "m", default=None
     )
     width: Positive | None = quantity("Width; needed without `lanes`.", "m", default=None)
-    lanes: (
-        Annotated[tuple[ConveyorLane, ...], Len(1, MOST_PIECES), Holds(f"a list of 1 to {MOST_PIECES} lanes")] | None
-    ) = quantity("Lanes from right to left, each a surface, instead of `width`.", default=None)
-    sections: (
-        Annotated[tuple[ConveyorSection, ...], Len(1, MOST_PIECES), Holds(f"a list of 1 to {MOST_PIECES} sections")]
-        | None
-    ) = quantity("Parts in the direction of travel that are driven separately. Left out: one belt.", default=None)
+    lanes: Lanes | None = quantity("Lanes from right to left, each a surface, instead of `width`.", default=None)
+    sections: Sections | None = quantity(
+        "Parts in the direction of travel that are driven separately. Left out: one belt.", default=None
+    )
     guides: ConveyorGuides | None = quantity("Guides along its path. Left out: none.", default=None)
 
 

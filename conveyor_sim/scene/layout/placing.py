@@ -55,14 +55,17 @@ def lanes_of(conveyor: Conveyor, path: Path) -> tuple[Lane, ...]:
         if conveyor.width is None:
             raise LayoutFault((*path, "width"), "missing, expected a number greater than 0 (m), or lanes")
         raise LayoutFault((*path, "width"), f"{shown(conveyor.width)} given, expected either width or lanes")
-    if conveyor.lanes is None:
-        return (Lane(-0.5 * conveyor.width, conveyor.width, 1.0),) if conveyor.width is not None else ()
+    strips = [(lane.width, lane.ratio) for lane in conveyor.lanes or ()] or [(conveyor.width or 0.0, 1.0)]
     total = 0.0
-    for lane in conveyor.lanes:
-        total += lane.width
+    for width, _ in strips:
+        total += width
+    if total > COORDINATE_LIMIT:
+        field = "width" if conveyor.lanes is None else "lanes"
+        text = f"{total:.6g} m of width given, expected at most {COORDINATE_LIMIT:.0f} (m)"
+        raise LayoutFault((*path, field), text)
     lanes, right = [], -0.5 * total
-    for lane in conveyor.lanes:
-        lanes.append(Lane(right, lane.width, lane.ratio))
+    for width, ratio in strips:
+        lanes.append(Lane(right, width, ratio))
         right = lanes[-1].left
     return tuple(lanes)
 

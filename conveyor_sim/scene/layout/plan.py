@@ -1,14 +1,26 @@
 """Plan of a layout: conveyors with their paths, for placing devices, checks and drawings."""
 
 from bisect import bisect_right
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Literal, Protocol
 
-from conveyor_sim.scene.layout.routes import Route
+from conveyor_sim.scene.layout.routes import Bend, Route
 from conveyor_sim.scene.types import XY
 
 Side = Literal["left", "right"]
 SIDES: tuple[Side, Side] = ("left", "right")
+
+
+Box = tuple[float, float, float, float]
+"""Lowest x and y, greatest x and y (m)."""
+
+
+def box_of(points: Sequence[XY], margin: float = 0.0) -> Box:
+    """Return the box of points (m), larger by a margin (m) on all sides."""
+    x, y = zip(*points, strict=True)
+    return min(x) - margin, min(y) - margin, max(x) + margin, max(y) + margin
 
 
 @dataclass(frozen=True)
@@ -89,6 +101,21 @@ class ConveyorPlan:
     def width(self) -> float:
         """Width (m)."""
         return self.edges[1] - self.edges[0]
+
+    @cached_property
+    def box(self) -> Box:
+        """Box that holds it, with half a width beyond either edge."""
+        points = [self.route.start.xy, *(piece.end.xy for piece in self.route.pieces)]
+        for piece in self.route.pieces:
+            if isinstance(piece, Bend):
+                x, y = piece.centre
+                points += [(x - piece.radius, y - piece.radius), (x + piece.radius, y + piece.radius)]
+        return box_of(points, self.width)
+
+    def near(self, box: Box) -> bool:
+        """Return True if it may meet what is in a box."""
+        own = self.box
+        return own[0] <= box[2] and box[0] <= own[2] and own[1] <= box[3] and box[1] <= own[3]
 
     def belt_at(self, s: float) -> str:
         """Return the name of the belt at a station (m)."""

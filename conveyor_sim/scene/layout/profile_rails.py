@@ -1,5 +1,6 @@
 """Rails of guides along a path: polylines on straight pieces, arcs in bends."""
 
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import Any
@@ -22,7 +23,9 @@ def rails_along(route: Route, profile: GuideProfile, parts: Sequence[Stretch], p
     """
     runs = list(_runs(route))
     for first, last in parts:
-        for begin, end, bend in runs:
+        for begin, end, bend in runs[bisect_right(runs, first, key=lambda run: run[1]) :]:
+            if begin >= last:
+                break
             low, high = max(first, begin), min(last, end)
             if high - low <= TOUCH:
                 continue
@@ -49,8 +52,13 @@ def _runs(route: Route) -> Iterator[tuple[float, float, Bend | None]]:
 
 def _nodes(profile: GuideProfile, low: float, high: float) -> list[XY]:
     """Return the stations and offsets (m) of a profile at two stations and at the corners between them."""
-    inside = [corner for corner in profile.corners if low + TOUCH < corner[0] < high - TOUCH]
+    first = bisect_right(profile.corners, low + TOUCH, key=_station)
+    inside = profile.corners[first : bisect_left(profile.corners, high - TOUCH, key=_station)]
     return [(low, profile.offset(low)), *inside, (high, profile.offset(high))]
+
+
+def _station(corner: XY) -> float:
+    return corner[0]
 
 
 def _offset_in_bend(profile: GuideProfile, low: float, high: float, path: Path) -> float:

@@ -69,8 +69,8 @@ class Bend:
 
     def between(self, s0: float, s1: float) -> "Bend":
         """Return the part between two distances (m) from its start."""
-        share = 1.0 if s0 == 0.0 and s1 == self.length else (s1 - s0) / self.length
-        return Bend(self.frame(s0), self.frame(s1), self.centre, self.radius, self.turn * share)
+        turn = self.turn * ((s1 - s0) / self.length)
+        return Bend(self.frame(s0), self.frame(s1), self.centre, self.radius, turn)
 
 
 PathPiece = Straight | Bend
@@ -136,7 +136,8 @@ class Route:
             last, end = last - 1, self.pieces[last - 1].length
         for index in range(first, last + 1):
             piece = self.pieces[index]
-            yield index, piece.between(begin if index == first else 0.0, end if index == last else piece.length)
+            low, high = begin if index == first else 0.0, end if index == last else piece.length
+            yield index, piece if low == 0.0 and high == piece.length else piece.between(low, high)
 
     def _place(self, s: float) -> tuple[int, float]:
         """Return a piece and the distance (m) from its start. A station within TOUCH of a joint is the joint."""

@@ -83,7 +83,7 @@ def test_what_has_come_to_rest_looks_it(plant: StaticGeometry, frame: PlantFrame
     still = replace(
         frame,
         speed=np.full(3, 1e-12),
-        belt_speeds=np.zeros(len(plant.belts)),
+        belt_speeds=np.zeros(len(plant.speeds)),
         contacts=Contacts(frame.contacts.lines, np.full(2, 1e-10)) if frame.contacts else None,
     )
     view = drawn(plant, still)[0]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import Collection
@@ -21,8 +23,8 @@ def chevrons(ax: Axes, plant: StaticGeometry, speeds: np.ndarray) -> tuple[np.nd
 
 
 def only(plant: StaticGeometry, name: str) -> StaticGeometry:
-    index = [belt.name for belt in plant.belts].index(name)
-    return StaticGeometry((plant.belts[index],), plant.speeds[index : index + 1], ())
+    index = [surface.name for surface in plant.surfaces].index(name)
+    return StaticGeometry((replace(plant.surfaces[index], belt=0),), plant.speeds[index : index + 1], ())
 
 
 def artist(ax: Axes, gid: str) -> Collection:
@@ -32,8 +34,8 @@ def artist(ax: Axes, gid: str) -> Collection:
 
 def test_each_belt_is_the_area_of_its_outline(ax: Axes, plant: StaticGeometry) -> None:
     paths = draw_belts(ax, plant, plant.speeds, NORM).get_paths()
-    assert len(paths) == len(plant.belts)
-    for path, shape in zip(paths, plant.belts, strict=True):
+    assert len(paths) == len(plant.surfaces)
+    for path, shape in zip(paths, plant.surfaces, strict=True):
         np.testing.assert_allclose(path.vertices[:-1], shape.outline(96))
 
 
@@ -58,7 +60,7 @@ def test_chevrons_turn_counter_clockwise_on_a_curve_and_clockwise_at_negative_sp
     for name, speed, sense in (("bend", 0.4, 1.0), ("ring", -0.3, -1.0)):
         belt = only(plant, name)
         tips, pointing = chevrons(ax, belt, np.array([speed]))
-        arm = tips - np.array(belt.belts[0].centre)
+        arm = tips - np.array(belt.surfaces[0].centre)
         turning = arm[:, 0] * pointing[:, 1] - arm[:, 1] * pointing[:, 0]
         assert np.all(sense * turning > 0.9 * np.hypot(*arm.T))
 
@@ -70,7 +72,7 @@ def test_a_turning_ring_shows_its_travel_all_around(ax: Axes, plant: StaticGeome
 
 
 def test_chevrons_lie_on_their_belts(ax: Axes, plant: StaticGeometry) -> None:
-    for shape, speed in zip(plant.belts, plant.speeds, strict=True):
+    for shape, speed in zip(plant.surfaces, plant.speeds, strict=True):
         if speed != 0.0:
             tips, _ = chevrons(ax, only(plant, shape.name), np.array([speed]))
             belt = draw_belts(ax, only(plant, shape.name), np.array([speed]), NORM).get_paths()[0]

@@ -50,7 +50,7 @@ def test_table_shows_the_widest_belt_and_the_bottles_there(plant: StaticGeometry
 
 
 def test_a_plant_that_is_one_belt_is_shown_whole(plant: StaticGeometry, frame: PlantFrame) -> None:
-    single = StaticGeometry(plant.belts[1:2], plant.speeds[1:2], plant.rails[:2])
+    single = StaticGeometry((replace(plant.surfaces[1], belt=0),), plant.speeds[1:2], plant.rails[:2])
     x0, y0, x1, y1 = table_region(single, [frame.within((0.0, 0.0, 2.0, 1.0))])
     assert x0 < 0.0 and y0 < 0.0 and x1 > 2.0 and y1 > 1.0
 
@@ -76,7 +76,7 @@ def test_plant_shows_every_bottle_and_names_every_belt(plant: StaticGeometry, fr
     assert count(ax, "bottles") == 3
     names = {text.get_text().split("\n")[0] for text in ax.texts}
     marks = {"infeed inlet", "outfeed reject", "eye entry", "zone waiting", "counter exit"}
-    assert names == {belt.name for belt in plant.belts} | marks
+    assert names == {surface.name for surface in plant.surfaces} | marks
 
 
 def test_plant_labels_belts_with_the_speeds_of_that_instant(plant: StaticGeometry, frame: PlantFrame) -> None:

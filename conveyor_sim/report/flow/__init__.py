@@ -1,0 +1,1 @@
+"""Flow of bottles through a scene: traces of lone bottles, transit times, capacities, and faults of the layout."""

@@ -1,0 +1,285 @@
+"""Traces of lone bottles: each leg leads from an entry, or from a station's return, to where the bottle ends."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from conveyor_sim.errors import SimulationError
+from conveyor_sim.line.devices.belt_surfaces import BeltSurfaces
+from conveyor_sim.physics.model import build_model
+from conveyor_sim.physics.state import State
+from conveyor_sim.physics.stepping.tick import Integration
+from conveyor_sim.report.flow.guides import Guides
+from conveyor_sim.report.flow.surfaces import NONE, FlowSurface, Indices, running_speeds, under
+from conveyor_sim.report.flow.trace_scene import trace_scene
+from conveyor_sim.scene.geometry import Array, initial_bottles
+from conveyor_sim.scene.parts.outfeed import Outfeed
+from conveyor_sim.scene.parts.sink import Sink
+from conveyor_sim.scene.parts.spill import Spill
+from conveyor_sim.scene.parts.station import Station
+from conveyor_sim.scene.polygons import inside
+from conveyor_sim.scene.problems import Path
+from conveyor_sim.scene.schema import Grid, Scene, Single
+from conveyor_sim.scene.types import XY
+
+CHUNK = 50
+"""Ticks between two looks at the bottles."""
+
+MOST_WORK = 2e7
+"""Largest work of all traces, steps of one bottle: below a second of one core of the 2020s."""
+
+TICK_WORK = 1000
+"""Work of a tick beside its steps, in steps of one bottle."""
+
+MOST_LEGS = 64
+"""Largest number of traced bottles."""
+
+STILL = 0.02
+"""Way over radius below which a bottle has stopped within a chunk."""
+
+FARTHEST_PUSH = 0.5
+"""m, longest way over which bottles push one that rests on a plate."""
+
+ASTRAY = 0.5
+"""m without a surface after which a bottle has left the line."""
+
+End = Literal["exit", "station", "stopped", "off", "circulates", "cap", "failed"]
+"""End of a leg. exit: outfeed or sink; off: beside all belts; cap: the work was used up; failed: the engine refused."""
+
+
+@dataclass(frozen=True)
+class Entrance:
+    """Start of a leg: place, direction and speed of a bottle."""
+
+    path: Path
+    bottle: str
+    position: XY
+    direction: float
+    """rad"""
+    speed: float
+    """m/s"""
+    returned: bool = False
+    """True for a bottle that a station returns."""
+
+
+@dataclass(frozen=True, eq=False)
+class Leg:
+    """Path of a lone bottle from a start to its end."""
+
+    start: Entrance
+    radius: float
+    times: Array
+    """(k,), s since the start."""
+    points: Array
+    """(k, 2), m"""
+    carriers: Indices
+    """(k,), index of the surface under each point, or NONE."""
+    end: End
+    exit: Path | None = None
+    """Path of the device that took the bottle."""
+    reason: str = ""
+    """Reason of a failure."""
+
+    @property
+    def seconds(self) -> float:
+        """Duration, s."""
+        return float(self.times[-1])
+
+    @property
+    def length(self) -> float:
+        """Way, m."""
+        return float(np.hypot(*np.diff(self.points, axis=0).T).sum())
+
+    @property
+    def last(self) -> XY:
+        """Last point, m."""
+        return float(self.points[-1, 0]), float(self.points[-1, 1])
+
+    @property
+    def last_carrier(self) -> int:
+        """Index of the last surface, or NONE."""
+        on = self.carriers[self.carriers != NONE]
+        return int(on[-1]) if on.size else NONE
+
+
+def starts_of(scene: Scene) -> list[Entrance]:
+    """Return all starts: infeeds, sources and stations, or else the first bottle of each entry of `bottles`."""
+    starts = [
+        Entrance(path, _bottle_of(scene, part), part.position, *part.heading, isinstance(part, Station))
+        for path, part in scene.givers()
+        if not isinstance(part, Spill)
+    ]
+    return (starts or _initial(scene))[:MOST_LEGS]
+
+
+def trace(scene: Scene, surfaces: Sequence[FlowSurface], guides: Guides) -> list[Leg]:
+    """Trace a lone bottle from every start with the engine at draft accuracy.
+
+    A bottle that stops on a plate is put behind it, as the bottles after it would push it. The work is limited by
+    MOST_WORK, so that the result does not depend on the machine.
+    """
+    starts = starts_of(scene)
+    if not starts or not surfaces:
+        return []
+    return _Tracer(scene, surfaces, guides, starts).run()
+
+
+class _Tracer:
+    def __init__(
+        self, scene: Scene, surfaces: Sequence[FlowSurface], guides: Guides, starts: Sequence[Entrance]
+    ) -> None:
+        self._surfaces, self._guides, self._starts = surfaces, guides, starts
+        self._radius = [scene.bottle_types[start.bottle].radius for start in starts]
+        fastest = max([0.1, *(abs(surface.running) for surface in surfaces), *(start.speed for start in starts)])
+        # A bottle moves by less than its radius in a tick, and is not lost between two ticks.
+        tick = max(0.001, round(0.5 * min(self._radius) / fastest, 3))
+        bottles = [
+            Single.model_construct(type=start.bottle, position=start.position, velocity=_velocity(start))
+            for start in starts
+        ]
+        model = build_model(trace_scene(scene, bottles, tick))
+        self._tick, self._steps = tick, model.steps_per_tick
+        self._state = State(model, len(starts))
+        for kind, x, y, theta, vx, vy, omega in model.plant.bottles:
+            self._state.add(model.bottle_types.index(kind), x, y, theta, vx, vy, omega)
+        self._state.make_lists()
+        self._belts = BeltSurfaces(self._state)
+        speeds = [*running_speeds(scene).values()]
+        self._belts.move(np.array([*speeds, *([0.0] * (len(model.belts) - len(speeds)))]))
+        self._integration = Integration(self._state, 1, True)
+        self._exits = [(path, part.region) for path, part in scene.exits() if isinstance(part, (Outfeed, Sink))]
+        self._stations = [(path, part.region) for path, part in scene.exits() if isinstance(part, Station)]
+
+    def run(self) -> list[Leg]:
+        """Advance all bottles until each has ended."""
+        count = len(self._starts)
+        paths = [np.array([start.position]) for start in self._starts]
+        legs: dict[int, Leg] = {}
+        ticks, work = 0, 0.0
+        while len(legs) < count:
+            active = [index for index in range(count) if index not in legs]
+            if work > MOST_WORK:
+                legs.update({index: self._leg(index, paths[index], "cap") for index in active})
+                break
+            chunk = np.empty((CHUNK, count, 2))
+            bottles = self._state.world.bottles
+            try:
+                for place in range(CHUNK):
+                    self._integration.take_tick(ticks, self._belts.fastest)
+                    self._state.make_lists()
+                    ticks += 1
+                    chunk[place, :, 0], chunk[place, :, 1] = bottles.x[:count], bottles.y[:count]
+            except SimulationError as error:
+                legs.update({index: self._leg(index, paths[index], "failed", reason=str(error)) for index in active})
+                break
+            work += CHUNK * (self._steps * len(active) + TICK_WORK)
+            for index in active:
+                paths[index] = np.vstack([paths[index], chunk[:, index]])
+                leg = self._ended(index, paths[index])
+                if leg is not None and leg.end == "stopped" and self._pushed_on(index, leg):
+                    paths[index] = leg.points
+                elif leg is not None:
+                    legs[index] = leg
+                    self._state.remove(index)
+            self._state.make_lists()
+        return [legs[index] for index in range(count)]
+
+    def _ended(self, index: int, path: Array) -> Leg | None:
+        """Return the leg of a bottle that has ended within the last chunk, or None."""
+        recent, before = path[-CHUNK:], len(path) - CHUNK
+        taken = [
+            (before + int(np.argmax(within)), kind, device)
+            for kind, devices in (("exit", self._exits), ("station", self._stations))
+            for device, region in devices
+            if (within := inside(recent, region)).any()
+        ]
+        if taken:
+            place, kind, device = min(taken, key=lambda entry: entry[0])
+            return self._leg(index, path[: place + 1], "exit" if kind == "exit" else "station", device)
+        radius = self._radius[index]
+        apart = np.hypot(*(recent - path[-1]).T)
+        if apart.max() < STILL * radius:
+            still = np.hypot(*(path - path[-1]).T) < STILL * radius
+            place = len(path) - int(np.argmin(still[::-1])) if not still.all() else 0
+            carried = under(self._surfaces, path[-1:])[0] != NONE
+            return self._leg(index, path[: place + 1], "stopped" if carried else "off")
+        carriers = under(self._surfaces, path)
+        on = np.flatnonzero(carriers != NONE)
+        first_off = int(on[-1]) + 1 if on.size else 0
+        if math.dist(path[min(first_off, len(path) - 1)], path[-1]) > ASTRAY:
+            return self._leg(index, path[: first_off + 1], "off")
+        if (closed := _closed(path, radius)) is not None:
+            return self._leg(index, path[: closed + 1], "circulates")
+        return None
+
+    def _pushed_on(self, index: int, leg: Leg) -> bool:
+        """Put a bottle that has stopped on a plate behind it, at its first speed. Return False if it can't go on."""
+        plate = int(leg.carriers[-1])
+        before = np.flatnonzero(leg.carriers != plate)
+        if not self._surfaces[plate].rests or not before.size or len(leg.points) < 2:
+            return False
+        came = leg.points[before[-1] + 1] - leg.points[before[-1]]
+        step = float(np.hypot(*came))
+        along = came / max(step, 1e-12)
+        ways = np.arange(0.002, FARTHEST_PUSH, 0.002)[:, None]
+        ahead = leg.points[-1] + ways * along
+        carriers = under(self._surfaces, ahead)
+        beyond = np.flatnonzero(carriers != plate)
+        if not beyond.size or carriers[beyond[0]] == NONE:
+            return False
+        way = float(ways[beyond[0], 0])
+        if float(self._guides.distance(leg.points[-1:], along[None])[0]) < way + leg.radius:
+            return False
+        bottles = self._state.world.bottles
+        bottles.x[index], bottles.y[index] = ahead[beyond[0]]
+        bottles.vx[index], bottles.vy[index] = came / self._tick
+        self._state.world.neighbourhood.stale[0] = 1
+        self._integration.put_in()
+        return True
+
+    def _leg(self, index: int, path: Array, end: End, device: Path | None = None, reason: str = "") -> Leg:
+        times = self._tick * np.arange(len(path), dtype=np.float64)
+        carriers = under(self._surfaces, path)
+        return Leg(self._starts[index], self._radius[index], times, path, carriers, end, device, reason)
+
+
+def _closed(path: Array, radius: float) -> int | None:
+    """Return the index at which a path comes back to an earlier place in the same direction, or None."""
+    ways = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
+    marks = np.searchsorted(ways, np.arange(0.0, ways[-1], radius))
+    recent = marks[marks >= len(path) - CHUNK]
+    for mark in recent:
+        earlier = marks[ways[marks] < ways[mark] - 8.0 * radius]
+        earlier = earlier[earlier > 0]
+        if not earlier.size or mark == 0:
+            continue
+        near = earlier[np.hypot(*(path[earlier] - path[mark]).T) < 0.6 * radius]
+        direction = path[mark] - path[mark - 1]
+        if any(float((path[place] - path[place - 1]) @ direction) > 0.0 for place in near):
+            return int(mark)
+    return None
+
+
+def _velocity(start: Entrance) -> XY:
+    return start.speed * math.cos(start.direction), start.speed * math.sin(start.direction)
+
+
+def _bottle_of(scene: Scene, part: object) -> str:
+    """Return the type of bottles from a part; a station returns any type, so the first one stands for all."""
+    return str(getattr(part, "bottle", None) or next(iter(scene.bottle_types)))
+
+
+def _initial(scene: Scene) -> list[Entrance]:
+    """Return the first bottle of each entry of `bottles`."""
+    starts, place = [], 0
+    bottles = initial_bottles(scene)
+    for index, entry in enumerate(scene.bottles):
+        kind, x, y, _, vx, vy, _ = bottles[place]
+        starts.append(Entrance(("bottles", index), kind, (x, y), math.atan2(vy, vx), math.hypot(vx, vy)))
+        place += entry.grid.rows * entry.grid.columns if isinstance(entry, Grid) else 1
+    return starts
