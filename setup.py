@@ -63,6 +63,7 @@ setup(
         "optimise": [*requirements("studies"), *requirements("optimise")],
         "dask": requirements("dask"),
         "st": requirements("st"),
+        "cad": requirements("cad"),
         "bench": requirements("bench"),
         "test": requirements("pytest"),
         "docs": requirements("docs"),

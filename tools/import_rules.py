@@ -19,6 +19,7 @@ RULES: Mapping[str, str] = {
     "support": "errors | numpy rich",
     "control": "support | lark",
     "scene": "errors support | annotated_types numpy pydantic pydantic_core ruamel yaml",
+    "drawings": "errors scene support | ezdxf numpy ruamel",
     "physics": "columns engine errors scene support | llvmlite numpy pydantic",
     "line": "columns engine errors physics scene support | numpy",
     "simulation": "columns engine line physics scene | numpy",
@@ -36,7 +37,7 @@ RULES: Mapping[str, str] = {
     "ros": "bag columns control errors line protocols report run scene simulation support | "
     "builtin_interfaces click conveyor_msgs diagnostic_msgs numpy rcl_interfaces rclpy rosgraph_msgs std_msgs std_srvs",
     "testing": "bag control errors line page protocols report ros run scene simulation support | numpy pytest",
-    "cli": "accuracy bag control errors page physics protocols report ros run scene studies support | click rich",
+    "cli": "accuracy bag control drawings errors page physics protocols report ros run scene studies support | click rich",
 }
 """Packages and modules from the lowest up: what each may import of this package | of third-party packages."""
 
@@ -107,6 +108,7 @@ LABELS: Mapping[str, str] = {
     "physics": "effects, time step, model, state, tick",
     "scene": "YAML schema, geometry",
     "control": "controllers, Structured Text",
+    "drawings": "plans as DXF and SVG",
     "engine": "kernels over arrays",
     "columns": "observations",
     "statistics": "intervals, comparisons",

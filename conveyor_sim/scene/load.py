@@ -8,14 +8,16 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from conveyor_sim.errors import SceneError
+from conveyor_sim.scene.beside import Beside
 from conveyor_sim.scene.checks import problems_of
 from conveyor_sim.scene.layout.compose import compose
-from conveyor_sim.scene.overrides import parse_overrides, plain, yaml_text
+from conveyor_sim.scene.overrides import FILES, in_quotes, parse_overrides, plain, yaml_text
 from conveyor_sim.scene.part import validated
 from conveyor_sim.scene.reading import Reading
 from conveyor_sim.scene.refusal import refused
 from conveyor_sim.scene.schema import Origin, Scene
-from conveyor_sim.scene.tables import Beside, with_tables
+from conveyor_sim.scene.tables import with_tables
+from conveyor_sim.scene.words import shown
 from conveyor_sim.scene.yaml_lines import LONGEST_TEXT, Document
 from conveyor_sim.support.files import FileError, in_mb, read_file
 
@@ -54,7 +56,8 @@ def parse_scene(
     """
     document = _document(text, name)
     changes = plain(overrides or {}, name)
-    composition = compose(document, name, changes)
+    beside = _with_stored(beside, changes.pop(FILES, {}))
+    composition = compose(document, name, changes, beside)
     data, unread = with_tables(composition.data, beside)
     if unread:
         raise refused(unread, composition.sources.place_of, name)
@@ -67,21 +70,36 @@ def parse_scene(
     problems = problems_of(scene)
     if problems:
         raise reading.refused(problems)
-    # Recordings store the text and the overrides. With the tables among them, they need no file.
+    # Recordings store the text and the overrides. With the content of other files among them, they need no file.
     changes_text = yaml_text(changes)
-    stored_text = changes_text if data is composition.data else yaml_text({**changes, "contacts": data["contacts"]})
+    files = (
+        {path: content.decode("utf-8-sig") for path, content in beside.used.items()} if composition.is_composed else {}
+    )
+    if files:
+        stored_text = f"{changes_text}{FILES}: {in_quotes(files)}\n"
+    else:
+        stored_text = changes_text if data is composition.data else yaml_text({**changes, "contacts": data["contacts"]})
     if len(stored_text) > LONGEST_TEXT:
         most = in_mb(LONGEST_TEXT)
-        raise SceneError(f"{name}: tables and overrides of {in_mb(len(stored_text))} as YAML, expected at most {most}")
-    scene._source = Origin(text, name, changes_text, stored_text)
+        text = f"tables, other files and overrides of {in_mb(len(stored_text))} as YAML, expected at most {most}"
+        raise SceneError(f"{name}: {text}")
+    scene._source = Origin(text, name, changes_text, stored_text, files=files)
     scene._layout = reading.expansion.plan
     return scene
+
+
+def _with_stored(beside: Beside | None, stored: Any) -> Beside:
+    """Return the place of the files of one scene. stored: text of files by path, from the overrides of a recording."""
+    if not isinstance(stored, dict) or not all(isinstance(text, str) for text in stored.values()):
+        raise SceneError(f"{FILES}: {shown(stored)} given in overrides, expected a mapping of paths to texts")
+    return Beside(None, stored=stored) if beside is None else Beside(beside.folder, beside.outside, stored)
 
 
 def reread(scene: Scene) -> Reading:
     """Return the data of a scene from its text again, because scenes do not store places of fields."""
     changes = parse_overrides(scene.given_overrides)
-    composition = compose(_document(scene.source_text or "{}", scene.source_name), scene.source_name, changes)
+    document = _document(scene.source_text or "{}", scene.source_name)
+    composition = compose(document, scene.source_name, changes, Beside(None, stored=scene.source_files))
     return Reading(composition, composition.data)
 
 

@@ -1,6 +1,8 @@
 """Overrides: plain data that are laid over the data of a scene file."""
 
 import io
+import json
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -9,6 +11,12 @@ from ruamel.yaml import YAML
 from conveyor_sim.errors import SceneError
 from conveyor_sim.scene.problems import Path
 from conveyor_sim.scene.yaml_lines import Document
+
+FILES = "files"
+"""Field of stored overrides that holds the texts of the files that a scene names, by path."""
+
+_SPECIAL = re.compile("[\x7f-\x9f\u2028\u2029\ufeff]")
+"""Characters that YAML reads as others unless they are escaped."""
 
 
 def parse_overrides(text: str) -> dict[str, Any]:
@@ -62,3 +70,9 @@ def yaml_text(changes: Any) -> str:
     yaml.default_flow_style = False
     yaml.dump(changes, stream)
     return stream.getvalue()
+
+
+def in_quotes(texts: Mapping[str, str]) -> str:
+    """Return a mapping of texts as one line of YAML, which is read fast."""
+    text = json.dumps(texts, ensure_ascii=False)
+    return _SPECIAL.sub(lambda match: f"\\u{ord(match[0]):04x}", text)

@@ -2,6 +2,7 @@
 
 from conveyor_sim.scene.load import reread
 from conveyor_sim.scene.problems import Path
+from conveyor_sim.scene.provenance import FieldPlace
 from conveyor_sim.scene.schema import Scene
 
 
@@ -18,6 +19,10 @@ class Places:
     def of(self, path: Path) -> str:
         """Return the place such as `plant.yaml:7`, or `plant.yaml (override)`."""
         return str(self._reading.place_of(path))
+
+    def place_of(self, path: Path) -> FieldPlace:
+        """Return the place of a field of the expanded scene, or of the nearest one above it."""
+        return self._reading.place_of(path)
 
     def unwritten(self, path: Path) -> str:
         """Return the origin of a field without a line: `override` or `default`."""

@@ -1,6 +1,6 @@
 """Provenance of a scene's data: the file and line that each field of the read scene comes from."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,8 +10,8 @@ from conveyor_sim.scene.yaml_lines import Document
 
 
 @dataclass(frozen=True)
-class Place:
-    """Place of a field in a file."""
+class FieldPlace:
+    """FieldPlace of a field in a file."""
 
     file: str
     line: int | None
@@ -53,8 +53,8 @@ class Provenance:
         return (*source, *rest)
 
 
-@dataclass(frozen=True)
-class SourceFile:
+@dataclass(frozen=True, eq=False)
+class SceneFile:
     """A file that a scene was read from."""
 
     name: str
@@ -62,33 +62,46 @@ class SourceFile:
     document: Document
     cell: str = ""
     """Name of the cell that the file was read for."""
+    key: str = ""
+    """Path from the scene's folder."""
 
 
 class Sources:
     """Files of a scene and its overrides: the place of each field of the composed data."""
 
-    def __init__(self, document: Document, name: str, changes: Any = None) -> None:
-        """Start with the scene's own file. changes: overrides."""
-        self.main = SourceFile(name, document)
+    def __init__(self, main: SceneFile, changes: Any = None) -> None:
+        """Start with one file, from which all fields without another origin come. changes: overrides."""
+        self.main = main
         self.changes = changes or {}
-        self._origins: dict[Path, tuple[SourceFile, Path]] = {}
+        self._origins: dict[Path, tuple[SceneFile, Path]] = {}
+        self._below: dict[Path, list[Path]] = {}
 
-    def add(self, path: Path, file: SourceFile, source: Path) -> None:
+    def empty(self) -> "Sources":
+        """Return the same file and overrides without other origins."""
+        return Sources(self.main, self.changes)
+
+    def add(self, path: Path, file: SceneFile, source: Path) -> None:
         """Set the file of a path and of all paths below it, and its path in this file."""
+        if path not in self._origins:
+            for length in (1, 2) if len(path) > 2 else range(1, len(path)):
+                self._below.setdefault(path[:length], []).append(path)
         self._origins[path] = file, source
 
-    def items(self) -> Iterable[tuple[Path, tuple[SourceFile, Path]]]:
-        """Return the origins that differ from the scene's own file, by path."""
-        return self._origins.items()
+    def adopt(self, path: Path, other: "Sources", old: Path) -> None:
+        """Take over the origins of a path of other data, which has one or two parts, and of all paths below it."""
+        if (origin := other.origin_of(old)) != self.origin_of(path):
+            self.add(path, *origin)
+        for deeper in other._below.get(old, ()):
+            self.add((*path, *deeper[len(old) :]), *other._origins[deeper])
 
-    def place_of(self, path: Path) -> Place:
+    def place_of(self, path: Path) -> FieldPlace:
         """Return the place of a field of the composed data, or of the nearest one above it."""
         if holds(self.changes, path):
-            return Place(self.main.name, None, path)
+            return FieldPlace(self.main.name, None, path)
         file, source = self.origin_of(path)
-        return Place(file.name, file.document.line_of(source), source, file.cell)
+        return FieldPlace(file.name, file.document.line_of(source), source, file.cell)
 
-    def origin_of(self, path: Path) -> tuple[SourceFile, Path]:
+    def origin_of(self, path: Path) -> tuple[SceneFile, Path]:
         """Return the file of a field of the composed data, and its path in this file."""
         for length in range(len(path), 0, -1) if self._origins else ():
             if (origin := self._origins.get(path[:length])) is not None:

@@ -7,7 +7,7 @@ from conveyor_sim.errors import SceneError
 from conveyor_sim.scene.layout.compose import Composition
 from conveyor_sim.scene.layout.expand import Expansion, expand
 from conveyor_sim.scene.problems import Path, Problem
-from conveyor_sim.scene.provenance import Place, Provenance, inside
+from conveyor_sim.scene.provenance import FieldPlace, Provenance, inside
 from conveyor_sim.scene.refusal import refused
 
 
@@ -20,11 +20,11 @@ class Reading:
         self.expansion = expand(data) if isinstance(data, dict) else Expansion(data)
         self._provenance = Provenance(self.expansion.sources)
 
-    def place_of(self, path: Path) -> Place:
+    def place_of(self, path: Path) -> FieldPlace:
         """Return the place of a field of the expanded scene, or of the nearest one above it."""
         composed, rest = self._composed(path)
         place = self.composition.sources.place_of(composed)
-        return Place(place.file, place.line, place.path, place.cell, path if rest else ())
+        return FieldPlace(place.file, place.line, place.path, place.cell, path if rest else ())
 
     def is_written(self, path: Path) -> bool:
         """Return True if a field of the expanded scene is written in a file or an override."""

@@ -5,12 +5,14 @@ from collections.abc import Callable, Iterable
 from conveyor_sim.errors import SceneError
 from conveyor_sim.scene.problem_count import MOST_SAID
 from conveyor_sim.scene.problems import Path, Problem, dotted
-from conveyor_sim.scene.provenance import Place
+from conveyor_sim.scene.provenance import FieldPlace
 
 _MOST_PROBLEMS = 50  # listed; more would scroll the first off the screen
 
 
-def refused(problems: Iterable[Problem], place_of: Callable[[Path], Place], name: str, more: int = 0) -> SceneError:
+def refused(
+    problems: Iterable[Problem], place_of: Callable[[Path], FieldPlace], name: str, more: int = 0
+) -> SceneError:
     """Return the error for the problems of a file. Those of other files and of overrides come with their own place.
 
     place_of: place of a problem's path; name: of the scene's file; more: number of problems that were only counted. A

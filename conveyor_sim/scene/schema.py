@@ -157,6 +157,8 @@ class Origin:
     """Overrides and the content of other files, as YAML. With the text, it gives the scene without these files."""
     streams_by_index: bool = False
     """True if random streams are keyed by places in lists, as in old recordings, and not by names."""
+    files: Mapping[str, str] = field(default_factory=dict, compare=False)
+    """Texts of the files that the scene includes or uses, by path from its folder."""
 
 
 def _bottle_tag(data: Any) -> str:
@@ -355,6 +357,11 @@ class Scene(Part):
     def source_name(self) -> str:
         """Name of the scene's file, as given."""
         return self._source.name
+
+    @property
+    def source_files(self) -> Mapping[str, str]:
+        """Texts of the files that a composed scene includes or uses, by path from its folder."""
+        return self._source.files
 
     @property
     def overrides_text(self) -> str:

@@ -1,37 +1,25 @@
 """Tables of contacts in CSV files that a scene names."""
 
 import csv
-from dataclasses import dataclass
-from pathlib import Path as FilePath
 from typing import Any
 
+from conveyor_sim.scene.beside import Beside
 from conveyor_sim.scene.problems import Problem
 from conveyor_sim.scene.words import shown
-from conveyor_sim.support.files import MB, FileError, OutsideError, in_mb, read_file
+from conveyor_sim.support.files import MB, in_mb
 
 _MOST_ROWS = 100_000
 _MOST_BYTES = 10 * MB
 _MOST_BYTES_TOGETHER = 100 * MB
 """Largest size of all tables of a scene, bytes. A scene may name one file many times."""
+_NO_FILE = "expected a list of points [overlap, force]: a scene that is no file has no files beside it"
 _ROWS = "expected two numbers a line, overlap and force (m, N)"
 
-OUTSIDE = "the option --outside-tables, or the parameter outside_tables of the node, allows others"
 
-
-@dataclass(frozen=True)
-class Beside:
-    """Place of the files that a scene names."""
-
-    folder: FilePath
-    """Folder of the scene, where paths start."""
-    outside: bool = False
-    """True if paths may lead out of the folder."""
-
-
-def with_tables(data: Any, beside: Beside | None) -> tuple[Any, list[Problem]]:
+def with_tables(data: Any, beside: Beside) -> tuple[Any, list[Problem]]:
     """Return the data of a scene with points instead of paths, and problems of the files.
 
-    Without paths the same object is returned. beside: place of the files; None: no file can be read.
+    Without paths the same object is returned. beside: place of the files.
     """
     contacts = data.get("contacts") if isinstance(data, dict) else None
     if not isinstance(contacts, list):
@@ -47,7 +35,9 @@ def with_tables(data: Any, beside: Beside | None) -> tuple[Any, list[Problem]]:
         try:
             if left <= 0:
                 raise ValueError(f"expected tables of at most {in_mb(_MOST_BYTES_TOGETHER)} together")
-            content, is_inside = _content(path, beside)
+            if beside.is_none:
+                raise ValueError(_NO_FILE)
+            content, is_inside = beside.read(path, _MOST_BYTES, "a CSV file")
             left -= len(content)
             read.append({**contact, "table": _points(content, is_inside)})
         except ValueError as error:
@@ -103,23 +93,3 @@ def _is_number(cell: str) -> bool:
     except ValueError:
         return False
     return True
-
-
-def _content(path: str, beside: Beside | None) -> tuple[bytes, bool]:
-    """Return the content of a file that a scene names, and whether it lies in the scene's folder.
-
-    Raise ValueError with the reason if it can't be read.
-    """
-    if beside is None:
-        raise ValueError("expected a list of points [overlap, force]: a scene that is no file has no files beside it")
-    try:
-        return read_file(FilePath(path), _MOST_BYTES, beside.folder), True
-    except OutsideError:
-        if not beside.outside:
-            raise ValueError(f"which leads out of the scene's folder, expected a CSV file in it; {OUTSIDE}") from None
-    except FileError as error:
-        raise ValueError(f"expected a CSV file in {beside.folder} ({error})") from None
-    try:
-        return read_file(beside.folder / path, _MOST_BYTES), False
-    except FileError as error:
-        raise ValueError(f"expected a CSV file ({error})") from None

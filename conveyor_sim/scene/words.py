@@ -201,8 +201,15 @@ def _first_unconverted(value: Any) -> Unconverted | None:
 
 
 def _unknown(name: str, names: list[str]) -> str:
+    return f"no such field, {did_you_mean(name, names)}"
+
+
+def did_you_mean(name: str, names: list[str]) -> str:
+    """Return the expectation for an unknown name: the one that it resembles, or all of them."""
     close = difflib.get_close_matches(name, names, n=1) if len(name) <= _LONGEST_NAME else []
-    return "no such field, " + (f"did you mean {close[0]}?" if close else "expected " + listed(names))
+    if close:
+        return f"did you mean {close[0]}?"
+    return f"expected {listed(names)}" if len(names) <= _LISTED and names else f"expected {some_of(names) or 'none'}"
 
 
 def _wrong_kind(value: Any, kinds: str) -> str:

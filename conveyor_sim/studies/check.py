@@ -9,7 +9,7 @@ from conveyor_sim.errors import ConveyorError, StudyError
 from conveyor_sim.scene import Scene
 from conveyor_sim.scene.part import Part
 from conveyor_sim.scene.problems import Path, Problem
-from conveyor_sim.scene.provenance import Sources
+from conveyor_sim.scene.provenance import SceneFile, Sources
 from conveyor_sim.scene.refusal import refused
 from conveyor_sim.scene.words import field_names, shown, unit_of
 from conveyor_sim.scene.yaml_lines import Document
@@ -37,7 +37,7 @@ def check_study(setup: Setup, first: Point | None = None) -> None:
 
 
 def _refused(setup: Setup, problems: list[Problem]) -> StudyError:
-    places = Sources(Document(setup.source, setup.path), setup.path)
+    places = Sources(SceneFile(setup.path, Document(setup.source, setup.path)))
     return StudyError(str(refused(problems, places.place_of, setup.path)))
 
 

@@ -9,7 +9,7 @@ from conveyor_sim.errors import SceneError, StudyError
 from conveyor_sim.scene import load_scene
 from conveyor_sim.scene.part import validated
 from conveyor_sim.scene.problems import Problem
-from conveyor_sim.scene.provenance import Sources
+from conveyor_sim.scene.provenance import SceneFile, Sources
 from conveyor_sim.scene.refusal import refused
 from conveyor_sim.scene.yaml_lines import LONGEST_TEXT, Document
 from conveyor_sim.studies.code import digest_of, files_of, function, located
@@ -45,7 +45,7 @@ def parse_study(text: str, name: str = "<text>", folder: Path | None = None) -> 
         study = _study(document, name)
         problems = [*study.problems(), *_metric_problems(study, folder)]
         if problems:
-            raise refused(problems, Sources(document, name).place_of, name)
+            raise refused(problems, Sources(SceneFile(name, document)).place_of, name)
     except SceneError as error:
         raise StudyError(str(error)) from None
     code = {what: located(what, folder) if what else "" for what in (study.function or "", study.controller or "")}
@@ -84,7 +84,7 @@ def parse_study(text: str, name: str = "<text>", folder: Path | None = None) -> 
 def _study(document: Document, name: str) -> Study:
     study = validated(Study, document.data)
     if isinstance(study, tuple):
-        raise refused(study[0], Sources(document, name).place_of, name, study[1])
+        raise refused(study[0], Sources(SceneFile(name, document)).place_of, name, study[1])
     return study
 
 

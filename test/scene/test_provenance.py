@@ -1,6 +1,6 @@
 """Provenance: fields of expanded data are reported at the place that they were written at."""
 
-from conveyor_sim.scene.provenance import Provenance, SourceFile, Sources
+from conveyor_sim.scene.provenance import Provenance, SceneFile, Sources
 from conveyor_sim.scene.yaml_lines import Document
 
 SCENE = "conveyors:\n  lane:\n    width: 1\n    speed: 2\n"
@@ -15,8 +15,8 @@ def test_the_longest_prefix_decides() -> None:
 
 
 def test_a_field_has_the_line_of_its_file() -> None:
-    sources = Sources(Document(SCENE, "plant.yaml"), "plant.yaml", {"conveyors": {"lane": {"speed": 5}}})
-    cell = SourceFile("cell.yaml", Document(CELL, "cell.yaml"), "block")
+    sources = Sources(SceneFile("plant.yaml", Document(SCENE, "plant.yaml")), {"conveyors": {"lane": {"speed": 5}}})
+    cell = SceneFile("cell.yaml", Document(CELL, "cell.yaml"), "block")
     sources.add(("conveyors", "block_a"), cell, ("conveyors", "a"))
     assert str(sources.place_of(("conveyors", "lane", "width"))) == "plant.yaml:3"
     assert sources.place_of(("conveyors", "lane", "speed")).line is None

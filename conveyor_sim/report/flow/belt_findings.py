@@ -42,6 +42,8 @@ def opposed_belts(surfaces: Sequence[FlowSurface]) -> Iterator[Finding]:
 
 def _opposed(surfaces: Sequence[FlowSurface], index: int) -> Iterator[int]:
     """Yield the belts next to both ends of a belt that oppose it."""
+    if surfaces[index].rests:
+        return
     middle = surfaces[index].middle
     for end, before in ((middle[-1], middle[-2]), (middle[0], middle[1])):
         outward = (end - before) / max(float(np.hypot(*(end - before))), 1e-12)
@@ -53,17 +55,19 @@ def _opposed(surfaces: Sequence[FlowSurface], index: int) -> Iterator[int]:
         place, other = beyond
         own = surfaces[index].heading(end[None])[0]
         theirs = surfaces[other].heading(probes[place][None])[0]
-        if float(own @ theirs) < OPPOSED:
+        if not surfaces[other].rests and float(own @ theirs) < OPPOSED:
             yield other
 
 
-def backward_belts(surfaces: Sequence[FlowSurface]) -> Iterator[Finding]:
+def backward_belts(scene: Scene, surfaces: Sequence[FlowSurface]) -> Iterator[Finding]:
     """Yield a note that names the belts with a negative speed."""
     backwards = [surface for surface in surfaces if surface.speed < 0.0]
     if backwards:
         names = some_of(dict.fromkeys(surface.name for surface in backwards))
         text = f"negative speed: {names} run against the listed direction of travel"
-        yield Finding((*backwards[0].path, "speed"), text, "note")
+        drive = scene.belts[str(backwards[0].path[1])].drive_name
+        path = backwards[0].path if drive is None else ("drives", drive)
+        yield Finding((*path, "speed"), text, "note")
 
 
 def watchdogs(scene: Scene) -> Iterator[Finding]:

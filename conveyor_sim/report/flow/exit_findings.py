@@ -12,9 +12,9 @@ from conveyor_sim.report.flow.routes import TransitRoute
 from conveyor_sim.report.flow.stretches import feed_rate
 from conveyor_sim.report.flow.surfaces import NONE, FlowSurface
 from conveyor_sim.report.flow.trace import Leg
-from conveyor_sim.scene.parts.infeed import Infeed
 from conveyor_sim.scene.parts.machine import TakingPart
 from conveyor_sim.scene.parts.outfeed import Outfeed
+from conveyor_sim.scene.parts.scatter import Scattered
 from conveyor_sim.scene.parts.sink import Sink
 from conveyor_sim.scene.schema import Scene
 
@@ -65,7 +65,7 @@ def perfect_columns(
                 continue
             text = (
                 f"no scatter: bottles meet in one exact column on {surfaces[carrier].name}, which is wide enough for "
-                f"several rows; expected a scatter such as {_remedy(scene, leg)}"
+                f"several rows; expected a scatter such as lateral_jitter: 0.5 mm"
             )
             yield Finding(leg.start.path, text)
             break
@@ -73,12 +73,7 @@ def perfect_columns(
 
 def _scatters(scene: Scene, leg: Leg) -> bool:
     part = scene.named()[str(leg.start.path[0])][str(leg.start.path[1])]
-    return any(getattr(part, field, 0.0) > 0.0 for field in ("lateral_jitter", "scatter", "scatter_angle"))
-
-
-def _remedy(scene: Scene, leg: Leg) -> str:
-    part = scene.named()[str(leg.start.path[0])][str(leg.start.path[1])]
-    return "`lateral_jitter: 0.0005`" if isinstance(part, Infeed) else "0.5 mm"
+    return isinstance(part, Scattered) and (part.lateral_jitter > 0.0 or part.angular_jitter > 0.0)
 
 
 def _straight(leg: Leg, carrier: int) -> bool:

@@ -20,8 +20,9 @@ class Finding:
     level: Level = "warning"
 
     def line(self, places: Places) -> str:
-        """Return the finding with file, line and field."""
-        return f"{places.of(self.path)}: {dotted(self.path)}: {self.text}"
+        """Return the finding with file, line and field; of an expanded part those of the part that was written."""
+        place = places.place_of(self.path)
+        return f"{place}: {dotted(place.path or self.path)}: {self.text}"
 
 
 def at(point: tuple[float, float]) -> str:

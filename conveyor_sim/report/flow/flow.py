@@ -35,7 +35,7 @@ def flow_of(scene: Scene) -> LineFlow:
     """Trace a lone bottle from every entry of a scene, and return routes, capacities and findings."""
     surfaces = surfaces_of(scene)
     guides = Guides(guide_pieces(scene))
-    legs = trace(scene, surfaces)
+    legs = trace(scene, surfaces, guides)
     clearances = [clearance(leg, surfaces, guides) for leg in legs]
     routes = routes_of(scene, legs)
     stretches = stretches_of(legs, clearances, surfaces)
@@ -49,6 +49,6 @@ def flow_of(scene: Scene) -> LineFlow:
         *guide_gaps(scene, surfaces, guides, legs, clearances),
         *perfect_columns(scene, surfaces, legs, clearances),
         *watchdogs(scene),
-        *backward_belts(surfaces),
+        *backward_belts(scene, surfaces),
     ]
     return LineFlow(surfaces, routes, stretches, bottleneck(scene, routes, stretches), tuple(findings))

@@ -113,8 +113,9 @@ def _end_of_guide(samples: Clearance, side: int, guided: int, open_: int, guides
     near = np.isfinite(distance) & (distance <= samples.guides[side][guided] + 2.0 * samples.radius)
     last = int(np.flatnonzero(near)[-1]) if near.any() else 0
     reach = distance[last] if np.isfinite(distance[last]) else 0.0
-    end: Array = points[last] + reach * direction
-    return end
+    seen: Array = points[last] + reach * direction
+    end = guides.nearest_end(seen)
+    return end if math.dist(end, seen) < samples.radius else seen
 
 
 def _narrowest(leg: Leg, surfaces: Sequence[FlowSurface], guides: Guides) -> tuple[float, Array, Array]:

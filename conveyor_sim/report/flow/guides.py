@@ -19,11 +19,17 @@ class Guides:
     def __init__(self, pieces: Iterable[Piece]) -> None:
         pieces = tuple(pieces)
         segments = [piece for piece in pieces if isinstance(piece, SegmentPiece)]
+        self._ends = np.array([end for piece in pieces for end in piece.ends]).reshape(-1, 2)
         arcs = [piece for piece in pieces if isinstance(piece, ArcPiece)]
         self._start = np.array([piece.p1 for piece in segments]).reshape(-1, 2)
         self._along = np.array([piece.p2 for piece in segments]).reshape(-1, 2) - self._start
         self._centre = np.array([piece.centre for piece in arcs]).reshape(-1, 2)
         self._arc = np.array([(piece.radius, piece.start_angle, piece.span) for piece in arcs]).reshape(-1, 3)
+
+    def nearest_end(self, point: Array) -> Array:
+        """Return the end of a piece that is nearest to a point (2,). There must be a piece."""
+        end: Array = self._ends[np.argmin(np.hypot(*(self._ends - point).T))]
+        return end
 
     def distance(self, points: Array, directions: Array) -> Array:
         """Return the distance (k,) from points (k, 2) along unit vectors (k, 2) to the first rail; inf without one."""

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conveyor_sim.scene.driven import belt_speeds, speed_limits
-from conveyor_sim.scene.geometry import Array, BeltShape, belt_shapes, is_full_turn
+from conveyor_sim.scene.geometry import Array, BeltShape, is_full_turn, surface_shapes
 from conveyor_sim.scene.problems import Path
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.scene.types import TOUCH, XY
@@ -27,16 +27,16 @@ NONE = -1
 
 @dataclass(frozen=True)
 class FlowSurface:
-    """A belt as bottles see it."""
+    """A surface of a belt, or a plate."""
 
     name: str
     path: Path
-    """Path of its belt in the scene."""
+    """Path of its belt or plate in the scene."""
     shape: BeltShape
     speed: float
-    """m/s along its travel at the start; negative backwards."""
+    """m/s along its travel at the start; negative backwards, 0 for a plate."""
     running: float
-    """m/s in a trace: the speed at the start, or a nominal one if the belt stands then."""
+    """m/s in a trace along the angle of its shape, or counter-clockwise. A belt that stands has a nominal speed."""
 
     def contains(self, points: Array) -> Mask:
         """Return True for points (k, 2) on the surface, (k,)."""
@@ -68,17 +68,39 @@ class FlowSurface:
     def middle(self) -> Array:
         """Points along the middle in the direction of motion, (k, 2)."""
         line = self.shape.centre_line(2 if self.shape.kind == "straight" else 33)
-        return line[::-1] if self.running < 0.0 else line
+        return line[::-1] if self.speed < 0.0 else line
+
+    @property
+    def rests(self) -> bool:
+        """True for a plate."""
+        return self.path[0] == "plates"
 
 
 def surfaces_of(scene: Scene) -> tuple[FlowSurface, ...]:
-    """Return the surfaces of a scene in the order of its belts. Where they overlap, the last one carries."""
-    shapes, speeds = belt_shapes(scene), belt_speeds(scene)
-    running = running_speeds(scene)
-    return tuple(
-        FlowSurface(name, ("belts", name), shape, speeds[name], running[name])
-        for name, shape in zip(scene.belts, shapes, strict=True)
-    )
+    """Return the surfaces of a scene: those of belts in order, then plates. Where they overlap, the last one carries.
+
+    They have the names of their conveyors where there is a layout, else those of their belts or plates.
+    """
+    speeds, running = belt_speeds(scene), running_speeds(scene)
+    belts, names = list(scene.belts), _conveyors(scene)
+    surfaces = []
+    for shape in surface_shapes(scene):
+        if shape.belt is None:
+            surfaces.append(FlowSurface(shape.name, ("plates", shape.name), shape, 0.0, 0.0))
+            continue
+        belt = belts[shape.belt]
+        sense = -shape.ratio if shape.clockwise else shape.ratio
+        surface = FlowSurface(
+            names.get(belt, belt), ("belts", belt), shape, shape.ratio * speeds[belt], sense * running[belt]
+        )
+        surfaces.append(surface)
+    return tuple(surfaces)
+
+
+def _conveyors(scene: Scene) -> dict[str, str]:
+    """Return the conveyor of each belt in a layout, by belt; belts of sections keep their names."""
+    conveyors = {} if scene.layout is None else scene.layout.conveyors
+    return {belt: name for name, plan in conveyors.items() for belt in plan.belts if len(plan.belts) == 1}
 
 
 def running_speeds(scene: Scene) -> dict[str, float]:

@@ -14,6 +14,7 @@ from conveyor_sim.line.devices.belt_surfaces import BeltSurfaces
 from conveyor_sim.physics.model import build_model
 from conveyor_sim.physics.state import State
 from conveyor_sim.physics.stepping.tick import Integration
+from conveyor_sim.report.flow.guides import Guides
 from conveyor_sim.report.flow.surfaces import NONE, FlowSurface, Indices, running_speeds, under
 from conveyor_sim.report.flow.trace_scene import trace_scene
 from conveyor_sim.scene.geometry import Array, initial_bottles
@@ -41,7 +42,10 @@ MOST_LEGS = 64
 STILL = 0.02
 """Way over radius below which a bottle has stopped within a chunk."""
 
-ASTRAY = 1.0
+FARTHEST_PUSH = 0.5
+"""m, longest way over which bottles push one that rests on a plate."""
+
+ASTRAY = 0.5
 """m without a surface after which a bottle has left the line."""
 
 End = Literal["exit", "station", "stopped", "off", "circulates", "cap", "failed"]
@@ -113,20 +117,23 @@ def starts_of(scene: Scene) -> list[Entrance]:
     return (starts or _initial(scene))[:MOST_LEGS]
 
 
-def trace(scene: Scene, surfaces: Sequence[FlowSurface]) -> list[Leg]:
+def trace(scene: Scene, surfaces: Sequence[FlowSurface], guides: Guides) -> list[Leg]:
     """Trace a lone bottle from every start with the engine at draft accuracy.
 
-    The work is limited by MOST_WORK, so that the result does not depend on the machine.
+    A bottle that stops on a plate is put behind it, as the bottles after it would push it. The work is limited by
+    MOST_WORK, so that the result does not depend on the machine.
     """
     starts = starts_of(scene)
     if not starts or not surfaces:
         return []
-    return _Tracer(scene, surfaces, starts).run()
+    return _Tracer(scene, surfaces, guides, starts).run()
 
 
 class _Tracer:
-    def __init__(self, scene: Scene, surfaces: Sequence[FlowSurface], starts: Sequence[Entrance]) -> None:
-        self._surfaces, self._starts = surfaces, starts
+    def __init__(
+        self, scene: Scene, surfaces: Sequence[FlowSurface], guides: Guides, starts: Sequence[Entrance]
+    ) -> None:
+        self._surfaces, self._guides, self._starts = surfaces, guides, starts
         self._radius = [scene.bottle_types[start.bottle].radius for start in starts]
         fastest = max([0.1, *(abs(surface.running) for surface in surfaces), *(start.speed for start in starts)])
         # A bottle moves by less than its radius in a tick, and is not lost between two ticks.
@@ -174,7 +181,9 @@ class _Tracer:
             for index in active:
                 paths[index] = np.vstack([paths[index], chunk[:, index]])
                 leg = self._ended(index, paths[index])
-                if leg is not None:
+                if leg is not None and leg.end == "stopped" and self._pushed_on(index, leg):
+                    paths[index] = leg.points
+                elif leg is not None:
                     legs[index] = leg
                     self._state.remove(index)
             self._state.make_lists()
@@ -207,6 +216,31 @@ class _Tracer:
         if (closed := _closed(path, radius)) is not None:
             return self._leg(index, path[: closed + 1], "circulates")
         return None
+
+    def _pushed_on(self, index: int, leg: Leg) -> bool:
+        """Put a bottle that has stopped on a plate behind it, at its first speed. Return False if it can't go on."""
+        plate = int(leg.carriers[-1])
+        before = np.flatnonzero(leg.carriers != plate)
+        if not self._surfaces[plate].rests or not before.size or len(leg.points) < 2:
+            return False
+        came = leg.points[before[-1] + 1] - leg.points[before[-1]]
+        step = float(np.hypot(*came))
+        along = came / max(step, 1e-12)
+        ways = np.arange(0.002, FARTHEST_PUSH, 0.002)[:, None]
+        ahead = leg.points[-1] + ways * along
+        carriers = under(self._surfaces, ahead)
+        beyond = np.flatnonzero(carriers != plate)
+        if not beyond.size or carriers[beyond[0]] == NONE:
+            return False
+        way = float(ways[beyond[0], 0])
+        if float(self._guides.distance(leg.points[-1:], along[None])[0]) < way + leg.radius:
+            return False
+        bottles = self._state.world.bottles
+        bottles.x[index], bottles.y[index] = ahead[beyond[0]]
+        bottles.vx[index], bottles.vy[index] = came / self._tick
+        self._state.world.neighbourhood.stale[0] = 1
+        self._integration.put_in()
+        return True
 
     def _leg(self, index: int, path: Array, end: End, device: Path | None = None, reason: str = "") -> Leg:
         times = self._tick * np.arange(len(path), dtype=np.float64)

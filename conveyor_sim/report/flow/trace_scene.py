@@ -1,7 +1,8 @@
 """Scene of a trace: belts and rails of a scene with soft contacts and without devices.
 
 All traces have the same effects, so that one set of compiled kernels serves every scene: spare parts far away enable
-what a scene lacks. Bottles do not touch each other, so each is alone.
+what a scene lacks. Bottles do not touch each other, so each is alone. The floor has no friction, because the base of
+a bottle spans a gap that its axis passes.
 """
 
 from __future__ import annotations
@@ -74,6 +75,7 @@ def trace_scene(scene: Scene, bottles: Sequence[Single], tick: float) -> Scene:
             "tick": tick,
             "duration": tick,
             "accuracy": Accuracy.model_construct(preset="draft"),
+            "floor": "none",
             "friction_solver": "implicit",
             "friction_curve": "polynomial",
             "contacts": (

@@ -1,0 +1,77 @@
+"""Commands on drawings: import, draw."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from conveyor_sim.cli.output import OUTSIDE_TABLES
+from conveyor_sim.errors import ConveyorError
+
+
+@click.command("import")
+@click.argument("plan", type=click.Path(path_type=Path))
+@click.option(
+    "--map", "map_", type=click.Path(path_type=Path), required=True, help="What each layer stands for (YAML)."
+)
+@click.option("-o", "--out", type=click.Path(path_type=Path), required=True, help="Scene file to write.")
+@click.option("--base", type=click.Path(path_type=Path), help="Scene that the parts are added to: types, materials.")
+@click.option(
+    "--unit", type=click.Choice(["mm", "cm", "dm", "m", "in", "ft", "yd"]), help="Unit of PLAN, if it names none."
+)
+def import_(plan: Path, map_: Path, out: Path, base: Path | None, unit: str | None) -> None:
+    """Write a scene from PLAN, a DXF file.
+
+    Conveyors, rails and devices are what the map says of their layers. What could not be used is listed.
+    """
+    from conveyor_sim.drawings.entities import read_plan
+    from conveyor_sim.drawings.importing import imported
+    from conveyor_sim.drawings.layer_map import read_map
+    from conveyor_sim.drawings.listing import skipped_lines
+    from conveyor_sim.drawings.scene_text import scene_text
+    from conveyor_sim.support.files import FileError, write_file
+
+    rules = read_map(map_)
+    drawn = read_plan(plan, unit, rules.is_symbol)
+    result = imported(drawn, rules)
+    for line in skipped_lines(result.skipped):
+        click.echo(line)
+    for note in result.notes:
+        click.echo(f"note: {note}")
+    if not any(result.sections.values()):
+        raise ConveyorError(f"{plan}: no entity became a part, expected entities on the layers of {map_}")
+    text = scene_text(result.sections, f"From {plan.name} (drawn in {drawn.unit}) by the map {map_.name}.", base)
+    try:
+        write_file(out, text.encode())
+    except FileError as error:
+        raise ConveyorError(f"{out}: {error}") from None
+    counts = ", ".join(f"{len(parts)} {section}" for section, parts in result.sections.items() if parts)
+    click.echo(f"wrote {out}: {counts} (unit of the drawing: {drawn.unit})")
+
+
+@click.command()
+@click.argument("scene")
+@click.option("--dxf", type=click.Path(path_type=Path), help="DXF file to write, in mm.")
+@click.option("--svg", type=click.Path(path_type=Path), help="SVG file to write, in mm.")
+@click.option("--outside-tables", is_flag=True, help=OUTSIDE_TABLES)
+def draw(scene: str, dxf: Path | None, svg: Path | None, outside_tables: bool) -> None:
+    """Write the plan of SCENE: belts, rails and devices, with their names, on layers."""
+    from conveyor_sim.drawings.dxf_plan import dxf_of
+    from conveyor_sim.drawings.plan import plan_of
+    from conveyor_sim.drawings.svg_plan import svg_of
+    from conveyor_sim.scene import load_scene
+    from conveyor_sim.support.files import FileError, write_file
+    from conveyor_sim.support.resources import scene_path
+
+    if dxf is None and svg is None:
+        raise ConveyorError("neither --dxf nor --svg given, expected one of them")
+    loaded = load_scene(scene_path(scene), outside_tables=outside_tables)
+    shapes = plan_of(loaded)
+    for file, make in ((dxf, dxf_of), (svg, lambda drawn: svg_of(drawn, loaded.name))):
+        if file is not None:
+            try:
+                write_file(file, make(shapes))
+            except FileError as error:
+                raise ConveyorError(f"{file}: {error}") from None
+            click.echo(f"drawn to {file}")

@@ -1,0 +1,1 @@
+"""Drawings: plans read from DXF files and written as DXF and SVG."""

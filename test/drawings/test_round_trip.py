@@ -1,0 +1,84 @@
+"""Import after export: belts, rails and devices of every shipped scene agree within 1e-6 m."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scenes import SHIPPED, shipped_name
+
+from conveyor_sim.drawings.dxf_plan import dxf_of
+from conveyor_sim.drawings.entities import read_plan
+from conveyor_sim.drawings.importing import imported
+from conveyor_sim.drawings.layer_map import read_map
+from conveyor_sim.drawings.plan import plan_of
+from conveyor_sim.drawings.scene_text import scene_text
+from conveyor_sim.scene import Scene, load_scene, parse_scene
+from conveyor_sim.scene.geometry import belt_shapes, rail_shapes
+from conveyor_sim.scene.marks import marks_of
+
+pytest.importorskip("ezdxf", reason="ezdxf is not installed: pip install conveyor-sim[cad]")
+
+DRAWN = ("belts", "rails", "photo_eyes", "counters", "zones", "outfeeds", "infeeds")
+"""Sections that are made anew; the others stay as they are in the scene."""
+MAP = """
+CONVEYORS: {as: conveyor, material: $BELT}
+BELTS: {as: belt, material: $BELT}
+RAILS: {as: rail, material: $RAIL}
+PHOTO_EYES: {as: photo_eye}
+COUNTERS: {as: counter}
+ZONES: {as: zone}
+OUTFEEDS: {as: outfeed}
+INFEEDS: {as: infeed, block: INFEED, bottle: $BOTTLE, speed: 0.3, gap: 0.01}
+GATES: {as: ignore}
+PUSHERS: {as: ignore}
+DIVERTERS: {as: ignore}
+INSPECTIONS: {as: ignore}
+SINKS: {as: ignore}
+STATIONS: {as: ignore}
+REJECTS: {as: ignore}
+SOURCES: {as: ignore}
+SPILLS: {as: ignore}
+"""
+
+
+def imported_again(scene: Scene, folder: Path) -> Scene:
+    """Draw a scene, import the drawing, and return a scene with the imported parts and the others of the old one."""
+    (folder / "plan.dxf").write_bytes(dxf_of(plan_of(scene)))
+    materials = {"$BOTTLE": next(iter(scene.bottle_types))}
+    materials["$BELT"] = next((belt.material for belt in scene.belts.values()), "chain")
+    materials["$RAIL"] = next((shape.material for shape in rail_shapes(scene)), "steel")
+    text = MAP
+    for word, name in materials.items():
+        text = text.replace(word, name)
+    (folder / "map.yaml").write_text(text)
+    rules = read_map(folder / "map.yaml")
+    result = imported(read_plan(folder / "plan.dxf", None, rules.is_symbol), rules)
+    assert result.skipped == []
+    base: dict[str, Any] = json.loads(scene.model_dump_json(by_alias=True, exclude_unset=True))
+    for section in DRAWN:
+        base.pop(section, None)
+    (folder / "base.yaml").write_text(json.dumps(base))
+    return parse_scene(scene_text(result.sections, "test", folder / "base.yaml"))
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=shipped_name)
+def test_shipped_scene_comes_back(path: Path, tmp_path: Path) -> None:
+    scene = load_scene(path)
+    again = imported_again(scene, tmp_path)
+    assert set(again.belts) == set(scene.belts)
+    outlines = {shape.name: shape.outline() for shape in belt_shapes(again)}
+    for shape in belt_shapes(scene):
+        assert outlines[shape.name] == pytest.approx(shape.outline(), abs=1e-6), shape.name
+    rails = {shape.name: shape.outline() for shape in rail_shapes(again)}
+    assert set(rails) == {shape.name for shape in rail_shapes(scene)}
+    for rail in rail_shapes(scene):
+        assert rails[rail.name] == pytest.approx(rail.outline(), abs=1e-6), rail.name
+    marks = {(mark.kind, mark.name, mark.look): mark for mark in marks_of(again)}
+    for mark in marks_of(scene):
+        other = marks[mark.kind, mark.name, mark.look]
+        assert np.asarray(other.points) == pytest.approx(np.asarray(mark.points), abs=1e-6), mark.name
+        assert other.direction == pytest.approx(mark.direction, abs=1e-9)
