@@ -60,7 +60,7 @@ class ConveyorExpansion:
                 if other is not None and other not in self.conveyors:
                     text = f"{shown(other)} given, expected a name from conveyors: {some_of(self.conveyors)}"
                     raise LayoutFault((*path, way), text)
-                if other in left_out:
+                if other in left_out or self.surfaces > _MOST_SURFACES:
                     left_out.add(name)
                     continue
                 if other is not None and other not in self.plans:
