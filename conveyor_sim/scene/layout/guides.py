@@ -7,7 +7,7 @@ from typing import Any
 from conveyor_sim.scene.layout.faults import LayoutFault
 from conveyor_sim.scene.layout.guide_line import guide_line
 from conveyor_sim.scene.layout.joined import JoinedRoute, joined
-from conveyor_sim.scene.layout.parts import Conveyor, ConveyorGuides, Guide
+from conveyor_sim.scene.layout.parts import Conveyor, Guide, GuideSides
 from conveyor_sim.scene.layout.plan import SIDES, ConveyorPlan, GuideProfile, LayoutPlan, Side
 from conveyor_sim.scene.layout.profile_rails import rails_along
 from conveyor_sim.scene.layout.routes import Route, Straight
@@ -70,7 +70,7 @@ def rails_of_guide(guide: Guide, layout: LayoutPlan, order: Iterable[str], path:
 
 
 def _rails_along(
-    guide: ConveyorGuides, way: JoinedRoute, shift: float, order: Iterable[str], path: Path
+    guide: GuideSides, way: JoinedRoute, shift: float, order: Iterable[str], path: Path
 ) -> Iterator[GuideRail]:
     """Yield the rails of a guide along a path. shift: station of the path where stations of the guide begin (m)."""
     for side in sorted(_sides(guide, path), key=[*(name for name in order if name in SIDES), *SIDES].index):
@@ -111,7 +111,7 @@ def _rails_by_points(guide: Guide, points: tuple[XY, ...], layout: LayoutPlan, p
             plan.guides.append(line)
 
 
-def _sides(guide: ConveyorGuides, path: Path) -> Sequence[Side]:
+def _sides(guide: GuideSides, path: Path) -> Sequence[Side]:
     """Return the sides that a guide has."""
     given = [side for side in SIDES if guide.corners(side) is not None]
     if bool(given) == (guide.clearance is not None):
@@ -133,7 +133,7 @@ def _check_corners(corners: Sequence[XY], length: float, path: Path) -> None:
         least = s + _APART
 
 
-def _stretch(guide: ConveyorGuides, first: float, length: float, path: Path) -> XY:
+def _stretch(guide: GuideSides, first: float, length: float, path: Path) -> XY:
     """Return the stations where a guide begins and ends (m)."""
     if guide.to is not None and not guide.to <= length + TOUCH:
         text = f"{shown(guide.to)} given, expected at most the length of the path, {length:.6g} (m)"
@@ -149,7 +149,7 @@ def _stretch(guide: ConveyorGuides, first: float, length: float, path: Path) -> 
     return begin, end
 
 
-def _closed(guide: ConveyorGuides, side: Side, first: float, last: float, path: Path) -> list[XY]:
+def _closed(guide: GuideSides, side: Side, first: float, last: float, path: Path) -> list[XY]:
     """Return the parts of a side without its openings, each first and last station (m)."""
     openings = guide.open.left if side == "left" else guide.open.right
     parts, begin = [], first
