@@ -25,7 +25,7 @@ RULES: Mapping[str, str] = {
     "simulation": "columns engine line physics scene | numpy",
     "__init__": "scene simulation",
     "bag": "columns errors line scene simulation support | lz4 mcap numpy rosbags yaml zstandard",
-    "page": "bag columns errors scene simulation support | numpy",
+    "page": "bag columns drawings errors scene simulation support | numpy",
     "run": "bag columns control engine errors line physics scene simulation support | click numpy",
     "report": "bag columns drawings errors line page physics run scene simulation support | click matplotlib numpy rich",
     "protocols": "bag columns errors line page run scene simulation support | "
