@@ -305,7 +305,11 @@ def serve(broker: Mosquitto) -> Iterator[Serve]:
     with ServerThread() as thread:
 
         def start(
-            primary_host: str = "", port: int | None = None, wait: bool = True, scene: str | Path = SCENE, **options: Any
+            primary_host: str = "",
+            port: int | None = None,
+            wait: bool = True,
+            scene: str | Path = SCENE,
+            **options: Any,
         ) -> Line:
             source = Stepped(Simulation(load_scene(scene), threads=1))
             place = Broker("127.0.0.1", port or broker.port, secured=False, primary_host=primary_host)
