@@ -9,6 +9,8 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from conveyor_sim.scene import accuracy, belts, contacts, drives, failures, limits, schema
+from conveyor_sim.scene.layout import parts
+from conveyor_sim.scene.layout.devices import PLACEABLE
 from conveyor_sim.scene.parts import machine, station
 from conveyor_sim.scene.units import UNITS
 from conveyor_sim.scene.words import expectation, field_names, in_yaml
@@ -47,7 +49,7 @@ Every number that has a unit below can be a text with a unit: `33 mm`, `90 deg`,
 - Texts are expressions of `+`, `-`, `*`, `/` and parentheses: `2 * (33 mm + 0.5 mm)`. A unit binds first, so
   `1/2 s` is 1/(2 s).
 - A number without a unit takes that of the field: `0.1 + 5 mm` for a length is 0.105 m.
-- An angle is a dimension of its own: divide by `1 rad` to get a plain number.
+- An angle has a separate dimension: divide by `1 rad` to get a plain number.
 - A value of a wrong dimension is refused: `33 mm` for a speed. So is a number without a unit beyond a full turn
   for an angle: `-90` asks whether `-90 deg` was meant.
 - `33 mm` and `0.033` are the same number to the last bit.
@@ -93,6 +95,19 @@ BEHIND: dict[str, list[tuple[str, type[BaseModel]]]] = {
 """Sections that follow those of a mapping's parts."""
 
 
+LAYOUT: list[tuple[str, type[BaseModel]]] = [
+    ("The whole file: layout", parts.SceneLayout),
+    ("An entry of `conveyors`", parts.Conveyor),
+    ("An entry of `path` of a conveyor", parts.Move),
+    ("An entry of `lanes` of a conveyor", parts.ConveyorLane),
+    ("An entry of `sections` of a conveyor", parts.ConveyorSection),
+    ("`guides` of a conveyor", parts.ConveyorGuides),
+    ("An entry of `guides`", parts.Guide),
+    ("`open` of guides", parts.Openings),
+]
+"""Sections of the layout, which becomes belts and rails."""
+
+
 def sections() -> Iterator[tuple[str, type[BaseModel]]]:
     """Yield title and model of each section, in the order of the fields of a scene."""
     yield "The whole file", schema.Scene
@@ -103,6 +118,17 @@ def sections() -> Iterator[tuple[str, type[BaseModel]]]:
             of_kind = "" if kind is None else f": `kind: {get_args(kind.annotation)[0]}`"
             yield f"An entry of `{name}`{of_kind}", model
         yield from BEHIND.get(name, [])
+    yield from LAYOUT
+    yield from _places()
+
+
+def _places() -> Iterator[tuple[str, type[BaseModel]]]:
+    """Yield title and model of the places along conveyors; kinds with the same fields are one section."""
+    titles: dict[type[BaseModel], list[str]] = {}
+    for kind in PLACEABLE:
+        field = f"`{kind.within}` of `{kind.field}`" if kind.within else f"`{kind.field}`"
+        titles.setdefault(kind.place, []).append(field + (f" of `kind: {kind.kind}`" if kind.kind else ""))
+    yield from ((f"Along a conveyor: {', '.join(dict.fromkeys(texts))}", model) for model, texts in titles.items())
 
 
 def _models(annotation: Any) -> Iterator[type[BaseModel]]:
