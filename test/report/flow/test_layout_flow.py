@@ -23,7 +23,8 @@ conveyors:
   next: {after: lane, gap: 100 mm, plate: nylon, path: [{straight: 2}], width: 0.09, speed: 0.4, material: chain,
      guides: {clearance: 75 mm, material: steel}}
 guides:
-  funnel: {along: [table, lane], material: steel, left: [[0, 0.28], [1.9, 75 mm/2]], right: [[0, -0.28], [1.9, -75 mm/2]]}
+  funnel: {along: [table, lane], material: steel, left: [[0, 0.28], [1.9, 75 mm/2]],
+    right: [[0, -0.28], [1.9, -75 mm/2]]}
 infeeds: {f: {bottle: b, along: table, at: 0.1, rate: 1}}
 outfeeds: {o: {along: next, at: 0.5, length: 0.1}}
 photo_eyes: {e: {along: lane, at: 1.5}}
@@ -62,4 +63,4 @@ def test_a_fault_of_a_layout_is_found_where_it_is_written(
     assert LINE.count(before) == 1
     (finding,) = found(LINE.replace(before, after))
     assert finding.startswith(place)
-    assert missing(finding, facts) == []
+    assert missing(finding, *facts) == []
