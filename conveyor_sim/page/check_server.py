@@ -31,7 +31,7 @@ class _Stamp(NamedTuple):
 
 
 class CheckServer(AbstractContextManager["CheckServer"]):
-    """Server of the page of a scene that is being written. It examines the scene in a thread of its own."""
+    """Server of the page of a scene that is being written. A thread examines the scene."""
 
     def __init__(self, examine: Examine, port: int = 0) -> None:
         """Examine the scene once, and serve. port: 0 for any free port. Raise ConveyorError if it is taken."""
