@@ -4,7 +4,6 @@ import re
 from pathlib import Path
 
 import pytest
-
 from scene.layout.written import read
 
 PAGE = Path(__file__).parents[3] / "docs" / "conveyors.md"
