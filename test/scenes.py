@@ -25,6 +25,9 @@ SHIPPED = sorted(
 )
 """Every scene file that is shipped or shown."""
 
+DRIVEN_LINE = ROOT / "test" / "driven_line.yaml"
+"""Scene with a named drive, m1, of the belts `feeder` (ratio 2) and `table`."""
+
 RADIUS = 0.065
 MASS = 0.2
 NO_FLOOR: dict[str, Any] = {"floor": "none"}

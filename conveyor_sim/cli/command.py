@@ -18,6 +18,7 @@ from conveyor_sim.cli.optimise import optimise
 from conveyor_sim.cli.recordings import events, plot, recover, replay, report
 from conveyor_sim.cli.run import run
 from conveyor_sim.cli.scenes import check, explain, tags
+from conveyor_sim.cli.schema import schema
 from conveyor_sim.cli.serve import serve
 from conveyor_sim.cli.studies import study_, sweep
 from conveyor_sim.cli.user import user
@@ -63,7 +64,7 @@ def main(context: click.Context) -> None:
 
 
 for command in (
-    check, tags, explain, draw, import_, run, serve, attach, user, accuracy, recover, replay, events, report, plot,
-    view, sweep, optimise, study_,
+    check, schema, tags, explain, draw, import_, run, serve, attach, user, accuracy, recover, replay, events, report,
+    plot, view, sweep, optimise, study_,
 ):  # fmt: skip
     main.add_command(command)

@@ -5,9 +5,10 @@
 nothing of the simulation: a controller knows the line by its inputs alone.
 
 A controller is a dataclass whose fields are its parameters: SI units; belts and photo-eyes by their names in the scene,
-signals and commands by their names in the process image. It returns all its commands in every scan, as a PLC writes its
-outputs. Exceptions state that they return commands only while they act (`jam.JamClearing`, `eye_monitor.EyeMonitor`);
-they precede the others in `scan.priority`. Memory starts empty, so make a new controller for a new run.
+named drives as `drives/<name>`, signals and commands by their names in the process image. It returns all its commands
+in every scan, as a PLC writes its outputs. Exceptions state that they return commands only while they act
+(`jam.JamClearing`, `eye_monitor.EyeMonitor`); they precede the others in `scan.priority`. Memory starts empty, so make
+a new controller for a new run.
 """
 
 from conveyor_sim.control.alarm import Alarm

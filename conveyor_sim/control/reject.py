@@ -11,20 +11,20 @@ from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from conveyor_sim.control.scan import Inputs, require, speed_signal
+from conveyor_sim.control.scan import Inputs, pulses_signal, require, speed_signal
 
 
 @dataclass
 class TrackedReject:
     """Rejecter that fires when a bad bottle is in front of it.
 
-    belt: with the encoder, belts/<belt>/pulses, of `pulses_per_metre`. inspection: the count of bad bottles
-    (machines/<m>/bad). seen: a signal with the time when the last of them was seen (machines/<m>/bad_time), or the last
-    bottle at all (photo_eyes/<e>/rose), s. fire: the command (machines/<r>/fire). distance: from the place where a
-    bottle is seen to the place where it is hit, m. stroke: travel for which `fire` stays on, m. It must exceed the
-    belt's travel in one scan, and be less than the distance of two bottles by two such travels, because the rejecter
-    acts on rising edges. response: time from the end of the scan that fires to the hit, s; compensated by the belt's
-    speed.
+    belt: with the encoder, belts/<belt>/pulses, of `pulses_per_metre`; or its drive, "drives/<name>", if the belt runs
+    at ratio 1. inspection: the count of bad bottles (machines/<m>/bad). seen: a signal with the time when the last of
+    them was seen (machines/<m>/bad_time), or the last bottle at all (photo_eyes/<e>/rose), s. fire: the command
+    (machines/<r>/fire). distance: from the place where a bottle is seen to the place where it is hit, m. stroke: travel
+    for which `fire` stays on, m. It must exceed the belt's travel in one scan, and be less than the distance of two
+    bottles by two such travels, because the rejecter acts on rising edges. response: time from the end of the scan that
+    fires to the hit, s; compensated by the belt's speed.
     """
 
     belt: str
@@ -47,7 +47,7 @@ class TrackedReject:
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
         """Return the command to fire, 0 or 1."""
-        pulses, bad = inputs[f"belts/{self.belt}/pulses"], inputs[self.inspection]
+        pulses, bad = inputs[pulses_signal(self.belt)], inputs[self.inspection]
         speed = inputs[speed_signal(self.belt)] * self.pulses_per_metre
         new = 0 if self._bad is None else round(bad - self._bad)
         self._bad = bad

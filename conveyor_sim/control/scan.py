@@ -226,18 +226,28 @@ def require(condition: bool, text: str) -> None:
 
 
 def speed_command(belt: str) -> str:
-    """Return the command that sets a belt's speed, m/s."""
-    return f"belts/{belt}/cmd_speed"
+    """Return the command that sets a belt's speed, m/s. belt: a belt, or "drives/<name>" for a named drive."""
+    return f"{_tags(belt)}/cmd_speed"
 
 
 def speed_signal(belt: str) -> str:
-    """Return the signal of a belt's actual speed, m/s."""
-    return f"belts/{belt}/speed"
+    """Return the signal of a belt's actual speed, m/s. belt: as in `speed_command`."""
+    return f"{_tags(belt)}/speed"
+
+
+def pulses_signal(belt: str) -> str:
+    """Return the signal of an encoder's count. belt: as in `speed_command`."""
+    return f"{_tags(belt)}/pulses"
 
 
 def eye_signal(eye: str, what: str = "blocked") -> str:
     """Return a signal of a photo-eye: blocked, rose, fell or edges."""
     return f"photo_eyes/{eye}/{what}"
+
+
+def _tags(belt: str) -> str:
+    """Return the prefix of a belt's or drive's tags."""
+    return belt if belt.startswith("drives/") else f"belts/{belt}"
 
 
 def _nearest(name: str, signals: Mapping[str, float]) -> str:

@@ -17,6 +17,7 @@ from conveyor_sim.line.commands.authority import MAY, PEOPLE, unauthorized
 from conveyor_sim.line.commands.forcing import Forcing
 from conveyor_sim.line.commands.inputs import FAULT, INJECT, SET, WATCHDOG, CommandOutcome, Input, normalized
 from conveyor_sim.line.commands.modes import Modes
+from conveyor_sim.line.commands.moved import moved_belts
 from conveyor_sim.line.commands.operation import Operation
 from conveyor_sim.line.commands.read_back import ReadBack
 from conveyor_sim.line.commands.refusal import refusal, shown
@@ -98,6 +99,7 @@ class Line:
         self._owner = {entry.name: device for device in devices for entry in (*device.commands, *device.faults)}
         self._commands = {tag.name: tag for tag in self.image.commands}
         self._faults = {tag.name: tag for tag in self.image.faults}
+        self._moved = moved_belts(self.image.tags)
         objecting = [device for device in devices if type(device).objection is not Device.objection]
         self._objecting = {command.name: device for device in objecting for command in device.commands}
         self._counters = ProductionCounters(devices)
@@ -184,7 +186,7 @@ class Line:
 
     def _set_refusal(self, request: Input) -> str:
         names, values = request.names, request.values
-        if reason := _with_texts(request) or refusal(self._commands, "command", names, values):
+        if reason := _with_texts(request) or refusal(self._commands, "command", names, values, self._moved):
             return reason
         for name, value in zip(names, values, strict=True) if self._objecting else ():
             if name in self._objecting and (reason := self._objecting[name].objection(name, value, self.now)):
@@ -192,7 +194,7 @@ class Line:
         return self._alarms.report_problem(names, values)
 
     def _inject_refusal(self, request: Input) -> str:
-        return _with_texts(request) or refusal(self._faults, FAULT, request.names, request.values)
+        return _with_texts(request) or refusal(self._faults, FAULT, request.names, request.values, self._moved)
 
     def _set(self, request: Input, now: ScanContext) -> None:
         by_hand = self.modes.stops_by_hand(request)

@@ -39,3 +39,12 @@ def of_roles(tags: Sequence[Tag], roles: Sequence[Role]) -> tuple[Tag, ...]:
 def speed_command(belt: str) -> str:
     """Return the name of a belt's speed setpoint, which is also its topic."""
     return f"belts/{belt}/cmd_speed"
+
+
+def speed_topics(belts: Sequence[str], commands: Sequence[str]) -> list[str]:
+    """Return the topics of speed setpoints, of all belts and of named drives, from names of belts and commands.
+
+    Belts that a named drive moves have a topic, too, because a refusal with a reason is better than no answer.
+    """
+    drives = [name for name in commands if name.startswith("drives/") and name.endswith("/cmd_speed")]
+    return [*map(speed_command, belts), *drives]

@@ -1,4 +1,4 @@
-"""Subscriptions that command the line: `commands`, and `belts/<belt>/cmd_speed` for each belt."""
+"""Subscriptions that command the line: `commands`, and `cmd_speed` of each belt and named drive."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from std_msgs.msg import Float64
 from conveyor_sim.bag.messages.qos import Qos
 from conveyor_sim.bag.messages.topics import CMD_SPEED, TOPICS
 from conveyor_sim.line.commands.inputs import SET, Input
-from conveyor_sim.line.process_image import speed_command
+from conveyor_sim.line.process_image import speed_topics
 from conveyor_sim.ros.direct import Aside, take_message
 from conveyor_sim.ros.gaps import Gaps
 from conveyor_sim.ros.publishers import ros_qos
@@ -29,12 +29,12 @@ UNREADABLE = "not readable as {type}, expected its serialized form"
 
 def subscribe_commands(node: Node, stepper: Stepper) -> list[CommandTopic]:
     """Subscribe to commands for a simulation, which checks them at the start of the next tick."""
-    qos = TOPICS["commands"].qos
+    qos, simulation = TOPICS["commands"].qos, stepper.run.session.simulation
     return [
         CommandTopic(node, stepper, "commands", Commands, qos, _commands),
         *(
             CommandTopic(node, stepper, name, Float64, CMD_SPEED.qos, partial(_speed, name))
-            for name in map(speed_command, stepper.run.session.simulation.model.belts)
+            for name in speed_topics(simulation.model.belts, simulation.process_image.command_names)
         ),
     ]
 

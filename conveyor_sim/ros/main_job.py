@@ -50,6 +50,12 @@ def run_in_lockstep(
     """
     file = scene_path(scene_name).resolve()
     scene = load_scene(file, {"duration": duration} if duration is not None else None, outside_tables)
+    driven = [belt for belt in CONTROLLED if belt in scene.belts and scene.belts[belt].drive_name is not None]
+    if driven:
+        raise ConveyorError(
+            f"{file}: belts.{driven[0]} is moved by drives.{scene.belts[driven[0]].drive_name}, expected a belt that "
+            f"the controller can command; without a controller: conveyor-sim run {scene_name}"
+        )
     missing = [belt for belt in CONTROLLED if belt not in scene.belts]
     if missing:
         raise ConveyorError(

@@ -12,7 +12,7 @@ from conveyor_sim.bag.messages.qos import EVENTS, LATCHED, Qos
 from conveyor_sim.bag.reader import Bag
 from conveyor_sim.errors import BagError
 from conveyor_sim.line.commands.inputs import SET
-from conveyor_sim.line.process_image import speed_command
+from conveyor_sim.line.process_image import speed_topics
 from conveyor_sim.line.run_state import REPLAYING, RunState
 from conveyor_sim.support.printable import printable
 
@@ -62,8 +62,9 @@ class Playback:
     """The messages of an open bag by tick: `cue` goes to a tick, `take` then yields tick after tick.
 
     Some topics are not recorded because others hold their content. Playback derives these messages from the recorded
-    ones and publishes them first. Commands come from `outcomes`: on `belts/<belt>/cmd_speed` if they were sent there,
-    else on `commands`, even refused ones. `photo_eyes/<eye>` come from `signals`.
+    ones and publishes them first. Commands come from `outcomes`: on `belts/<belt>/cmd_speed` or
+    `drives/<drive>/cmd_speed` if they were sent there, else on `commands`, even refused ones. `photo_eyes/<eye>` come
+    from `signals`.
     """
 
     def __init__(self, bag: Bag, only: Collection[str] | None = None) -> None:
@@ -93,7 +94,8 @@ class Playback:
         made = [PlayedTopic(RUN_STATE, encode.RUN_STATE, LATCHED, None)]
         if "outcomes" in known and only is None:
             made.append(PlayedTopic("commands", encode.COMMANDS, EVENTS, None))
-            made += [PlayedTopic(speed_command(belt), encode.SPEED, EVENTS, None) for belt in bag.line.belts]
+            speeds = speed_topics(bag.line.belts, bag.line.command_names)
+            made += [PlayedTopic(name, encode.SPEED, EVENTS, None) for name in speeds]
         eyes = _photo_eyes(bag.line.signal_names) if "signals" in known and only is None else {}
         made += [PlayedTopic(eye, encode.BOOL, LATCHED, None) for eye in eyes]
         self.topics = (*recorded, *(topic for topic in made if topic.name not in known))

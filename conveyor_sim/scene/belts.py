@@ -38,7 +38,7 @@ class _Belt(SpeedSetpoint):
 
     material: Name = quantity("Material, as named in `base`.")
     drive: _Drive | None = quantity(
-        "What moves it: a drive of its own, or the name of one from `drives`, which then has the speed, the "
+        "What moves it: a separate drive, or the name of one from `drives`, which then has the speed, the "
         "speed_limits and the watchdog. Left out: it has the commanded speed from one tick to the next.",
         default=None,
     )

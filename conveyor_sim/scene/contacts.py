@@ -6,7 +6,7 @@ from typing import Annotated, Literal, NamedTuple
 from annotated_types import Len
 
 from conveyor_sim.scene.part import Part
-from conveyor_sim.scene.types import Component, NotNegative, Pair, Positive, Restitution, Says, quantity
+from conveyor_sim.scene.types import Component, NotNegative, OrText, Pair, Positive, Restitution, Says, quantity
 
 ELASTIC = ("stiffness", "hertz_stiffness", "table")
 """Fields of a contact that choose an elastic law."""
@@ -37,6 +37,7 @@ DampingEffect = Literal["paper_damping", "normal_damping", "tsuji_damping", "ons
 TablePoints = Annotated[
     tuple[tuple[Component, Component], ...],
     Len(1),
+    OrText(),
     Says("the path of a CSV file with columns overlap and force, or a list of points [overlap, force]"),
 ]
 

@@ -47,7 +47,7 @@ Every number that has a unit below can be a text with a unit: `33 mm`, `90 deg`,
 - Texts are expressions of `+`, `-`, `*`, `/` and parentheses: `2 * (33 mm + 0.5 mm)`. A unit binds first, so
   `1/2 s` is 1/(2 s).
 - A number without a unit takes that of the field: `0.1 + 5 mm` for a length is 0.105 m.
-- An angle is a dimension of its own: divide by `1 rad` to get a plain number.
+- An angle has a separate dimension: divide by `1 rad` to get a plain number.
 - A value of a wrong dimension is refused: `33 mm` for a speed. So is a number without a unit beyond a full turn
   for an angle: `-90` asks whether `-90 deg` was meant.
 - `33 mm` and `0.033` are the same number to the last bit.

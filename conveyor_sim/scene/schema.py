@@ -5,12 +5,12 @@ A scene is read with `load_scene`; `docs/scene.md` is generated from the fields 
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, get_args
 
 from annotated_types import Len
 from pydantic import Discriminator, PrivateAttr, Tag
 
-from conveyor_sim.scene.accuracy import Accuracy
+from conveyor_sim.scene.accuracy import Accuracy, Preset
 from conveyor_sim.scene.belts import Belt
 from conveyor_sim.scene.contacts import Base, Contact
 from conveyor_sim.scene.drives import NamedDrive
@@ -38,6 +38,7 @@ from conveyor_sim.scene.types import (
     Name,
     NotNegative,
     Number,
+    OrText,
     Point,
     Positive,
     Seed,
@@ -192,7 +193,9 @@ class Scene(Part):
         "Scan cycle, in whole nanoseconds: commands act and outputs appear at ticks.", "s", default=0.01
     )
     accuracy: Annotated[
-        Accuracy, Holds('"draft", "standard", "fine", or a mapping with the fields ' + ", ".join(Accuracy.model_fields))
+        Accuracy,
+        OrText(get_args(Preset)),
+        Holds('"draft", "standard", "fine", or a mapping with the fields ' + ", ".join(Accuracy.model_fields)),
     ] = quantity(
         "Accuracy of the integration of a tick: a preset such as `fine`, or a mapping.",
         default=Accuracy.model_construct(),

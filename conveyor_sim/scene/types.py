@@ -13,6 +13,7 @@ from pydantic import (
     BeforeValidator,
     Field,
     GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
     Strict,
     StringConstraints,
 )
@@ -47,6 +48,18 @@ class Says(Holds):
                 raise PydanticCustomError("expected", "{text}", {"text": self.text}) from None
 
         return core_schema.no_info_wrap_validator_function(in_words, handler(source))
+
+
+@dataclass(frozen=True)
+class OrText:
+    """Texts that a field takes beside its values and that are replaced before these are validated."""
+
+    words: tuple[str, ...] = ()
+    """All texts; empty: every text."""
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        text = {"type": "string", **({"enum": list(self.words)} if self.words else {})}
+        return {"anyOf": [text, handler(schema)]}
 
 
 def parse_start_time(value: Any) -> str:

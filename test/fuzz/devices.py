@@ -35,18 +35,39 @@ class Clear(Protocol):
         """Whether bottles of a radius (m) at points touch no rail."""
 
 
+OF_DRIVE = ("speed", "speed_limits", "watchdog")
+"""Fields of a belt that its named drive has instead."""
+
+
 @st.composite
-def drives(draw: st.DrawFn, frame: Frame) -> Data:
-    """The drive of a belt, or none."""
-    if draw(st.integers(0, 2)) == 0:
-        return {}
+def drives(draw: st.DrawFn, frame: Frame, belts: Data) -> Data:
+    """Belts with drives: none, one of their own, or a named one; the fields `belts` and `drives`."""
+    moved, named = {}, {}
+    for n in range(draw(st.integers(0, 2))):
+        first = draw(st.sampled_from(sorted(belts))) if belts else None
+        taken = {field: belts[first][field] for field in OF_DRIVE if field in belts[first]} if first else {}
+        named[f"drive_{n}"] = {**taken, **draw(st.one_of(st.just({}), _drive(frame)))}
+    for name, belt in belts.items():
+        kind = draw(st.integers(0, 3 if named else 2))
+        if kind == 3:
+            rest = {field: value for field, value in belt.items() if field not in OF_DRIVE}
+            ratio = draw(st.sampled_from([{}, {"ratio": 0.5}, {"ratio": 1.3}]))
+            moved[name] = {**rest, "drive": draw(st.sampled_from(sorted(named))), **ratio}
+        else:
+            moved[name] = {**belt, "drive": draw(_drive(frame))} if kind else belt
+    return {"belts": moved, "drives": named} if named else {"belts": moved}
+
+
+@st.composite
+def _drive(draw: st.DrawFn, frame: Frame) -> Data:
+    """Ramps and encoder of a drive."""
     ticks = draw(st.sampled_from([0.5, 3.0, 17.0]))
     drive: Data = {"acceleration": frame.speed / (ticks * frame.tick)}
     if draw(st.booleans()):
         drive["jerk"] = drive["acceleration"] / (frame.tick * draw(st.sampled_from([0.7, 5.0])))
     if draw(st.booleans()):
         drive["pulses_per_metre"] = draw(scaled(0.1, 1e4))
-    return {"drive": drive}
+    return drive
 
 
 @st.composite

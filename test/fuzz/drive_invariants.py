@@ -6,11 +6,12 @@ import math
 from typing import Any
 
 import numpy as np
-from fuzz.inputs import accepted, commands_of, faults_of
+from fuzz.inputs import accepted, commands_of, faults_of, speed_parts
 from fuzz.violation import Violation
 
 from conveyor_sim.line.commands.inputs import CommandOutcome
 from conveyor_sim.line.commands.refusal import shown
+from conveyor_sim.scene.drives import NamedDrive
 from conveyor_sim.simulation import Simulation
 
 
@@ -20,7 +21,14 @@ class ExpectedBelts:
     def __init__(self, simulation: Simulation) -> None:
         self._sim = simulation
         self._commands, self._faults = commands_of(simulation.scene), faults_of(simulation.scene)
-        self._belts = [_Belt(name, belt, simulation.scene.tick) for name, belt in simulation.scene.belts.items()]
+        scene = simulation.scene
+        self._movers = [_Mover(place, part, scene.tick) for place, part in speed_parts(scene)]
+        moves = {mover.place: mover for mover in self._movers}
+        self._moved = [
+            (f"belts/{name}", moves[f"drives/{belt.drive}" if belt.drive_name else f"belts/{name}"], belt.ratio)
+            for name, belt in scene.belts.items()
+        ]
+        """Place, mover and ratio of each belt."""
 
     def check(self, sent: list[tuple[Any, ...]], outcomes: list[CommandOutcome]) -> None:
         """After a tick; sent: names, values, and whether they are faults; outcomes: what was told of them."""
@@ -30,10 +38,12 @@ class ExpectedBelts:
             good = accepted(self._faults if fault else self._commands, names, values)
             told.append((tick, "fault" if fault else "commands", names if good else shown(names), good))
             for name, value in zip(names, values, strict=False) if good else ():
-                for belt in self._belts:
-                    belt.take(name, value, tick)
+                for mover in self._movers:
+                    mover.take(name, value, tick)
         told += [
-            (tick, "watchdog", (f"{belt.place}/cmd_speed",), True) for belt in self._belts if belt.falls_silent(tick)
+            (tick, "watchdog", (f"{mover.place}/cmd_speed",), True)
+            for mover in self._movers
+            if mover.falls_silent(tick)
         ]
         found = [(outcome.tick, outcome.source, outcome.names, outcome.accepted) for outcome in outcomes]
         if found != told:
@@ -42,18 +52,23 @@ class ExpectedBelts:
             raise Violation("outcomes", "a refusal without a reason, or a reason without a refusal")
         speeds = self._sim.belts()
         image = dict(zip(self._sim.process_image.signal_names, self._sim.signals().tolist(), strict=True))
-        for n, belt in enumerate(self._belts):
-            belt.check(float(speeds.commanded[n]), float(speeds.actual[n]), image, self._sim.tick)
+        for mover in self._movers:
+            mover.check(image, self._sim.tick)
+        for n, (place, mover, ratio) in enumerate(self._moved):
+            commanded, actual = float(speeds.commanded[n]), float(speeds.actual[n])
+            if commanded != ratio * mover.setpoint or not actual == image[f"{place}/speed"] == ratio * mover.speed:
+                found = f"{commanded} and {actual} for {ratio} x {mover.setpoint} and {mover.speed} m/s"
+                raise Violation("belts", f"{place}: {found} at tick {self._sim.tick}")
 
 
-class _Belt:
-    """One belt."""
+class _Mover:
+    """A belt without a named drive, or a named drive."""
 
-    def __init__(self, name: str, belt: Any, tick: float) -> None:
-        self.place = f"belts/{name}"
-        self._drive, self._tick = belt.drive, tick
-        self._setpoint = self._speed = belt.speed
-        self._patience = math.inf if belt.watchdog is None else max(1, math.ceil(belt.watchdog / tick - 1e-9))
+    def __init__(self, place: str, part: Any, tick: float) -> None:
+        self.place = place
+        self._drive, self._tick = part if isinstance(part, NamedDrive) else part.drive, tick
+        self.setpoint = self.speed = part.speed
+        self._patience = math.inf if part.watchdog is None else max(1, math.ceil(part.watchdog / tick - 1e-9))
         self._heard, self._silent = 0, False
         self._run, self._reverse, self._reset, self._trip, self._tripped = True, False, False, False, False
 
@@ -63,7 +78,7 @@ class _Belt:
         if place != self.place:
             return
         if what == "cmd_speed":
-            self._setpoint, self._heard, self._silent = value, tick, False
+            self.setpoint, self._heard, self._silent = value, tick, False
         elif what == "run":
             self._run = value == 1.0
         elif what == "reverse":
@@ -80,27 +95,26 @@ class _Belt:
         """Whether its watchdog trips."""
         if self._silent or tick - self._heard < self._patience:
             return False
-        self._setpoint, self._silent = 0.0, True
+        self.setpoint, self._silent = 0.0, True
         return True
 
-    def check(self, commanded: float, actual: float, image: dict[str, float], tick: int) -> None:
-        """Setpoint and speed, and the signals."""
-        if commanded != self._setpoint or image[f"{self.place}/speed"] != actual:
-            raise Violation("belts", f"{self.place}: {commanded} for {self._setpoint} m/s at tick {tick}")
+    def check(self, image: dict[str, float], tick: int) -> None:
+        """Speed, and the signals."""
+        actual, before = image[f"{self.place}/speed"], self.speed
+        self.speed = actual
         if self._drive is None:
-            if actual != self._setpoint:
-                raise Violation("belts", f"{self.place} runs at {actual} for {self._setpoint} m/s at tick {tick}")
+            if actual != self.setpoint:
+                raise Violation("belts", f"{self.place} runs at {actual} for {self.setpoint} m/s at tick {tick}")
             return
-        wanted = 0.0 if not self._run or self._tripped else -self._setpoint if self._reverse else self._setpoint
-        most = self._drive.acceleration * self._tick
+        wanted = 0.0 if not self._run or self._tripped else -self.setpoint if self._reverse else self.setpoint
+        most = math.inf if self._drive.acceleration is None else self._drive.acceleration * self._tick
         if self._drive.jerk is None:
-            expected = self._speed + float(np.clip(wanted - self._speed, -most, most))
+            expected = before + float(np.clip(wanted - before, -most, most))
             wrong = abs(actual - expected) > 1e-9 * max(1.0, abs(wanted))
         else:
-            wrong = abs(actual - self._speed) > most * (1.0 + 1e-9) + 1e-12
+            wrong = abs(actual - before) > most * (1.0 + 1e-9) + 1e-12
         running, at_speed, fault = (image[f"{self.place}/{what}"] for what in ("running", "at_speed", "fault"))
         wrong |= (running, fault) != (self._run and not self._tripped, self._tripped)
         wrong |= at_speed != (abs(actual - wanted) <= 1e-9)
         if wrong:
-            raise Violation("drives", f"{self.place} went from {self._speed} to {actual} m/s, wanted {wanted}: {image}")
-        self._speed = actual
+            raise Violation("drives", f"{self.place} went from {before} to {actual} m/s, wanted {wanted}: {image}")

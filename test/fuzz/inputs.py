@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from conveyor_sim.scene import Scene
+from conveyor_sim.scene.drives import NamedDrive, SpeedSetpoint
 from conveyor_sim.scene.parts.machine import PackmlPart
 from conveyor_sim.scene.parts.reject import Reject
 
@@ -30,13 +31,24 @@ Table = Mapping[str, Input]
 MOVERS = (("gates", "open"), ("pushers", "push"), ("diverters", "divert"))
 
 
+def speed_parts(scene: Scene) -> list[tuple[str, SpeedSetpoint]]:
+    """Named drives, then belts without one, by their tags."""
+    drives = [(f"drives/{name}", drive) for name, drive in scene.drives.items()]
+    return [*drives, *((f"belts/{name}", belt) for name, belt in scene.belts.items() if belt.drive_name is None)]
+
+
+def has_drive(part: SpeedSetpoint) -> bool:
+    """Whether it runs, reverses and trips."""
+    return isinstance(part, NamedDrive) or getattr(part, "drive", None) is not None
+
+
 def commands_of(scene: Scene) -> Table:
     """The commands."""
     table: dict[str, Input] = {}
-    for name, belt in scene.belts.items():
-        table[f"belts/{name}/cmd_speed"] = Input("number", *belt.speed_limits)
-        if belt.drive is not None:
-            table |= {f"belts/{name}/{what}": Input() for what in ("run", "reverse", "reset")}
+    for place, part in speed_parts(scene):
+        table[f"{place}/cmd_speed"] = Input("number", *part.speed_limits)
+        if has_drive(part):
+            table |= {f"{place}/{what}": Input() for what in ("run", "reverse", "reset")}
     for field, order in MOVERS:
         table |= {f"{field}/{name}/{order}": Input() for name in getattr(scene, field)}
     for name, machine in scene.machines.items():
@@ -50,7 +62,7 @@ def commands_of(scene: Scene) -> Table:
 
 def faults_of(scene: Scene) -> Table:
     """The faults."""
-    table = {f"belts/{name}/trip": Input() for name, belt in scene.belts.items() if belt.drive is not None}
+    table = {f"{place}/trip": Input() for place, part in speed_parts(scene) if has_drive(part)}
     for field, _ in MOVERS:
         table |= {f"{field}/{name}/jammed": Input() for name in getattr(scene, field)}
     table |= {f"machines/{name}/stop": Input() for name in scene.machines}

@@ -68,7 +68,7 @@ def scenes(draw: st.DrawFn, family: Family, beyond: bool = True) -> Data:
         spring = {"stiffness": frame.stiffness * draw(between(0.1, 1.0)), "damping": draw(scaled(0.1, 10.0))}
         data["base"] = [{**base, "tangential": spring} for base in data["base"]]
     if family.drives:
-        data["belts"] = {name: {**belt, **draw(drives(frame))} for name, belt in data["belts"].items()}
+        data |= draw(drives(frame, data["belts"]))
     if family.movers:
         data |= draw(movers(frame, STEEL))
     clear = _Clear(data, frame)

@@ -6,6 +6,7 @@ import math
 from typing import Any, cast
 
 import pytest
+from scenes import DRIVEN_LINE
 
 from conveyor_sim.protocols.tags.line_mirror import DrawableProvider
 from conveyor_sim.protocols.tags.tag_provider import SteppedTagProvider
@@ -55,3 +56,19 @@ def test_a_command_out_of_range_is_not_handed_on(source: SteppedTagProvider, val
     source.before_tick()
     source._simulation.advance()
     assert source._simulation.take_outcomes() == []
+
+
+def test_a_named_drive_is_commanded_and_a_command_to_its_belt_is_refused_with_its_name() -> None:
+    source = SteppedTagProvider(Simulation(load_scene(DRIVEN_LINE), threads=1))
+    commands = PageCommands(cast(DrawableProvider, source))
+    reason = commands.do(TEST, {"do": "set", "names": ["belts/feeder/cmd_speed"], "values": [0.1]})
+    assert "drives/m1 moves this belt" in reason
+    assert "drives/m1" in commands.do(OPERATOR, {"do": "mode", "names": ["belts/feeder"], "values": [3]})
+    assert not commands.do(OPERATOR, {"do": "mode", "names": ["drives/m1"], "values": [3]})
+    source.before_tick()
+    source._simulation.advance()
+    source.after_tick()
+    assert not commands.do(OPERATOR, {"do": "set", "names": ["drives/m1/cmd_speed"], "values": [0.1]})
+    source.before_tick()
+    source._simulation.advance()
+    assert source._simulation.belts().commanded.tolist() == [0.2, 0.1, 0.3]

@@ -106,7 +106,7 @@ def commands_message(names: Sequence[str], values: NDArray[np.float64], header: 
 
 
 def speed_message(speed: float) -> bytes:
-    """Return a std_msgs/Float64 with a belt's speed, m/s."""
+    """Return a std_msgs/Float64 with the speed of a belt or drive, m/s."""
     writer = CdrWriter()
     writer.pack("d", speed)
     return writer.finish()

@@ -388,13 +388,21 @@ _ROWS = (
         recorded=False,
         subscribed=True,
     ),
+    Topic(
+        "drives/<drive>/cmd_speed",
+        encode.SPEED,
+        "speed of one named drive, m/s, likewise",
+        qos=EVENTS,
+        recorded=False,
+        subscribed=True,
+    ),
 )
 
 TOPICS: dict[str, Topic] = {topic.name: topic for topic in _ROWS}
 """All topics by name. Within a tick, messages are written in this order."""
 
 CMD_SPEED = TOPICS["belts/<belt>/cmd_speed"]
-"""Row for the speed commands of all belts."""
+"""Row for the speed commands of all belts. Those of named drives have the same quality of service."""
 
 OUTPUTS = {name: topic for name, topic in TOPICS.items() if topic.recorded}
 """Topics that are recorded."""

@@ -20,6 +20,7 @@ from conveyor_sim.line.commands.authority import (
     who,
 )
 from conveyor_sim.line.commands.inputs import DISOWN, MODE, OWN, SET, WRITER_KINDS, Input
+from conveyor_sim.line.commands.moved import moved_belts
 from conveyor_sim.line.commands.operation import Operation
 from conveyor_sim.line.commands.refusal import refusal
 from conveyor_sim.line.device import Device, ScanContext
@@ -63,6 +64,7 @@ class Modes:
         self._device_of = {command.name: device.name for device in commanded for command in device.commands}
         self._tags = tuple(_tag(device) for device in commanded)
         self._table = {tag.device: tag for tag in self._tags}
+        self._moved = moved_belts([tag for device in devices for tag in device.tags])
         self.modes = {device.name: AUTOMATIC for device in commanded}
         self.taken_by = dict.fromkeys(self.modes, "")
         self.owner = ""
@@ -199,7 +201,7 @@ class Modes:
     def _mode_problem(self, request: Input) -> str:
         if request.texts:
             return f"{len(request.texts)} texts given, expected none"
-        if reason := refusal(self._table, "device", request.names, request.values):
+        if reason := refusal(self._table, "device", request.names, request.values, self._moved):
             return reason
         for device, value in zip(request.names, request.values, strict=True):
             wrong = reserved_mode(request.writer_kind, (value, self.modes[device]))

@@ -20,6 +20,7 @@ from conveyor_sim.line.commands.authority import (
     unauthorized,
 )
 from conveyor_sim.line.commands.inputs import DISOWN, FORCE, INJECT, MODE, OWN, SET, UNFORCE, Input
+from conveyor_sim.line.commands.moved import moved_belts
 from conveyor_sim.line.commands.refusal import ALARMS, refusal
 from conveyor_sim.line.tag import COMMANDS, SIGNALS, Tag
 from conveyor_sim.support.printable import printable
@@ -57,6 +58,7 @@ class Receipt:
             FORCE: ("signal", signals),
         }
         """Tags that an operation may name, with the word for one of them, by operation."""
+        self._moved = moved_belts(tags)
         self._counting = {LINE, *(tag.device for tag in tags if tag.device_class in COUNTING)}
 
     def refusal(self, request: Input) -> Refusal | None:
@@ -84,7 +86,7 @@ class Receipt:
     def _table_refusal(self, request: Input) -> Refusal | None:
         what, known = self._tables[request.operation]
         names, values = request.names, request.values
-        if reason := refusal(known, what, names, values):
+        if reason := refusal(known, what, names, values, self._moved):
             return Refusal(_cause(known, what, names, values), reason)
         for device, mode in zip(names, values, strict=True) if request.operation == MODE else ():
             if reserved_mode(request.writer_kind, [mode]) is not None:

@@ -14,10 +14,16 @@ LISTED = 20
 """Largest number of known names that a refusal lists."""
 
 
-def refusal(known: Mapping[str, Tag], what: str, names: Sequence[str], values: Sequence[float]) -> str:
+def refusal(
+    known: Mapping[str, Tag],
+    what: str,
+    names: Sequence[str],
+    values: Sequence[float],
+    moved: Mapping[str, str] | None = None,
+) -> str:
     """Return why a set of inputs can't be applied, "" if it can.
 
-    known: tags by name. what: the word for one of them.
+    known: tags by name. what: the word for one of them. moved: drives of belts (`moved_belts`).
     """
     if len(names) != len(values):
         return f"{len(names)} names and {len(values)} values given, expected the same number of both"
@@ -28,7 +34,8 @@ def refusal(known: Mapping[str, Tag], what: str, names: Sequence[str], values: S
         command = known.get(name)
         if command is None:
             if not name.startswith(ALARMS) or what != "command":
-                return f"{printable(name)}: no such {what}, expected {_listed(list(known))}"
+                reason = _of_drive(name, known, what, moved) if moved else ""
+                return reason or f"{printable(name)}: no such {what}, expected {_listed(list(known))}"
             if wrong := alarm_problem(name, value):
                 return wrong
             continue
@@ -57,6 +64,18 @@ def alarm_problem(name: str, value: float) -> str:
 def shown(names: Sequence[str]) -> tuple[str, ...]:
     """Return names from a client, escaped and shortened for display in a command result."""
     return tuple(map(printable, names))
+
+
+def _of_drive(name: str, known: Mapping[str, Tag], what: str, moved: Mapping[str, str]) -> str:
+    """Return why a name of a belt, or one below it, belongs to its drive; "" for other names."""
+    field, _, rest = name.partition("/")
+    belt, _, tag = rest.partition("/")
+    drive = moved.get(f"{field}/{belt}")
+    if drive is None:
+        return ""
+    of_drive = f"{drive}/{tag}" if tag else drive
+    expected = of_drive if of_drive in known else f"one of {drive}"
+    return f"{printable(name)}: no such {what}, as {drive} moves this belt, expected {expected}"
 
 
 def _listed(known: Sequence[str]) -> str:

@@ -35,7 +35,7 @@ class DrivenBelt(SpeedDevice):
 
 
 def belt_device(name: str, belt: Belt, setup: DeviceSetup) -> Device:
-    """Build a belt, with a drive of its own, moved by a named drive, or without a drive."""
+    """Build a belt: with a separate drive, moved by a named drive, or without a drive."""
     short_name = name.rpartition("/")[2]
     radius = float(setup.model.type_radius.min())
     most = sum(most_inside(shape.outline(), radius) for shape in shapes_of_belt(short_name, belt))

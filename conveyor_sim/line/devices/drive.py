@@ -57,7 +57,7 @@ class Ramp:
 
 
 class DriveDevice(SetpointDevice):
-    """Belt with a drive of its own, or named drive. It runs at the start, at the speed of the scene.
+    """Belt with a separate drive, or named drive. It runs at the start, at the speed of the scene.
 
     A trip ramps it down; it runs again after the fault has ended and `reset` has had a rising edge.
     """

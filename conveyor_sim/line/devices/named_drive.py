@@ -10,7 +10,7 @@ from conveyor_sim.scene.drives import NamedDrive
 
 
 class NamedDriveDevice(DriveDevice):
-    """Drive with a name of its own. Its speed is that of its belts at ratio 1."""
+    """Drive that belts refer to by name. Its speed is that of its belts at ratio 1."""
 
     def __init__(self, name: str, drive: NamedDrive, setup: DeviceSetup) -> None:
         """Build the tags."""

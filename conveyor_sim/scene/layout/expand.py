@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from conveyor_sim.scene.layout.conveyors import ConveyorExpansion, LaidConveyor
+from conveyor_sim.scene.layout.devices import Placement, has_places, is_placed
 from conveyor_sim.scene.layout.faults import LayoutFault
 from conveyor_sim.scene.layout.guides import GuideRail, rails_of_guide
 from conveyor_sim.scene.layout.named import KINDS, NamedParts, numbered
@@ -32,7 +33,7 @@ class Expansion:
 
 def expand(data: dict[str, Any]) -> Expansion:
     """Return a scene without layout parts. Data without such parts are returned as they are."""
-    if not isinstance(data, Mapping) or not any(name in data for name in _FIELDS):
+    if not isinstance(data, Mapping) or not (any(name in data for name in _FIELDS) or has_places(data)):
         return Expansion(data)
     layout = validated(SceneLayout, {name: data[name] for name in _FIELDS if name in data})
     if isinstance(layout, tuple):
@@ -42,7 +43,7 @@ def expand(data: dict[str, Any]) -> Expansion:
     plan = LayoutPlan({name: laid.plan for name, laid in conveyors.laid.items()})
     faults = list(conveyors.faults)
     rails = _rails(layout, data.get("guides", {}), plan, faults)
-    parts = NamedParts()
+    parts, placement = NamedParts(), Placement(plan, layout.conveyors)
     # A dictionary's order is that of the file, and the order of belts and rails is that of their indices.
     for name in data:
         if name == "conveyors":
@@ -53,9 +54,13 @@ def expand(data: dict[str, Any]) -> Expansion:
                 parts.add_rails(guide, layout.guides[guide].material, own)
         elif name in KINDS and isinstance(data[name], Mapping):
             for each, content in data[name].items():
-                parts.add(name, each, content, (name, each))
-    problems = [fault.problem for fault in faults] + parts.problems
-    return Expansion(parts.added_to(data, _FIELDS), plan, parts.sources, problems)
+                if name == "rails" and is_placed(content):
+                    _add_rails(parts, each, content, placement)
+                else:
+                    parts.add(name, each, content, (name, each))
+    expanded = placement.in_coordinates(parts.added_to(data, _FIELDS))
+    problems = [fault.problem for fault in faults] + parts.problems + placement.problems
+    return Expansion(expanded, plan, parts.sources | placement.sources, problems)
 
 
 def _rails(
@@ -86,3 +91,13 @@ def _add_conveyor(parts: NamedParts, name: str, conveyor: Conveyor, laid: LaidCo
         parts.add("plates", plate, {**content, "material": conveyor.plate}, (*path, "plate"))
     if conveyor.guides is not None:
         parts.add_rails(name, conveyor.guides.material, laid.rails)
+
+
+def _add_rails(parts: NamedParts, name: str, rail: Mapping[str, Any], placement: Placement) -> None:
+    """Enter the rails of an entry of `rails` that is placed along a conveyor."""
+    path = ("rails", name)
+    rails = placement.rails(path, rail)
+    other = {field: rail[field] for field in ("material",) if field in rail}
+    for each, (geometry, source) in zip(numbered(name, len(rails)), rails, strict=True):
+        parts.add("rails", each, {**geometry, **other}, path)
+        parts.sources |= {("rails", each, field): source for field in geometry}

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -97,9 +98,9 @@ class Line:
 
 
 @contextmanager
-def serving(role: WriterKind | None) -> Iterator[Line]:
+def serving(role: WriterKind | None, scene: str | Path = "config/scenarios/zoned_line.yaml") -> Iterator[Line]:
     """Serve the line. role: role in which clients write; None: they may not."""
-    simulation = Simulation(load_scene("config/scenarios/zoned_line.yaml"), threads=1)
+    simulation = Simulation(load_scene(scene), threads=1)
     source = SteppedTagProvider(simulation)
     rows = modbus_map(source.info.tags)
     server = ModbusServer(source, rows, role, quota=Quota(idle=LONG))

@@ -1,0 +1,85 @@
+"""JSON Schema (draft 2020-12) of scene files, with which editors complete, document and check them."""
+
+import re
+from collections.abc import Callable
+from typing import Any
+
+from conveyor_sim.scene.quantities import FULL_TURN, example_of
+from conveyor_sim.scene.schema import Scene
+from conveyor_sim.scene.text_patterns import text_pattern
+
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+
+Node = dict[str, Any]
+
+
+def scene_schema() -> Node:
+    """Return the JSON Schema of scene files."""
+    schema = Scene.model_json_schema(by_alias=True)
+    texts: dict[str, Node] = {}
+    for model in (schema, *schema["$defs"].values()):
+        for name, field in model.get("properties", {}).items():
+            model["properties"][name] = _field(field, texts)
+    described: Node = _each(schema, _closed)
+    described["$defs"].update(texts)
+    return {"$schema": DIALECT, "title": "Scene of conveyor-sim", **described}
+
+
+def _field(field: Node, texts: dict[str, Node]) -> Node:
+    """Return the schema of a field, with its unit in the description, and with texts beside its numbers."""
+    kept = {key: value for key, value in field.items() if key not in ("unit", "title", "description", "default")}
+    unit, description = field.get("unit", ""), field.get("description", "")
+    shown = f"{description} ({unit})" if unit not in ("", "1") else description
+    default = {"default": field["default"]} if isinstance(field.get("default"), (str, int, float)) else {}
+    return {"description": shown, **default, **(_with_texts(kept, unit.split(", "), texts) if unit else kept)}
+
+
+def _with_texts(schema: Node, units: list[str], texts: dict[str, Node]) -> Node:
+    """Return a schema that takes texts of quantities wherever it takes numbers.
+
+    units: several for the items of the innermost lists. texts: definitions by name, which grow.
+    """
+    if schema.get("type") in ("number", "integer"):
+        (unit,) = units
+        name = "text_in_" + (re.sub(r"\W+", "_", unit).strip("_") or "any")
+        example = example_of(unit)
+        texts[name] = {"type": "string", "pattern": text_pattern(unit), **({"examples": [example]} if example else {})}
+        turn = {"minimum": -FULL_TURN, "maximum": FULL_TURN} if unit == "rad" else {}
+        return {"anyOf": [{**turn, **schema}, {"$ref": f"#/$defs/{name}"}]}
+    changed = dict(schema)
+    for key in ("anyOf", "oneOf"):
+        if key in schema:
+            changed[key] = [_with_texts(item, units, texts) for item in schema[key]]
+    if "prefixItems" in schema:
+        own = [[unit] for unit in units] if len(units) > 1 else [units] * len(schema["prefixItems"])
+        changed["prefixItems"] = [
+            _with_texts(item, its, texts) for item, its in zip(schema["prefixItems"], own, strict=True)
+        ]
+    for key in ("items", "additionalProperties"):
+        if isinstance(schema.get(key), dict):
+            changed[key] = _with_texts(schema[key], units, texts)
+    if "patternProperties" in schema:
+        items = schema["patternProperties"].items()
+        changed["patternProperties"] = {name: _with_texts(item, units, texts) for name, item in items}
+    return changed
+
+
+def _each(node: Any, change: Callable[[Node], Node]) -> Any:
+    """Return a schema with all mappings in it changed, the inner ones first."""
+    if isinstance(node, dict):
+        return change({key: _each(value, change) for key, value in node.items()})
+    return [_each(item, change) for item in node] if isinstance(node, list) else node
+
+
+def _closed(node: Node) -> Node:
+    """Return a mapping with names of ECMAScript's anchors, and without names that no pattern allows."""
+    if isinstance(node.get("pattern"), str):
+        node["pattern"] = _anchored(node["pattern"])
+    if "patternProperties" in node:
+        node["patternProperties"] = {_anchored(name): value for name, value in node["patternProperties"].items()}
+        node.setdefault("additionalProperties", False)
+    return node
+
+
+def _anchored(pattern: str) -> str:
+    return re.sub(r"\\z$", "$", re.sub(r"^\\A", "^", pattern))

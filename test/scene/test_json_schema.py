@@ -1,0 +1,107 @@
+"""The JSON Schema of scene files takes what is shipped, and refuses faults of types, fields and units."""
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner
+from jsonschema import Draft202012Validator
+from scenes import SHIPPED, shipped_name
+
+from conveyor_sim.cli import main
+from conveyor_sim.scene.json_schema import scene_schema
+from conveyor_sim.scene.quantities import Unconverted, converted
+from conveyor_sim.scene.text_patterns import FORMS, text_pattern
+from conveyor_sim.scene.yaml_lines import Document
+
+HERE = Path(__file__).parent
+GOOD = (HERE / "good.yaml").read_text(encoding="utf-8")
+BAD = Document((HERE / "bad_scenes.yaml").read_text(encoding="utf-8"), "bad_scenes.yaml").data
+UNKNOWN_FIELDS = [case for case in BAD if case["facts"][0] == "no such field"]
+SCHEMA = Draft202012Validator(scene_schema())
+
+
+def read(text: str) -> Any:
+    return Document(text, "scene.yaml").data
+
+
+@pytest.mark.parametrize("path", [*SHIPPED, HERE / "good.yaml"], ids=shipped_name)
+def test_shipped_scenes_are_accepted(path: Path) -> None:
+    assert list(SCHEMA.iter_errors(read(path.read_text(encoding="utf-8")))) == []
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "at"),
+    [
+        ("mass: 0.2", "mass: [0.2]", "$.bottle_types.jar"),
+        ("mass: 0.2", "mass: 33 mm", "$.bottle_types.jar"),
+        ("mass: 0.2", "mass: 33 kgs", "$.bottle_types.jar"),
+        ("mass: 0.2", "mass: '0.2'", "$.bottle_types.jar"),
+        ("mass: 0.2", "mass: true", "$.bottle_types.jar"),
+        ("mass: 0.2", "mass: 0.2, weight: 1", "$.bottle_types.jar"),
+        ("duration: 1.0", "duration: 1 m/s", "$.duration"),
+        ("duration: 1.0", "duration: -1", "$.duration"),
+        ("duration: 1.0", "duration: 1.0\nwidths: 2", "$"),
+        ("duration: 1.0", "", "$"),
+        ("angle: 0 deg", "angle: -90", "$.belts.feeder"),
+        ("angle: 0 deg", "angle: 5 s", "$.belts.feeder"),
+        ("angle: 0 deg", "angel: 0 deg", "$.belts.feeder"),
+        ("from: [0, 0]", "from: [0]", "$.rails.side"),
+        ("from: [0, 0]", "from: [0, 2 kg]", "$.rails.side"),
+        ("kind: segment", "kind: line", "$.rails.side"),
+        ("rows: 2", "rows: 2.5", "$.bottles[1]"),
+    ],
+)
+def test_faults_of_types_fields_and_units_are_refused(old: str, new: str, at: str) -> None:
+    assert old in GOOD
+    errors = list(SCHEMA.iter_errors(read(GOOD.replace(old, new, 1))))
+    assert [error.json_path for error in errors if error.json_path.startswith(at)]
+
+
+@pytest.mark.parametrize("case", UNKNOWN_FIELDS, ids=lambda case: case["id"])
+def test_unknown_fields_are_refused(case: dict[str, Any]) -> None:
+    assert not SCHEMA.is_valid(json.loads(json.dumps(read(GOOD.replace(case["old"], case["new"], 1)))))
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("mass: 0.2", "mass: 200 g"),
+        ("mass: 0.2", "mass: 2 * heavy + 1 kg"),
+        ("duration: 1.0", "duration: 1 min"),
+        ("rows: 2", "rows: 4 / 2"),
+        ("from: [0, 0]", "from: [0, -gap/2]"),
+        ("duration: 1.0", "duration: 1.0\naccuracy: fine"),
+        ("duration: 1.0", "duration: 1.0\nfloor: none"),
+    ],
+)
+def test_texts_and_words_are_accepted(old: str, new: str) -> None:
+    assert list(SCHEMA.iter_errors(read(GOOD.replace(old, new, 1)))) == []
+
+
+@pytest.mark.parametrize("unit", FORMS)
+def test_patterns_take_single_quantities_as_the_reader_does(unit: str) -> None:
+    texts = [f"24 000 {form.removeprefix('1')}" for form in FORMS] + ["24 000", "1e3 m", "2", "-2.5 deg", "3 mm/min"]
+    for text in texts:
+        for field in ("m", "m/s", "N m", "1", unit if unit != "%" else "1"):
+            read = not isinstance(converted(text, field), Unconverted)
+            assert (re.search(text_pattern(field), text) is not None) == read, (text, field)
+
+
+def test_fields_have_descriptions_units_and_examples() -> None:
+    schema = scene_schema()
+    length = schema["$defs"]["StraightBelt"]["properties"]["length"]
+    assert length["description"].endswith("(m)")
+    assert schema["$defs"]["text_in_m"]["examples"] == ["33 mm"]
+    for model in (schema, *schema["$defs"].values()):
+        assert all(field["description"] for field in model.get("properties", {}).values())
+
+
+def test_the_command_prints_a_valid_schema() -> None:
+    result = CliRunner().invoke(main, ["schema"])
+    assert result.exit_code == 0
+    printed = json.loads(result.output)
+    Draft202012Validator.check_schema(printed)
+    assert printed == json.loads(json.dumps(scene_schema()))
