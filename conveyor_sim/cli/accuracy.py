@@ -40,6 +40,8 @@ def accuracy(
         raise ConveyorError("accuracy: scipy is not installed, expected it (pip install 'conveyor_sim[accuracy]')")
     if not 0.0 < tolerance <= 0.5:
         raise ConveyorError(f"--tolerance: {tolerance:g} given, expected a number greater than 0, at most 0.5")
+    if write and options.are_choices:
+        raise ConveyorError("--apply: given with --set, --variant or --format, expected none: the copy would lack them")
     with held_back():
         from conveyor_sim.accuracy.effort import DEFAULT, THOROUGH
         from conveyor_sim.accuracy.report.apply import apply

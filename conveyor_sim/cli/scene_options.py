@@ -28,6 +28,11 @@ class SceneOptions:
     format: str | None = None
     outside_tables: bool = False
 
+    @property
+    def are_choices(self) -> bool:
+        """True if parameters, a variant or a format are chosen."""
+        return bool(self.settings or self.variant or self.format)
+
     def load(self, scene: str, duration: float | None = None) -> Scene:
         """Read a scene file or a shipped scene. duration: simulated time (s) in place of the scene's.
 
