@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, ClassVar, Literal
 
-from annotated_types import Len
 from pydantic import Discriminator, SerializerFunctionWrapHandler, Tag, model_serializer
 
 from conveyor_sim.scene.areas import TURN_TEXT, CurvedArea, StraightArea, Turn
@@ -116,6 +115,9 @@ BeltSurface = Annotated[
 ]
 
 
+_SURFACES = "a list of surfaces, at least one"
+
+
 class PathBelt(_Belt):
     """Several surfaces that move together: pieces one behind the other, or lanes side by side.
 
@@ -123,9 +125,15 @@ class PathBelt(_Belt):
     """
 
     kind: Literal["path"] = quantity("The kind of belt.")
-    surfaces: Annotated[tuple[BeltSurface, ...], Len(1), Holds("a list of surfaces, at least one")] = quantity(
+    surfaces: Annotated[tuple[BeltSurface, ...], Holds(_SURFACES)] = quantity(
         "Its surfaces, along travel. Where they overlap, the last listed carries."
     )
+
+    def problems(self, path: Path, others: Others) -> Iterator[Problem]:
+        """Yield problems of every belt, and one without surfaces."""
+        yield from super().problems(path, others)
+        if not self.surfaces:  # a minimum length of the field would also report lists whose entries are all invalid
+            yield Problem((*path, "surfaces"), f"[] given, expected {_SURFACES}")
 
 
 Belt = Annotated[

@@ -2,8 +2,13 @@
 
 import re
 from collections.abc import Callable
-from typing import Any
+from typing import Any, cast
 
+from pydantic.json_schema import models_json_schema
+
+from conveyor_sim.scene.layout.cells import WITH_PORTS
+from conveyor_sim.scene.layout.language_schema import NAME_OR_PORT, language_fields
+from conveyor_sim.scene.layout.parts import Conveyor, SceneLayout
 from conveyor_sim.scene.quantities import FULL_TURN, example_of
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.scene.text_patterns import text_pattern
@@ -14,15 +19,32 @@ Node = dict[str, Any]
 
 
 def scene_schema() -> Node:
-    """Return the JSON Schema of scene files."""
-    schema = Scene.model_json_schema(by_alias=True)
+    """Return the JSON Schema of scene files. It holds for cell files, too."""
+    _, both = models_json_schema([(Scene, "validation"), (SceneLayout, "validation")], by_alias=True)
+    definitions: dict[str, Node] = both["$defs"]
     texts: dict[str, Node] = {}
-    for model in (schema, *schema["$defs"].values()):
+    for model in definitions.values():
         for name, field in model.get("properties", {}).items():
             model["properties"][name] = _field(field, texts)
-    described: Node = _each(schema, _closed)
-    described["$defs"].update(texts)
-    return {"$schema": DIALECT, "title": "Scene of conveyor-sim", **described}
+            if name in WITH_PORTS:
+                model["properties"][name] = _with_ports(model["properties"][name])
+    scene, layout = definitions.pop(Scene.__name__), definitions.pop(SceneLayout.__name__)
+    fields = {**scene["properties"], **layout["properties"]}
+    language = language_fields(definitions[Conveyor.__name__], fields)
+    closed: Node = _each({**scene, "properties": {**fields, **language}, "$defs": {**definitions, **texts}}, _closed)
+    # Other files may hold the fields that a scene needs.
+    required = [closed.pop("required"), ["include"], ["ports"]]
+    title = "Scene of conveyor-sim"
+    return {"$schema": DIALECT, **closed, "title": title, "anyOf": [{"required": names} for names in required]}
+
+
+def _with_ports(schema: Node) -> Node:
+    """Return the schema of a name of a conveyor, or several, which takes a port of a cell in place of each."""
+
+    def change(node: Node) -> Node:
+        return {**node, "pattern": NAME_OR_PORT} if "pattern" in node else node
+
+    return cast(Node, _each(schema, change))
 
 
 def _field(field: Node, texts: dict[str, Node]) -> Node:

@@ -9,6 +9,8 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from conveyor_sim.scene import accuracy, belts, contacts, drives, failures, limits, schema
+from conveyor_sim.scene.layout import parts
+from conveyor_sim.scene.layout.devices import PLACEABLE
 from conveyor_sim.scene.parts import machine, station
 from conveyor_sim.scene.units import UNITS
 from conveyor_sim.scene.words import expectation, field_names, in_yaml
@@ -93,6 +95,19 @@ BEHIND: dict[str, list[tuple[str, type[BaseModel]]]] = {
 """Sections that follow those of a mapping's parts."""
 
 
+LAYOUT: list[tuple[str, type[BaseModel]]] = [
+    ("The whole file: layout", parts.SceneLayout),
+    ("An entry of `conveyors`", parts.Conveyor),
+    ("An entry of `path` of a conveyor", parts.Move),
+    ("An entry of `lanes` of a conveyor", parts.ConveyorLane),
+    ("An entry of `sections` of a conveyor", parts.ConveyorSection),
+    ("`guides` of a conveyor", parts.ConveyorGuides),
+    ("An entry of `guides`", parts.Guide),
+    ("`open` of guides", parts.Openings),
+]
+"""Sections of the layout, which becomes belts and rails."""
+
+
 def sections() -> Iterator[tuple[str, type[BaseModel]]]:
     """Yield title and model of each section, in the order of the fields of a scene."""
     yield "The whole file", schema.Scene
@@ -103,6 +118,17 @@ def sections() -> Iterator[tuple[str, type[BaseModel]]]:
             of_kind = "" if kind is None else f": `kind: {get_args(kind.annotation)[0]}`"
             yield f"An entry of `{name}`{of_kind}", model
         yield from BEHIND.get(name, [])
+    yield from LAYOUT
+    yield from _places()
+
+
+def _places() -> Iterator[tuple[str, type[BaseModel]]]:
+    """Yield title and model of the places along conveyors; kinds with the same fields are one section."""
+    titles: dict[type[BaseModel], list[str]] = {}
+    for kind in PLACEABLE:
+        field = f"`{kind.within}` of `{kind.field}`" if kind.within else f"`{kind.field}`"
+        titles.setdefault(kind.place, []).append(field + (f" of `kind: {kind.kind}`" if kind.kind else ""))
+    yield from ((f"Along a conveyor: {', '.join(dict.fromkeys(texts))}", model) for model, texts in titles.items())
 
 
 def _models(annotation: Any) -> Iterator[type[BaseModel]]:

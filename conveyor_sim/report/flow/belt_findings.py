@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from conveyor_sim.report.flow.finding import Finding, at, in_mm
-from conveyor_sim.report.flow.surfaces import NONE, FlowSurface, under
+from conveyor_sim.report.flow.surfaces import NONE, SurfaceMap
 from conveyor_sim.report.flow.trace import Leg
 from conveyor_sim.scene.geometry import Array
 from conveyor_sim.scene.schema import Scene
@@ -24,7 +24,7 @@ GAP_AHEAD = 0.5
 """m beyond a belt at which the far side of a transfer gap is looked for."""
 
 
-def opposed_belts(surfaces: Sequence[FlowSurface]) -> Iterator[Finding]:
+def opposed_belts(surfaces: SurfaceMap) -> Iterator[Finding]:
     """Yield a finding for each belt whose travel opposes that of the belt before or after it."""
     against: dict[int, set[int]] = {index: set() for index in range(len(surfaces))}
     for index in range(len(surfaces)):
@@ -40,7 +40,7 @@ def opposed_belts(surfaces: Sequence[FlowSurface]) -> Iterator[Finding]:
             against[other].discard(fault)
 
 
-def _opposed(surfaces: Sequence[FlowSurface], index: int) -> Iterator[int]:
+def _opposed(surfaces: SurfaceMap, index: int) -> Iterator[int]:
     """Yield the belts next to both ends of a belt that oppose it."""
     if surfaces[index].rests:
         return
@@ -48,7 +48,7 @@ def _opposed(surfaces: Sequence[FlowSurface], index: int) -> Iterator[int]:
     for end, before in ((middle[-1], middle[-2]), (middle[0], middle[1])):
         outward = (end - before) / max(float(np.hypot(*(end - before))), 1e-12)
         probes = end + np.array(NEXT_TO)[:, None] * outward
-        carriers = [int(carrier) for carrier in under(surfaces, probes)]
+        carriers = [int(carrier) for carrier in surfaces.under(probes)]
         beyond = next(((n, carrier) for n, carrier in enumerate(carriers) if carrier not in (NONE, index)), None)
         if beyond is None:
             continue
@@ -59,7 +59,7 @@ def _opposed(surfaces: Sequence[FlowSurface], index: int) -> Iterator[int]:
             yield other
 
 
-def backward_belts(scene: Scene, surfaces: Sequence[FlowSurface]) -> Iterator[Finding]:
+def backward_belts(scene: Scene, surfaces: SurfaceMap) -> Iterator[Finding]:
     """Yield a note that names the belts with a negative speed."""
     backwards = [surface for surface in surfaces if surface.speed < 0.0]
     if backwards:
@@ -79,7 +79,7 @@ def watchdogs(scene: Scene) -> Iterator[Finding]:
                 yield Finding((field, name, "watchdog"), text)
 
 
-def transfer_gaps(scene: Scene, surfaces: Sequence[FlowSurface], legs: Sequence[Leg]) -> Iterator[Finding]:
+def transfer_gaps(scene: Scene, surfaces: SurfaceMap, legs: Sequence[Leg]) -> Iterator[Finding]:
     """Yield a finding for each gap between two belts that is wider than half the base of a bottle that crosses it."""
     seen: set[tuple[int, int]] = set()
     for leg in legs:
@@ -95,7 +95,7 @@ def transfer_gaps(scene: Scene, surfaces: Sequence[FlowSurface], legs: Sequence[
                 yield Finding(surfaces[second].path, text)
 
 
-def _gaps(surfaces: Sequence[FlowSurface], leg: Leg) -> Iterator[tuple[int, int, float, tuple[float, float]]]:
+def _gaps(surfaces: SurfaceMap, leg: Leg) -> Iterator[tuple[int, int, float, tuple[float, float]]]:
     """Yield gaps on the way of a bottle: surfaces before and after, width (m), beginning (m)."""
     off = leg.carriers == NONE
     for place in np.flatnonzero(off[1:] & ~off[:-1]) + 1:
@@ -109,7 +109,7 @@ def _gaps(surfaces: Sequence[FlowSurface], leg: Leg) -> Iterator[tuple[int, int,
             along = leg.points[place] - leg.points[place - 1]
             along = along / max(float(np.hypot(*along)), 1e-12)
             ahead = before + np.arange(0.002, GAP_AHEAD, 0.002)[:, None] * along
-            carriers = under(surfaces, ahead)
+            carriers = surfaces.under(ahead)
             if not (carriers != NONE).any():
                 continue
             first_on = int(np.argmax(carriers != NONE))
@@ -118,11 +118,11 @@ def _gaps(surfaces: Sequence[FlowSurface], leg: Leg) -> Iterator[tuple[int, int,
         yield int(leg.carriers[place - 1]), second, gap, (float(before[0]), float(before[1]))
 
 
-def _edge(surfaces: Sequence[FlowSurface], on: Array, off: Array) -> Array:
+def _edge(surfaces: SurfaceMap, on: Array, off: Array) -> Array:
     """Return the point between a point on the belts and one beside them where the belts end."""
     for _ in range(40):
         middle = 0.5 * (on + off)
-        if under(surfaces, middle[None])[0] == NONE:
+        if surfaces.under(middle[None])[0] == NONE:
             off = middle
         else:
             on = middle

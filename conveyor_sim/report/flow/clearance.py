@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from conveyor_sim.report.flow.guides import Guides, left_of
-from conveyor_sim.report.flow.surfaces import NONE, FlowSurface, Indices, Mask, under
+from conveyor_sim.report.flow.surfaces import NONE, Indices, Mask, SurfaceMap
 from conveyor_sim.report.flow.trace import Leg
 from conveyor_sim.scene.geometry import Array
 
@@ -62,7 +61,7 @@ class Clearance:
         return wide
 
 
-def clearance(leg: Leg, surfaces: Sequence[FlowSurface], guides: Guides) -> Clearance | None:
+def clearance(leg: Leg, surfaces: SurfaceMap, guides: Guides) -> Clearance | None:
     """Return the samples of a leg; None for a bottle that has not moved by its radius."""
     ways = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(leg.points, axis=0).T))])
     if ways[-1] < leg.radius:
@@ -82,20 +81,20 @@ def clearance(leg: Leg, surfaces: Sequence[FlowSurface], guides: Guides) -> Clea
         np.interp(marks, ways, leg.times),
         points,
         directions,
-        under(surfaces, points),
+        surfaces.under(points),
         np.array([guides.distance(points, side) for side in (-left, left)]),
         np.array([_edges(points, side, surfaces, leg.radius) for side in (-left, left)]),
     )
 
 
-def _edges(points: Array, directions: Array, surfaces: Sequence[FlowSurface], radius: float) -> Array:
+def _edges(points: Array, directions: Array, surfaces: SurfaceMap, radius: float) -> Array:
     """Return the distance (k,) from points along directions to the edge of the belts side by side, to half a radius."""
     reach = min(WIDEST, max((surface.shape.width for surface in surfaces), default=0.0) * 2.0)
     offsets = np.arange(0.0, reach + radius, SPACING * radius)
     every = max(1, round(1.0 / SPACING))  # a sample per radius is enough for edges
     some = np.unique(np.append(np.arange(0, len(points), every), len(points) - 1))
     probes = points[some, None, :] + offsets[None, :, None] * directions[some, None, :]
-    on = (under(surfaces, probes.reshape(-1, 2)) != NONE).reshape(len(some), len(offsets))
+    on = (surfaces.under(probes.reshape(-1, 2)) != NONE).reshape(len(some), len(offsets))
     # The first offset beyond the belts; a seam between two belts is no edge.
     on[:, :-1] |= on[:, 1:]
     first_off = np.where(on.all(axis=1), len(offsets) - 1, np.argmin(on, axis=1))

@@ -21,6 +21,8 @@ def flow_table(scene: Scene, flow: LineFlow) -> RenderableType:
     for route in flow.routes:
         way = " -> ".join(printable(dotted(stop)) for stop in route.stops)
         end = "" if route.last.end == "exit" else ending(route.last, flow.surfaces)
+        if route.traced is not None:
+            end = f"{end} (estimated by belt speeds after {route.traced:.3g} m)".strip()
         routes.add_row(way, f"{route.seconds:.2f}", f"{route.length:.2f}", end)
     stretches = Table(box=SIMPLE)
     for heading in ("stretch", "", "length (m)", "width (m)", "bottles", "bottles/s"):

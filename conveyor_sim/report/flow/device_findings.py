@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from conveyor_sim.report.flow.finding import Finding, at
-from conveyor_sim.report.flow.surfaces import NONE, FlowSurface, under
+from conveyor_sim.report.flow.surfaces import NONE, SurfaceMap
 from conveyor_sim.report.flow.trace import Leg
 from conveyor_sim.scene.geometry import Array
 from conveyor_sim.scene.moving import movers_of, moving_shape
@@ -29,13 +29,13 @@ OPPOSED = -0.5
 """Largest cosine between a bottle's first direction and that of its belt at which they oppose each other."""
 
 
-def devices_beside(scene: Scene, surfaces: Sequence[FlowSurface]) -> Iterator[Finding]:
+def devices_beside(scene: Scene, surfaces: SurfaceMap) -> Iterator[Finding]:
     """Yield a finding for each device that stands on no belt. Scenes without belts have none."""
     if not surfaces:
         return
     for path, part in scene.devices():
         for points in _footprints(part):
-            if (under(surfaces, points) == NONE).all():
+            if (surfaces.under(points) == NONE).all():
                 middle = points.mean(axis=0)
                 yield Finding(path, f"stands on no belt: none is at {at((middle[0], middle[1]))}")
                 break
@@ -48,7 +48,7 @@ def devices_beside(scene: Scene, surfaces: Sequence[FlowSurface]) -> Iterator[Fi
             yield Finding(place_of, f"stands beside all belts: none is at {at((middle[0], middle[1]))}")
 
 
-def devices_reversed(scene: Scene, surfaces: Sequence[FlowSurface], legs: Sequence[Leg]) -> Iterator[Finding]:
+def devices_reversed(scene: Scene, surfaces: SurfaceMap, legs: Sequence[Leg]) -> Iterator[Finding]:
     """Yield a finding for each counter, inspection and entry against the direction of travel."""
     for path, part in scene.devices():
         if isinstance(part, (Counter, Inspection)):
@@ -61,9 +61,9 @@ def devices_reversed(scene: Scene, surfaces: Sequence[FlowSurface], legs: Sequen
             yield from _entry_reversed(path, part, surfaces)
 
 
-def _entry_reversed(path: Path, part: Giver, surfaces: Sequence[FlowSurface]) -> Iterator[Finding]:
+def _entry_reversed(path: Path, part: Giver, surfaces: SurfaceMap) -> Iterator[Finding]:
     place = np.array([part.position])
-    carrier = int(under(surfaces, place)[0])
+    carrier = int(surfaces.under(place)[0])
     if carrier == NONE:
         return
     direction = np.array([math.cos(part.heading[0]), math.sin(part.heading[0])])
@@ -71,14 +71,14 @@ def _entry_reversed(path: Path, part: Giver, surfaces: Sequence[FlowSurface]) ->
         yield Finding((*path, "direction"), f"against the direction of travel of {surfaces[carrier].name}")
 
 
-def _travel(start: XY, end: XY, surfaces: Sequence[FlowSurface], legs: Sequence[Leg]) -> Array | None:
+def _travel(start: XY, end: XY, surfaces: SurfaceMap, legs: Sequence[Leg]) -> Array | None:
     """Return the direction in which bottles cross a line: of the first leg that does, else of the belt below."""
     for leg in legs:
         crossing = _crossing(leg.points, np.array(start), np.array(end))
         if crossing is not None:
             return crossing
     points = _line(start, end)
-    carriers = under(surfaces, points)
+    carriers = surfaces.under(points)
     on = np.flatnonzero(carriers != NONE)
     if not on.size:
         return None
@@ -122,9 +122,9 @@ def _area(region: Sequence[XY]) -> Array:
     return np.vstack([*sides, grid[inside(grid, corners)]])
 
 
-def _near(surfaces: Sequence[FlowSurface], points: Array, reach: float) -> bool:
+def _near(surfaces: SurfaceMap, points: Array, reach: float) -> bool:
     """Return True if a belt is at points (k, 2), or within reach of one."""
     turns = np.linspace(0.0, 2.0 * math.pi, 9)[:-1]
     around = reach * np.column_stack([np.cos(turns), np.sin(turns)])
     probes = np.vstack([points, (points[:, None, :] + around[None, :, :]).reshape(-1, 2)])
-    return bool((under(surfaces, probes) != NONE).any())
+    return bool((surfaces.under(probes) != NONE).any())

@@ -10,7 +10,7 @@ from conveyor_sim.report.flow.clearance import Clearance
 from conveyor_sim.report.flow.finding import Finding, at
 from conveyor_sim.report.flow.routes import TransitRoute
 from conveyor_sim.report.flow.stretches import feed_rate
-from conveyor_sim.report.flow.surfaces import NONE, FlowSurface
+from conveyor_sim.report.flow.surfaces import NONE, SurfaceMap
 from conveyor_sim.report.flow.trace import Leg
 from conveyor_sim.scene.parts.machine import TakingPart
 from conveyor_sim.scene.parts.outfeed import Outfeed
@@ -27,7 +27,7 @@ def has_exit(scene: Scene) -> bool:
     return any(isinstance(part, (Outfeed, Sink)) for _, part in scene.exits())
 
 
-def unreached_exits(scene: Scene, surfaces: Sequence[FlowSurface], routes: Sequence[TransitRoute]) -> Iterator[Finding]:
+def unreached_exits(scene: Scene, surfaces: SurfaceMap, routes: Sequence[TransitRoute]) -> Iterator[Finding]:
     """Yield a finding for each entry from which a bottle reaches no exit, if the scene has one."""
     for route in routes if has_exit(scene) else ():
         if route.last.end not in ("exit", "cap"):
@@ -35,7 +35,7 @@ def unreached_exits(scene: Scene, surfaces: Sequence[FlowSurface], routes: Seque
             yield Finding(route.entry, text)
 
 
-def ending(leg: Leg, surfaces: Sequence[FlowSurface]) -> str:
+def ending(leg: Leg, surfaces: SurfaceMap) -> str:
     """Return the end of a leg without an exit, in words."""
     belt = "" if leg.last_carrier == NONE else f" {surfaces[leg.last_carrier].name}"
     place = at(leg.last)
@@ -51,7 +51,7 @@ def ending(leg: Leg, surfaces: Sequence[FlowSurface]) -> str:
 
 
 def perfect_columns(
-    scene: Scene, surfaces: Sequence[FlowSurface], legs: Sequence[Leg], clearances: Sequence[Clearance | None]
+    scene: Scene, surfaces: SurfaceMap, legs: Sequence[Leg], clearances: Sequence[Clearance | None]
 ) -> Iterator[Finding]:
     """Yield a finding for each entry without scatter whose bottles queue in one exact line in a wide place."""
     for leg, samples in zip(legs, clearances, strict=True):
@@ -87,7 +87,7 @@ def _straight(leg: Leg, carrier: int) -> bool:
     return float(np.abs(across).max()) <= STRAIGHT
 
 
-def _queues(scene: Scene, leg: Leg, surfaces: Sequence[FlowSurface], carrier: int) -> bool:
+def _queues(scene: Scene, leg: Leg, surfaces: SurfaceMap, carrier: int) -> bool:
     """Return True if bottles of a leg meet on a belt: it is too slow for them, or they wait at its end."""
     rate = feed_rate(scene, leg.start.path)
     if rate > abs(surfaces[carrier].running) / (2.0 * leg.radius) > 0.0:

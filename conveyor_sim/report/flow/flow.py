@@ -13,7 +13,7 @@ from conveyor_sim.report.flow.guide_findings import guide_gaps, narrow_passages
 from conveyor_sim.report.flow.guides import Guides
 from conveyor_sim.report.flow.routes import TransitRoute, routes_of
 from conveyor_sim.report.flow.stretches import Bottleneck, Stretch, bottleneck, stretches_of
-from conveyor_sim.report.flow.surfaces import FlowSurface, surfaces_of
+from conveyor_sim.report.flow.surfaces import SurfaceMap, surfaces_of
 from conveyor_sim.report.flow.trace import trace
 from conveyor_sim.report.flow.trace_scene import guide_pieces
 from conveyor_sim.scene.schema import Scene
@@ -23,7 +23,7 @@ from conveyor_sim.scene.schema import Scene
 class LineFlow:
     """Flow of bottles through a scene."""
 
-    surfaces: tuple[FlowSurface, ...]
+    surfaces: SurfaceMap
     routes: tuple[TransitRoute, ...]
     stretches: tuple[Stretch, ...]
     bottleneck: Bottleneck | None

@@ -11,7 +11,7 @@ import numpy as np
 from conveyor_sim.report.flow.clearance import Clearance
 from conveyor_sim.report.flow.finding import Finding, at, in_mm
 from conveyor_sim.report.flow.guides import Guides, left_of
-from conveyor_sim.report.flow.surfaces import NONE, FlowSurface, under
+from conveyor_sim.report.flow.surfaces import NONE, SurfaceMap
 from conveyor_sim.report.flow.trace import Leg
 from conveyor_sim.scene.geometry import Array, RailShape, rail_shapes
 from conveyor_sim.scene.moving import movers_of, moving_shape
@@ -37,7 +37,7 @@ PLAY = 1e-4
 
 def guide_gaps(
     scene: Scene,
-    surfaces: Sequence[FlowSurface],
+    surfaces: SurfaceMap,
     guides: Guides,
     legs: Sequence[Leg],
     clearances: Sequence[Clearance | None],
@@ -73,9 +73,7 @@ def guide_gaps(
                 yield Finding(_rail_path(scene, rails, start), text)
 
 
-def narrow_passages(
-    scene: Scene, surfaces: Sequence[FlowSurface], guides: Guides, legs: Sequence[Leg]
-) -> Iterator[Finding]:
+def narrow_passages(scene: Scene, surfaces: SurfaceMap, guides: Guides, legs: Sequence[Leg]) -> Iterator[Finding]:
     """Yield a finding for each passage in which a bottle stops because it is too narrow."""
     rails = rail_shapes(scene)
     seen: list[Array] = []
@@ -118,14 +116,14 @@ def _end_of_guide(samples: Clearance, side: int, guided: int, open_: int, guides
     return end if math.dist(end, seen) < samples.radius else seen
 
 
-def _narrowest(leg: Leg, surfaces: Sequence[FlowSurface], guides: Guides) -> tuple[float, Array, Array]:
+def _narrowest(leg: Leg, surfaces: SurfaceMap, guides: Guides) -> tuple[float, Array, Array]:
     """Return the least width (m) between guides ahead of a bottle that has stopped, its place and a point of a guide.
 
     The place follows the middle between the guides.
     """
     place, best = leg.points[-1].copy(), (math.inf, leg.points[-1], leg.points[-1])
     for _ in range(round(LOOK_AHEAD / (STEP * leg.radius))):
-        carrier = int(under(surfaces, place[None])[0])
+        carrier = int(surfaces.under(place[None])[0])
         if carrier == NONE:
             break
         along = surfaces[carrier].heading(place[None])

@@ -120,7 +120,8 @@ def _group(scene: Scene, flow: LineFlow, routes: Sequence[TransitRoute]) -> str:
     seconds = sorted(route.seconds for route in routes)
     time = f"{seconds[0]:.3g} s" if seconds[-1] - seconds[0] < 0.05 else f"{seconds[0]:.3g} to {seconds[-1]:.3g} s"
     if first.last.end == "exit":
-        return f"{way}: transit {time} over {first.length:.3g} m"
+        estimate = "" if first.traced is None else f", after {first.traced:.3g} m by belt speeds"
+        return f"{way}: transit {time} over {first.length:.3g} m{estimate}"
     text = f"{way}: a lone bottle {ending(first.last, flow.surfaces)} after {time}"
     return text if has_exit(scene) else f"{text}; no exit"
 

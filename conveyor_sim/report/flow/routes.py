@@ -40,6 +40,11 @@ class TransitRoute:
         return sum(leg.seconds for leg in self.legs) + self.cycles
 
     @property
+    def traced(self) -> float | None:
+        """Way in m after which a leg is estimated by the speeds of the belts; None if all are traced."""
+        return next((leg.traced for leg in self.legs if leg.traced is not None), None)
+
+    @property
     def length(self) -> float:
         """Way on the line, m."""
         return sum(leg.length for leg in self.legs)

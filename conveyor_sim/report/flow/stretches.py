@@ -11,7 +11,7 @@ import numpy as np
 
 from conveyor_sim.report.flow.clearance import SPACING, Clearance
 from conveyor_sim.report.flow.routes import TransitRoute
-from conveyor_sim.report.flow.surfaces import NONE, FlowSurface, Indices, Mask
+from conveyor_sim.report.flow.surfaces import NONE, Indices, Mask, SurfaceMap
 from conveyor_sim.report.flow.trace import Leg
 from conveyor_sim.scene.parts.infeed import Infeed
 from conveyor_sim.scene.parts.machine import PackmlPart
@@ -58,7 +58,7 @@ class Bottleneck:
 def stretches_of(
     legs: Sequence[Leg],
     clearances: Sequence[Clearance | None],
-    surfaces: Sequence[FlowSurface],
+    surfaces: SurfaceMap,
 ) -> tuple[Stretch, ...]:
     """Return the stretches of all legs in order. Legs from entries share stretches: the longest stands for all."""
     longest: dict[tuple[str, bool], Stretch] = {}
@@ -95,7 +95,7 @@ def feed_rate(scene: Scene, path: Path) -> float:
     return 0.0
 
 
-def _along(leg: Leg, samples: Clearance, surfaces: Sequence[FlowSurface]) -> Iterator[Stretch]:
+def _along(leg: Leg, samples: Clearance, surfaces: SurfaceMap) -> Iterator[Stretch]:
     spacing = SPACING * leg.radius
     wide = _steady(samples)
     for first, last in _equal(np.column_stack([samples.carriers, wide])):

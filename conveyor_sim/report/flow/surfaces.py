@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,13 +14,16 @@ from conveyor_sim.scene.driven import belt_speeds, speed_limits
 from conveyor_sim.scene.geometry import Array, BeltShape, is_full_turn, surface_shapes
 from conveyor_sim.scene.problems import Path
 from conveyor_sim.scene.schema import Scene
-from conveyor_sim.scene.types import TOUCH, XY
+from conveyor_sim.scene.types import TOUCH
 
 NOMINAL_SPEED = 0.2
 """m/s, assumed speed of belts that stand at the start, because a controller will run them."""
 
 Mask = NDArray[np.bool_]
 Indices = NDArray[np.intp]
+
+_BLOCK = 500
+"""Points that are compared at once with the surfaces near them."""
 
 NONE = -1
 """Index that stands for no surface."""
@@ -76,7 +80,42 @@ class FlowSurface:
         return self.path[0] == "plates"
 
 
-def surfaces_of(scene: Scene) -> tuple[FlowSurface, ...]:
+class SurfaceMap(Sequence[FlowSurface]):
+    """Surfaces by index, with a search for the one under a point. Where they overlap, the last one carries."""
+
+    def __init__(self, surfaces: Sequence[FlowSurface]) -> None:
+        self._surfaces = tuple(surfaces)
+        outlines = [surface.shape.outline() for surface in surfaces]
+        # Chords of 64 points cut less than a tenth of a radius off the box of an arc.
+        spare = [0.1 * float(np.ptp(outline, axis=0).max()) for outline in outlines]
+        self._low = np.array([o.min(axis=0) - more for o, more in zip(outlines, spare, strict=True)]).reshape(-1, 2)
+        self._high = np.array([o.max(axis=0) + more for o, more in zip(outlines, spare, strict=True)]).reshape(-1, 2)
+
+    def __len__(self) -> int:
+        return len(self._surfaces)
+
+    @overload
+    def __getitem__(self, index: int) -> FlowSurface: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[FlowSurface]: ...
+
+    def __getitem__(self, index: int | slice) -> FlowSurface | Sequence[FlowSurface]:
+        return self._surfaces[index]
+
+    def under(self, points: Array) -> Indices:
+        """Return the index of the surface that carries each of some points (k, 2), or NONE, (k,)."""
+        carrier = np.full(len(points), NONE, dtype=np.intp)
+        for first in range(0, len(points), _BLOCK):
+            block = points[first : first + _BLOCK]
+            low, high = block.min(axis=0), block.max(axis=0)
+            near = ((self._low <= high) & (self._high >= low)).all(axis=1)
+            for index in np.flatnonzero(near):
+                carrier[first : first + _BLOCK][self._surfaces[index].contains(block)] = index
+        return carrier
+
+
+def surfaces_of(scene: Scene) -> SurfaceMap:
     """Return the surfaces of a scene: those of belts in order, then plates. Where they overlap, the last one carries.
 
     They have the names of their conveyors where there is a layout, else those of their belts or plates.
@@ -94,7 +133,7 @@ def surfaces_of(scene: Scene) -> tuple[FlowSurface, ...]:
             names.get(belt, belt), ("belts", belt), shape, shape.ratio * speeds[belt], sense * running[belt]
         )
         surfaces.append(surface)
-    return tuple(surfaces)
+    return SurfaceMap(surfaces)
 
 
 def _conveyors(scene: Scene) -> dict[str, str]:
@@ -114,20 +153,6 @@ def running_speeds(scene: Scene) -> dict[str, float]:
             least, greatest = speed_limits(scene, name)
             speeds[name] = min(max(NOMINAL_SPEED, least), greatest)
     return speeds
-
-
-def under(surfaces: Sequence[FlowSurface], points: Array) -> Indices:
-    """Return the index of the surface that carries each of some points (k, 2), or NONE, (k,)."""
-    carrier = np.full(len(points), NONE, dtype=np.intp)
-    for index, surface in enumerate(surfaces):
-        carrier[surface.contains(points)] = index
-    return carrier
-
-
-def surface_at(surfaces: Sequence[FlowSurface], point: XY) -> FlowSurface | None:
-    """Return the surface that carries a point, or None."""
-    index = int(under(surfaces, np.array([point]))[0])
-    return None if index == NONE else surfaces[index]
 
 
 def _straight_coordinates(shape: BeltShape, points: Array) -> tuple[Array, Array]:

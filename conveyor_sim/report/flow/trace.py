@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -14,9 +14,11 @@ from conveyor_sim.line.devices.belt_surfaces import BeltSurfaces
 from conveyor_sim.physics.model import build_model
 from conveyor_sim.physics.state import State
 from conveyor_sim.physics.stepping.tick import Integration
+from conveyor_sim.report.flow.drift import drift
 from conveyor_sim.report.flow.guides import Guides
-from conveyor_sim.report.flow.surfaces import NONE, FlowSurface, Indices, running_speeds, under
+from conveyor_sim.report.flow.surfaces import NONE, Indices, SurfaceMap, running_speeds
 from conveyor_sim.report.flow.trace_scene import trace_scene
+from conveyor_sim.report.flow.track import Track
 from conveyor_sim.scene.geometry import Array, initial_bottles
 from conveyor_sim.scene.parts.outfeed import Outfeed
 from conveyor_sim.scene.parts.sink import Sink
@@ -30,7 +32,7 @@ from conveyor_sim.scene.types import XY
 CHUNK = 50
 """Ticks between two looks at the bottles."""
 
-MOST_WORK = 2e7
+MOST_WORK = 1e7
 """Largest work of all traces, steps of one bottle: below a second of one core of the 2020s."""
 
 TICK_WORK = 1000
@@ -39,14 +41,8 @@ TICK_WORK = 1000
 MOST_LEGS = 64
 """Largest number of traced bottles."""
 
-STILL = 0.02
-"""Way over radius below which a bottle has stopped within a chunk."""
-
 FARTHEST_PUSH = 0.5
 """m, longest way over which bottles push one that rests on a plate."""
-
-ASTRAY = 0.5
-"""m without a surface after which a bottle has left the line."""
 
 End = Literal["exit", "station", "stopped", "off", "circulates", "cap", "failed"]
 """End of a leg. exit: outfeed or sink; off: beside all belts; cap: the work was used up; failed: the engine refused."""
@@ -84,6 +80,8 @@ class Leg:
     """Path of the device that took the bottle."""
     reason: str = ""
     """Reason of a failure."""
+    traced: float | None = None
+    """m, way after which it is estimated by the speeds of the belts; None if all of it is traced."""
 
     @property
     def seconds(self) -> float:
@@ -117,7 +115,7 @@ def starts_of(scene: Scene) -> list[Entrance]:
     return (starts or _initial(scene))[:MOST_LEGS]
 
 
-def trace(scene: Scene, surfaces: Sequence[FlowSurface], guides: Guides) -> list[Leg]:
+def trace(scene: Scene, surfaces: SurfaceMap, guides: Guides) -> list[Leg]:
     """Trace a lone bottle from every start with the engine at draft accuracy.
 
     A bottle that stops on a plate is put behind it, as the bottles after it would push it. The work is limited by
@@ -130,9 +128,7 @@ def trace(scene: Scene, surfaces: Sequence[FlowSurface], guides: Guides) -> list
 
 
 class _Tracer:
-    def __init__(
-        self, scene: Scene, surfaces: Sequence[FlowSurface], guides: Guides, starts: Sequence[Entrance]
-    ) -> None:
+    def __init__(self, scene: Scene, surfaces: SurfaceMap, guides: Guides, starts: Sequence[Entrance]) -> None:
         self._surfaces, self._guides, self._starts = surfaces, guides, starts
         self._radius = [scene.bottle_types[start.bottle].radius for start in starts]
         fastest = max([0.1, *(abs(surface.running) for surface in surfaces), *(start.speed for start in starts)])
@@ -158,13 +154,16 @@ class _Tracer:
     def run(self) -> list[Leg]:
         """Advance all bottles until each has ended."""
         count = len(self._starts)
-        paths = [np.array([start.position]) for start in self._starts]
+        tracks = [
+            Track(start.position, radius, self._surfaces)
+            for start, radius in zip(self._starts, self._radius, strict=True)
+        ]
         legs: dict[int, Leg] = {}
         ticks, work = 0, 0.0
         while len(legs) < count:
             active = [index for index in range(count) if index not in legs]
             if work > MOST_WORK:
-                legs.update({index: self._leg(index, paths[index], "cap") for index in active})
+                legs.update({index: self._estimated(self._leg(index, tracks[index], None, "cap")) for index in active})
                 break
             chunk = np.empty((CHUNK, count, 2))
             bottles = self._state.world.bottles
@@ -175,47 +174,56 @@ class _Tracer:
                     ticks += 1
                     chunk[place, :, 0], chunk[place, :, 1] = bottles.x[:count], bottles.y[:count]
             except SimulationError as error:
-                legs.update({index: self._leg(index, paths[index], "failed", reason=str(error)) for index in active})
+                failed = {index: self._leg(index, tracks[index], None, "failed", reason=str(error)) for index in active}
+                legs.update(failed)
                 break
             work += CHUNK * (self._steps * len(active) + TICK_WORK)
             for index in active:
-                paths[index] = np.vstack([paths[index], chunk[:, index]])
-                leg = self._ended(index, paths[index])
+                tracks[index].add(chunk[:, index])
+                leg = self._ended(index, tracks[index])
                 if leg is not None and leg.end == "stopped" and self._pushed_on(index, leg):
-                    paths[index] = leg.points
+                    tracks[index].cut(len(leg.points))
                 elif leg is not None:
                     legs[index] = leg
                     self._state.remove(index)
             self._state.make_lists()
         return [legs[index] for index in range(count)]
 
-    def _ended(self, index: int, path: Array) -> Leg | None:
+    def _ended(self, index: int, track: Track) -> Leg | None:
         """Return the leg of a bottle that has ended within the last chunk, or None."""
-        recent, before = path[-CHUNK:], len(path) - CHUNK
         taken = [
-            (before + int(np.argmax(within)), kind, device)
+            (track.before + int(np.argmax(within)) + 1, kind, device)
             for kind, devices in (("exit", self._exits), ("station", self._stations))
             for device, region in devices
-            if (within := inside(recent, region)).any()
+            if (within := inside(track.chunk, region)).any()
         ]
         if taken:
-            place, kind, device = min(taken, key=lambda entry: entry[0])
-            return self._leg(index, path[: place + 1], "exit" if kind == "exit" else "station", device)
-        radius = self._radius[index]
-        apart = np.hypot(*(recent - path[-1]).T)
-        if apart.max() < STILL * radius:
-            still = np.hypot(*(path - path[-1]).T) < STILL * radius
-            place = len(path) - int(np.argmin(still[::-1])) if not still.all() else 0
-            carried = under(self._surfaces, path[-1:])[0] != NONE
-            return self._leg(index, path[: place + 1], "stopped" if carried else "off")
-        carriers = under(self._surfaces, path)
-        on = np.flatnonzero(carriers != NONE)
-        first_off = int(on[-1]) + 1 if on.size else 0
-        if math.dist(path[min(first_off, len(path) - 1)], path[-1]) > ASTRAY:
-            return self._leg(index, path[: first_off + 1], "off")
-        if (closed := _closed(path, radius)) is not None:
-            return self._leg(index, path[: closed + 1], "circulates")
+            count, kind, device = min(taken, key=lambda entry: entry[0])
+            return self._leg(index, track, count, "exit" if kind == "exit" else "station", device)
+        if (count_to := track.stopped()) is not None:
+            return self._leg(index, track, count_to, "stopped" if track.carried else "off")
+        if (count_to := track.astray()) is not None:
+            return self._leg(index, track, count_to, "off")
+        if (count_to := track.closed()) is not None:
+            return self._leg(index, track, count_to, "circulates")
         return None
+
+    def _estimated(self, leg: Leg) -> Leg:
+        """Return a leg that ends at the cap with the rest of its way by the speeds of the belts."""
+        step = leg.points[-1] - leg.points[-2]
+        along = step / max(float(np.hypot(*step)), 1e-12)
+        takers = [*self._exits, *self._stations]
+        times, points, taker = drift(leg.points[-1], along, self._surfaces, self._guides, takers)
+        end: End = "cap" if taker is None else "station" if taker in dict(self._stations) else "exit"
+        return replace(
+            leg,
+            times=np.concatenate([leg.times, leg.times[-1] + times]),
+            points=np.vstack([leg.points, points]),
+            carriers=np.concatenate([leg.carriers, self._surfaces.under(points)]),
+            end=end,
+            exit=taker,
+            traced=leg.length,
+        )
 
     def _pushed_on(self, index: int, leg: Leg) -> bool:
         """Put a bottle that has stopped on a plate behind it, at its first speed. Return False if it can't go on."""
@@ -228,7 +236,7 @@ class _Tracer:
         along = came / max(step, 1e-12)
         ways = np.arange(0.002, FARTHEST_PUSH, 0.002)[:, None]
         ahead = leg.points[-1] + ways * along
-        carriers = under(self._surfaces, ahead)
+        carriers = self._surfaces.under(ahead)
         beyond = np.flatnonzero(carriers != plate)
         if not beyond.size or carriers[beyond[0]] == NONE:
             return False
@@ -242,27 +250,13 @@ class _Tracer:
         self._integration.put_in()
         return True
 
-    def _leg(self, index: int, path: Array, end: End, device: Path | None = None, reason: str = "") -> Leg:
-        times = self._tick * np.arange(len(path), dtype=np.float64)
-        carriers = under(self._surfaces, path)
-        return Leg(self._starts[index], self._radius[index], times, path, carriers, end, device, reason)
-
-
-def _closed(path: Array, radius: float) -> int | None:
-    """Return the index at which a path comes back to an earlier place in the same direction, or None."""
-    ways = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
-    marks = np.searchsorted(ways, np.arange(0.0, ways[-1], radius))
-    recent = marks[marks >= len(path) - CHUNK]
-    for mark in recent:
-        earlier = marks[ways[marks] < ways[mark] - 8.0 * radius]
-        earlier = earlier[earlier > 0]
-        if not earlier.size or mark == 0:
-            continue
-        near = earlier[np.hypot(*(path[earlier] - path[mark]).T) < 0.6 * radius]
-        direction = path[mark] - path[mark - 1]
-        if any(float((path[place] - path[place - 1]) @ direction) > 0.0 for place in near):
-            return int(mark)
-    return None
+    def _leg(
+        self, index: int, track: Track, count: int | None, end: End, device: Path | None = None, reason: str = ""
+    ) -> Leg:
+        """Return the leg of the first `count` places of a track; None: all."""
+        points, carriers = track.path(count)
+        times = self._tick * np.arange(len(points), dtype=np.float64)
+        return Leg(self._starts[index], self._radius[index], times, points, carriers, end, device, reason)
 
 
 def _velocity(start: Entrance) -> XY:

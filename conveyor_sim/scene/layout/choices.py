@@ -8,7 +8,8 @@ from conveyor_sim.scene.layout.parameters import unknown, with_value
 from conveyor_sim.scene.problems import Path
 from conveyor_sim.scene.words import did_you_mean, shown
 
-_NOT_IN_VARIANTS = ("include", "variants", "formats", "variant", "ports")
+NOT_IN_VARIANTS = ("include", "variants", "formats", "variant", "ports")
+"""Fields of a scene that a variant does not have."""
 
 
 def with_choices(fragment: Fragment, changes: Mapping[str, Any], report: Report) -> None:
@@ -53,7 +54,7 @@ def _lay_variant(fragment: Fragment, name: str, report: Report) -> None:
     if not isinstance(entry, dict):
         report(fragment.place_of(source), f"{shown(entry)} given, expected a mapping of fields of the scene")
         return
-    for field in _NOT_IN_VARIANTS:
+    for field in NOT_IN_VARIANTS:
         if field in entry:
             report(fragment.place_of((*source, field)), "given in a variant, expected in the scene")
             return

@@ -19,7 +19,9 @@ class Infeed(Scattered, BadBottles, Entry):
     bottle: Name = quantity("Bottle type.")
     position: Point = quantity("Where a bottle's axis appears.", "m")
     direction: Angle = quantity("Direction of its velocity.", "rad")
-    speed: NotNegative = quantity("Its speed at first, along `direction`.", "m/s")
+    speed: NotNegative = quantity(
+        "Its speed at first, along `direction`. Left out along a conveyor: that of the belt.", "m/s"
+    )
     count: Count | None = quantity("How many bottles enter. Left out: without end.", "1", default=None)
     gap: NotNegative | None = quantity(
         "Clear distance to the bottle before it, in a tightly packed in-line. Or give `rate`.", "m", default=None

@@ -15,10 +15,14 @@ class Scattered(Giver):
         speed: float
 
     lateral_jitter: NotNegative = quantity(
-        "Each bottle is to the left or right by up to this, drawn evenly from the seed.", "m", default=0.0
+        "Each bottle is to the left or right by up to this, drawn evenly from the seed. Left out along a conveyor: "
+        "0.5 mm, or what the guides leave free.",
+        "m",
+        default=0.0,
     )
     angular_jitter: NotNegativeAngle = quantity(
-        "The velocity of each bottle is turned to the left or right by up to this, drawn evenly from the seed.",
+        "The velocity of each bottle is turned to the left or right by up to this, drawn evenly from the seed. Left "
+        "out along a conveyor: 0.5 deg, or 0 where the guides leave nothing free.",
         "rad",
         default=0.0,
     )

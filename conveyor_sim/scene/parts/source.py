@@ -20,7 +20,9 @@ class Source(PackmlPart, Scattered, BadBottles, Entry):
     bottle: Name = quantity("Bottle type.")
     position: Point = quantity("Where a bottle's axis appears.", "m")
     direction: Angle = quantity("Direction of its velocity.", "rad")
-    speed: NotNegative = quantity("Its speed at first, along `direction`.", "m/s")
+    speed: NotNegative = quantity(
+        "Its speed at first, along `direction`. Left out along a conveyor: that of the belt.", "m/s"
+    )
 
     def problems(self, path: Path, others: Others) -> Iterator[Problem]:
         """Yield problems of a rate beyond its limit, and of bad bottles given in two ways."""

@@ -74,7 +74,9 @@ class Station(TakingPart, Scattered):
     kind: Literal["station"] = quantity("The kind of machine.")
     position: Point = quantity("Where it gives a bottle's axis back. Without room there, it is blocked.", "m")
     direction: Angle = quantity("Direction of the bottle's velocity then.", "rad")
-    speed: NotNegative = quantity("Its speed then, along `direction`.", "m/s")
+    speed: NotNegative = quantity(
+        "Its speed then, along `direction`. Left out along a conveyor: that of the belt.", "m/s"
+    )
     sets: Annotated[
         dict[Name, AttributeRule],
         Len(0, MOST_ATTRIBUTES),

@@ -77,3 +77,20 @@ def test_more_findings_than_lines_are_counted(tmp_path: Path) -> None:
     assert any(line.strip().startswith(f"{20 - warnings} more") for line in short)
     full = runner.invoke(main, ["check", str(scene), "--details", "--out", str(tmp_path)]).output.splitlines()
     assert sum(line.startswith("warning") for line in full) == 20
+
+
+def test_a_long_line_is_estimated_by_the_speeds_of_its_belts() -> None:
+    overrides = {
+        "belts": {"lane": {"length": 300.0}},
+        "rails": {
+            "left": {"to": [300.0, 0.045]},
+            "right": {"from": [300.0, -0.045]},
+            "end": {"from": [300.0, 0.045], "to": [300.0, -0.045]},
+        },
+        "machines": {"packer": {"region": [[299.9, -0.05], [300.0, -0.05], [300.0, 0.05], [299.9, 0.05]]}},
+    }
+    (route,) = flow_of(load_scene(ROOT / "config" / "scenarios" / "buffer_lane.yaml", overrides)).routes
+    assert route.last.end == "exit"
+    assert route.traced is not None
+    assert 50.0 < route.traced < 299.0
+    assert route.seconds == pytest.approx((299.9 - 0.06) / 0.5, rel=0.001)
