@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from conveyor_sim.scene import Scene
 
 NAMES = ("set", "variant", "format", "outside_tables")
@@ -38,14 +40,19 @@ class SceneOptions:
 
         Raise SceneError.
         """
+        from conveyor_sim.support.resources import scene_path
+
+        return self.load_file(scene_path(scene), duration)
+
+    def load_file(self, file: Path, duration: float | None = None) -> Scene:
+        """Read a scene file. See `load`."""
         from conveyor_sim.scene import load_scene
         from conveyor_sim.scene.choices import choices, settings_of
-        from conveyor_sim.support.resources import scene_path
 
         overrides = choices(settings_of(self.settings), self.variant, self.format)
         if duration is not None:
             overrides["duration"] = duration
-        return load_scene(scene_path(scene), overrides, self.outside_tables)
+        return load_scene(file, overrides, self.outside_tables)
 
 
 def scene_options(command: Command) -> Command:

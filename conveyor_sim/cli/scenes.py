@@ -20,8 +20,10 @@ if TYPE_CHECKING:
 @click.argument("scene")
 @click.option("--out", type=click.Path(path_type=Path), default=Path(), help="Folder for the picture (default: here).")
 @click.option("--details", is_flag=True, help="List routes, stretches, effects, bounds and their reasons as well.")
+@click.option("--watch", is_flag=True, help="Serve a page with plan and problems, redrawn whenever a file is saved.")
+@click.option("--port", type=click.IntRange(0, 65535), help="With --watch: serve the page here (default: any).")
 @scene_options
-def check(scene: str, out: Path, details: bool, options: SceneOptions) -> None:
+def check(scene: str, out: Path, details: bool, watch: bool, port: int | None, options: SceneOptions) -> None:
     """Validate SCENE, trace a bottle through it, and draw it.
 
     SCENE is a file, or the name of a shipped scene. Faults of its layout are listed with file and line.
@@ -37,7 +39,13 @@ def check(scene: str, out: Path, details: bool, options: SceneOptions) -> None:
     from conveyor_sim.run.speed import expected
     from conveyor_sim.support.resources import scene_path
 
-    checked = options.load(scene)
+    path = scene_path(scene)
+    if port is not None and not watch:
+        raise ConveyorError("--port: given without --watch, expected both or neither")
+    if watch:
+        _watch(path, port or 0, options)
+        return
+    checked = options.load_file(path)
     model = build_model(checked)
     tag_rows(checked)  # which finds alarms of tags that there are not
     flow = flow_of(checked)
@@ -59,8 +67,20 @@ def check(scene: str, out: Path, details: bool, options: SceneOptions) -> None:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise ConveyorError(f"{out}: can't be made ({error.strerror}), expected a folder to draw into") from error
-    drawn = f"drawn to {plot_scene(checked, out / f'{scene_path(scene).stem}.png')}"
+    drawn = f"drawn to {plot_scene(checked, out / f'{path.stem}.png')}"
     click.echo(drawn if details else f"{drawn}; {lists}")
+
+
+def _watch(path: Path, port: int, options: SceneOptions) -> None:
+    """Serve the page of a scene that is being written until Ctrl-C."""
+    from conveyor_sim.page.check_server import CheckServer
+    from conveyor_sim.report.check_page import CheckPage
+    from conveyor_sim.support.stop_request import StopRequest
+
+    page = CheckPage(path, options.load_file)
+    with StopRequest() as stop, CheckServer(page.examine, port) as server:
+        click.echo(f"{path}: {server.url} (Ctrl-C ends it)")
+        stop.wait()
 
 
 @click.command()

@@ -21,15 +21,42 @@ _DIGITS = 5
 
 def head(line: Any, scene: Scene) -> dict[str, Any]:
     """Return the constant data of the page and the scales of the changing data, from a decoded Line message."""
-    signals, shapes = list(line.signal_names), surface_shapes(scene)
-    named = list(named_surfaces(shapes).values())
+    signals = list(line.signal_names)
     return {
-        "scene": scene.name,
-        "description": scene.description,
+        **plan_head(scene),
         "run": line.run_id,
         "seed": int(line.seed),
         "where": getattr(line, "where", ""),
         "tick": float(line.tick_ns * 1e-9),
+        "types": [
+            {"name": name, "radius": float(radius)}
+            for name, radius in zip(line.bottle_types, line.type_radius, strict=True)
+        ],
+        "drives": {
+            f"belts/{name}": f"drives/{belt.drive_name}" for name, belt in scene.belts.items() if belt.drive_name
+        },
+        "signals": signals,
+        "commands": list(line.command_names),
+        "tags": _tags(line),
+        "fields": fields(),
+        "steps": {
+            "mm": MM,
+            "signal": SIGNAL_STEPS,
+            "force": LEAST_FORCE,
+            "levels": LEVELS,
+            "unknown": UNKNOWN,
+            "forceFrames": FORCE_FRAMES,
+        },
+    }
+
+
+def plan_head(scene: Scene) -> dict[str, Any]:
+    """Return what the page draws of a scene that does not run: surfaces, rails, moving rails and marks."""
+    shapes = surface_shapes(scene)
+    named = list(named_surfaces(shapes).values())
+    return {
+        "scene": scene.name,
+        "description": scene.description,
         "surfaces": [{**_surface(shape), "named": shape in named} for shape in shapes],
         "rails": [_points(shape.outline(_ARC_POINTS)) for shape in rail_shapes(scene)],
         "movers": [
@@ -54,22 +81,6 @@ def head(line: Any, scene: Scene) -> dict[str, Any]:
             }
             for mark in marks_of(scene)
         ],
-        "types": [
-            {"name": name, "radius": float(radius)}
-            for name, radius in zip(line.bottle_types, line.type_radius, strict=True)
-        ],
-        "signals": signals,
-        "commands": list(line.command_names),
-        "tags": _tags(line),
-        "fields": fields(),
-        "steps": {
-            "mm": MM,
-            "signal": SIGNAL_STEPS,
-            "force": LEAST_FORCE,
-            "levels": LEVELS,
-            "unknown": UNKNOWN,
-            "forceFrames": FORCE_FRAMES,
-        },
     }
 
 

@@ -18,11 +18,45 @@ from conveyor_sim.bag.messages.topics import CMD_SPEED, TOPICS
 from conveyor_sim.line.commands.inputs import SET, Input
 from conveyor_sim.line.process_image import speed_topics
 from conveyor_sim.ros.direct import Aside, take_message
-from conveyor_sim.ros.gaps import Gaps
 from conveyor_sim.ros.publishers import ros_qos
 from conveyor_sim.run.inbox import MESSAGE_BYTES, TOO_LARGE
 from conveyor_sim.run.lockstep import inputs_of, is_empty
 from conveyor_sim.run.stepper import Stepper
+
+
+class Gaps:
+    """Sequence numbers of the messages of one topic, until all its publishers have left.
+
+    Fast DDS reports no message-lost event for messages that a full history drops, but their numbers are missing. rclpy
+    passes the number without the publisher. With one publisher, the count is exact from the first received message on.
+    With several, numbers are assigned to the best fitting publisher, and a gap may look like a new publisher, once for
+    each.
+    """
+
+    def __init__(self) -> None:
+        self._last: list[int] = []  # last number of each known publisher, the most recent one at the end
+
+    def before(self, number: int | None, publishers: Callable[[], int]) -> int:
+        """Return the number of missing messages before a number (None if the middleware has no numbers).
+
+        publishers: returns the present number of publishers.
+        """
+        if number is None:
+            return 0
+        if number - 1 in self._last:
+            self._last.remove(number - 1)
+            self._last.append(number)
+            return 0
+        present = max(1, publishers())
+        del self._last[: max(0, len(self._last) - present)]  # their publishers have left
+        earlier = [last for last in self._last if last < number]
+        if not earlier or len(self._last) < present:
+            self._last.append(number)  # the first message of a publisher
+            return 0
+        self._last.remove(max(earlier))
+        self._last.append(number)
+        return number - max(earlier) - 1
+
 
 UNREADABLE = "not readable as {type}, expected its serialized form"
 

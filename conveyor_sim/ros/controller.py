@@ -9,13 +9,17 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence, Set
 from typing import Any
 
 from conveyor_msgs.msg import Commands, Line, Signals
+from conveyor_msgs.msg import Variables as Message
 from conveyor_msgs.srv import Lockstep
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 
+from conveyor_sim.bag.messages.qos import ANSWERS
 from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.control.recorded import RecordedVariables
 from conveyor_sim.control.scan import (
@@ -26,15 +30,95 @@ from conveyor_sim.control.scan import (
     declared_alarms,
 )
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.ros.alarms import AlarmPublisher
-from conveyor_sim.ros.lockstep_client import LockstepClient
+from conveyor_sim.ros.clock import to_time
+from conveyor_sim.ros.direct import Aside, WaitSet, send_request, take_response
 from conveyor_sim.ros.publishers import ros_qos
 from conveyor_sim.ros.spinner import Spinner
-from conveyor_sim.ros.variables import VariablePublisher
 from conveyor_sim.run.alarm_changes import AlarmChanges
 from conveyor_sim.scene import parse_overrides, parse_scene
 from conveyor_sim.support.printable import SENTENCE, printable
 from conveyor_sim.support.stop_request import StopRequest
+
+
+class LockstepClient:
+    """Client for one thread."""
+
+    def __init__(self, node: Node) -> None:
+        self._client = node.create_client(Lockstep, "lockstep", qos_profile=ros_qos(ANSWERS), callback_group=Aside())
+        self._waiting = WaitSet(node.context, clients=[self._client])
+
+    def close(self) -> None:
+        """Release the client."""
+        self._waiting.close()
+
+    def is_ready(self) -> bool:
+        """Return True if the service is available."""
+        ready: bool = self._client.service_is_ready()
+        return ready
+
+    def send(self, request: Any) -> int:
+        """Send a request. Return the number of its answer."""
+        return send_request(self._client, request)
+
+    def response(self, numbers: Set[int], seconds: float) -> Any:
+        """Return the answer to a request with one of these numbers; None if none comes within `seconds`."""
+        until = time.monotonic() + seconds
+        while (left := until - time.monotonic()) > 0.0:
+            self._waiting.wait(left)
+            while (taken := take_response(self._client)) is not None:
+                number, response = taken
+                if number in numbers:
+                    return response
+        return None
+
+
+class AlarmPublisher:
+    """Publishes all alarms of a controller: one status per alarm, ERROR while it stands and OK otherwise.
+
+    The topic is latched, so that late subscribers see present and past alarms.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self._publisher = node.create_publisher(DiagnosticArray, "alarms", ros_qos(TOPICS["alarms"].qos))
+        self._source = node.get_name()
+        self._published: dict[str, bool] = {}
+
+    def publish(self, alarms: Mapping[str, bool], stamp_ns: int) -> None:
+        """Publish the alarms of a scan, by text, if one has changed. stamp_ns: simulated time of the scan."""
+        if alarms == self._published:
+            return
+        self._published = dict(alarms)
+        message = DiagnosticArray()
+        message.header.stamp = to_time(stamp_ns)
+        message.status = [
+            DiagnosticStatus(
+                level=DiagnosticStatus.ERROR if stands else DiagnosticStatus.OK,
+                name=text,
+                message="stands" if stands else "",
+                hardware_id=self._source,
+            )
+            for text, stands in alarms.items()
+        ]
+        self._publisher.publish(message)
+
+
+class VariablePublisher:
+    """Publishes variables. The publisher is created at the first scan with variables."""
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._publisher: Publisher | None = None
+
+    def publish(self, names: Sequence[str], values: Sequence[float], tick: int, stamp_ns: int) -> None:
+        """Publish the values after the scan at a tick. stamp_ns: simulated time of the scan."""
+        if not names:
+            return
+        if self._publisher is None:
+            self._publisher = self._node.create_publisher(Message, "variables", ros_qos(TOPICS["variables"].qos))
+        message = Message(tick=tick, name=list(names), value=list(values))
+        message.header.stamp = to_time(stamp_ns)
+        self._publisher.publish(message)
+
 
 LOOK = 0.01  # s of wall time between two searches for the simulation
 STOP_LOOK = 0.1  # s of wall time between two checks for a stop request while it waits for an answer

@@ -6,15 +6,22 @@ import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import CancelledError
 from pathlib import Path
+from typing import Any
 
+from conveyor_msgs.srv import InjectFault, Operate
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.context import Context
+from rclpy.executors import Executor
+from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from conveyor_sim.bag.folder import bag_folder, require_recordable
 from conveyor_sim.bag.messages.topics import OUTPUTS, photo_eye_topics
 from conveyor_sim.bag.messages.typestore import default_distro
+from conveyor_sim.line.commands.authority import PEOPLE
+from conveyor_sim.line.commands.inputs import FAULT, INJECT, OPERATE, Input
 from conveyor_sim.report.explain.choices import setting_line
 from conveyor_sim.ros import parameters
 from conveyor_sim.ros.checkpoint_services import CheckpointServices
@@ -23,20 +30,72 @@ from conveyor_sim.ros.commands import subscribe_commands
 from conveyor_sim.ros.context import new_node, one_sentence
 from conveyor_sim.ros.diagnostics import Diagnostics
 from conveyor_sim.ros.graph_watch import GraphWatch
-from conveyor_sim.ros.input_services import InputServices
 from conveyor_sim.ros.intake import Intake
 from conveyor_sim.ros.lockstep_service import LockstepService
 from conveyor_sim.ros.publishers import RosSink
-from conveyor_sim.ros.services import Services
+from conveyor_sim.ros.services import Services, settled
 from conveyor_sim.ros.spinner import Spinner
 from conveyor_sim.run.active_run import ActiveRun
 from conveyor_sim.run.compilation import Cancelled, Compilation
+from conveyor_sim.run.lockstep import Refused
 from conveyor_sim.run.pacing import RateCap
 from conveyor_sim.run.session import RunSession
 from conveyor_sim.run.stepper import Stepper
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
+from conveyor_sim.support.printable import MOST, printable
 from conveyor_sim.support.resources import scene_path
+
+WRITERS = (*PEOPLE, "controller")
+
+
+class InputServices:
+    """Answers requests through the stepper."""
+
+    def __init__(self, node: Node, executor: Executor, stepper: Stepper) -> None:
+        self._executor = executor
+        self._stepper = stepper
+        group = ReentrantCallbackGroup()
+        node.create_service(InjectFault, "inject_fault", self._inject, callback_group=group)
+        node.create_service(Operate, "operate", self._operate, callback_group=group)
+
+    async def _inject(self, request: Any, response: Any) -> Any:
+        def between_ticks() -> str:
+            response.tick = self._stepper.simulation.tick
+            return self._stepper.offer(Input(FAULT, "inject_fault", "test", INJECT, (request.name,), (request.value,)))
+
+        response.message = await self._refusal(between_ticks)
+        response.success = not response.message
+        return response
+
+    async def _operate(self, request: Any, response: Any) -> Any:
+        def between_ticks() -> str:
+            response.tick = self._stepper.simulation.tick
+            names, values, texts = tuple(request.names), tuple(request.values), tuple(request.texts)
+            command = Input(OPERATE, request.writer, request.writer_kind, request.operation, names, values, texts)
+            return self._stepper.run.standstill or _writer_problem(request) or self._stepper.offer(command)
+
+        response.reason = await self._refusal(between_ticks)
+        response.accepted = not response.reason
+        return response
+
+    async def _refusal(self, between_ticks: Callable[[], str]) -> str:
+        try:
+            return await settled(self._executor, self._stepper.call(between_ticks))
+        except Refused as error:
+            return str(error)
+
+
+def _writer_problem(request: Any) -> str:
+    """Return why the writer of a request can't use the service, or ""."""
+    if request.writer_kind not in WRITERS:
+        return f"writer_kind: {printable(request.writer_kind)!r} given, expected one of {', '.join(WRITERS)}"
+    if not request.writer:
+        return "writer: no name given, expected that of the person or controller"
+    if len(request.writer) > MOST:
+        return f"writer: a name of {len(request.writer)} characters given, expected at most {MOST}"
+    return ""
+
 
 REPORT = 10.0  # s of wall time between two reports on compiling
 LINGER = 0.3  # s of wall time after a request to quit: its answer is lost if the process ends before DDS has sent it

@@ -4,11 +4,15 @@ import re
 from collections.abc import Callable
 from typing import Any, cast
 
+from pydantic import BaseModel
 from pydantic.json_schema import models_json_schema
 
 from conveyor_sim.scene.layout.cells import WITH_PORTS
 from conveyor_sim.scene.layout.language_schema import NAME_OR_PORT, language_fields
 from conveyor_sim.scene.layout.parts import Conveyor, SceneLayout
+from conveyor_sim.scene.layout.place_schema import PLACES, placed_devices
+from conveyor_sim.scene.parts.infeed import Infeed
+from conveyor_sim.scene.parts.source import Source
 from conveyor_sim.scene.quantities import FULL_TURN, example_of
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.scene.text_patterns import text_pattern
@@ -20,7 +24,8 @@ Node = dict[str, Any]
 
 def scene_schema() -> Node:
     """Return the JSON Schema of scene files. It holds for cell files, too."""
-    _, both = models_json_schema([(Scene, "validation"), (SceneLayout, "validation")], by_alias=True)
+    models: tuple[type[BaseModel], ...] = (Scene, SceneLayout, *PLACES)
+    _, both = models_json_schema([(model, "validation") for model in models], by_alias=True)
     definitions: dict[str, Node] = both["$defs"]
     texts: dict[str, Node] = {}
     for model in definitions.values():
@@ -28,14 +33,31 @@ def scene_schema() -> Node:
             model["properties"][name] = _field(field, texts)
             if name in WITH_PORTS:
                 model["properties"][name] = _with_ports(model["properties"][name])
+    for part in (Infeed, Source):
+        definitions[part.__name__]["required"].remove("bottle")  # a format may give it
     scene, layout = definitions.pop(Scene.__name__), definitions.pop(SceneLayout.__name__)
     fields = {**scene["properties"], **layout["properties"]}
     language = language_fields(definitions[Conveyor.__name__], fields)
-    closed: Node = _each({**scene, "properties": {**fields, **language}, "$defs": {**definitions, **texts}}, _closed)
+    placed = placed_devices(definitions)
+    for place in PLACES:
+        del definitions[place.__name__]
+    everything = {**scene, "properties": {**fields, **language}, "$defs": definitions}
+    choices = {f"#/$defs/{name}": [f"#/$defs/{one}" for one in (*ways, name)] for name, ways in placed.items()}
+    closed: Node = _each(_each(everything, lambda node: _with_choices(node, choices)), _closed)
+    for more in (*placed.values(), texts):
+        closed["$defs"] |= _each(more, _closed)
     # Other files may hold the fields that a scene needs.
     required = [closed.pop("required"), ["include"], ["ports"]]
     title = "Scene of conveyor-sim"
     return {"$schema": DIALECT, **closed, "title": title, "anyOf": [{"required": names} for names in required]}
+
+
+def _with_choices(node: Node, choices: dict[str, list[str]]) -> Node:
+    """Return a reference as a choice of references."""
+    if node.get("$ref") not in choices:
+        return node
+    other = {key: value for key, value in node.items() if key != "$ref"}
+    return {**other, "anyOf": [{"$ref": name} for name in choices[node["$ref"]]]}
 
 
 def _with_ports(schema: Node) -> Node:

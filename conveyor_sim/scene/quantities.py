@@ -7,6 +7,7 @@ and rounded once, so that `33 mm` has the bits of 0.033. An angle in degrees has
 import difflib
 import math
 import re
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -184,7 +185,7 @@ def dimensions(unit: str) -> tuple[Dimension, ...]:
 
 def angle_refused(value: float) -> Unconverted | None:
     """Return the refusal of a number without unit for an angle beyond a full turn; None of other numbers."""
-    if not FULL_TURN < abs(value) < math.inf:
+    if not FULL_TURN < abs(value) <= sys.float_info.max:  # whole numbers can be larger
         return None
     return Unconverted(value, f"more than a full turn in rad, did you mean {value:g} deg?")
 

@@ -7,8 +7,9 @@ replaced in between.
 
 import os
 import stat
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from pathlib import Path
 from typing import BinaryIO
 from uuid import uuid4
@@ -36,12 +37,28 @@ class OutsideError(FileError):
     """Error: a file lies outside its folder."""
 
 
+_noted: ContextVar[set[Path] | None] = ContextVar("noted", default=None)
+
+
+@contextmanager
+def noting_files() -> Iterator[set[Path]]:
+    """Collect the paths that `read_file` is asked for in this thread, whether or not the files can be read."""
+    paths: set[Path] = set()
+    token = _noted.set(paths)
+    try:
+        yield paths
+    finally:
+        _noted.reset(token)
+
+
 def read_file(path: Path, most: int, folder: Path | None = None) -> bytes:
     """Return the content of a regular file of at most `most` bytes. Never waits for another process.
 
     folder: where relative paths start, and which no path may leave, by `..` or by a link; None: anywhere.
     Raises FileError.
     """
+    if (noted := _noted.get()) is not None:
+        noted.add(path if folder is None else folder / path)
     try:
         descriptor = os.open(_in_folder(path, folder), os.O_PATH | os.O_CLOEXEC)
         try:

@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+import ast
+import inspect
 import math
 import secrets
 import uuid
 from collections import ChainMap
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
+from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
+from types import CodeType
 from typing import Any, NoReturn
 
 from conveyor_sim.bag.input_log import InputLog, copier
 from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.recorder import Recorder
-from conveyor_sim.control.scan import ALARMS, ControlError, Controller
+from conveyor_sim.control.scan import ALARMS, ControlError, Controller, Inputs
 from conveyor_sim.errors import CommandError, SimulationError
-from conveyor_sim.line.commands.inputs import DISOWN, FAULT, INJECT, SET, Input
+from conveyor_sim.line.commands.authority import MODES
+from conveyor_sim.line.commands.inputs import DISOWN, FAULT, FORCE, INJECT, MODE, SET, UNFORCE, Input, WriterKind
 from conveyor_sim.line.run_state import ENDED, RUNNING, STOPPED, RunState
 from conveyor_sim.protocols.tags.tag_provider import SCADA_SOURCES, SteppedTagProvider
 from conveyor_sim.run.scan_loop import AttachedController, LocalController, ScanLoop
@@ -26,11 +31,145 @@ from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.modbus_rows import Row
 from conveyor_sim.support.printable import SENTENCE, printable
 from conveyor_sim.testing import plc
-from conveyor_sim.testing.conditions import Assertion, Condition, Present, values
 from conveyor_sim.testing.history import ScenarioHistory
-from conveyor_sim.testing.person import PanelUser
 from conveyor_sim.testing.plc_server import ServedPlc
 from conveyor_sim.testing.scene_of import scene_of
+
+Condition = Callable[["Present"], Any]
+"""Function of the present signals that returns true or false: `lambda s: s["belts/table/bottles"] < 40`."""
+
+
+_PLAIN = (str, int, float)
+
+
+class Present(Inputs):
+    """Signals and alarms at a tick, by name. Records the names that are read."""
+
+    __slots__ = ("read",)
+
+    def __init__(self, signals: Mapping[str, float], time: float, tick: int, length: float) -> None:
+        super().__init__(signals, time, tick, length)
+        self.read: dict[str, None] = {}
+        """Names, in the order of the first reading."""
+
+    def __getitem__(self, name: str) -> float:
+        """Return the value of a signal, or of an alarm by its full name. Raise NoSuchSignal, which is a KeyError."""
+        value = super().__getitem__(name)
+        self.read[name] = None
+        return value
+
+
+def text_of(condition: Condition) -> str:
+    """Return the text of a lambda, or the name of a function."""
+    code = getattr(condition, "__code__", None)
+    if not isinstance(code, CodeType):
+        return repr(condition)
+    if code.co_name != "<lambda>":
+        return code.co_name
+    try:
+        source = "".join(inspect.findsource(condition)[0])
+        lambdas = [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Lambda)]
+    except (OSError, SyntaxError):
+        return f"the lambda in line {code.co_firstlineno} of {code.co_filename}"
+    here = [node for node in lambdas if node.lineno == code.co_firstlineno]
+    if len(here) > 1:
+        constants = {value for value in code.co_consts if isinstance(value, _PLAIN)}
+        here = [node for node in here if _constants(node) == constants]
+    texts = {" ".join((ast.get_source_segment(source, node.body) or "").split()) for node in here}
+    # Two lambdas on one line that differ in an operator only are both listed.
+    return " or ".join(sorted(texts)) or f"the lambda in line {code.co_firstlineno} of {code.co_filename}"
+
+
+def _constants(node: ast.Lambda) -> set[object]:
+    inner = (part.value for part in ast.walk(node.body) if isinstance(part, ast.Constant))
+    return {value for value in inner if isinstance(value, _PLAIN)}
+
+
+@dataclass(frozen=True)
+class Assertion:
+    """A condition that is asserted from a time on."""
+
+    condition: Condition
+    word: str
+    """always, never, eventually or run_until."""
+    since: float
+    """s"""
+
+    @property
+    def text(self) -> str:
+        """The assertion as the test states it."""
+        return f"{self.word}({text_of(self.condition)})"
+
+
+def values(
+    names: Iterable[str], present: Mapping[str, float], units: Callable[[str], str], forced: Collection[str] = ()
+) -> str:
+    """Return one line per signal: name, value and unit, and a note if it is forced."""
+    lines = [
+        f"    {name} = {present[name]:g} {units(name)}".rstrip() + " (forced)" * (name in forced) for name in names
+    ]
+    return "\n".join(lines) or "    (it reads no signals)"
+
+
+NUMBERS = {text.lower(): number for number, text in MODES.items()}
+"""Numbers of the modes, by name."""
+
+
+class PanelUser:
+    """An operator or engineer. Operations act at the next tick; CommandError is raised if it would refuse them."""
+
+    def __init__(self, source: str, kind: WriterKind, give: Callable[[Input], None]) -> None:
+        """source: of the inputs. kind: kind and name of the writer. give: takes an input, or raises CommandError."""
+        self._source = source
+        self._kind = kind
+        self._give = give
+
+    def set(self, name: str, value: float) -> None:
+        """Give a command to a device that the person controls."""
+        self.operate(SET, [name], [value])
+
+    def mode(self, device: str, mode: int | str) -> None:
+        """Set the mode of a device ("belts/table"), by number or as "automatic", "maintenance" or "manual"."""
+        if isinstance(mode, str):
+            if mode not in NUMBERS:
+                raise CommandError(f"{device}: mode {mode!r} given, expected one of {', '.join(NUMBERS)}")
+            mode = NUMBERS[mode]
+        self.operate(MODE, [device], [mode])
+
+    def force(self, signal: str, value: float) -> None:
+        """Force a signal: controllers read this value until the signal is unforced."""
+        self.operate(FORCE, [signal], [value])
+
+    def unforce(self, *signals: str) -> None:
+        """Unforce signals; without names: all signals."""
+        self.operate(UNFORCE, signals)
+
+    def acknowledge(self, *alarms: str) -> None:
+        """Acknowledge alarms by ID; without IDs: all unacknowledged alarms."""
+        self.operate("acknowledge", alarms)
+
+    def reset(self, *alarms: str) -> None:
+        """Reset latched alarms whose condition has ended, by ID; without IDs: all of them."""
+        self.operate("reset", alarms)
+
+    def shelve(self, alarm: str, seconds: float = 0.0) -> None:
+        """Shelve an alarm for `seconds`; 0: until its condition ends next."""
+        self.operate("shelve", [alarm], [seconds])
+
+    def unshelve(self, *alarms: str) -> None:
+        """Unshelve alarms by ID; without IDs: all."""
+        self.operate("unshelve", alarms)
+
+    def reset_counters(self, *devices: str) -> None:
+        """Reset the counters and times of devices; without names: of all devices."""
+        self.operate("reset_counters", devices)
+
+    def operate(
+        self, operation: str, names: Sequence[str] = (), values: Sequence[float] = (), texts: Sequence[str] = ()
+    ) -> None:
+        """Give any operation of the line, like the service `operate`."""
+        self._give(Input(self._source, self._kind, self._kind, operation, tuple(names), tuple(values), tuple(texts)))
+
 
 TEST = "test"
 """Source of commands of the test."""

@@ -10,8 +10,8 @@ import pytest
 from conveyor_sim.control.jam import JamAlarm, JamClearing
 from conveyor_sim.control.scan import Constant, Controller, priority
 from conveyor_sim.testing import Scenario
-from conveyor_sim.testing.conditions import Present
 from conveyor_sim.testing.plugin import Lines
+from conveyor_sim.testing.scenario import Present
 
 LINE = "scenarios/funnel_mouth"
 WITHIN = 5.0  # s

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scenes import MASS, NO_FLOOR, RADIUS, base, belt, bottle, contact, line, scene, segment, stiffness_for
 
-from conveyor_sim.accuracy.measure.chatter import ChatterProbe
 from conveyor_sim.accuracy.measure.failures import failure_of
+from conveyor_sim.accuracy.measure.precision import ChatterProbe
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.accuracy.trajectory import follow, variant
 from conveyor_sim.physics.stepping.guard.chatter import chatter_of

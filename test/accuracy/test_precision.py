@@ -10,8 +10,7 @@ from scenes import NO_FLOOR, base, belt, bottle, contact, scene, segment, stiffn
 from conveyor_sim.accuracy.candidates import candidates, forbidden, own_setting, softer, standard_steps
 from conveyor_sim.accuracy.displacement import displace
 from conveyor_sim.accuracy.energy import energies
-from conveyor_sim.accuracy.measure.deviation import HORIZON, errors_of
-from conveyor_sim.accuracy.measure.precision import WorkPrecision
+from conveyor_sim.accuracy.measure.precision import HORIZON, WorkPrecision, errors_of
 from conveyor_sim.accuracy.measure.reference import reference_setting
 from conveyor_sim.accuracy.measure.starts import find_starts
 from conveyor_sim.accuracy.measure.timing import costs_of

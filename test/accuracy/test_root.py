@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from conveyor_sim.accuracy.cases.root import root
+from conveyor_sim.accuracy.cases.set_down import root
 from conveyor_sim.engine.contact.laws.onset import onset_restitution
 
 

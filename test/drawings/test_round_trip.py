@@ -69,6 +69,11 @@ def imported_again(scene: Scene, folder: Path) -> Scene:
 def test_shipped_scene_comes_back(path: Path, tmp_path: Path) -> None:
     scene = load_scene(path)
     again = imported_again(scene, tmp_path)
+    agree(scene, again)
+
+
+def agree(scene: Scene, again: Scene) -> None:
+    """Compare belts, rails and devices."""
     assert set(again.belts) == set(scene.belts)
     outlines = {shape.name: shape.outline() for shape in belt_shapes(again)}
     for shape in belt_shapes(scene):
@@ -82,3 +87,50 @@ def test_shipped_scene_comes_back(path: Path, tmp_path: Path) -> None:
         other = marks[mark.kind, mark.name, mark.look]
         assert np.asarray(other.points) == pytest.approx(np.asarray(mark.points), abs=1e-6), mark.name
         assert other.direction == pytest.approx(mark.direction, abs=1e-9)
+
+
+LAYOUT = """
+name: layout
+duration: 10
+bottle_types: {bottle: {radius: 0.03, mass: 0.3, material: glass}}
+contacts:
+- {between: [glass, glass], stiffness: 1e4}
+- {between: [glass, steel], stiffness: 1e4}
+base:
+- {between: [glass, chain], friction: 0.2}
+conveyors:
+  lane:
+    start: [0.1, 0.2]
+    heading: 17 deg
+    path: [{straight: 1}, {right: 100 deg, radius: 0.5}, {left: 190 deg, radius: 0.4}, {straight: 0.7}]
+    width: 0.09
+    material: chain
+    speed: 0.3
+  next: {after: lane, path: [{straight: 2}], width: 0.12, material: chain, speed: 0.3}
+guides:
+  g: {along: lane, material: steel, left: [[0, 0.05], [0.8, 0.04]], right: [[0, -0.05]]}
+photo_eyes:
+  bend: {along: lane, at: 1.4}
+  wide: {along: next, at: 0.5, extend: 0.02}
+counters:
+  count: {along: next, at: -0.3}
+infeeds:
+  feed: {along: lane, at: 0.05, bottle: bottle, gap: 0.02}
+outfeeds:
+  end: {along: next, at: 2, length: 0.1}
+"""
+
+
+def test_layout_comes_back(tmp_path: Path) -> None:
+    """Conveyors come back as conveyors, guides as rails."""
+    scene = parse_scene(LAYOUT)
+    (tmp_path / "plan.dxf").write_bytes(dxf_of(plan_of(scene)))
+    text = MAP.replace("$BELT", "chain, speed: 0.3").replace("$RAIL", "steel").replace("$BOTTLE", "bottle")
+    (tmp_path / "map.yaml").write_text(text)
+    rules = read_map(tmp_path / "map.yaml")
+    result = imported(read_plan(tmp_path / "plan.dxf", None, rules.is_symbol), rules)
+    assert result.skipped == []
+    assert result.sections["photo_eyes"]["wide"] == {"along": "next", "at": 0.5, "extend": 0.02}
+    assert result.sections["counters"]["count"] == {"along": "next", "at": 1.7}
+    (tmp_path / "base.yaml").write_text(LAYOUT.partition("conveyors:")[0])
+    agree(scene, parse_scene(scene_text(result.sections, "test", tmp_path / "base.yaml")))

@@ -15,7 +15,7 @@ from hard_cases.case import Case
 from numpy.typing import NDArray
 
 from conveyor_sim.accuracy.displacement import displace
-from conveyor_sim.accuracy.measure.chatter import STEPS
+from conveyor_sim.accuracy.measure.precision import STEPS
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.accuracy.trajectory import variant
 from conveyor_sim.columns.bottles import BottleColumns

@@ -31,9 +31,10 @@ from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.columns.bottles import BottleColumns
 from conveyor_sim.columns.events import Event, event_columns
 from conveyor_sim.errors import BagError, ConveyorError
+from conveyor_sim.page.http_host import MOST_CONNECTIONS, PageHandler
 from conveyor_sim.page.one_file import write_page
 from conveyor_sim.page.recording import PageRecording
-from conveyor_sim.page.server import MOST_CONNECTIONS, SERVED, RecordingServer, _Handler
+from conveyor_sim.page.server import SERVED, RecordingServer
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 
@@ -325,7 +326,7 @@ def test_connections_that_ask_for_nothing_make_room(server: RecordingServer) -> 
 
 
 def test_who_asks_for_nothing_is_not_waited_for_without_end(server: RecordingServer, monkeypatch: Any) -> None:
-    monkeypatch.setattr(_Handler, "timeout", 0.05)
+    monkeypatch.setattr(PageHandler, "timeout", 0.05)
     address = urlsplit(server.url)
     for asked in (b"", b"GET /data/hea"):
         with socket.create_connection((address.hostname, address.port), timeout=60) as waiting:

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 
 import pytest
 
-from conveyor_sim.ros.gaps import Gaps
+from conveyor_sim.ros.commands import Gaps
 
 
 def missing(numbers: Sequence[int | None], publishers: int) -> list[int]:

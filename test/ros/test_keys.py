@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from conveyor_sim.ros.keys import Keys, readable
+from conveyor_sim.ros.replay_job import Keys, readable
 
 
 @pytest.fixture

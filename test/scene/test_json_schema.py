@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 from click.testing import CliRunner
 from jsonschema import Draft202012Validator
+from scene.layout.along_line import devices, line
 from scenes import SHIPPED, shipped_name
 
 from conveyor_sim.cli import main
@@ -144,6 +145,40 @@ def test_layouts_are_accepted(old: str, new: str) -> None:
 def test_faults_of_layouts_are_refused(old: str, new: str) -> None:
     assert old in LAYOUT
     assert not SCHEMA.is_valid(read(LAYOUT.replace(old, new)))
+
+
+def placed() -> Any:
+    """A scene with a device of every kind along a conveyor."""
+    return json.loads(json.dumps({"name": "placed", "duration": "1 min", **line(**devices())}))
+
+
+def test_devices_along_a_conveyor_are_accepted() -> None:
+    assert list(SCHEMA.iter_errors(placed())) == []
+
+
+@pytest.mark.parametrize(
+    ("path", "change"),
+    [
+        (("photo_eyes", "eye"), {"at": None}),
+        (("photo_eyes", "eye"), {"at": "2 s"}),
+        (("photo_eyes", "eye"), {"along": 2}),
+        (("photo_eyes", "eye"), {"extent": 0.01}),
+        (("photo_eyes", "eye"), {"to": [1, 2]}),
+        (("zones", "zone"), {"region": [[0, 0], [1, 0], [1, 1]]}),
+        (("gates", "slide"), {"side": None}),
+        (("gates", "swing"), {"angle": 80}),
+        (("machines", "station"), {"out": {"along": "lane"}}),
+        (("machines", "station"), {"out": None}),
+        (("machines", "source"), {"rate": "2 m"}),
+        (("rails", "across"), {"kind": "segment"}),
+        (("infeeds", "feed"), {"position": [0, 0]}),
+    ],
+)
+def test_faults_of_places_along_a_conveyor_are_refused(path: tuple[str, str], change: dict[str, Any]) -> None:
+    scene = placed()
+    device = {**scene[path[0]][path[1]], **change}
+    scene[path[0]][path[1]] = {name: value for name, value in device.items() if value is not None}
+    assert not SCHEMA.is_valid(scene)
 
 
 @pytest.mark.parametrize("unit", FORMS)

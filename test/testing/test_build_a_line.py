@@ -34,7 +34,8 @@ def test_without_a_controller_the_queue_presses_as_it_says(tmp_path: Path) -> No
 
 
 def test_the_scene_passes_its_check(tmp_path: Path) -> None:
-    (tmp_path / "my_line.yaml").write_text(BLOCKS["my_line.yaml"])
+    (tmp_path / "my_line.yaml").write_text(f"# my_line.yaml\n{BLOCKS['my_line.yaml']}")
     done = run(["-c", "from conveyor_sim.cli import main; main()", "check", "my_line.yaml"], cwd=tmp_path)
     assert done.returncode == 0, done.stderr
+    assert done.stdout in PAGE
     assert (tmp_path / "my_line.png").stat().st_size > 1000

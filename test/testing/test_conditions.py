@@ -1,6 +1,6 @@
 """Texts of conditions."""
 
-from conveyor_sim.testing.conditions import Present, text_of
+from conveyor_sim.testing.scenario import Present, text_of
 
 LIMIT = 3
 

@@ -4,15 +4,28 @@ It is looked at from the belt: the bottle slides on a floor at rest that has the
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import bisect
 
 from conveyor_sim.accuracy.cases.aside import PHASES, phases, rms, simulation_aside
-from conveyor_sim.accuracy.cases.root import root
 from conveyor_sim.accuracy.displacement import displace
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
+
+ROUNDING = 4.0 * float(np.finfo(np.float64).eps)
+"""Tolerance of the root: the finest that scipy allows."""
+
+
+def root(rising: Callable[[float], float], below: float, above: float) -> float:
+    """Return the root of a function that is <= 0 at `below` and >= 0 at `above`, to the last digits.
+
+    The function may be infinite at both ends. Raise ValueError for other signs.
+    """
+    return float(bisect(rising, below, above, xtol=1e-300, rtol=ROUNDING, maxiter=2000))
+
 
 COARSEST = 10
 """Steps in the time that the case lasts, the fewest."""

@@ -12,17 +12,17 @@ from typing import Any
 
 from asyncua import ua
 from asyncua.crypto.permission_rules import SimpleRoleRuleset, UserRole
+from asyncua.server.internal_server import InternalServer
 
 from conveyor_sim.protocols.opcua.conditions import AlarmStates
 from conveyor_sim.protocols.opcua.emitter import Emitter
 from conveyor_sim.protocols.opcua.history import OpcUaHistory, require_tags
-from conveyor_sim.protocols.opcua.limits import LIMITS, OpcUaLimits
+from conveyor_sim.protocols.opcua.limits import LIMITS, PUBLISHED, UNSUPPORTED, OpcUaLimits
 from conveyor_sim.protocols.opcua.line_events import LineEvents
 from conveyor_sim.protocols.opcua.methods import Methods, add_methods
 from conveyor_sim.protocols.opcua.nodes import INDEX, NAMESPACE, Nodes
 from conveyor_sim.protocols.opcua.packml import PackMl
 from conveyor_sim.protocols.opcua.passwords import checked
-from conveyor_sim.protocols.opcua.published_limits import publish
 from conveyor_sim.protocols.opcua.requests import Client, Requests, reader
 from conveyor_sim.protocols.opcua.session import SafeServer
 from conveyor_sim.protocols.opcua.transport import BoundedServer
@@ -35,6 +35,23 @@ from conveyor_sim.protocols.server.quotas import QUOTA, ConnectionSlots, Quota
 from conveyor_sim.protocols.server.users import Logins, LoginService, User
 from conveyor_sim.protocols.tags.tag_provider import OPCUA, TagProvider
 from conveyor_sim.protocols.tags.tick_clock import TickClock
+
+_CAPABILITIES = "Server_ServerCapabilities_"
+
+_SHORT = ("MaxBrowseContinuationPoints",)
+"""Nodes of type UInt16; the others are UInt32."""
+
+
+async def publish(server: InternalServer, limits: OpcUaLimits, quota: Quota) -> None:
+    """Write all limits that have a node. Raises UaStatusCodeError if a node is missing."""
+    values = {name: int(getattr(limits, field)) for name, field in PUBLISHED.items()}
+    values |= dict.fromkeys(UNSUPPORTED, 1) | {"MaxSessions": quota.connections}
+    for name, value in values.items():
+        kind = ua.VariantType.UInt16 if name in _SHORT else ua.VariantType.UInt32
+        node = ua.NodeId(getattr(ua.ObjectIds, _CAPABILITIES + name))
+        written = ua.DataValue(ua.Variant(min(value, 0xFFFF) if name in _SHORT else value, kind))
+        (await server.aspace.write_attribute_value(node, ua.AttributeIds.Value, written)).check()
+
 
 POLICIES = [
     ua.SecurityPolicyType.NoSecurity,

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import islice
 from typing import Any
 
 from conveyor_sim.scene.layout.faults import LayoutFault
@@ -17,6 +18,8 @@ from conveyor_sim.scene.types import TOUCH
 from conveyor_sim.scene.words import shown, some_of
 
 _MOST_SURFACES = 20_000
+_LISTED = 20
+"""Largest number of names of a circle that a message lists."""
 _OWN = ("speed", "speed_limits", "watchdog")
 """Fields of a belt that a named drive has instead."""
 _DRIVEN = (*_OWN, "drive", "ratio")
@@ -57,21 +60,26 @@ class ConveyorExpansion:
                 if other is not None and other not in self.conveyors:
                     text = f"{shown(other)} given, expected a name from conveyors: {some_of(self.conveyors)}"
                     raise LayoutFault((*path, way), text)
-                if other in left_out:
+                if other in left_out or self.surfaces > _MOST_SURFACES:
                     left_out.add(name)
                     continue
                 if other is not None and other not in self.plans:
                     # Others come before those that are placed by them, unless they form a circle.
-                    names = circle(name, self.conveyors)
-                    left_out.update(names)
-                    text = f"{shown(other)} given, expected conveyors that are not placed by each other in a circle"
-                    raise LayoutFault((*path, way), f"{text}: {some_of(names)}")
+                    left_out.update(names := set(circle(name, self.conveyors)))
+                    raise self._in_a_circle(next(each for each in self.conveyors if each in names))
                 self.laid[name] = self._lay(name, conveyor, path)
                 self.plans[name] = self.laid[name].plan
             except LayoutFault as fault:
                 left_out.add(name)
                 self.faults.append(fault)
         self.laid = {name: self.laid[name] for name in self.conveyors if name in self.laid}
+
+    def _in_a_circle(self, name: str) -> LayoutFault:
+        """Return the fault of a conveyor in a circle of conveyors that are placed by each other."""
+        conveyor = self.conveyors[name]
+        text = f"{shown(dependency(conveyor))} given, expected conveyors that are not placed by each other in a circle"
+        names = " -> ".join(islice(circle(name, self.conveyors), _LISTED))
+        return LayoutFault(("conveyors", name, "after" if conveyor.after is not None else "beside"), f"{text}: {names}")
 
     def _lay(self, name: str, conveyor: Conveyor, path: Path) -> LaidConveyor:
         lanes = lanes_of(conveyor, path)

@@ -14,6 +14,7 @@ from conveyor_sim.scene.layout.plan import LayoutPlan
 from conveyor_sim.scene.part import validated
 from conveyor_sim.scene.problems import Path, Problem
 
+_MOST_RAILS = 20_000
 _FIELDS = tuple(SceneLayout.model_fields)
 
 
@@ -67,14 +68,20 @@ def _rails(
     layout: SceneLayout, raw: Mapping[str, Any], plan: LayoutPlan, faults: list[LayoutFault]
 ) -> dict[str, list[GuideRail]]:
     """Return the rails of each guide. Guides along a conveyor with a fault are left out."""
-    rails = {}
+    rails: dict[str, list[GuideRail]] = {}
+    count = 0
     for name, guide in layout.guides.items():
         if any(conveyor in layout.conveyors and conveyor not in plan.conveyors for conveyor in guide.conveyors):
             continue
         try:
-            rails[name] = list(rails_of_guide(guide, plan.conveyors, raw[name], ("guides", name)))
+            rails[name] = list(rails_of_guide(guide, plan, raw[name], ("guides", name)))
+            count += len(rails[name])
+            if count > _MOST_RAILS:
+                raise LayoutFault(("guides", name), f"rail number {count} given, expected at most {_MOST_RAILS}")
         except LayoutFault as fault:
             faults.append(fault)
+            if count > _MOST_RAILS:
+                break
     return rails
 
 

@@ -1,14 +1,14 @@
 """Guides of a layout: rails on both sides of conveyors or of a line through points."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 from conveyor_sim.scene.layout.faults import LayoutFault
 from conveyor_sim.scene.layout.guide_line import guide_line
 from conveyor_sim.scene.layout.joined import JoinedRoute, joined
-from conveyor_sim.scene.layout.parts import Conveyor, ConveyorGuides, Guide
-from conveyor_sim.scene.layout.plan import SIDES, ConveyorPlan, GuideProfile, Side
+from conveyor_sim.scene.layout.parts import Conveyor, Guide, GuideSides
+from conveyor_sim.scene.layout.plan import SIDES, ConveyorPlan, GuideProfile, LayoutPlan, Side
 from conveyor_sim.scene.layout.profile_rails import rails_along
 from conveyor_sim.scene.layout.routes import Route, Straight
 from conveyor_sim.scene.problems import Path
@@ -45,9 +45,7 @@ def rails_of_conveyor(conveyor: Conveyor, plan: ConveyorPlan, order: Iterable[st
     yield from _rails_along(guides, JoinedRoute(route, places), before, order, path)
 
 
-def rails_of_guide(
-    guide: Guide, plans: Mapping[str, ConveyorPlan], order: Iterable[str], path: Path
-) -> Iterator[GuideRail]:
+def rails_of_guide(guide: Guide, layout: LayoutPlan, order: Iterable[str], path: Path) -> Iterator[GuideRail]:
     """Yield the rails of a guide, and enter it in the plans of its conveyors. Raise LayoutFault.
 
     order: names of its fields as written, because the sides follow the file.
@@ -56,8 +54,9 @@ def rails_of_guide(
         text = "neither" if guide.along is None else "both"
         raise LayoutFault(path, f"{text} given, expected either along or points")
     if guide.points is not None:
-        yield from _rails_by_points(guide, guide.points, plans, path)
+        yield from _rails_by_points(guide, guide.points, layout, path)
         return
+    plans = layout.conveyors
     for index, name in enumerate(guide.conveyors):
         if name in guide.conveyors[:index]:
             raise LayoutFault((*path, "along", index), f"{shown(name)} given, expected each conveyor once")
@@ -71,7 +70,7 @@ def rails_of_guide(
 
 
 def _rails_along(
-    guide: ConveyorGuides, way: JoinedRoute, shift: float, order: Iterable[str], path: Path
+    guide: GuideSides, way: JoinedRoute, shift: float, order: Iterable[str], path: Path
 ) -> Iterator[GuideRail]:
     """Yield the rails of a guide along a path. shift: station of the path where stations of the guide begin (m)."""
     for side in sorted(_sides(guide, path), key=[*(name for name in order if name in SIDES), *SIDES].index):
@@ -97,9 +96,7 @@ def _rails_along(
                 plan.guides.append(within)
 
 
-def _rails_by_points(
-    guide: Guide, points: tuple[XY, ...], plans: Mapping[str, ConveyorPlan], path: Path
-) -> Iterator[GuideRail]:
+def _rails_by_points(guide: Guide, points: tuple[XY, ...], layout: LayoutPlan, path: Path) -> Iterator[GuideRail]:
     for side in SIDES:
         if guide.corners(side) is not None:
             raise LayoutFault((*path, side), "given with points, expected clearance only")
@@ -110,12 +107,11 @@ def _rails_by_points(
         first, last = _stretch(guide, 0.0, line.stations[-1], path)
         for data in line.rails(_closed(guide, side, first, last, path)):
             yield GuideRail(side, data, (*path, "points"))
-        for plan in plans.values():
-            if plan.near(line.box):
-                plan.guides.append(line)
+        for plan in layout.near(line.box):
+            plan.guides.append(line)
 
 
-def _sides(guide: ConveyorGuides, path: Path) -> Sequence[Side]:
+def _sides(guide: GuideSides, path: Path) -> Sequence[Side]:
     """Return the sides that a guide has."""
     given = [side for side in SIDES if guide.corners(side) is not None]
     if bool(given) == (guide.clearance is not None):
@@ -137,7 +133,7 @@ def _check_corners(corners: Sequence[XY], length: float, path: Path) -> None:
         least = s + _APART
 
 
-def _stretch(guide: ConveyorGuides, first: float, length: float, path: Path) -> XY:
+def _stretch(guide: GuideSides, first: float, length: float, path: Path) -> XY:
     """Return the stations where a guide begins and ends (m)."""
     if guide.to is not None and not guide.to <= length + TOUCH:
         text = f"{shown(guide.to)} given, expected at most the length of the path, {length:.6g} (m)"
@@ -153,7 +149,7 @@ def _stretch(guide: ConveyorGuides, first: float, length: float, path: Path) -> 
     return begin, end
 
 
-def _closed(guide: ConveyorGuides, side: Side, first: float, last: float, path: Path) -> list[XY]:
+def _closed(guide: GuideSides, side: Side, first: float, last: float, path: Path) -> list[XY]:
     """Return the parts of a side without its openings, each first and last station (m)."""
     openings = guide.open.left if side == "left" else guide.open.right
     parts, begin = [], first

@@ -98,10 +98,12 @@ class ConveyorSection(_Driven):
 
 
 Range = Annotated[tuple[Component, Component], Says("two stations [from, to]")]
-Ranges = Annotated[tuple[Range, ...], Len(0, MOST_PIECES), Holds(f"a list of at most {MOST_PIECES} ranges [from, to]")]
+Ranges = Annotated[tuple[Range, ...], Len(0, MOST_PIECES), Holds("a list of ranges [from, to] of two numbers")]
 Corner = Annotated[tuple[Component, Component], Says("a station and an offset [station, offset]")]
 Corners = Annotated[
-    tuple[Corner, ...], AfterValidator(_bounded), Holds(f"a list of 1 to {MOST_PIECES} corners [station, offset]")
+    tuple[Corner, ...],
+    AfterValidator(_bounded),
+    Holds("a list of corners [station, offset] of two numbers"),
 ]
 
 
@@ -112,12 +114,8 @@ class Openings(Part):
     right: Ranges = quantity("On the right.", "m", default=())
 
 
-class ConveyorGuides(Part):
-    """Guides on both sides of a path, rails `<name>_left` and `<name>_right`.
-
-    Given by `clearance`, or by corners of `left`, of `right` or of both. A guide with openings or bends has several
-    rails, `<name>_left_1` and so on, which join end to end.
-    """
+class GuideSides(Part):
+    """Sides of guides along a path."""
 
     material: Name = quantity("Material, as named in `contacts`.")
     clearance: Positive | None = quantity("Distance between both sides, half of it on either side.", "m", default=None)
@@ -142,8 +140,19 @@ class ConveyorGuides(Part):
         return self.left if side == "left" else self.right
 
 
-class Guide(ConveyorGuides):
-    """Guides along conveyors, or on both sides of a line through points."""
+class ConveyorGuides(GuideSides):
+    """Guides along a conveyor: rails `<conveyor>_left` and `<conveyor>_right`, as those of `guides`.
+
+    Given by `clearance`, they also cover the gap in front of a conveyor that is `after` another.
+    """
+
+
+class Guide(GuideSides):
+    """Guides along conveyors, or on both sides of a line through points: rails `<guide>_left` and `<guide>_right`.
+
+    Given by `clearance`, or by corners of `left`, of `right` or of both. A side with openings or bends has several
+    rails, `<guide>_left_1` and so on. Where they meet, they are one surface.
+    """
 
     along: NameOrNames | None = quantity(
         "Conveyor that it follows, or several that follow each other: stations count along all of them.", default=None

@@ -6,6 +6,9 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal, Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
 from conveyor_sim.scene.layout.routes import Bend, Route
 from conveyor_sim.scene.types import XY
 
@@ -102,7 +105,7 @@ class ConveyorPlan:
         """Width (m)."""
         return self.edges[1] - self.edges[0]
 
-    @cached_property
+    @property
     def box(self) -> Box:
         """Box that holds it, with half a width beyond either edge."""
         points = [self.route.start.xy, *(piece.end.xy for piece in self.route.pieces)]
@@ -111,11 +114,6 @@ class ConveyorPlan:
                 x, y = piece.centre
                 points += [(x - piece.radius, y - piece.radius), (x + piece.radius, y + piece.radius)]
         return box_of(points, self.width)
-
-    def near(self, box: Box) -> bool:
-        """Return True if it may meet what is in a box."""
-        own = self.box
-        return own[0] <= box[2] and box[0] <= own[2] and own[1] <= box[3] and box[1] <= own[3]
 
     def belt_at(self, s: float) -> str:
         """Return the name of the belt at a station (m)."""
@@ -138,3 +136,14 @@ class LayoutPlan:
     """All conveyors of a layout by name, in the order of the file."""
 
     conveyors: dict[str, ConveyorPlan] = field(default_factory=dict)
+
+    def near(self, box: Box) -> list[ConveyorPlan]:
+        """Return the conveyors that may meet what is in a box."""
+        plans = list(self.conveyors.values())
+        low_x, low_y, high_x, high_y = self._boxes
+        meets = (low_x <= box[2]) & (box[0] <= high_x) & (low_y <= box[3]) & (box[1] <= high_y)
+        return [plans[index] for index in np.flatnonzero(meets)]
+
+    @cached_property
+    def _boxes(self) -> NDArray[np.float64]:
+        return np.array([plan.box for plan in self.conveyors.values()]).reshape(-1, 4).T

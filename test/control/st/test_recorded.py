@@ -17,8 +17,7 @@ from conveyor_sim.cli import main
 from conveyor_sim.control.recorded import RecordedVariables
 from conveyor_sim.control.scan import ControlError, together
 from conveyor_sim.control.st import StructuredText
-from conveyor_sim.page.content import Collector
-from conveyor_sim.page.recording import Detail, PageRecording
+from conveyor_sim.page.recording import Collector, Detail, PageRecording
 from conveyor_sim.page.watch import Watch
 from conveyor_sim.testing import Scenario
 

@@ -3,6 +3,7 @@
 import re
 
 import pytest
+from facts import missing
 from line.alarms.board import Board
 
 from conveyor_sim.line.alarms.declaration import MOST_ALARMS
@@ -217,12 +218,10 @@ def test_only_so_many() -> None:
     many = {f"a{n}": True for n in range(MOST_ALARMS)}
     assert board.alarms.room_problem(many) == ""
     board.say(**many)
-    assert board.alarms.room_problem({"one more": True}) == (
-        f"1 alarms given beside {MOST_ALARMS} that stand or are declared, expected {MOST_ALARMS} at most"
-    )
+    assert missing(board.alarms.room_problem({"one more": True}), "1 alarm", f"expected {MOST_ALARMS}") == []
     board.say(**{"one more": True})
     assert len(board.alarms) == 1 + MOST_ALARMS and "one more" not in board.alarms
-    assert board.declare(b={}) == f"alarm b: 1 alarms declared beside {MOST_ALARMS}, expected {MOST_ALARMS} at most"
+    assert missing(board.declare(b={}), "alarm b", "1 alarm", f"expected {MOST_ALARMS}") == []
     # In place of one that goes at the same time, and one that is there already, there is room.
     assert board.alarms.room_problem({"a0": False, "one more": True}) == ""
     assert board.declare(a7={"text": "seven"}) == ""
@@ -258,13 +257,13 @@ def test_one_that_others_follow_from_is_not_forgotten() -> None:
 
 def test_operations_are_refused_with_what_was_expected() -> None:
     board = Board(jam={}, full={})
-    assert board.do("acknowledge", "jamm") == "jamm: no such alarm, expected one of jam, full"
-    assert board.do("acknowledge", "jam") == "jam: is normal, expected one that waits to be acknowledged"
+    assert missing(board.do("acknowledge", "jamm"), "jamm", "jam, full") == []
+    assert missing(board.do("acknowledge", "jam"), "jam", "normal", "acknowledged") == []
     board.say(jam=True)
     assert board.do("acknowledge", "jam", "alarms/jam") == "jam: given twice"
     assert board.do("acknowledge", "jam", values=(1.0,)) == "1 values given, expected none"
-    assert board.do("shelve") == "no name given, expected the id of an alarm"
-    assert board.do("shelve", "jam", values=(1.0, 2.0)) == "2 values given, expected one per name (1), or none"
+    assert missing(board.do("shelve"), "name", "id of an alarm") == []
+    assert missing(board.do("shelve", "jam", values=(1.0, 2.0)), "2 values", "(1)", "none") == []
     nan = float("nan")
     for value, shown in ((-1.0, "-1"), (1e9, "1e+09"), (nan, "nan")):
         expected = f"{shown} given, expected a shelving time of 0 to 86400 s"

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
+from facts import missing
 from scenes import base, belt, bottle, simulation
 
 from conveyor_sim.line.commands.refusal import refusal, shown
@@ -143,7 +144,7 @@ def test_without_belts_there_is_nothing_to_command() -> None:
     sim = simulation(bottles=[bottle(0.0, 0.0)])
     sim.command(["belts/one/cmd_speed"], [0.1])
     sim.advance()
-    assert sim.take_outcomes()[0].reason == "belts/one/cmd_speed: no such command, expected none: the line has none"
+    assert missing(sim.take_outcomes()[0].reason, "belts/one/cmd_speed", "no such command", "none") == []
 
 
 def test_a_refusal_lists_some_of_many_names() -> None:

@@ -5,6 +5,7 @@ from itertools import pairwise
 from typing import Any
 
 import pytest
+from facts import missing
 from scenes import base, belt, bottle, simulation
 
 from conveyor_sim.line.devices.drive import Ramp
@@ -103,7 +104,7 @@ def test_faults_are_no_commands_and_commands_no_faults() -> None:
     sim.advance()
     reasons = [outcome.reason for outcome in sim.take_outcomes()]
     assert reasons[0].startswith("belts/one/trip: no such command, expected one of belts/one/cmd_speed, ")
-    assert reasons[1] == "belts/one/run: no such fault, expected one of belts/one/trip"
+    assert missing(reasons[1], "belts/one/run", "fault", "belts/one/trip") == []
     with pytest.raises(ValueError, match="expected another: fault, watchdog and arrival are the line's"):
         sim.command(["belts/one/run"], [0.0], source="fault")
 

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from facts import missing
 from line.machines.machine_line import END, line, signals, sink, source
 
 from conveyor_sim.line.machines.machine import MachineDevice
@@ -81,13 +82,13 @@ def test_who_stopped_it_can_be_told() -> None:
 def test_a_command_that_the_state_does_not_allow_is_refused_and_changes_nothing() -> None:
     sim = packing()
     name = "machines/packer/cntrl_cmd"
-    assert command(sim, "Start") == f"{name}: Start given in Execute, expected in Idle"
-    assert command(sim, "Reset") == f"{name}: Reset given in Execute, expected in Stopped or Complete"
+    assert missing(command(sim, "Start"), name, "Start", "Execute", "Idle") == []
+    assert missing(command(sim, "Reset"), name, "Reset", "Execute", "Stopped or Complete") == []
     assert at(sim) == ("Execute", "running", "none")
     sim.command([name, "machines/packer/rate"], [float(COMMANDS["Clear"]), 1.0])
     sim.advance()
     (outcome,) = sim.take_outcomes()
-    assert outcome.reason == f"{name}: Clear given in Execute, expected in Aborted"
+    assert missing(outcome.reason, name, "Clear", "Execute", "Aborted") == []
     assert signals(sim)["machines/packer/cur_rate"] == 2.0, "all of it is refused"
 
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from facts import missing
 from physics.test_turntable import MU, G, distance, turntable
 from scenes import (
     MASS,
@@ -266,7 +267,7 @@ def test_the_error_is_that_of_the_worst_impact() -> None:
     assert model.prediction.value == pytest.approx(expected)
     assert f"{n:.3g} steps a contact" in model.prediction.reason
     assert model.prediction.force == pytest.approx(math.sqrt(4e3 * MASS / 2))
-    assert model.prediction.force_reason == "an impact of two bottles at k = 4000 N/m and 1 m/s"
+    assert missing(model.prediction.force_reason, "two bottles", "4000 N/m", "1 m/s") == []
 
 
 def test_a_scene_without_contacts_has_no_force_to_be_wrong() -> None:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from conveyor_sim.protocols.mqtt.birth_numbers import COUNT, BirthNumbers, state_folder
+from conveyor_sim.protocols.mqtt.edge_node import COUNT, BirthNumbers, state_folder
 from conveyor_sim.support.file_lock import locked
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ def test_they_go_on_from_process_to_process_and_round(state: Path) -> None:
 
 
 def test_processes_side_by_side_never_take_the_same(state: Path) -> None:
-    code = "from conveyor_sim.protocols.mqtt.birth_numbers import BirthNumbers as B\n"
+    code = "from conveyor_sim.protocols.mqtt.edge_node import BirthNumbers as B\n"
     code += f"n = B({URL!r}, 'plant', 'line')\nprint(*(n.take() for _ in range(20)))"
     running = [subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) for _ in range(3)]
     taken = [int(number) for one in running for number in one.communicate()[0].split()]

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from facts import missing
 
 from conveyor_sim.line.commands.inputs import DISOWN, OWN
 from conveyor_sim.protocols.mqtt import link
@@ -31,7 +32,7 @@ def controlled(serve: Callable[..., Line]) -> Line:
 def test_without_a_role_nobody_commands(serve: Callable[..., Line]) -> None:
     line = serve()
     line.host.set(SETPOINT, 0.1)
-    assert line.refused(1) == "a command given, expected none: the line is served read-only"
+    assert missing(line.refused(1), "command", "read-only") == []
     line.advance()
     assert line.outcomes() == [] and line.node.status().writes == 0
     assert properties_of(line.host.last("DBIRTH").metrics[SETPOINT])["readOnly"] is True
@@ -117,7 +118,7 @@ def test_a_command_that_the_broker_has_kept_is_not_obeyed(serve: Callable[..., L
     host.state(True, 1)  # by then the broker has the one before, too
     host.close()
     line = serve(role="operator")
-    assert line.refused(1) == "a command kept by the broker, expected one that is sent without retain"
+    assert missing(line.refused(1), "broker", "retain") == []
     line.advance()
     assert line.outcomes() == []
 
@@ -215,7 +216,7 @@ def test_a_float_is_taken_for_a_double_and_a_limit_in_it_is_the_limit(controlled
 
 def test_a_mode_that_is_not_for_operators_is_refused_at_once(line: Line) -> None:
     line.host.set(MODE, 2, INT32)
-    assert line.refused(1) == "belts/zone1: Maintenance is not for operators, expected an engineer"
+    assert missing(line.refused(1), "belts/zone1", "Maintenance", "engineer") == []
     assert line.node.status().writes == 0
     line.advance()
     assert [row[1:] for row in line.outcomes()] == [("mode", ("belts/zone1",), (2.0,), False)]

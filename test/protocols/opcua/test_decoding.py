@@ -11,8 +11,8 @@ from asyncua import ua
 from asyncua.common.utils import Buffer, NotEnoughData, ServiceError
 from asyncua.ua.ua_binary import struct_from_binary, struct_to_binary, variant_from_binary, variant_to_binary
 
-from conveyor_sim.protocols.opcua.decoding import Allowance, BoundedBuffer
 from conveyor_sim.protocols.opcua.limits import LIMITS
+from conveyor_sim.protocols.opcua.processor import Allowance, BoundedBuffer
 from test.protocols.opcua.conftest import PATIENCE
 
 if TYPE_CHECKING:

@@ -8,6 +8,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from facts import missing
 from protocols.waiting import until
 
 from conveyor_sim.bag.outputs import OutputWriter
@@ -135,7 +136,7 @@ def test_it_plays_with_what_happens_and_ends_and_begins_anew(source: BagTagProvi
 
 def test_it_can_not_be_commanded_nor_led_out_of_itself(source: BagTagProvider) -> None:
     assert source.give(GIVEN).endswith("a recording can't be commanded")
-    assert source.control("seek", 11.0, "a test") == "seek: 11 given, expected a time of the recording, 0 to 10 (s)"
+    assert missing(source.control("seek", 11.0, "a test"), "seek", "11 ", "0 to 10 (s)") == []
     assert source.control("speed", -1.0, "a test").startswith("speed: -1 given")
     assert source.control("step", 1.0, "a test").startswith("step: expected one of loop, pause")
 
