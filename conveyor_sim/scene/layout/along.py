@@ -17,7 +17,7 @@ class Along(Part):
 
 class _At(Along):
     at: PathStation = quantity(
-        'PathStation: distance from the start of the conveyor along its path. A negative number counts from the end, "end" '
+        'Station: distance from the start of the conveyor along its path. A negative number counts from the end, "end" '
         "is the end.",
         "m",
     )
@@ -46,18 +46,18 @@ class AlongLine(_Across):
 
 class _Stretch(Along):
     at: PathStation | None = quantity(
-        'PathStation where it ends, with `length`; a negative number counts from the end, "end" is the end.',
+        'Station where it ends, with `length`; a negative number counts from the end, "end" is the end.',
         "m",
         default=None,
     )
     length: Positive | None = quantity("Its length before `at`.", "m", default=None)
     from_: PathStation | None = quantity(
-        "PathStation where it begins, instead of `at` and `length`. Left out beside `to`: the start.",
+        "Station where it begins, instead of `at` and `length`. Left out beside `to`: the start.",
         "m",
         default=None,
         alias="from",
     )
-    to: PathStation | None = quantity("PathStation where it ends. Left out beside `from`: the end.", "m", default=None)
+    to: PathStation | None = quantity("Station where it ends. Left out beside `from`: the end.", "m", default=None)
 
 
 class AlongRegion(_Stretch):
@@ -73,19 +73,19 @@ class AlongRail(Along):
     """A rail across a conveyor (`at`), or along it (`from`, `to`)."""
 
     at: PathStation | None = quantity(
-        'PathStation of a rail across; a negative number counts from the end, "end" is the end.', "m", default=None
+        'Station of a rail across; a negative number counts from the end, "end" is the end.', "m", default=None
     )
     width: Positive | None = quantity(
         "Length of a rail across, half of it on either side of `offset`. Left out: the clear width.", "m", default=None
     )
     extend: Number = quantity("Length by which a rail across is longer at either end.", "m", default=0.0)
     from_: PathStation | None = quantity(
-        "PathStation where a rail along the conveyor begins. Left out beside `to`: the start.",
+        "Station where a rail along the conveyor begins. Left out beside `to`: the start.",
         "m",
         default=None,
         alias="from",
     )
-    to: PathStation | None = quantity("PathStation where it ends. Left out beside `from`: the end.", "m", default=None)
+    to: PathStation | None = quantity("Station where it ends. Left out beside `from`: the end.", "m", default=None)
     offset: Number = quantity(
         "Distance of a rail along from the middle of the path, positive to the left; shift of a rail across.",
         "m",
@@ -123,7 +123,7 @@ class AlongDiverter(Along):
     """A diverter beside a conveyor, along travel from its pivot while it does not divert."""
 
     at: PathStation = quantity(
-        'PathStation of its pivot; a negative number counts from the end, "end" is the end.',
+        'Station of its pivot; a negative number counts from the end, "end" is the end.',
         "m",
     )
     side: Side = quantity("Side on which it is while it does not divert.")
