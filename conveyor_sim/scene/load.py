@@ -17,6 +17,7 @@ from conveyor_sim.scene.reading import Reading
 from conveyor_sim.scene.refusal import refused
 from conveyor_sim.scene.schema import Origin, Scene
 from conveyor_sim.scene.tables import with_tables
+from conveyor_sim.scene.underlay import read_underlay
 from conveyor_sim.scene.words import shown
 from conveyor_sim.scene.yaml_lines import LONGEST_TEXT, Document
 from conveyor_sim.support.files import FileError, in_mb, read_file
@@ -75,10 +76,14 @@ def parse_scene(
     files = (
         {path: content.decode("utf-8-sig") for path, content in beside.used.items()} if composition.is_composed else {}
     )
+    if scene.underlay is not None:
+        scene._underlay = read_underlay(scene.underlay, beside)
+        if scene.underlay_url:
+            files = {**files, scene.underlay.file: scene.underlay_url}
+    is_in_files = composition.is_composed or data is composition.data
+    stored_text = changes_text if is_in_files else yaml_text({**changes, "contacts": data["contacts"]})
     if files:
-        stored_text = f"{changes_text}{FILES}: {in_quotes(files)}\n"
-    else:
-        stored_text = changes_text if data is composition.data else yaml_text({**changes, "contacts": data["contacts"]})
+        stored_text += f"{FILES}: {in_quotes(files)}\n"
     if len(stored_text) > LONGEST_TEXT:
         most = in_mb(LONGEST_TEXT)
         text = f"tables, other files and overrides of {in_mb(len(stored_text))} as YAML, expected at most {most}"
