@@ -32,6 +32,9 @@ def head(line: Any, scene: Scene) -> dict[str, Any]:
             {"name": name, "radius": float(radius)}
             for name, radius in zip(line.bottle_types, line.type_radius, strict=True)
         ],
+        "drives": {
+            f"belts/{name}": f"drives/{belt.drive_name}" for name, belt in scene.belts.items() if belt.drive_name
+        },
         "signals": signals,
         "commands": list(line.command_names),
         "tags": _tags(line),

@@ -26,12 +26,24 @@ def why_not_simple(corners: tuple[XY, ...]) -> str | None:
     for index, (start, end) in enumerate(sides):
         if math.dist(start, end) <= TOUCH:
             return f"side {index + 1} has no length"
+    boxes = [_box(*side) for side in sides]
     for i, one in enumerate(sides):
+        left, below, right, above = boxes[i]
         for j in range(i + 1, len(sides)):
+            box = boxes[j]
+            # Most sides are far apart, and only the others are worth a closer look.
+            if box[0] > right or box[2] < left or box[1] > above or box[3] < below:
+                continue
             neighbours = j == i + 1 or (i == 0 and j == len(sides) - 1)
             if _fold_back(one, sides[j]) if neighbours else _touch(one, sides[j]):
                 return f"sides {i + 1} and {j + 1} meet"
     return None
+
+
+def _box(start: XY, end: XY) -> tuple[float, float, float, float]:
+    """Return least x and y and greatest x and y of points within touching distance of a side."""
+    (x1, y1), (x2, y2) = start, end
+    return min(x1, x2) - TOUCH, min(y1, y2) - TOUCH, max(x1, x2) + TOUCH, max(y1, y2) + TOUCH
 
 
 def _fold_back(one: tuple[XY, XY], other: tuple[XY, XY]) -> bool:

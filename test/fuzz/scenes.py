@@ -57,6 +57,7 @@ def scenes(draw: st.DrawFn, family: Family, beyond: bool = True) -> Data:
             for material in frame.materials
         ],
         "belts": {f"belt_{n}": belt for n, belt in enumerate(draw(_belts(family, frame)))},
+        "plates": {f"plate_{n}": plate for n, plate in enumerate(draw(_plates(family, frame)))},
         "rails": {f"rail_{n}": rail for n, rail in enumerate(draw(_rails(family, frame)))},
         "floor": {"friction": draw(between(0.02, 0.7))} if family.base_friction else "none",
         "outputs": draw(_outputs(frame.tick)),
@@ -198,10 +199,37 @@ def _belts(draw: st.DrawFn, family: Family, frame: _Frame) -> list[Data]:
             belt["speed_limits"] = [-limit, limit]
             if draw(st.booleans()):
                 belt["watchdog"] = frame.tick * draw(st.sampled_from([1, 7, 20.5]))
-            belts.append(
-                {**belt, **draw(_straight(frame) if kind == "straight" else _curved(frame, "arc" in family.rails))}
-            )
+            if draw(st.integers(0, 3)):
+                belts.append({**belt, **draw(_area(kind, frame, "arc" in family.rails)), **draw(_turn(kind))})
+            else:
+                belts.append(
+                    {**belt, "kind": "path", "surfaces": draw(st.lists(_surface(kind, frame), min_size=1, max_size=3))}
+                )
     return draw(st.permutations(belts))
+
+
+@st.composite
+def _surface(draw: st.DrawFn, kind: str, frame: _Frame) -> Data:
+    """A surface of a path belt, no faster than its belt."""
+    return {"kind": kind, "ratio": draw(between(0.2, 1.0)), **draw(_area(kind, frame)), **draw(_turn(kind))}
+
+
+def _turn(kind: str) -> st.SearchStrategy[Data]:
+    turns = st.sampled_from([{}, {"turn": "left"}, {"turn": "right"}])
+    return turns if kind == "curved" else st.just({})
+
+
+@st.composite
+def _plates(draw: st.DrawFn, family: Family, frame: _Frame) -> list[Data]:
+    return [
+        {"kind": kind, "material": CHAIN, **draw(_area(kind, frame))}
+        for kind in family.belts
+        if draw(st.integers(0, 4)) == 0
+    ]
+
+
+def _area(kind: str, frame: _Frame, railed: bool = False) -> st.SearchStrategy[Data]:
+    return _straight(frame) if kind == "straight" else _curved(frame, railed)
 
 
 @st.composite

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from scenes import DRIVEN_LINE
 from studies.small import setup_of
 
 from conveyor_sim.studies.check import parameter_units
@@ -51,3 +52,14 @@ def test_a_metric_changes_only_what_it_needs(tmp_path: Path) -> None:
     scene = scene_of(setup, {"g": 9.7}, 0)
     assert scene.outputs.bottles == 1000.0 and scene.effects == {"peaks": "on"}
     assert scene_of(setup_of(tmp_path), {"rate": 4.0}, 0).effects == {}
+
+
+def test_fields_of_a_named_drive_are_varied_as_those_of_a_belt(tmp_path: Path) -> None:
+    parameters = {
+        "v": {"field": "drives.m1.speed", "values": [0.1]},
+        "r": {"field": "belts.feeder.ratio", "values": [1.5]},
+    }
+    setup = setup_of(tmp_path, function=None, scene=str(DRIVEN_LINE), parameters=parameters, metrics=["peak_force"])
+    scene = scene_of(setup, {"v": 0.1, "r": 1.5}, 0)
+    assert (scene.drives["m1"].speed, scene.belts["feeder"].ratio) == (0.1, 1.5)
+    assert parameter_units(setup, scene) == {"v": "m/s", "r": ""}

@@ -33,8 +33,17 @@ export class Faceplate {
     const alarms = this.alarms.map(({ view, list }) => element("div", {}, element("h3", {}, titled("Alarms", view)), list));
     this.count = element("span", { class: "badge" });
     // The alarms are below, so that fields do not move when an alarm comes.
-    this.body.replaceChildren(element("p", { class: "kind" }, tags[0]?.class?.replaceAll("_", " ") ?? "", this.count), ...groups, ...alarms);
+    this.body.replaceChildren(element("p", { class: "kind" }, tags[0]?.class?.replaceAll("_", " ") ?? "", this.count), ...this._moves(device), ...groups, ...alarms);
     this.draw();
+  }
+
+  // Returns a link from a belt to the named drive that moves it, and links from such a drive to its belts.
+  _moves(device) {
+    const { drives } = this.view.recording.head, drive = drives[device], belts = Object.keys(drives).filter((belt) => drives[belt] === device);
+    const linked = drive ? [drive] : belts;
+    if (!linked.length) return [];
+    const links = linked.map((name) => element("button", { class: "link", onclick: () => this.view.selectDevice(name) }, name));
+    return [element("p", { class: "moves" }, drive ? "Moved by " : "Moves ", ...links.flatMap((link, i) => (i ? [", ", link] : [link])))];
   }
 
   // Titles of the columns, if two recordings are shown.

@@ -15,7 +15,7 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 
 from conveyor_sim.report.figures import style
-from conveyor_sim.report.figures.data import Floats, PlantFrame
+from conveyor_sim.report.figures.data import Floats, PlantFrame, StaticGeometry
 
 Z_BOTTLE: Final = 3.0
 Z_MARK: Final = 3.2
@@ -60,12 +60,14 @@ class ForceScale:
         )
 
 
-def speed_scale(frames: Sequence[PlantFrame]) -> Normalize:
-    """Colours from rest to the fastest belt of `frames`, or to what few bottles exceed if that is more.
+def speed_scale(plant: StaticGeometry, frames: Sequence[PlantFrame]) -> Normalize:
+    """Colours from rest to the fastest surface of `frames`, or to what few bottles exceed if that is more.
 
     The few that were shot off in a collision would otherwise make all others look slow.
     """
-    belts = max((float(np.abs(frame.belt_speeds).max(initial=0.0)) for frame in frames), default=0.0)
+    belts = max(
+        (float(np.abs(plant.surface_speeds(frame.belt_speeds)).max(initial=0.0)) for frame in frames), default=0.0
+    )
     speeds = np.concatenate([frame.speed for frame in frames])
     top = max(belts, float(np.percentile(speeds, 98.0))) if len(speeds) else belts
     return Normalize(0.0, 1.05 * top if top > 0.0 else 1.0)

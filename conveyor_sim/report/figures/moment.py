@@ -100,7 +100,7 @@ def moment_figure(
 
 def _speeds(plant: StaticGeometry, frame: PlantFrame) -> Normalize:
     """Colours from rest to the fastest there is, or was at first: what has come to rest must look it."""
-    norm = speed_scale([frame])
+    norm = speed_scale(plant, [frame])
     fastest = 1.05 * float(np.abs(plant.surface_speeds(plant.speeds)).max(initial=0.0))
     return Normalize(0.0, max(norm.vmax or 0.0, fastest)) if fastest else norm
 

@@ -40,7 +40,7 @@ def table_figure(plant: StaticGeometry, frames: Sequence[PlantFrame], title: str
     figure = style.new_figure(WIDTH, 0.8 + rows * (panel * height / width + 0.4))
     _heading(figure, title)
     seen = [frame.within(box) for frame in frames]
-    norm = speed_scale(seen)
+    norm = speed_scale(plant, seen)
     forces = force_scale(seen, panel * _POINTS / width, peak)
     axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     for ax, frame in zip(axes.flat, seen, strict=False):
@@ -66,7 +66,7 @@ def plant_figure(plant: StaticGeometry, frame: PlantFrame, title: str, peak: flo
     inches = WIDTH - 0.8
     figure = style.new_figure(WIDTH, float(np.clip(inches * height / width, 3.0, 11.0)) + 1.6)
     _heading(figure, title)
-    norm = speed_scale([frame])
+    norm = speed_scale(plant, [frame])
     forces = force_scale([frame], inches * _POINTS / width, peak)
     ax = figure.subplots()
     draw_view(ax, plant, frame, norm, forces, box, inches)
@@ -87,7 +87,7 @@ def scene_figure(plant: StaticGeometry, frame: PlantFrame, title: str) -> Figure
     inches = WIDTH - 0.8
     figure = style.new_figure(WIDTH, float(np.clip(inches * height / width, 3.0, 11.0)) + 1.4)
     _heading(figure, title)
-    norm = speed_scale([frame])
+    norm = speed_scale(plant, [frame])
     ax = figure.subplots()
     draw_view(ax, plant, frame, norm, None, box, inches)
     _lighten([ax], [frame])

@@ -29,8 +29,8 @@ def region(site: Site[AlongRegion]) -> list[Coordinate]:
 
 def polygon(route: Route, right: float, left: float) -> list[XY]:
     """Return the corners, counter-clockwise, of the area between two offsets (m) from a route."""
-    stations = list(_stations(route))
-    corners = [route.point(s, right) for s in stations] + [route.point(s, left) for s in reversed(stations)]
+    frames = [route.frame(s) for s in _stations(route)]
+    corners = [frame.point(0.0, right) for frame in frames] + [frame.point(0.0, left) for frame in reversed(frames)]
     return list(_apart(corners))
 
 

@@ -304,8 +304,14 @@ def serve(broker: Mosquitto) -> Iterator[Serve]:
     lines: list[Line] = []
     with ServerThread() as thread:
 
-        def start(primary_host: str = "", port: int | None = None, wait: bool = True, **options: Any) -> Line:
-            source = Stepped(Simulation(load_scene(SCENE), threads=1))
+        def start(
+            primary_host: str = "",
+            port: int | None = None,
+            wait: bool = True,
+            scene: str | Path = SCENE,
+            **options: Any,
+        ) -> Line:
+            source = Stepped(Simulation(load_scene(scene), threads=1))
             place = Broker("127.0.0.1", port or broker.port, secured=False, primary_host=primary_host)
             node = EdgeNode(source, place, **options)
             lines.append(Line(source, node, Host(broker.port), broker, thread))

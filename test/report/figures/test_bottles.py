@@ -11,7 +11,7 @@ from matplotlib.colors import Normalize
 
 from conveyor_sim.report.figures import style
 from conveyor_sim.report.figures.bottles import ForceScale, draw_bottles, draw_forces, draw_orientation, speed_scale
-from conveyor_sim.report.figures.data import Contacts, PlantFrame
+from conveyor_sim.report.figures.data import Contacts, PlantFrame, StaticGeometry
 
 NORM = Normalize(0.0, 1.0)
 
@@ -96,17 +96,22 @@ def test_legend_shows_forces_in_newtons_at_their_width(ax: Axes, frame: PlantFra
     assert shown["20 N"].get_linewidth() == pytest.approx(3.0)
 
 
-def test_speed_scale_spans_the_belts(frame: PlantFrame) -> None:
-    assert speed_scale([frame]).vmax == pytest.approx(1.05 * 0.8)
+def test_speed_scale_spans_the_belts(plant: StaticGeometry, frame: PlantFrame) -> None:
+    assert speed_scale(plant, [frame]).vmax == pytest.approx(1.05 * 0.8)
 
 
-def test_one_bottle_shot_off_does_not_stretch_the_speed_scale(frame: PlantFrame) -> None:
+def test_speed_scale_spans_surfaces_faster_than_their_belt(plant: StaticGeometry, frame: PlantFrame) -> None:
+    twice = replace(plant, surfaces=tuple(replace(surface, ratio=2.0) for surface in plant.surfaces))
+    assert speed_scale(twice, [frame]).vmax == pytest.approx(2.0 * 1.05 * 0.8)
+
+
+def test_one_bottle_shot_off_does_not_stretch_the_speed_scale(plant: StaticGeometry, frame: PlantFrame) -> None:
     speed = np.concatenate([np.full(99, 0.5), [30.0]])
     many = PlantFrame(0.0, *np.zeros((3, 100)), np.full(100, 0.05), speed, frame.belt_speeds)
-    assert speed_scale([many]).vmax == pytest.approx(1.05 * 0.8)
+    assert speed_scale(plant, [many]).vmax == pytest.approx(1.05 * 0.8)
 
 
-def test_speed_scale_spans_the_bottles_where_all_belts_rest(frame: PlantFrame) -> None:
+def test_speed_scale_spans_the_bottles_where_all_belts_rest(plant: StaticGeometry, frame: PlantFrame) -> None:
     resting = replace(frame, belt_speeds=np.zeros(6), speed=np.array([0.3, 0.3, 0.3]))
-    assert speed_scale([resting]).vmax == pytest.approx(1.05 * 0.3)
-    assert speed_scale([replace(resting, speed=np.zeros(3))]).vmax == 1.0
+    assert speed_scale(plant, [resting]).vmax == pytest.approx(1.05 * 0.3)
+    assert speed_scale(plant, [replace(resting, speed=np.zeros(3))]).vmax == 1.0

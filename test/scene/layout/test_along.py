@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from conveyor_sim.scene.layout.devices import PLACEABLE
 from conveyor_sim.scene.layout.expand import expand
 from conveyor_sim.scene.moving import moving_shape
 from conveyor_sim.scene.schema import Scene
+from conveyor_sim.scene.types import XY
 from conveyor_sim.scene.words import field_names
 from conveyor_sim.simulation import Simulation
 
@@ -105,36 +107,59 @@ def test_a_rail_along_a_bend_is_one_surface() -> None:
     assert rails["across"].from_ == pytest.approx((1.5 + HALF, 2.5))
 
 
-def coordinates(scene_: Scene, sign: float) -> dict[Any, Any]:
-    """All coordinates of all devices; y and angles times `sign`, lines and regions as sets of points."""
+def coordinates(scene_: Scene, point: Callable[[XY], XY], turn: Callable[[float], float]) -> dict[Any, Any]:
+    """All coordinates of all devices, moved by functions of points and angles; lines and regions as sets of points."""
 
-    def point(xy: Any) -> Any:
-        return round(xy[0], 9), round(sign * xy[1] + 0.0, 9)
+    def moved(xy: XY) -> XY:
+        x, y = point(xy)
+        return round(x, 9) + 0.0, round(y, 9) + 0.0
 
     result: dict[Any, Any] = {}
     for path, part in scene_.devices():
         for name, value in part:
-            if name in ("from_", "to") and path[0] not in ("gates", "diverters"):
-                result.setdefault((*path, "ends"), set()).add(point(value))
+            if name in ("from_", "to") and path[0] != "diverters" and path[1] != "swing":
+                result.setdefault((*path, "ends"), set()).add(moved(value))
             elif name in ("from_", "to", "position"):
-                result[(*path, name)] = point(value)
+                result[(*path, name)] = moved(value)
             elif name == "region":
-                result[(*path, name)] = {point(corner) for corner in value}
-            elif name in ("direction", "angle"):
-                turned = sign * value
-                result[(*path, name)] = (round(math.cos(turned), 9), round(math.sin(turned) + 0.0, 9))
+                result[(*path, name)] = {moved(corner) for corner in value}
+            elif name == "direction":
+                angle = turn(value)
+                result[(*path, name)] = (round(math.cos(angle), 9) + 0.0, round(math.sin(angle), 9) + 0.0)
             elif name in ("speed", "lateral_jitter", "angular_jitter", "stroke"):
                 result[(*path, name)] = pytest.approx(value)
-    ends = [result.pop(("gates", "slide", name)) for name in ("from_", "to")]
-    return {**result, ("gates", "slide", "ends"): set(ends)}
+    return result
+
+
+def same(xy: XY) -> XY:
+    return xy
 
 
 def test_a_mirrored_layout_mirrors_its_devices() -> None:
     """A right-hand bend with devices on the right is the mirror image of a left-hand one with devices on the left."""
-    left = coordinates(placed({"lane": lane("left")}, **devices("left")), 1.0)
-    right = coordinates(placed({"lane": lane("right")}, **devices("right")), -1.0)
-    assert left.keys() == right.keys()
-    assert {key: value for key, value in left.items() if right[key] != value} == {}
+    left, right = (placed({"lane": lane(side)}, **devices(side)) for side in ("left", "right"))
+    expected = coordinates(left, lambda xy: (xy[0], -xy[1]), lambda angle: -angle)
+    result = coordinates(right, same, lambda angle: angle)
+    assert result.keys() == expected.keys()
+    assert {key: value for key, value in expected.items() if result[key] != value} == {}
+    for field, name in (("gates", "swing"), ("diverters", "diverter")):
+        one, other = (getattr(result, field)[name].angle for result in (left, right))
+        assert one == -other
+
+
+@pytest.mark.parametrize("heading", [0.7, "90 deg"])
+def test_a_turned_layout_turns_its_devices(heading: float | str) -> None:
+    """Start and heading of the conveyor move all devices along it."""
+    angle = 0.5 * math.pi if isinstance(heading, str) else heading
+    cos, sin = math.cos(angle), math.sin(angle)
+    expected = coordinates(
+        placed(**devices()),
+        lambda xy: (3.0 + cos * xy[0] - sin * xy[1], sin * xy[0] + cos * xy[1] - 2.0),
+        lambda own: own + angle,
+    )
+    moved = placed({"lane": lane(start=[3.0, -2.0], heading=heading)}, **devices())
+    result = coordinates(moved, same, lambda own: own)
+    assert {key: value for key, value in expected.items() if result[key] != value} == {}
 
 
 @pytest.mark.parametrize("turn", ["left", "right"])

@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
 import pytest
 from scene.layout.along_line import RADIUS, Data, expansion, lane, placed
 from scenes import kind
 
 from conveyor_sim.scene.parts.infeed import Infeed
+from conveyor_sim.simulation import Simulation
 
 HALF_DEGREE = math.radians(0.5)
 
@@ -106,3 +108,30 @@ def test_a_station_may_have_its_region_or_its_exit_in_coordinates() -> None:
         assert station["position"] == position
         assert station["region"] == [pytest.approx(corner) for corner in region]
         assert ("lateral_jitter" in station) == ("out" in fields)
+
+
+@pytest.mark.parametrize(("fields", "is_column"), [({}, False), ({"lateral_jitter": 0, "angular_jitter": 0}, True)])
+def test_bottles_on_a_table_stand_in_a_column_only_without_scatter(fields: Data, is_column: bool) -> None:
+    """30 bottles from the middle of a lane, behind a rail at the end of a table of 0.6 m."""
+    path, material = [{"straight": 1.0}], "chain"
+    conveyors = {
+        "lane": {"start": [0, 0], "path": path, "width": 0.09, "material": material, "speed": 0.4},
+        "table": {"after": "lane", "path": [{"straight": 2.0}], "width": 0.6, "material": material, "speed": 0.1},
+    }
+    sides = {"left": [[0.0, 0.04], [0.99, 0.04], [1.0, 0.3]], "right": [[0.0, -0.04], [0.99, -0.04], [1.0, -0.3]]}
+    sim = Simulation(
+        placed(
+            conveyors,
+            duration=60.0,
+            accuracy="draft",
+            friction_solver="implicit",
+            guides={"walls": {"along": ["lane", "table"], "material": "steel", **sides}},
+            rails={"end": {"along": "table", "at": "end", "material": "steel"}},
+            infeeds={"feed": {"bottle": "bottle", "along": "lane", "at": 0.05, "rate": 1.5, "count": 30, **fields}},
+        )
+    )
+    sim.advance(4000)
+    y = sim.bottles().y
+    assert len(y) == 30
+    assert (np.ptp(y) == 0.0) == is_column
+    assert is_column or np.ptp(y) > 0.2

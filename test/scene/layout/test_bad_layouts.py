@@ -30,10 +30,10 @@ def test_one_wrong_thing_gets_one_line(case: dict[str, Any]) -> None:
     (message,) = str(error.value).splitlines()
     head = f"plant.yaml:{line}: {case['field']}: " if "field" in case else f"plant.yaml:{line}: "
     assert message.startswith(head)
-    assert missing(message.removeprefix(head), case["facts"]) == []
+    assert missing(message.removeprefix(head), *case["facts"]) == []
 
 
 def test_a_whole_number_beyond_doubles_is_refused() -> None:
     with pytest.raises(SceneError) as error:
         read(GOOD.replace("heading: 0", f"heading: 1{'0' * 400}"))
-    assert missing(str(error.value), ["plant.yaml:8", "conveyors.table.heading", "angle", "rad"]) == []
+    assert missing(str(error.value), "plant.yaml:8", "conveyors.table.heading", "angle", "rad") == []
