@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from conveyor_sim.scene.layout.fragments import Fragment, Report
-from conveyor_sim.scene.layout.parameters import unknown, with_value
+from conveyor_sim.scene.layout.parameters import unknown, value_fault, with_value
 from conveyor_sim.scene.layout.parts import SceneLayout
 from conveyor_sim.scene.problems import Path
 from conveyor_sim.scene.schema import Scene
@@ -81,9 +81,13 @@ def _check_format(fragment: Fragment, name: Any, report: Report) -> None:
             report(at, f"no such field, {did_you_mean(str(field), ['bottle', 'set'])}")
         elif field == "set":
             _check_parameters(fragment, value, (*path, field), report)
+            known = _named(fragment.data, "parameters")
+            for parameter, quantity in value.items() if isinstance(value, dict) else ():
+                if parameter in known and (fault := value_fault(quantity, known)):
+                    report(fragment.place_of((*path, field, parameter)), fault)
         elif not isinstance(value, str) or value not in _named(fragment.data, "bottle_types"):
-            known = [str(one) for one in _named(fragment.data, "bottle_types")]
-            report(at, f"{shown(value)} given, {did_you_mean(str(value), known)}: names of bottle_types")
+            types = [str(one) for one in _named(fragment.data, "bottle_types")]
+            report(at, f"{shown(value)} given, {did_you_mean(str(value), types)}: names of bottle_types")
 
 
 def _check_parameters(fragment: Fragment, values: Any, path: Path, report: Report) -> None:

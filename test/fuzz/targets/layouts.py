@@ -36,20 +36,25 @@ LONGEST = 30.0
 """s of CPU time for one scene; the largest layouts take a tenth of it."""
 
 VALUES: tuple[Any, ...] = (
-    None, True, 0, -1, 1, 0.5, 3, -0.0, 1e-9, 1e5, 1e20, 1e300, math.nan, math.inf, 10**30, "", " ", "none", "end", [], {}, [[]],
-    [0, 0], [0, 0, 0], [[0, 0]], [[0, 0], [0, 0]], [[0, 0.1], [1, 0.1]], [[1, 0.1], [0, 0.1]], {"": 1}, {"a": {"b": 1}}, [0] * 2000,
-    "table", "lane", "comb", "next", "nowhere", "table.end", "block.out", "block.in", "block_exit", "m1", "z1", "gap", "length",
-    "left", "right", "33 mm", "-33 mm", "90 deg", "-90", -90, 360, "24 000 /h", "2 m/s", "5 kN/m", "1e400 m", "nan", "33 mn",
-    "gap/2", "-gap/2", "length/0", "gap/(gap-gap)", "length - 3*gap", "length * length", "1/gap", "(" * 150, "-" * 150 + "gap",
-    "gap^2", "1e999*" * 30 + "1", "length deg", "\x00", "\u2009", "\ud7ff", "x" * 5000, "cell.yaml", "scene.yaml", "../secret",
+    None, True, 0, -1, 1, 0.5, 3, -0.0, 1e-9, 1e5, 1e20, 1e300, math.nan, math.inf, 10**30, "", "none", "end", [], {},
+    [[]], [0, 0], [0, 0, 0], [[0, 0]], [[0, 0], [0, 0]], [[0, 0.1], [1, 0.1]], [[1, 0.1], [0, 0.1]], {"": 1},
+    {"a": {"b": 1}}, [0] * 2000, "table", "lane", "comb", "next", "nowhere", "table.end", "block.out", "block.in",
+    "block_exit", "m1", "z1", "gap", "length", "left", "right", "33 mm", "-33 mm", "90 deg", "-90", -90, 360,
+    "24 000 /h", "2 m/s", "5 kN/m", "1e400 m", "nan", "33 mn", "gap/2", "-gap/2", "length/0", "gap/(gap-gap)",
+    "length - 3*gap", "length * length", "1/gap", "(" * 150, "-" * 150 + "gap", "gap^2", "1e999*" * 30 + "1",
+    "length deg", "\x00", "\u2009", "\ud7ff", "x" * 5000, "cell.yaml", "scene.yaml", "../secret",
 )  # fmt: skip
 
 FIELDS = (
-    "start", "heading", "after", "back", "beside", "side", "from", "to", "gap", "offset", "plate", "path", "points", "radius",
-    "width", "lanes", "sections", "guides", "drive", "ratio", "speed", "along", "at", "length", "extend", "left", "right", "open",
-    "straight", "material", "clearance", "kind", "turn", "surfaces", "use", "set", "default", "min", "max", "bottle", "name",
-    "conveyors", "parameters", "include", "cells", "ports", "variants", "formats", "variant", "format", "drives", "plates", "out",
+    "start", "heading", "after", "back", "beside", "side", "from", "to", "gap", "offset", "plate", "path", "points",
+    "radius", "width", "lanes", "sections", "guides", "drive", "ratio", "speed", "along", "at", "length", "extend",
+    "left", "right", "open", "straight", "material", "clearance", "kind", "turn", "surfaces", "use", "set", "default",
+    "min", "max", "bottle", "name", "conveyors", "parameters", "include", "cells", "ports", "variants", "formats",
+    "variant", "format", "drives", "plates", "out",
 )  # fmt: skip
+
+NAMES = ("table", "lane", "lane_z1", "block_exit", "m", "table_left", "1", "ä", "a" * 120)
+PIECES = ["+", "-", "*", "/", "(", ")", "mm", "s", "gap", "length", "0", "1", ".", "e5", "^2", "°", ",", "'"]
 
 CELL = """
 ports: {in: infeed.start, out: exit.end}
@@ -152,11 +157,12 @@ def _play(file: Path, overrides: Data) -> str:
 
 
 def _check_places(scene: Scene) -> None:
-    """Raise Violation unless every part of an expanded scene has a line in a file."""
+    """Raise Violation unless every part of an expanded scene has a line in a file, or is from an override."""
     reading = reread(scene)
     for field, parts in scene.named().items():
         for name in parts:
-            if reading.place_of((field, name)).line < 1:
+            place = reading.place_of((field, name))
+            if place.line is not None and place.line < 1:
                 raise Violation("a part without a line", f"{field}.{name}")
 
 
@@ -185,17 +191,15 @@ def _change(draw: Rng, data: Data) -> None:
         case "twice" if isinstance(holder, list):
             holder.extend(copy.deepcopy(holder * int(draw.integers(1, 4))))
         case "renamed" if isinstance(holder, dict):
-            new = _one(draw, [*FIELDS, "table", "lane", "lane_z1", "block_exit", "m", "table_left", "1", "ä", "a" * 120])
-            holder[new] = holder.pop(key)
+            holder[_one(draw, [*FIELDS, *NAMES])] = holder.pop(key)
         case _:
             pass
 
 
 def _mutated(draw: Rng, text: str) -> str:
-    pieces = ["+", "-", "*", "/", "(", ")", " ", "mm", "s", "gap", "length", "0", "1", ".", "e5", "^2", "\u00b0", ",", "'"]
     for _ in range(int(draw.integers(1, 4))):
         at = int(draw.integers(len(text) + 1))
-        text = text[:at] + str(_one(draw, pieces)) + text[at + int(draw.integers(2)) :]
+        text = text[:at] + _one(draw, [*PIECES, " "]) + text[at + int(draw.integers(2)) :]
     return text
 
 
