@@ -206,13 +206,14 @@ class _Tracer:
             for device, region in devices
             if (within := inside(track.chunk, region)).any()
         ]
-        if taken:
+        astray = track.astray
+        if taken and (astray is None or min(count for count, *_ in taken) <= astray[1]):
             count, kind, device = min(taken, key=lambda entry: entry[0])
             return self._leg(index, track, count, "exit" if kind == "exit" else "station", device)
+        if astray is not None:
+            return self._leg(index, track, astray[0], "off")
         if (count_to := track.stopped()) is not None:
             return self._leg(index, track, count_to, "stopped" if track.carried else "off")
-        if (count_to := track.astray()) is not None:
-            return self._leg(index, track, count_to, "off")
         if (count_to := track.closed()) is not None:
             return self._leg(index, track, count_to, "circulates")
         return None
