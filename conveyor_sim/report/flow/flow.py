@@ -16,6 +16,7 @@ from conveyor_sim.report.flow.stretches import Bottleneck, Stretch, bottleneck, 
 from conveyor_sim.report.flow.surfaces import SurfaceMap, surfaces_of
 from conveyor_sim.report.flow.trace import trace
 from conveyor_sim.report.flow.trace_scene import guide_pieces
+from conveyor_sim.report.flow.underlay_finding import hidden_underlay
 from conveyor_sim.scene.schema import Scene
 
 
@@ -50,5 +51,6 @@ def flow_of(scene: Scene) -> LineFlow:
         *perfect_columns(scene, surfaces, legs, clearances),
         *watchdogs(scene),
         *backward_belts(scene, surfaces),
+        *hidden_underlay(scene),
     ]
     return LineFlow(surfaces, routes, stretches, bottleneck(scene, routes, stretches), tuple(findings))

@@ -10,6 +10,9 @@ from conveyor_sim.report.flow.surfaces import NONE, Indices, SurfaceMap
 from conveyor_sim.scene.geometry import Array
 from conveyor_sim.scene.types import XY
 
+CHUNK = 50
+"""Ticks between two looks at the bottles."""
+
 STILL = 0.02
 """Way over radius below which a bottle has stopped within a chunk."""
 
@@ -68,8 +71,8 @@ class Track:
         self._chunks, self._carriers, self._count = [points], [carriers], count
 
     def stopped(self) -> int | None:
-        """Return the number of places up to the stop of a bottle, None if it moves."""
-        if np.hypot(*(self.chunk - self.chunk[-1]).T).max() >= STILL * self._radius:
+        """Return the number of places up to the stop of a bottle, None if it moves or the chunk is short."""
+        if len(self.chunk) < CHUNK or np.hypot(*(self.chunk - self.chunk[-1]).T).max() >= STILL * self._radius:
             return None
         points, _ = self.path()
         moving = np.flatnonzero(np.hypot(*(points - points[-1]).T) >= STILL * self._radius)

@@ -126,7 +126,7 @@ def test_a_fault_is_found_at_its_place(name: str) -> None:
     findings = [text for text in found(changed(*changes)) if f" {field}: " in text]
     assert len(findings) == 1
     assert findings[0].startswith(f"warning line.yaml:{PLACES[line]}: {field}: ")
-    assert missing(findings[0], facts) == []
+    assert missing(findings[0], *facts) == []
 
 
 @pytest.mark.parametrize(
@@ -162,7 +162,7 @@ def test_a_belt_of_a_drive_that_runs_backwards_is_named_at_the_drive() -> None:
            "[2, 0.05], angle: 180 deg, length: 1, width: 0.1, drive: m"))  # fmt: skip
     (note,) = found(text)
     assert note.startswith("note line.yaml:1: drives.m.speed: ")
-    assert missing(note, ["second"]) == []
+    assert missing(note, "second") == []
 
 
 def test_a_gap_at_a_reject_is_meant() -> None:
