@@ -32,7 +32,7 @@ def check(scene: str, out: Path, details: bool, watch: bool, port: int | None, o
     from conveyor_sim.physics.model.remedies import step_limit
     from conveyor_sim.report.explain.account import account
     from conveyor_sim.report.flow.details import flow_table
-    from conveyor_sim.report.flow.flow import flow_of
+    from conveyor_sim.report.flow.flow import compile_traces, flow_of
     from conveyor_sim.report.flow.overview import finding_lines, overview
     from conveyor_sim.report.report import can_draw
     from conveyor_sim.report.tags import tag_rows
@@ -48,6 +48,7 @@ def check(scene: str, out: Path, details: bool, watch: bool, port: int | None, o
     checked = options.load_file(path)
     model = build_model(checked)
     tag_rows(checked)  # which finds alarms of tags that there are not
+    compile_traces(checked, say)
     flow = flow_of(checked)
     if details:
         show(account(checked, model))
