@@ -25,9 +25,10 @@ RULES: Mapping[str, str] = {
     "simulation": "columns engine line physics scene | numpy",
     "__init__": "scene simulation",
     "bag": "columns errors line scene simulation support | lz4 mcap numpy rosbags yaml zstandard",
-    "page": "bag columns errors scene simulation support | numpy",
+    "page": "bag columns drawings errors scene simulation support | numpy",
     "run": "bag columns control engine errors line physics scene simulation support | click numpy",
-    "report": "bag columns drawings errors line page physics run scene simulation support | click matplotlib numpy rich",
+    "report": "bag columns drawings errors line page physics run scene simulation support | "
+    "click matplotlib numpy rich",
     "protocols": "bag columns errors line page run scene simulation support | "
     "aiohttp asyncua cryptography foxglove google numpy paho pymodbus",
     "accuracy": "columns engine errors line physics report scene simulation statistics support | "
@@ -37,7 +38,8 @@ RULES: Mapping[str, str] = {
     "ros": "bag columns control errors line protocols report run scene simulation support | "
     "builtin_interfaces click conveyor_msgs diagnostic_msgs numpy rcl_interfaces rclpy rosgraph_msgs std_msgs std_srvs",
     "testing": "bag control errors line page protocols report ros run scene simulation support | numpy pytest",
-    "cli": "accuracy bag control drawings errors page physics protocols report ros run scene studies support | click rich",
+    "cli": "accuracy bag control drawings errors page physics protocols report ros run scene studies support | "
+    "click rich",
 }
 """Packages and modules from the lowest up: what each may import of this package | of third-party packages."""
 

@@ -42,7 +42,11 @@ def require_ezdxf(what: str) -> None:
 def open_dxf(path: Path, folder: Path | None = None) -> Drawing:
     """Read a DXF file. folder: as for `read_file`. Raise ConveyorError, and FileError if the file can't be read."""
     require_ezdxf(f"{path}: a DXF file")
-    content = read_file(path, MOST_BYTES, folder)
+    return parse_dxf(path, read_file(path, MOST_BYTES, folder))
+
+
+def parse_dxf(path: Path, content: bytes) -> Drawing:
+    """Parse the content of a DXF file. Raise ConveyorError."""
     if content.startswith(_BINARY):
         raise ConveyorError(f"{path}: a binary DXF file, expected a DXF file in ASCII")
     if re.match(rb"AC10\d\d", content):

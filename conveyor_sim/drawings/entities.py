@@ -95,7 +95,12 @@ def read_plan(
     except FileError as error:
         raise ConveyorError(f"{path}: {error}, expected a DXF file") from None
     name, scale = metres_per_unit(path, document, unit)
-    reader = _Reader(path, document, scale, is_symbol, DrawnPlan(name))
+    return plan_in(path, document, scale, DrawnPlan(name), is_symbol)
+
+
+def plan_in(path: Path, document: Any, scale: float, plan: DrawnPlan, is_symbol: IsSymbol) -> DrawnPlan:
+    """Return a plan with the content of the model space. scale: unit of the drawing in m. Raise ConveyorError."""
+    reader = _Reader(path, document, scale, is_symbol, plan)
     try:
         for layout in document.blocks:
             for insert in layout.query("INSERT"):

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
+from conveyor_sim.drawings.underlay import ShownUnderlay, shown_underlay
 from conveyor_sim.page.block import FORCE_FRAMES, LEAST_FORCE, LEVELS, MM, SIGNAL_STEPS, UNKNOWN
 from conveyor_sim.page.story import fields
 from conveyor_sim.scene import Scene
@@ -57,6 +59,7 @@ def plan_head(scene: Scene) -> dict[str, Any]:
     return {
         "scene": scene.name,
         "description": scene.description,
+        "underlay": _underlay(scene),
         "surfaces": [{**_surface(shape), "named": shape in named} for shape in shapes],
         "rails": [_points(shape.outline(_ARC_POINTS)) for shape in rail_shapes(scene)],
         "movers": [
@@ -82,6 +85,12 @@ def plan_head(scene: Scene) -> dict[str, Any]:
             for mark in marks_of(scene)
         ],
     }
+
+
+def _underlay(scene: Scene) -> dict[str, Any] | None:
+    """Return the underlay of a scene; None if there is none that can be shown."""
+    shown = shown_underlay(scene)
+    return asdict(shown) if isinstance(shown, ShownUnderlay) else None
 
 
 def _surface(shape: BeltShape) -> dict[str, Any]:

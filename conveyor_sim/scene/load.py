@@ -10,13 +10,14 @@ from typing import Any
 from conveyor_sim.errors import SceneError
 from conveyor_sim.scene.beside import Beside
 from conveyor_sim.scene.checks import problems_of
-from conveyor_sim.scene.layout.compose import compose
+from conveyor_sim.scene.layout.compose import chosen, compose
 from conveyor_sim.scene.overrides import FILES, in_quotes, parse_overrides, plain, yaml_text
 from conveyor_sim.scene.part import validated
 from conveyor_sim.scene.reading import Reading
 from conveyor_sim.scene.refusal import refused
 from conveyor_sim.scene.schema import Origin, Scene
 from conveyor_sim.scene.tables import with_tables
+from conveyor_sim.scene.underlay import read_underlay
 from conveyor_sim.scene.words import shown
 from conveyor_sim.scene.yaml_lines import LONGEST_TEXT, Document
 from conveyor_sim.support.files import FileError, in_mb, read_file
@@ -75,10 +76,14 @@ def parse_scene(
     files = (
         {path: content.decode("utf-8-sig") for path, content in beside.used.items()} if composition.is_composed else {}
     )
+    if scene.underlay is not None:
+        scene._underlay = read_underlay(scene.underlay, beside)
+        if scene.underlay_url:
+            files = {**files, scene.underlay.file: scene.underlay_url}
+    is_in_files = composition.is_composed or data is composition.data
+    stored_text = changes_text if is_in_files else yaml_text({**changes, "contacts": data["contacts"]})
     if files:
-        stored_text = f"{changes_text}{FILES}: {in_quotes(files)}\n"
-    else:
-        stored_text = changes_text if data is composition.data else yaml_text({**changes, "contacts": data["contacts"]})
+        stored_text += f"{FILES}: {in_quotes(files)}\n"
     if len(stored_text) > LONGEST_TEXT:
         most = in_mb(LONGEST_TEXT)
         text = f"tables, other files and overrides of {in_mb(len(stored_text))} as YAML, expected at most {most}"
@@ -93,6 +98,19 @@ def _with_stored(beside: Beside | None, stored: Any) -> Beside:
     if not isinstance(stored, dict) or not all(isinstance(text, str) for text in stored.values()):
         raise SceneError(f"{FILES}: {shown(stored)} given in overrides, expected a mapping of paths to texts")
     return Beside(None, stored=stored) if beside is None else Beside(beside.folder, beside.outside, stored)
+
+
+def chosen_data(text: str, name: str, overrides: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the plain data of a scene with includes, variant, format and overrides: fields that overrides can name.
+
+    Other files are taken from the overrides of a read scene. Raise SceneError.
+    """
+    changes = plain(overrides, name)
+    beside = _with_stored(None, changes.pop(FILES, {}))
+    data = chosen(_document(text, name), name, changes, beside)
+    if not isinstance(data, dict):
+        raise SceneError(f"{name}:1: expected a scene, a mapping of fields")
+    return data
 
 
 def reread(scene: Scene) -> Reading:

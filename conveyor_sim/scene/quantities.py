@@ -126,6 +126,11 @@ def evaluate(text: str, unit: str = "") -> Quantity:
     return _short(stack.pop())
 
 
+def names_in(text: str) -> list[str]:
+    """Return the names of parameters in an expression. Raise ValueError for a text that is none."""
+    return [token.text for token in _postfix(text) if token.kind == "name"]
+
+
 def to_si(text: str, unit: str) -> float:
     """Return the value of a text for a field, in the field's unit; an int if a field of unit "1" has a whole number.
 

@@ -49,6 +49,7 @@ from conveyor_sim.scene.types import (
     nanoseconds,
     quantity,
 )
+from conveyor_sim.scene.underlay import Underlay
 
 
 class BottleType(Part):
@@ -294,7 +295,12 @@ class Scene(Part):
         "Effects forced on or off against the choice by the scene; docs/effects.md lists them.", default={}
     )
 
+    underlay: Annotated[Underlay | None, Holds("a mapping with the fields " + ", ".join(Underlay.model_fields))] = (
+        quantity("An image or a drawing that is shown below the plan.", default=None)
+    )
+
     _source: Origin = PrivateAttr(default=Origin())
+    _underlay: tuple[str, str] = PrivateAttr(default=("", ""))
     _layout: LayoutPlan | None = PrivateAttr(default=None)
 
     @property
@@ -360,6 +366,16 @@ class Scene(Part):
     def source_name(self) -> str:
         """Name of the scene's file, as given."""
         return self._source.name
+
+    @property
+    def underlay_url(self) -> str:
+        """Content of the underlay as a data URL; "" without."""
+        return self._underlay[0]
+
+    @property
+    def underlay_fault(self) -> str:
+        """Reason why the underlay can't be shown; "" if it can, or if there is none."""
+        return self._underlay[1]
 
     @property
     def source_files(self) -> Mapping[str, str]:

@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from page.pixels import canvas
+from drawings.test_underlay import png
+from page.pixels import canvas, settled
 
 from conveyor_sim.page.check_server import CheckServer
 from conveyor_sim.report.check_page import CheckPage
@@ -141,3 +142,20 @@ def test_a_finding_leads_to_its_place(shown: Any, scene: Path) -> None:
     assert shown.locator("#problems li.chosen").count() == 1
     spot = shown.locator('#spots button[data-path^="photo_eyes.full"]')
     assert json.loads(spot.get_attribute("data-at")) == pytest.approx([1.0, 3.5])
+
+
+def test_an_underlay_is_shown(shown: Any, scene: Path) -> None:
+    image = scene.with_name("plan.png")
+    image.write_bytes(png(300, 100))
+    saved(
+        shown,
+        lambda: scene.write_text(
+            f"{SCENE}underlay: {{file: plan.png, scale: 10 mm, position: [0, -0.5], opacity: 1}}\n"
+        ),
+    )
+    shown.wait_for_selector('body[data-underlay="shown"]')
+    settled(shown)
+    assert (canvas(shown) == [255, 0, 0]).all(axis=-1).any()
+    saved(shown, lambda: image.write_bytes(b"GIF89a"))
+    assert "underlay.file" in problems(shown)[0]
+    assert not (canvas(shown) == [255, 0, 0]).all(axis=-1).any()

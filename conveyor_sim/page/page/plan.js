@@ -6,6 +6,7 @@ import { Crowd, MANY } from "./crowd.js";
 import { drawAreas, drawLines, drawMovers } from "./devices.js";
 import { byId, short } from "./dom.js";
 import { Labels, outside, placeAt } from "./labels.js";
+import { drawUnderlay } from "./underlay.js";
 
 const WIDTHS = 6; // widths of contact lines
 
@@ -59,6 +60,7 @@ export class Plan {
     context.fillRect(0, 0, camera.width, camera.height);
     this.labels.clear();
     if (this.said !== byId("notice").textContent) this.cover();
+    drawUnderlay(context, camera, colours, recording.head.underlay, () => view.touch());
     this.surfaces.draw(context, camera, colours, speeds);
     drawAreas(context, camera, colours, view);
     this._rails(colours);

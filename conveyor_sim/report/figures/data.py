@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conveyor_sim.columns.damage import RailWearColumns
+from conveyor_sim.drawings.underlay import ShownUnderlay, shown_underlay
 from conveyor_sim.scene.driven import belt_speeds
 from conveyor_sim.scene.geometry import BeltShape, RailShape, initial_bottles, rail_shapes, surface_shapes
 from conveyor_sim.scene.marks import marks_of
@@ -32,15 +33,18 @@ class StaticGeometry:
     speeds: Floats
     rails: tuple[RailShape, ...]
     marks: tuple[Mark, ...] = ()
+    underlay: ShownUnderlay | None = None
 
     @classmethod
     def of(cls, scene: Scene) -> StaticGeometry:
         """Return the static geometry of `scene`."""
+        underlay = shown_underlay(scene)
         return cls(
             surfaces=tuple(surface_shapes(scene)),
             speeds=np.array([*belt_speeds(scene).values()], dtype=np.float64),
             rails=(*rail_shapes(scene), *(shape.shape(shape.first) for shape in moving_shapes(scene))),
             marks=tuple(marks_of(scene)),
+            underlay=underlay if isinstance(underlay, ShownUnderlay) else None,
         )
 
     def drawn_as(self, look: Look) -> list[Mark]:

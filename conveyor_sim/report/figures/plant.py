@@ -13,6 +13,7 @@ from matplotlib.path import Path as Outline
 from conveyor_sim.report.figures import style
 from conveyor_sim.report.figures.data import Floats, StaticGeometry
 from conveyor_sim.report.figures.marks import draw_entries, draw_exits, draw_sensors
+from conveyor_sim.report.figures.underlay import draw_underlay
 from conveyor_sim.scene.geometry import BeltShape
 
 Z_BELT: Final = 1.0
@@ -26,6 +27,8 @@ def draw_plant(ax: Axes, plant: StaticGeometry, speeds: Floats, norm: Normalize,
     `speeds` (belts,) in m/s at that instant; `norm` maps a speed in m/s to a colour of the speed scale; `size` in m
     is the height of the largest chevron.
     """
+    if plant.underlay is not None:
+        draw_underlay(ax, plant.underlay)
     draw_belts(ax, plant, speeds, norm)
     draw_travel(ax, plant, speeds, size)
     draw_rails(ax, plant)

@@ -18,7 +18,7 @@ from conveyor_sim.report.flow.drift import drift
 from conveyor_sim.report.flow.guides import Guides
 from conveyor_sim.report.flow.surfaces import NONE, Indices, SurfaceMap, running_speeds
 from conveyor_sim.report.flow.trace_scene import trace_scene
-from conveyor_sim.report.flow.track import Track
+from conveyor_sim.report.flow.track import CHUNK, Track
 from conveyor_sim.scene.geometry import Array, initial_bottles
 from conveyor_sim.scene.parts.outfeed import Outfeed
 from conveyor_sim.scene.parts.sink import Sink
@@ -28,9 +28,6 @@ from conveyor_sim.scene.polygons import inside
 from conveyor_sim.scene.problems import Path
 from conveyor_sim.scene.schema import Grid, Scene, Single
 from conveyor_sim.scene.types import XY
-
-CHUNK = 50
-"""Ticks between two looks at the bottles."""
 
 MOST_WORK = 1e7
 """Largest work of all traces, steps of one bottle: below a second of one core of the 2020s."""
@@ -115,6 +112,12 @@ def starts_of(scene: Scene) -> list[Entrance]:
     return (starts or _initial(scene))[:MOST_LEGS]
 
 
+def traced_scene(scene: Scene, surfaces: SurfaceMap) -> Scene | None:
+    """Return the scene that is simulated for the traces of a scene; None if there is nothing to trace."""
+    starts = starts_of(scene)
+    return _traced(scene, surfaces, starts) if starts and surfaces else None
+
+
 def trace(scene: Scene, surfaces: SurfaceMap, guides: Guides) -> list[Leg]:
     """Trace a lone bottle from every start with the engine at draft accuracy.
 
@@ -131,15 +134,8 @@ class _Tracer:
     def __init__(self, scene: Scene, surfaces: SurfaceMap, guides: Guides, starts: Sequence[Entrance]) -> None:
         self._surfaces, self._guides, self._starts = surfaces, guides, starts
         self._radius = [scene.bottle_types[start.bottle].radius for start in starts]
-        fastest = max([0.1, *(abs(surface.running) for surface in surfaces), *(start.speed for start in starts)])
-        # A bottle moves by less than its radius in a tick, and is not lost between two ticks.
-        tick = max(0.001, round(0.5 * min(self._radius) / fastest, 3))
-        bottles = [
-            Single.model_construct(type=start.bottle, position=start.position, velocity=_velocity(start))
-            for start in starts
-        ]
-        model = build_model(trace_scene(scene, bottles, tick))
-        self._tick, self._steps = tick, model.steps_per_tick
+        model = build_model(_traced(scene, surfaces, starts))
+        self._tick, self._steps = 1e-9 * model.tick_ns, model.steps_per_tick
         self._state = State(model, len(starts))
         for kind, x, y, theta, vx, vy, omega in model.plant.bottles:
             self._state.add(model.bottle_types.index(kind), x, y, theta, vx, vy, omega)
@@ -148,6 +144,7 @@ class _Tracer:
         speeds = [*running_speeds(scene).values()]
         self._belts.move(np.array([*speeds, *([0.0] * (len(model.belts) - len(speeds)))]))
         self._integration = Integration(self._state, 1, True)
+        self._ticks = 0
         self._exits = [(path, part.region) for path, part in scene.exits() if isinstance(part, (Outfeed, Sink))]
         self._stations = [(path, part.region) for path, part in scene.exits() if isinstance(part, Station)]
 
@@ -159,26 +156,21 @@ class _Tracer:
             for start, radius in zip(self._starts, self._radius, strict=True)
         ]
         legs: dict[int, Leg] = {}
-        ticks, work = 0, 0.0
+        work = 0.0
         while len(legs) < count:
             active = [index for index in range(count) if index not in legs]
             if work > MOST_WORK:
                 legs.update({index: self._estimated(self._leg(index, tracks[index], None, "cap")) for index in active})
                 break
-            chunk = np.empty((CHUNK, count, 2))
-            bottles = self._state.world.bottles
-            try:
-                for place in range(CHUNK):
-                    self._integration.take_tick(ticks, self._belts.fastest)
-                    self._state.make_lists()
-                    ticks += 1
-                    chunk[place, :, 0], chunk[place, :, 1] = bottles.x[:count], bottles.y[:count]
-            except SimulationError as error:
-                failed = {index: self._leg(index, tracks[index], None, "failed", reason=str(error)) for index in active}
-                legs.update(failed)
-                break
-            work += CHUNK * (self._steps * len(active) + TICK_WORK)
-            for index in active:
+            chunk, wrong = self._chunk(count)
+            if wrong is not None:
+                index, reason = wrong
+                legs[index] = self._leg(index, tracks[index], None, "failed", reason=reason)
+                self._state.remove(index)
+            work += len(chunk) * self._steps * len(active) + CHUNK * TICK_WORK
+            for index in active if len(chunk) else ():
+                if index in legs:
+                    continue
                 tracks[index].add(chunk[:, index])
                 leg = self._ended(index, tracks[index])
                 if leg is not None and leg.end == "stopped" and self._pushed_on(index, leg):
@@ -189,6 +181,23 @@ class _Tracer:
             self._state.make_lists()
         return [legs[index] for index in range(count)]
 
+    def _chunk(self, count: int) -> tuple[Array, tuple[int, str] | None]:
+        """Advance by CHUNK ticks, fewer if the guard stops them.
+
+        Return the places of all bottles after each tick, (ticks, count, 2), and the bottle at fault with the reason.
+        """
+        chunk = np.empty((CHUNK, count, 2))
+        bottles = self._state.world.bottles
+        for place in range(CHUNK):
+            try:
+                self._integration.take_tick(self._ticks, self._belts.fastest)
+            except SimulationError as error:
+                return chunk[:place], (self._integration.take_events()[-1].bottle, str(error))
+            self._state.make_lists()
+            self._ticks += 1
+            chunk[place, :, 0], chunk[place, :, 1] = bottles.x[:count], bottles.y[:count]
+        return chunk, None
+
     def _ended(self, index: int, track: Track) -> Leg | None:
         """Return the leg of a bottle that has ended within the last chunk, or None."""
         taken = [
@@ -197,13 +206,14 @@ class _Tracer:
             for device, region in devices
             if (within := inside(track.chunk, region)).any()
         ]
-        if taken:
+        astray = track.astray
+        if taken and (astray is None or min(count for count, *_ in taken) <= astray[1]):
             count, kind, device = min(taken, key=lambda entry: entry[0])
             return self._leg(index, track, count, "exit" if kind == "exit" else "station", device)
+        if astray is not None:
+            return self._leg(index, track, astray[0], "off")
         if (count_to := track.stopped()) is not None:
             return self._leg(index, track, count_to, "stopped" if track.carried else "off")
-        if (count_to := track.astray()) is not None:
-            return self._leg(index, track, count_to, "off")
         if (count_to := track.closed()) is not None:
             return self._leg(index, track, count_to, "circulates")
         return None
@@ -257,6 +267,17 @@ class _Tracer:
         points, carriers = track.path(count)
         times = self._tick * np.arange(len(points), dtype=np.float64)
         return Leg(self._starts[index], self._radius[index], times, points, carriers, end, device, reason)
+
+
+def _traced(scene: Scene, surfaces: SurfaceMap, starts: Sequence[Entrance]) -> Scene:
+    fastest = max([0.1, *(abs(surface.running) for surface in surfaces), *(start.speed for start in starts)])
+    smallest = min(scene.bottle_types[start.bottle].radius for start in starts)
+    bottles = [
+        Single.model_construct(type=start.bottle, position=start.position, velocity=_velocity(start))
+        for start in starts
+    ]
+    # A bottle moves by less than its radius in a tick, so that none passes a region between two ticks.
+    return trace_scene(scene, bottles, max(0.001, round(0.5 * smallest / fastest, 3)))
 
 
 def _velocity(start: Entrance) -> XY:

@@ -9,19 +9,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from conveyor_sim.scene.accuracy import Accuracy
 from conveyor_sim.scene.belts import BeltRails, CurvedBelt, StraightBelt
 from conveyor_sim.scene.contacts import Base, Contact, Damping
-from conveyor_sim.scene.geometry import Piece, rail_shapes
+from conveyor_sim.scene.geometry import Piece, rail_shapes, surface_shapes
 from conveyor_sim.scene.limits import Limits as DamageLimits
 from conveyor_sim.scene.moving import MovingShape, movers_of, moving_shape
 from conveyor_sim.scene.parts.movers import SlidingGate, SwingingGate
 from conveyor_sim.scene.rails import ArcRail, SegmentRail
 from conveyor_sim.scene.schema import Outputs, Scene, Single
-from conveyor_sim.scene.types import COORDINATE_LIMIT
 
 STIFFNESS = 1.5e5
 """1/s^2, stiffness of contacts over the mass of a bottle: an impact at 0.5 m/s goes 1.3 mm deep."""
+
+DISTANCE = 100.0
+"""m between a scene and the spare parts."""
 
 _SPARE = "(spare)"
 """Name of spare parts and their material; names in a scene file have no brackets."""
@@ -44,7 +48,7 @@ def guide_pieces(scene: Scene) -> list[Piece]:
 
 def trace_scene(scene: Scene, bottles: Sequence[Single], tick: float) -> Scene:
     """Return the scene in which lone bottles are traced. bottles: at their entries. tick: s."""
-    spare = 0.9 * COORDINATE_LIMIT
+    spare = _beside(scene, bottles)
     rails = {
         shape.name: SegmentRail.model_construct(kind="segment", from_=piece.p1, to=piece.p2, material=shape.material)
         for shape in resting_movers(scene)
@@ -104,6 +108,14 @@ def trace_scene(scene: Scene, bottles: Sequence[Single], tick: float) -> Scene:
             },
         }
     )
+
+
+def _beside(scene: Scene, bottles: Sequence[Single]) -> float:
+    """Return a coordinate x to the right of a scene, at a distance that no bottle reaches, m."""
+    points = [shape.outline() for shape in surface_shapes(scene)]
+    points += [piece.points() for piece in guide_pieces(scene)]
+    points.append(np.array([bottle.position for bottle in bottles]))
+    return float(np.vstack(points)[:, 0].max()) + DISTANCE
 
 
 _KEPT = ("bottle_types", "belts", "rails", "drives", "plates")

@@ -126,7 +126,7 @@ def test_a_fault_is_found_at_its_place(name: str) -> None:
     findings = [text for text in found(changed(*changes)) if f" {field}: " in text]
     assert len(findings) == 1
     assert findings[0].startswith(f"warning line.yaml:{PLACES[line]}: {field}: ")
-    assert missing(findings[0], facts) == []
+    assert missing(findings[0], *facts) == []
 
 
 @pytest.mark.parametrize(
@@ -162,7 +162,7 @@ def test_a_belt_of_a_drive_that_runs_backwards_is_named_at_the_drive() -> None:
            "[2, 0.05], angle: 180 deg, length: 1, width: 0.1, drive: m"))  # fmt: skip
     (note,) = found(text)
     assert note.startswith("note line.yaml:1: drives.m.speed: ")
-    assert missing(note, ["second"]) == []
+    assert missing(note, "second") == []
 
 
 def test_a_gap_at_a_reject_is_meant() -> None:
@@ -177,3 +177,10 @@ def test_shipped_scenes_have_no_faults(path: Path) -> None:
     findings = [finding.path for finding in flow_of(load_scene(path)).findings if finding.level == "warning"]
     # Its bottles stand in one column before the stop, which keeps the first example short.
     assert findings == ([("infeeds", "filler")] if path.stem == "push" else [])
+
+
+def test_a_belt_that_was_moved_out_of_the_plant_is_noticed() -> None:
+    finding, counter = found(changed(("start: [1, -0.05]", "start: [11, -0.05]")))
+    assert counter.startswith(f"warning line.yaml:{PLACES['passed']}: counters.passed: ")
+    assert finding.startswith(f"warning line.yaml:{PLACES['filler']}: infeeds.filler: ")
+    assert missing(finding, "no exit", "first", "(1.00, 0.00)") == []
