@@ -64,8 +64,8 @@ def perfect_columns(
             if any((other.carriers == carrier).any() for other in others):
                 continue
             text = (
-                f"no scatter: bottles meet in one exact column on {surfaces[carrier].name}, which is wide enough for "
-                f"several rows; expected a scatter such as lateral_jitter: 0.5 mm, or 0 if that is meant"
+                f"no scatter: bottles meet in one exact column on {surfaces[carrier].name}, with room for several; "
+                "expected lateral_jitter, such as 0.5 mm, or 0 on purpose"
             )
             yield Finding(leg.start.path, text)
             break
