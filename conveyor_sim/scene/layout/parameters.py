@@ -61,6 +61,8 @@ def _is_number(value: Any) -> bool:
 
 def unknown(name: Any, known: Mapping[Any, Any]) -> str:
     """Return the words for a parameter that does not exist."""
+    if not known:
+        return "no such parameter, expected none: there are no parameters"
     return f"no such parameter, {did_you_mean(str(name), [str(one) for one in known])}"
 
 
