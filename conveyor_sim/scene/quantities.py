@@ -144,12 +144,20 @@ def to_si(text: str, unit: str) -> float:
 
 def converted(text: str, unit: str) -> float | Unconverted:
     """Return the value of a text for a field, see `to_si`, or the refused text with the reason."""
-    if not getattr(text, "scope", None):
+    if not getattr(text, "scope", None) or not _has_names(str(text)):
         return _converted(str(text), unit)
     try:
         return _in_unit(evaluate(text, unit), unit)
     except ValueError as error:
         return Unconverted(str(text), str(error))
+
+
+@lru_cache(maxsize=4096)
+def _has_names(text: str) -> bool:
+    try:
+        return bool(names_in(text))
+    except ValueError:
+        return False
 
 
 @lru_cache(maxsize=4096)
