@@ -11,6 +11,9 @@ from launch_ros.parameter_descriptions import ParameterValue
 
 SIMULATION_ARGUMENTS = (
     ("scene", "paper_plant", str, "Scene file, or the name of a shipped scene."),
+    ("set", "", str, "Parameters of the scene: NAME=VALUE, several with semicolons between them."),
+    ("variant", "", str, "Variant of the scene; empty text: as its file says."),
+    ("format", "", str, "Format of the scene; empty text: as its file says."),
     ("duration", "0.0", float, "Simulated seconds after which the run ends; 0: as the scene says."),
     ("real_time_factor", "1.0", float, "Simulated seconds per wall second; 0: as fast as possible."),
     ("start_paused", "false", bool, "Wait at tick 0 for a service call; with controller:=true it waits anyway."),

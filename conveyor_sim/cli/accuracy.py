@@ -7,7 +7,8 @@ from pathlib import Path
 
 import click
 
-from conveyor_sim.cli.output import OUTSIDE_TABLES, say, show
+from conveyor_sim.cli.output import say, show
+from conveyor_sim.cli.scene_options import SceneOptions, scene_options
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.support.progress import ProgressBar
 from conveyor_sim.support.signals import held_back
@@ -20,7 +21,7 @@ from conveyor_sim.support.signals import held_back
 @click.option("--thorough", is_flag=True, help="Many more long runs: up to an hour on two free processors.")
 @click.option("--details", is_flag=True, help="Print all tables behind the answer, too.")
 @click.option("--apply", "write", is_flag=True, help="Write the answer into a copy of the scene, in the folder.")
-@click.option("--outside-tables", is_flag=True, help=OUTSIDE_TABLES)
+@scene_options
 def accuracy(
     scene: str,
     tolerance: float,
@@ -28,7 +29,7 @@ def accuracy(
     thorough: bool,
     details: bool,
     write: bool,
-    outside_tables: bool,
+    options: SceneOptions,
 ) -> None:
     """Compare settings by error and run time.
 
@@ -39,6 +40,8 @@ def accuracy(
         raise ConveyorError("accuracy: scipy is not installed, expected it (pip install 'conveyor_sim[accuracy]')")
     if not 0.0 < tolerance <= 0.5:
         raise ConveyorError(f"--tolerance: {tolerance:g} given, expected a number greater than 0, at most 0.5")
+    if write and options.are_choices:
+        raise ConveyorError("--apply: given with --set, --variant or --format, expected none: the copy would lack them")
     with held_back():
         from conveyor_sim.accuracy.effort import DEFAULT, THOROUGH
         from conveyor_sim.accuracy.report.apply import apply
@@ -46,11 +49,9 @@ def accuracy(
         from conveyor_sim.accuracy.session import Session
         from conveyor_sim.accuracy.study import study_folder
         from conveyor_sim.report.report import can_draw
-        from conveyor_sim.scene import load_scene
         from conveyor_sim.support.resources import scene_path
 
-        path = scene_path(scene)
-        loaded = load_scene(path, outside_tables=outside_tables)
+        loaded = options.load(scene)
         folder = out or study_folder(loaded)
         session = Session(loaded, tolerance, click.echo, say)
         session.predict(folder, effort := THOROUGH if thorough else DEFAULT)
@@ -65,6 +66,6 @@ def accuracy(
                 click.echo(f"picture: {picture}")
         click.echo(f"numbers: {folder}/study.json, and CSV files beside it")
     if write and session.setting is not None:
-        copy = folder / path.name
+        copy = folder / scene_path(scene).name
         apply(loaded, session.setting, copy)
         click.echo(f"scene with the setting: {copy}")

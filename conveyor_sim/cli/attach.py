@@ -9,7 +9,8 @@ from typing import Any
 import click
 from rich.console import Console
 
-from conveyor_sim.cli.output import OUTSIDE_TABLES, Number
+from conveyor_sim.cli.output import Number
+from conveyor_sim.cli.scene_options import scene_options
 from conveyor_sim.cli.serve import scene_source, tell_end, watch
 from conveyor_sim.support.garbage import collected_later
 
@@ -27,7 +28,7 @@ from conveyor_sim.support.garbage import collected_later
 )
 @click.option("--no-record", is_flag=True, help="Nothing is written.")
 @click.option("--threads", type=click.IntRange(1), help="Threads to step with.")
-@click.option("--outside-tables", is_flag=True, help=OUTSIDE_TABLES)
+@scene_options
 def attach(scene: str, url: str, tags: Path, user: str, period: float, **of_scene: Any) -> None:
     """Have the PLC at URL control SCENE in real time.
 

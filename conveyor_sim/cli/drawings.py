@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from conveyor_sim.cli.output import OUTSIDE_TABLES
+from conveyor_sim.cli.scene_options import SceneOptions, scene_options
 from conveyor_sim.errors import ConveyorError
 
 
@@ -54,19 +54,17 @@ def import_(plan: Path, map_: Path, out: Path, base: Path | None, unit: str | No
 @click.argument("scene")
 @click.option("--dxf", type=click.Path(path_type=Path), help="DXF file to write, in mm.")
 @click.option("--svg", type=click.Path(path_type=Path), help="SVG file to write, in mm.")
-@click.option("--outside-tables", is_flag=True, help=OUTSIDE_TABLES)
-def draw(scene: str, dxf: Path | None, svg: Path | None, outside_tables: bool) -> None:
+@scene_options
+def draw(scene: str, dxf: Path | None, svg: Path | None, options: SceneOptions) -> None:
     """Write the plan of SCENE: belts, rails and devices, with their names, on layers."""
     from conveyor_sim.drawings.dxf_plan import dxf_of
     from conveyor_sim.drawings.plan import plan_of
     from conveyor_sim.drawings.svg_plan import svg_of
-    from conveyor_sim.scene import load_scene
     from conveyor_sim.support.files import FileError, write_file
-    from conveyor_sim.support.resources import scene_path
 
     if dxf is None and svg is None:
         raise ConveyorError("neither --dxf nor --svg given, expected one of them")
-    loaded = load_scene(scene_path(scene), outside_tables=outside_tables)
+    loaded = options.load(scene)
     shapes = plan_of(loaded)
     for file, make in ((dxf, dxf_of), (svg, lambda drawn: svg_of(drawn, loaded.name))):
         if file is not None:

@@ -8,8 +8,6 @@ from typing import Any
 import click
 from rich.console import Console, RenderableType
 
-OUTSIDE_TABLES = "Let SCENE name tables (CSV files) that lie outside its own folder."
-
 
 class Number(click.FloatRange):
     """A number in a range, and never NaN, which no comparison finds outside."""

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from conveyor_sim.cli.output import OUTSIDE_TABLES, say
+from conveyor_sim.cli.output import say
+from conveyor_sim.cli.scene_options import SceneOptions, scene_options
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.support.garbage import collected_later
 from conveyor_sim.support.progress import ProgressBar
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
 @click.option("--no-record", is_flag=True, help="Simulate only; nothing is written.")
 @click.option("--no-pictures", is_flag=True, help="Draw nothing; `conveyor-sim plot` does, any time later.")
 @click.option("--threads", type=click.IntRange(1), help="Threads to step with (default: as many as prove fastest).")
-@click.option("--outside-tables", is_flag=True, help=OUTSIDE_TABLES)
+@scene_options
 def run(
     scene: str,
     out: Path | None,
@@ -41,7 +42,7 @@ def run(
     no_record: bool,
     no_pictures: bool,
     threads: int | None,
-    outside_tables: bool,
+    options: SceneOptions,
 ) -> None:
     """Simulate SCENE without ROS, and record it.
 
@@ -56,14 +57,12 @@ def run(
         from conveyor_sim.report.report import report, report_unrecorded
         from conveyor_sim.run.compilation import Compilation
         from conveyor_sim.run.runner import run_scene
-        from conveyor_sim.scene import load_scene
-        from conveyor_sim.support.resources import scene_path
 
     for option, given in (("--parameters", parameters), ("--record-variables", variables)):
         if given and controller is None:
             raise ConveyorError(f"{option}: given without --controller, expected both or neither")
     controls = None if controller is None else _controller(controller, parameters)
-    loaded = load_scene(scene_path(scene), {} if duration is None else {"duration": duration}, outside_tables)
+    loaded = options.load(scene, duration)
     model = build_model(loaded)
     click.echo(setting_line(model))
     folder = drawing = None

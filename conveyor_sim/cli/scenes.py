@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from conveyor_sim.cli.output import OUTSIDE_TABLES, say, show
+from conveyor_sim.cli.output import say, show
+from conveyor_sim.cli.scene_options import SceneOptions, scene_options
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.support.progress import ProgressBar
 
@@ -21,8 +22,8 @@ if TYPE_CHECKING:
 @click.option("--details", is_flag=True, help="List routes, stretches, effects, bounds and their reasons as well.")
 @click.option("--watch", is_flag=True, help="Serve a page with plan and problems, redrawn whenever a file is saved.")
 @click.option("--port", type=click.IntRange(0, 65535), help="With --watch: serve the page here (default: any).")
-@click.option("--outside-tables", is_flag=True, help=OUTSIDE_TABLES)
-def check(scene: str, out: Path, details: bool, watch: bool, port: int | None, outside_tables: bool) -> None:
+@scene_options
+def check(scene: str, out: Path, details: bool, watch: bool, port: int | None, options: SceneOptions) -> None:
     """Validate SCENE, trace a bottle through it, and draw it.
 
     SCENE is a file, or the name of a shipped scene. Faults of its layout are listed with file and line.
@@ -31,23 +32,23 @@ def check(scene: str, out: Path, details: bool, watch: bool, port: int | None, o
     from conveyor_sim.physics.model.remedies import step_limit
     from conveyor_sim.report.explain.account import account
     from conveyor_sim.report.flow.details import flow_table
-    from conveyor_sim.report.flow.flow import flow_of
+    from conveyor_sim.report.flow.flow import compile_traces, flow_of
     from conveyor_sim.report.flow.overview import finding_lines, overview
     from conveyor_sim.report.report import can_draw
     from conveyor_sim.report.tags import tag_rows
     from conveyor_sim.run.speed import expected
-    from conveyor_sim.scene import load_scene
     from conveyor_sim.support.resources import scene_path
 
     path = scene_path(scene)
     if port is not None and not watch:
         raise ConveyorError("--port: given without --watch, expected both or neither")
     if watch:
-        _watch(path, port or 0, outside_tables)
+        _watch(path, port or 0, options)
         return
-    checked = load_scene(path, outside_tables=outside_tables)
+    checked = options.load_file(path)
     model = build_model(checked)
     tag_rows(checked)  # which finds alarms of tags that there are not
+    compile_traces(checked, say)
     flow = flow_of(checked)
     if details:
         show(account(checked, model))
@@ -71,14 +72,13 @@ def check(scene: str, out: Path, details: bool, watch: bool, port: int | None, o
     click.echo(drawn if details else f"{drawn}; {lists}")
 
 
-def _watch(path: Path, port: int, outside_tables: bool) -> None:
+def _watch(path: Path, port: int, options: SceneOptions) -> None:
     """Serve the page of a scene that is being written until Ctrl-C."""
     from conveyor_sim.page.check_server import CheckServer
     from conveyor_sim.report.check_page import CheckPage
-    from conveyor_sim.scene import load_scene
     from conveyor_sim.support.stop_request import StopRequest
 
-    page = CheckPage(path, lambda file: load_scene(file, outside_tables=outside_tables))
+    page = CheckPage(path, options.load_file)
     with StopRequest() as stop, CheckServer(page.examine, port) as server:
         click.echo(f"{path}: {server.url} (Ctrl-C ends it)")
         stop.wait()
@@ -90,18 +90,16 @@ def _watch(path: Path, port: int, outside_tables: bool) -> None:
 @click.option("--modbus", is_flag=True, help="As the map of their Modbus addresses, as CSV.")
 @click.option("--map", "kept", type=click.Path(path_type=Path), help="With --modbus: a map to keep, which only grows.")
 @click.option("--word-order", type=click.Choice(["big", "little"]), default="big", help="Of Modbus: ABCD or CDAB.")
-@click.option("--outside-tables", is_flag=True, help=OUTSIDE_TABLES)
+@scene_options
 def tags(
-    scene: str, as_csv: bool, modbus: bool, kept: Path | None, word_order: WordOrder, outside_tables: bool
+    scene: str, as_csv: bool, modbus: bool, kept: Path | None, word_order: WordOrder, options: SceneOptions
 ) -> None:
     """List the tags of SCENE: all that can be read, commanded and injected, with units, ranges and meaning."""
     from conveyor_sim.protocols.modbus.address_map import keep_map, modbus_map
     from conveyor_sim.report.tags import line_tags, tag_csv, tag_table
-    from conveyor_sim.scene import load_scene
     from conveyor_sim.support.modbus_rows import to_csv
-    from conveyor_sim.support.resources import scene_path
 
-    loaded = load_scene(scene_path(scene), outside_tables=outside_tables)
+    loaded = options.load(scene)
     if modbus:
         tags = line_tags(loaded)
         rows = modbus_map(tags, word_order=word_order) if kept is None else keep_map(kept, tags, word_order)
@@ -120,18 +118,16 @@ def tags(
     help="Measure what each effect costs, in ns per bottle and step, and what each remedy saves.",
 )
 @click.option("--at", type=float, help="Simulated time in s at which to measure (default: half the duration).")
-@click.option("--outside-tables", is_flag=True, help=OUTSIDE_TABLES)
-def explain(scene: str, price: bool, at: float | None, outside_tables: bool) -> None:
+@scene_options
+def explain(scene: str, price: bool, at: float | None, options: SceneOptions) -> None:
     """Explain effects and time step of SCENE.
 
     Lists why each effect is on or off, and what bounds the time step; with --price, what each effect costs.
     """
     from conveyor_sim.physics.model import build_model
     from conveyor_sim.report.explain.choices import explanation, price_table
-    from conveyor_sim.scene import load_scene
-    from conveyor_sim.support.resources import scene_path
 
-    loaded = load_scene(scene_path(scene), outside_tables=outside_tables)
+    loaded = options.load(scene)
     if at is not None and not price:
         raise ConveyorError(f"--at: {at:g} given, expected --price with it, for it is the time to measure at")
     if at is not None and not 0.0 < at <= loaded.duration:

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import click
 from rich.console import Console
 
-from conveyor_sim.cli.output import OUTSIDE_TABLES, Number
+from conveyor_sim.cli.output import Number
+from conveyor_sim.cli.scene_options import NAMES, SceneOptions, scene_options
 from conveyor_sim.errors import BagError, ConveyorError
 from conveyor_sim.support.garbage import collected_later
 
@@ -36,8 +37,8 @@ PORT = click.IntRange(0, 65535)
 
 MQTT_ROLES = ("viewer", "operator", "engineer", "controller")
 
-OF_SCENE = ("out", "no_record", "duration", "threads", "outside_tables", "lockstep")
-TAKEN_BY_SCENE = (*OF_SCENE, "real_time_factor")
+TAKEN_BY_SCENE = ("out", "no_record", "duration", "threads", "lockstep", "real_time_factor", "options")
+OF_SCENE = ("out", "no_record", "duration", "threads", "lockstep", *NAMES)
 OF_BAG = ("loop",)
 
 DRAWING = ("web", "foxglove")
@@ -133,7 +134,7 @@ _WHERE = {
 )
 @click.option("--no-record", is_flag=True, help="SCENE only: do not record.")
 @click.option("--threads", type=click.IntRange(1), help="Of SCENE: threads to step with.")
-@click.option("--outside-tables", is_flag=True, help=OUTSIDE_TABLES)
+@scene_options
 def serve(what: str | None, node: str | None, bind: str, stamps: Stamps, **given: Any) -> None:
     """Serve a line to SCADA systems, HMIs, PLCs, MQTT hosts, browsers and Foxglove.
 
@@ -239,7 +240,7 @@ def scene_source(
     duration: float | None,
     real_time_factor: float,
     threads: int | None,
-    outside_tables: bool,
+    options: SceneOptions,
     lockstep: bool = False,
 ) -> Iterator[SceneTagProvider]:
     """Yield a paused scene once its tags are known. lockstep: clients advance it.
@@ -250,11 +251,9 @@ def scene_source(
     from conveyor_sim.bag.recorder import run_folder
     from conveyor_sim.protocols.tags.scene_messages import SceneTask
     from conveyor_sim.protocols.tags.scene_provider import SceneTagProvider
-    from conveyor_sim.scene import load_scene
-    from conveyor_sim.support.resources import scene_path
     from conveyor_sim.support.stop_request import StopRequest
 
-    scene = load_scene(scene_path(what), {} if duration is None else {"duration": duration}, outside_tables)
+    scene = options.load(what, duration)
     with ExitStack() as starting:
         stop = starting.enter_context(StopRequest())  # an interrupt would be lost, or leave a folder behind
         folder = None

@@ -11,6 +11,7 @@ from rclpy.node import Node
 
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.ros.declared import DeclaredParameter, declare_table
+from conveyor_sim.scene.choices import choices, settings_of
 
 _RATE_TEXT = "Hz of simulated time; -1: that of the scene, 0: never. Must divide the tick rate."
 RATES = ("bottles", "poses", "contacts", "belts", "signals", "ledger", "damage", "counters")
@@ -30,7 +31,10 @@ TABLE = (
         1e6,
         fixed=False,
     ),
-    DeclaredParameter("outside_tables", False, "Whether the scene may refer to tables outside its folder."),
+    DeclaredParameter("outside_tables", False, "Whether the scene may refer to files outside its folder."),
+    DeclaredParameter("set", "", "Parameters of the scene: NAME=VALUE, several with semicolons between them."),
+    DeclaredParameter("variant", "", "Variant of the scene; empty text: the one that its file names, if any."),
+    DeclaredParameter("format", "", "Format of the scene; empty text: the one that its file names, if any."),
     DeclaredParameter(
         "checkpoint_folder",
         "checkpoints",
@@ -56,6 +60,9 @@ class Parameters:
     start_paused: bool
     real_time_factor: float
     outside_tables: bool
+    set: str
+    variant: str
+    format: str
     checkpoint_folder: Path | None
     record: Path | None
     frame_id: str
@@ -67,8 +74,9 @@ class Parameters:
     rates: Mapping[str, float]
 
     def overrides(self) -> dict[str, Any]:
-        """Return the overrides of the scene file, which the recording stores for a replay."""
-        changed: dict[str, Any] = {}
+        """Return the overrides of the scene file, which the recording stores for a replay. Raise SceneError."""
+        settings = settings_of(text for text in self.set.split(";") if text.strip())
+        changed = choices(settings, self.variant or None, self.format or None)
         if self.duration > 0.0:
             changed["duration"] = self.duration
         rates = {name: rate for name, rate in self.rates.items() if rate >= 0.0}

@@ -10,7 +10,8 @@ from typing import Any
 from conveyor_sim.errors import SceneError
 from conveyor_sim.scene.beside import Beside
 from conveyor_sim.scene.checks import problems_of
-from conveyor_sim.scene.layout.compose import compose
+from conveyor_sim.scene.conversion import any_angle
+from conveyor_sim.scene.layout.compose import chosen, compose
 from conveyor_sim.scene.overrides import FILES, in_quotes, parse_overrides, plain, yaml_text
 from conveyor_sim.scene.part import validated
 from conveyor_sim.scene.reading import Reading
@@ -93,11 +94,30 @@ def parse_scene(
     return scene
 
 
+def parse_again(text: str, name: str, overrides: Mapping[str, Any]) -> Scene:
+    """Read a scene from the text and the overrides of a recording, a checkpoint or a loaded scene. Raise SceneError."""
+    with any_angle():
+        return parse_scene(text, name, overrides)
+
+
 def _with_stored(beside: Beside | None, stored: Any) -> Beside:
     """Return the place of the files of one scene. stored: text of files by path, from the overrides of a recording."""
     if not isinstance(stored, dict) or not all(isinstance(text, str) for text in stored.values()):
         raise SceneError(f"{FILES}: {shown(stored)} given in overrides, expected a mapping of paths to texts")
     return Beside(None, stored=stored) if beside is None else Beside(beside.folder, beside.outside, stored)
+
+
+def chosen_data(text: str, name: str, overrides: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the plain data of a scene with includes, variant, format and overrides: fields that overrides can name.
+
+    Other files are taken from the overrides of a read scene. Raise SceneError.
+    """
+    changes = plain(overrides, name)
+    beside = _with_stored(None, changes.pop(FILES, {}))
+    data = chosen(_document(text, name), name, changes, beside)
+    if not isinstance(data, dict):
+        raise SceneError(f"{name}:1: expected a scene, a mapping of fields")
+    return data
 
 
 def reread(scene: Scene) -> Reading:

@@ -126,6 +126,11 @@ def evaluate(text: str, unit: str = "") -> Quantity:
     return _short(stack.pop())
 
 
+def names_in(text: str) -> list[str]:
+    """Return the names of parameters in an expression. Raise ValueError for a text that is none."""
+    return [token.text for token in _postfix(text) if token.kind == "name"]
+
+
 def to_si(text: str, unit: str) -> float:
     """Return the value of a text for a field, in the field's unit; an int if a field of unit "1" has a whole number.
 
@@ -139,12 +144,20 @@ def to_si(text: str, unit: str) -> float:
 
 def converted(text: str, unit: str) -> float | Unconverted:
     """Return the value of a text for a field, see `to_si`, or the refused text with the reason."""
-    if not getattr(text, "scope", None):
+    if not getattr(text, "scope", None) or not _has_names(str(text)):
         return _converted(str(text), unit)
     try:
         return _in_unit(evaluate(text, unit), unit)
     except ValueError as error:
         return Unconverted(str(text), str(error))
+
+
+@lru_cache(maxsize=4096)
+def _has_names(text: str) -> bool:
+    try:
+        return bool(names_in(text))
+    except ValueError:
+        return False
 
 
 @lru_cache(maxsize=4096)

@@ -13,6 +13,8 @@ from conveyor_sim.control.scan import ControlError, Controller
 from conveyor_sim.control.st.load import load
 from conveyor_sim.errors import ConveyorError, StudyError
 from conveyor_sim.scene import Scene, parse_overrides, parse_scene
+from conveyor_sim.scene.layout.expanded_parts import expanded_parts
+from conveyor_sim.scene.load import chosen_data
 from conveyor_sim.scene.overrides import merged
 from conveyor_sim.scene.problems import Path
 from conveyor_sim.scene.words import listed
@@ -32,14 +34,21 @@ def scene_of(setup: Setup, parameters: Mapping[str, Any], seed: int) -> Scene:
         if not isinstance(made, Scene):
             raise StudyError(f"{setup.function}: returned a {type(made).__name__}, expected a Scene")
         text, name, overrides = made.source_text, made.source_name, made.overrides_text
-    base = merged(_data(text), _data(overrides))
+
+    def laid_over(changes: dict[str, Any]) -> dict[str, Any]:
+        """Return the data of the scene with changes, before cells and conveyors are expanded."""
+        return chosen_data(text or "{}", name, merged(_data(overrides), changes))
+
     changes = merged({"seed": seed}, study.overrides)
     for path, value in _of(setup, parameters, "field").items():
-        changes = _with_field(base, changes, path, value)
-    changes = merged(changes, setup.needs(merged(base, changes)))
+        changes = _with_field(laid_over(changes), changes, path, value)
+    data = laid_over(changes)
+    changes = merged(changes, setup.needs(data))
     start = study.warm_start or 0.0
-    duration = study.duration if study.duration is not None else float(merged(base, changes).get("duration", 0.0))
-    changes["duration"] = start + duration
+    duration = data.get("duration", 0.0) if study.duration is None else study.duration
+    if isinstance(duration, str):
+        duration = parse_scene(text, name, merged(_data(overrides), changes)).duration
+    changes["duration"] = start + float(duration)
     return parse_scene(text, name, merged(_data(overrides), changes))
 
 
@@ -71,14 +80,17 @@ def _data(text: str) -> dict[str, Any]:
     return parse_overrides(text)
 
 
-def _with_field(base: dict[str, Any], changes: dict[str, Any], path: str, value: Any) -> dict[str, Any]:
-    """Return the overrides with one more. A list is overridden as a unit, so its other entries are copied."""
+def _with_field(data: dict[str, Any], changes: dict[str, Any], path: str, value: Any) -> dict[str, Any]:
+    """Return the overrides with one more. A list is overridden as a unit, so its other entries are copied.
+
+    data: of the scene with the overrides so far.
+    """
     steps: list[Any] = list(steps_of(path))
-    _require_named(merged(base, changes), steps, path)
+    _require_named(data, steps, path)
     first_index = next((place for place, step in enumerate(steps) if isinstance(step, int)), len(steps))
     new: Any = value
     if first_index < len(steps):
-        there: Any = merged(base, changes)
+        there: Any = data
         for step in steps[:first_index]:
             there = there.get(step) if isinstance(there, dict) else None
         new = copy.deepcopy(there)
@@ -97,6 +109,8 @@ def _with_field(base: dict[str, Any], changes: dict[str, Any], path: str, value:
 
 def _require_named(data: dict[str, Any], steps: list[Any], path: str) -> None:
     """Refuse a path to what the scene does not have by that name: a belt of one field would be missing all others."""
+    for _, text in expanded_parts(data, {str(steps[0]): {str(steps[1]): {}}} if len(steps) > 1 else {}):
+        raise StudyError(f"{path}: {text}")
     entries = data.get(steps[0])
     if len(steps) < 3 or not isinstance(entries, dict) or not all(isinstance(one, dict) for one in entries.values()):
         return

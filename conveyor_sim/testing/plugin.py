@@ -42,6 +42,9 @@ class Lines:
         scene: Scene | str | PathLike[str],
         overrides: Mapping[str, Any] | None = None,
         *,
+        parameters: Mapping[str, Any] | None = None,
+        variant: str | None = None,
+        format: str | None = None,
         start: str | PathLike[str] | None = None,
         history: float | None = None,
     ) -> Scenario:
@@ -52,7 +55,16 @@ class Lines:
         if self._folder is None:
             self._folder = make_folder(self._place)
         folder = _part(self._folder, len(self.made))
-        scenario = Scenario(scene, overrides, start=start, inputs=folder, history=history)
+        scenario = Scenario(
+            scene,
+            overrides,
+            parameters=parameters,
+            variant=variant,
+            format=format,
+            start=start,
+            inputs=folder,
+            history=history,
+        )
         self.made.append((scenario, folder))
         return scenario
 
@@ -153,6 +165,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 @pytest.fixture
 def line(request: pytest.FixtureRequest) -> Iterator[Lines]:
     """Make lines under test: `line("accumulation_table")`, `line("my_line.yaml", {"seed": 2})` is a Scenario.
+
+    `line("my_line.yaml", parameters={"length": "3 m"}, variant="long", format="half")` chooses a version of the scene.
 
     `start="warm.npz"` begins from a checkpoint. The inputs are written as the line runs. If the test fails, a bag, a
     page and a picture are made from them (option --line-failures). If it passes, the inputs are removed. A test that

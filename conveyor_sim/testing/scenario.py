@@ -192,21 +192,25 @@ class Scenario(AbstractContextManager["Scenario"]):
         scene: Scene | str | PathLike[str],
         overrides: Mapping[str, Any] | None = None,
         *,
+        parameters: Mapping[str, Any] | None = None,
+        variant: str | None = None,
+        format: str | None = None,
         start: str | PathLike[str] | None = None,
         bag: Path | None = None,
         inputs: Path | None = None,
         history: float | None = None,
     ) -> None:
         """scene: a loaded scene, a scene file, or the name of a shipped scene. overrides: replace fields of a file.
+        parameters, variant, format: choices among the versions of a file; None: those that the file makes.
         start: checkpoint of the same scene to begin from; None: the bottles of the scene.
         bag: new or empty folder to record to from the start; None: no recording.
         inputs: folder for the inputs, from which `conveyor-sim recover` makes the bag; None: not written.
         history: length of the stored history of signals, commands and alarms, s, for runs of hours; None: all.
 
         Raises SceneError for an invalid scene, CheckpointError for a start that is missing, damaged or of another
-        scene, BagError if it can't be recorded, ValueError for overrides of a loaded scene.
+        scene, BagError if it can't be recorded, ValueError for overrides or choices of a loaded scene.
         """
-        self.scene = scene_of(scene, overrides)
+        self.scene = scene_of(scene, overrides, parameters, variant, format)
         self.simulation = Simulation(self.scene) if start is None else Simulation.load(start, scene=self.scene)
         most = None if history is None else max(self._ticks(history), 1)
         self.history = ScenarioHistory(self.simulation.process_image, most)

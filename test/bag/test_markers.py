@@ -4,13 +4,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+import scenes
 from bag.hand_made import HEADER, bottles
 from bag.ros_decode import assert_same, deserialize
+from physics.test_surfaces import route
 
 from conveyor_sim.bag.messages.encode import MARKERS
 from conveyor_sim.bag.messages.markers import ADD, DELETEALL, LINE_STRIP, TRIANGLE_LIST, bottles_markers, plant_markers
 from conveyor_sim.bag.messages.typestore import typestore
-from conveyor_sim.scene import Scene, belt_shapes, rail_shapes
+from conveyor_sim.scene import Scene, belt_shapes, rail_shapes, surface_shapes
 from conveyor_sim.scene.geometry import RailShape, SegmentPiece
 from conveyor_sim.scene.parts.device_part import Mark
 
@@ -85,6 +87,23 @@ def test_arrows_point_along_positive_speed(scene: Scene) -> None:
             assert tip.y == pytest.approx(tail.y)
         else:  # on the turn, which runs counter-clockwise from -90 to 0 degrees
             assert tip.y > tail.y
+
+
+def test_surfaces_of_a_path_belt_share_a_name_and_plates_have_no_arrow() -> None:
+    """Clockwise travel has its right edge inside; every triangle still faces up."""
+    line = scenes.scene(**route(as_path=True))
+    markers = decode(plant_markers(surface_shapes(line), (), (), HEADER))
+    assert [marker.text for marker in markers if marker.ns == "names"] == ["line", "beside"]
+    surfaces = [marker for marker in markers if marker.type == TRIANGLE_LIST]
+    assert len(surfaces) == 5
+    for surface in surfaces:
+        corners = np.array([(point.x, point.y) for point in surface.points]).reshape(-1, 3, 2)
+        one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+        assert (one[:, 0] * two[:, 1] > one[:, 1] * two[:, 0]).all()
+    arrows = [[(point.x, point.y) for point in marker.points] for marker in markers if marker.ns == "directions"]
+    assert all(tip[1] > -0.9 for _, tip in arrows)
+    on_bend = [(tail, tip) for tail, tip in arrows if tail[0] > 0.5 and tail[1] > -0.5 and tail[1] < 0.5]
+    assert on_bend and all(tip[0] > tail[0] and tip[1] < tail[1] for tail, tip in on_bend)
 
 
 def test_sensors_are_lines_with_names() -> None:

@@ -91,8 +91,9 @@ def test_it_is_found_anew_wherever_a_bottle_moves_within_the_skin() -> None:
 def test_a_sector_wherever_it_starts(start: float, span: float) -> None:
     """Sectors across +-pi, beyond half a turn, and a full turn."""
     belts = {"one": curved((0.3, -0.2), 0.2, 0.4, start, span), "far": belt(0.0, (5.0, 5.0), 1.0, 1.0)}
+    in_rad = {**belts, "one": {**belts["one"], "start_angle": f"{start!r} rad"}}
     points = RANDOM.uniform(-0.6, 1.2, (1500, 2))
-    np.testing.assert_array_equal(carriers(state_of(plant(belts), points), 1500), expected_carriers(points, belts))
+    np.testing.assert_array_equal(carriers(state_of(plant(in_rad), points), 1500), expected_carriers(points, belts))
 
 
 def test_two_points_and_a_side_give_the_same_sector_as_its_angles() -> None:

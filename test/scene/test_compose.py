@@ -1,6 +1,7 @@
 """Composition of scenes: includes, parameters, cells, variants and formats."""
 
 import itertools
+import math
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -336,3 +337,25 @@ def test_the_tables_of_fields_cover_the_schema() -> None:
                 assert name in cell_coordinates.DIRECTIONS, (model, name)
             if "a velocity" in words:
                 assert name in cell_coordinates.VECTORS, (model, name)
+
+
+@pytest.mark.parametrize(
+    ("place", "start", "angle"),
+    [
+        ("beside: lane, side: left, from: 0.5, gap: 10 mm", (0.5, 0.055), 0.0),
+        ("start: [3, 1], heading: 90 deg", (3.045, 1.0), math.pi / 2),
+        ("after: lane, gap: 0.1, offset: 20 mm", (2.5 + 0.02 - 0.045, -0.6), -math.pi / 2),
+    ],
+)
+def test_a_cell_is_placed_as_a_conveyor_is(plant: Path, place: str, start: tuple[float, float], angle: float) -> None:
+    written(plant.parent / "cells" / "pair.yaml", PAIR.replace("start: [0, 0], ", ""))
+    text = LANES.replace("conveyor_after_cell: {}\n", "").replace("after: lane, gap: 10 mm", place)
+    belt = load_scene(written(plant.parent / "lanes.yaml", text)).belts["block_infeed"].model_dump()
+    assert belt["start"] == pytest.approx(start, abs=1e-12)
+    assert belt["angle"] == angle
+
+
+def test_an_override_of_a_list_replaces_those_of_cells(plant: Path) -> None:
+    contact = {"between": ["glass", "glass"], "stiffness": 7.0}
+    scene = load_scene(plant, {"contacts": [contact]})
+    assert [one.stiffness for one in scene.contacts] == [7.0]

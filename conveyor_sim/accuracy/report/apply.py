@@ -17,9 +17,9 @@ from conveyor_sim.support.files import FileError, write_file
 def apply(scene: Scene, setting: Setting, copy: Path) -> Scene:
     """Write the scene's file with the setting to `copy`; return the scene that is read back from it.
 
-    Tables that the scene names by path and that lie elsewhere are copied beside it. Raises ValueError for a setting of
-    another stiffness, which would change the materials; ConveyorError if the copy can't be written, is the scene's own
-    file, or the scene is written in braces, where no line can be put.
+    Files that the scene names are copied beside it, as are tables that lie elsewhere. Raises ValueError for a setting
+    of another stiffness, which would change the materials; ConveyorError if the copy can't be written, is the scene's
+    own file, or the scene is written in braces, where no line can be put.
     """
     if setting.stiffness != 1.0:
         raise ValueError(f"stiffness {setting.stiffness:g}, expected 1")
@@ -32,6 +32,8 @@ def apply(scene: Scene, setting: Setting, copy: Path) -> Scene:
     lines = scene.source_text.splitlines(keepends=True)
     _take_tables_along(lines, data, source.parent, copy)
     _put(lines, data, f"{line(setting)}\n")
+    for path, text in scene.source_files.items():
+        _copy_file(path, text, copy.parent)
     _write(copy, "".join(lines))
     return load_scene(copy)
 
@@ -73,6 +75,17 @@ def _take_tables_along(lines: list[str], data: Any, before: Path, copy: Path) ->
                 name = f"{copy.stem}_{Path(path).name}"
                 _write(copy.with_name(name), (before / path).read_text(encoding="utf-8"))
             lines[row] = lines[row][:column] + lines[row][column:].replace(path, name, 1)
+
+
+def _copy_file(path: str, text: str, folder: Path) -> None:
+    """Write a file that a scene includes or uses to the same path beside the copy."""
+    file = folder / path
+    if os.path.isabs(path) or path.startswith(".."):
+        raise ConveyorError(f"{file}: lies outside the scene's folder, expected files in it, to copy them")
+    if file.is_file() and file.read_bytes() == text.encode():
+        return
+    file.parent.mkdir(parents=True, exist_ok=True)
+    _write(file, text)
 
 
 def _write(file: Path, text: str) -> None:

@@ -17,6 +17,8 @@ def account(scene: Scene, model: Model) -> Table:
     table.add_row("scene", ": ".join(filter(None, (model.name, printable_lines(scene.description)))))
     table.add_row("bottles", f"{len(model.plant.bottles)} at the start; fed: {', '.join(fed) or 'none'}")
     table.add_row("belts", ", ".join(model.belts) or "none")
+    if scene.plates:
+        table.add_row("plates", ", ".join(scene.plates))
     table.add_row("rails", ", ".join(model.rails) or "none")
     table.add_row("duration", f"{scene.duration:g} s in {scene.duration_ticks} ticks of {scene.tick:g} s")
     for name, text in [*accuracy_rows(model), *note_rows(model)]:

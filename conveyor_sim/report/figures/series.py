@@ -55,7 +55,7 @@ def _belts_passed(ax: Axes, velocity: Velocity, belts: Sequence[str]) -> None:
     for number, (start, stop) in enumerate(zip(starts, ends, strict=True)):
         since, until = velocity.time[start], velocity.time[stop]
         belt = int(velocity.belt[start])
-        name = "floor" if belt < 0 else belts[belt]
+        name = "no belt" if belt < 0 else belts[belt]
         ax.fill_between(
             [since, until],
             1.02,

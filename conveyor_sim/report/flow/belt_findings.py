@@ -64,7 +64,7 @@ def backward_belts(scene: Scene, surfaces: SurfaceMap) -> Iterator[Finding]:
     backwards = [surface for surface in surfaces if surface.speed < 0.0]
     if backwards:
         names = some_of(dict.fromkeys(surface.name for surface in backwards))
-        text = f"negative speed: {names} run against the listed direction of travel"
+        text = f"negative speed, against the listed direction of travel: {names}"
         drive = scene.belts[str(backwards[0].path[1])].drive_name
         path = backwards[0].path if drive is None else ("drives", drive)
         yield Finding((*path, "speed"), text, "note")

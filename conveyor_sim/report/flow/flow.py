@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from conveyor_sim.report.flow.belt_findings import backward_belts, opposed_belts, transfer_gaps, watchdogs
@@ -14,9 +15,10 @@ from conveyor_sim.report.flow.guides import Guides
 from conveyor_sim.report.flow.routes import TransitRoute, routes_of
 from conveyor_sim.report.flow.stretches import Bottleneck, Stretch, bottleneck, stretches_of
 from conveyor_sim.report.flow.surfaces import SurfaceMap, surfaces_of
-from conveyor_sim.report.flow.trace import trace
+from conveyor_sim.report.flow.trace import trace, traced_scene
 from conveyor_sim.report.flow.trace_scene import guide_pieces
 from conveyor_sim.report.flow.underlay_finding import hidden_underlay
+from conveyor_sim.run.compilation import Compilation
 from conveyor_sim.scene.schema import Scene
 
 
@@ -30,6 +32,16 @@ class LineFlow:
     bottleneck: Bottleneck | None
     findings: tuple[Finding, ...]
     """Warnings in order of weight, then notes."""
+
+
+def compile_traces(scene: Scene, say: Callable[[str], object]) -> None:
+    """Bring the kernels of traces into this process. say: called with a sentence if they must be compiled.
+
+    Ctrl-C interrupts it within a moment.
+    """
+    traced = traced_scene(scene, surfaces_of(scene))
+    if traced is not None:
+        Compilation(traced, say).run()
 
 
 def flow_of(scene: Scene) -> LineFlow:

@@ -14,7 +14,7 @@ from conveyor_sim.line.devices.belt_surfaces import BeltSurfaces
 from conveyor_sim.physics.model import build_model
 from conveyor_sim.physics.state import State
 from conveyor_sim.physics.stepping.tick import Integration
-from conveyor_sim.report.flow.drift import drift
+from conveyor_sim.report.flow.drift import MOST_STEPS, drift
 from conveyor_sim.report.flow.guides import Guides
 from conveyor_sim.report.flow.surfaces import NONE, Indices, SurfaceMap, running_speeds
 from conveyor_sim.report.flow.trace_scene import trace_scene
@@ -112,6 +112,12 @@ def starts_of(scene: Scene) -> list[Entrance]:
     return (starts or _initial(scene))[:MOST_LEGS]
 
 
+def traced_scene(scene: Scene, surfaces: SurfaceMap) -> Scene | None:
+    """Return the scene that is simulated for the traces of a scene; None if there is nothing to trace."""
+    starts = starts_of(scene)
+    return _traced(scene, surfaces, starts) if starts and surfaces else None
+
+
 def trace(scene: Scene, surfaces: SurfaceMap, guides: Guides) -> list[Leg]:
     """Trace a lone bottle from every start with the engine at draft accuracy.
 
@@ -128,15 +134,8 @@ class _Tracer:
     def __init__(self, scene: Scene, surfaces: SurfaceMap, guides: Guides, starts: Sequence[Entrance]) -> None:
         self._surfaces, self._guides, self._starts = surfaces, guides, starts
         self._radius = [scene.bottle_types[start.bottle].radius for start in starts]
-        fastest = max([0.1, *(abs(surface.running) for surface in surfaces), *(start.speed for start in starts)])
-        # A bottle moves by less than its radius in a tick, and is not lost between two ticks.
-        tick = max(0.001, round(0.5 * min(self._radius) / fastest, 3))
-        bottles = [
-            Single.model_construct(type=start.bottle, position=start.position, velocity=_velocity(start))
-            for start in starts
-        ]
-        model = build_model(trace_scene(scene, bottles, tick))
-        self._tick, self._steps = tick, model.steps_per_tick
+        model = build_model(_traced(scene, surfaces, starts))
+        self._tick, self._steps = 1e-9 * model.tick_ns, model.steps_per_tick
         self._state = State(model, len(starts))
         for kind, x, y, theta, vx, vy, omega in model.plant.bottles:
             self._state.add(model.bottle_types.index(kind), x, y, theta, vx, vy, omega)
@@ -161,7 +160,9 @@ class _Tracer:
         while len(legs) < count:
             active = [index for index in range(count) if index not in legs]
             if work > MOST_WORK:
-                legs.update({index: self._estimated(self._leg(index, tracks[index], None, "cap")) for index in active})
+                steps = MOST_STEPS // len(active)
+                capped = {index: self._leg(index, tracks[index], None, "cap") for index in active}
+                legs.update({index: self._estimated(leg, steps) for index, leg in capped.items()})
                 break
             chunk, wrong = self._chunk(count)
             if wrong is not None:
@@ -207,23 +208,24 @@ class _Tracer:
             for device, region in devices
             if (within := inside(track.chunk, region)).any()
         ]
-        if taken:
+        astray = track.astray
+        if taken and (astray is None or min(count for count, *_ in taken) <= astray[1]):
             count, kind, device = min(taken, key=lambda entry: entry[0])
             return self._leg(index, track, count, "exit" if kind == "exit" else "station", device)
+        if astray is not None:
+            return self._leg(index, track, astray[0], "off")
         if (count_to := track.stopped()) is not None:
             return self._leg(index, track, count_to, "stopped" if track.carried else "off")
-        if (count_to := track.astray()) is not None:
-            return self._leg(index, track, count_to, "off")
         if (count_to := track.closed()) is not None:
             return self._leg(index, track, count_to, "circulates")
         return None
 
-    def _estimated(self, leg: Leg) -> Leg:
+    def _estimated(self, leg: Leg, steps: int) -> Leg:
         """Return a leg that ends at the cap with the rest of its way by the speeds of the belts."""
         step = leg.points[-1] - leg.points[-2]
         along = step / max(float(np.hypot(*step)), 1e-12)
         takers = [*self._exits, *self._stations]
-        times, points, taker = drift(leg.points[-1], along, self._surfaces, self._guides, takers)
+        times, points, taker = drift(leg.points[-1], along, self._surfaces, self._guides, takers, steps)
         end: End = "cap" if taker is None else "station" if taker in dict(self._stations) else "exit"
         return replace(
             leg,
@@ -267,6 +269,17 @@ class _Tracer:
         points, carriers = track.path(count)
         times = self._tick * np.arange(len(points), dtype=np.float64)
         return Leg(self._starts[index], self._radius[index], times, points, carriers, end, device, reason)
+
+
+def _traced(scene: Scene, surfaces: SurfaceMap, starts: Sequence[Entrance]) -> Scene:
+    fastest = max([0.1, *(abs(surface.running) for surface in surfaces), *(start.speed for start in starts)])
+    smallest = min(scene.bottle_types[start.bottle].radius for start in starts)
+    bottles = [
+        Single.model_construct(type=start.bottle, position=start.position, velocity=_velocity(start))
+        for start in starts
+    ]
+    # A bottle moves by less than its radius in a tick, so that none passes a region between two ticks.
+    return trace_scene(scene, bottles, max(0.001, round(0.5 * smallest / fastest, 3)))
 
 
 def _velocity(start: Entrance) -> XY:

@@ -33,15 +33,19 @@ class Track:
         self._surfaces, self._radius = surfaces, radius
         self._chunks = [np.array([start])]
         self._carriers = [surfaces.under(self._chunks[0])]
-        self._count, self._way, self._last_on = 1, 0.0, 0
+        self._count, self._way = 1, 0.0
+        self._last_on = 0, self._chunks[0][0]
+        self._astray: tuple[int, int] | None = None
         self._marks: dict[tuple[int, int], list[tuple[float, Array, Array]]] = {}
 
     def add(self, chunk: Array) -> None:
         """Append the places at further ticks, (k, 2)."""
         carriers = self._surfaces.under(chunk)
-        on = np.flatnonzero(carriers != NONE)
-        if on.size:
-            self._last_on = self._count + int(on[-1])
+        for place, point in enumerate(chunk):
+            if carriers[place] != NONE:
+                self._last_on = self._count + place, point
+            elif self._astray is None and math.dist(self._last_on[1], point) > ASTRAY:
+                self._astray = self._last_on[0] + 2, self._count + place
         self._chunks.append(chunk)
         self._carriers.append(carriers)
         self._count += len(chunk)
@@ -78,14 +82,10 @@ class Track:
         moving = np.flatnonzero(np.hypot(*(points - points[-1]).T) >= STILL * self._radius)
         return int(moving[-1]) + 2 if moving.size else 1
 
-    def astray(self) -> int | None:
-        """Return the number of places up to the end of the belts of a bottle that has left them, else None."""
-        if self._last_on == self._count - 1:
-            return None
-        points, _ = self.path()
-        if math.dist(points[self._last_on], points[-1]) <= ASTRAY:
-            return None
-        return min(self._last_on + 2, self._count)
+    @property
+    def astray(self) -> tuple[int, int] | None:
+        """Numbers of places up to the end of the belts, and until the bottle had left them by ASTRAY; None on belts."""
+        return self._astray
 
     def closed(self) -> int | None:
         """Return the number of places up to an earlier place with the same direction, or None. Call once per chunk."""

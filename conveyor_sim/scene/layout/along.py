@@ -6,7 +6,7 @@ from conveyor_sim.scene.layout.plan import Side
 from conveyor_sim.scene.part import Part
 from conveyor_sim.scene.types import Angle, Name, Number, Positive, Says, quantity
 
-Station = Annotated[Number | Literal["end"], Says('a number, negative from the end, or "end"')]
+PathStation = Annotated[Number | Literal["end"], Says('a number, negative from the end, or "end"')]
 
 
 class Along(Part):
@@ -16,7 +16,7 @@ class Along(Part):
 
 
 class _At(Along):
-    at: Station = quantity(
+    at: PathStation = quantity(
         'Station: distance from the start of the conveyor along its path. A negative number counts from the end, "end" '
         "is the end.",
         "m",
@@ -45,19 +45,19 @@ class AlongLine(_Across):
 
 
 class _Stretch(Along):
-    at: Station | None = quantity(
+    at: PathStation | None = quantity(
         'Station where it ends, with `length`; a negative number counts from the end, "end" is the end.',
         "m",
         default=None,
     )
     length: Positive | None = quantity("Its length before `at`.", "m", default=None)
-    from_: Station | None = quantity(
+    from_: PathStation | None = quantity(
         "Station where it begins, instead of `at` and `length`. Left out beside `to`: the start.",
         "m",
         default=None,
         alias="from",
     )
-    to: Station | None = quantity("Station where it ends. Left out beside `from`: the end.", "m", default=None)
+    to: PathStation | None = quantity("Station where it ends. Left out beside `from`: the end.", "m", default=None)
 
 
 class AlongRegion(_Stretch):
@@ -72,20 +72,20 @@ class AlongRegion(_Stretch):
 class AlongRail(Along):
     """A rail across a conveyor (`at`), or along it (`from`, `to`)."""
 
-    at: Station | None = quantity(
+    at: PathStation | None = quantity(
         'Station of a rail across; a negative number counts from the end, "end" is the end.', "m", default=None
     )
     width: Positive | None = quantity(
         "Length of a rail across, half of it on either side of `offset`. Left out: the clear width.", "m", default=None
     )
     extend: Number = quantity("Length by which a rail across is longer at either end.", "m", default=0.0)
-    from_: Station | None = quantity(
+    from_: PathStation | None = quantity(
         "Station where a rail along the conveyor begins. Left out beside `to`: the start.",
         "m",
         default=None,
         alias="from",
     )
-    to: Station | None = quantity("Station where it ends. Left out beside `from`: the end.", "m", default=None)
+    to: PathStation | None = quantity("Station where it ends. Left out beside `from`: the end.", "m", default=None)
     offset: Number = quantity(
         "Distance of a rail along from the middle of the path, positive to the left; shift of a rail across.",
         "m",
@@ -122,7 +122,7 @@ class AlongPusher(_Stretch):
 class AlongDiverter(Along):
     """A diverter beside a conveyor, along travel from its pivot while it does not divert."""
 
-    at: Station = quantity(
+    at: PathStation = quantity(
         'Station of its pivot; a negative number counts from the end, "end" is the end.',
         "m",
     )

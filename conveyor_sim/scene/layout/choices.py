@@ -4,8 +4,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from conveyor_sim.scene.layout.fragments import Fragment, Report
-from conveyor_sim.scene.layout.parameters import unknown, with_value
+from conveyor_sim.scene.layout.parameters import unknown, value_fault, with_value
+from conveyor_sim.scene.layout.parts import SceneLayout
 from conveyor_sim.scene.problems import Path
+from conveyor_sim.scene.schema import Scene
 from conveyor_sim.scene.words import did_you_mean, shown
 
 NOT_IN_VARIANTS = ("include", "variants", "formats", "variant", "ports")
@@ -23,8 +25,10 @@ def with_choices(fragment: Fragment, changes: Mapping[str, Any], report: Report)
             if not isinstance(name, str):
                 report(fragment.place_of((field, name)), f"{shown(name)} given as a name, expected a text")
     variant = _choice(fragment, changes, "variant", report)
-    if variant is not None:
-        _lay_variant(fragment, variant, report)
+    for name in fragment.data.get("variants", {}):
+        if _is_variant(fragment, name, report) and name == variant:
+            entry = fragment.data["variants"][name]
+            _lay_over(fragment, entry, report, lambda path: ("variants", variant, *path))
     # A variant may choose a format.
     kind = _choice(fragment, changes, "format", report)
     if kind is not None and isinstance(entry := fragment.data["formats"][kind], dict):
@@ -48,17 +52,22 @@ def _choice(fragment: Fragment, changes: Mapping[str, Any], field: str, report: 
     return None
 
 
-def _lay_variant(fragment: Fragment, name: str, report: Report) -> None:
-    source = ("variants", name)
-    entry = fragment.data["variants"][name]
+def _is_variant(fragment: Fragment, name: Any, report: Report) -> bool:
+    """Return True if a variant is a mapping of fields of a scene. Report it if not."""
+    source, entry = ("variants", name), fragment.data["variants"][name]
     if not isinstance(entry, dict):
         report(fragment.place_of(source), f"{shown(entry)} given, expected a mapping of fields of the scene")
-        return
-    for field in NOT_IN_VARIANTS:
-        if field in entry:
-            report(fragment.place_of((*source, field)), "given in a variant, expected in the scene")
-            return
-    _lay_over(fragment, entry, report, lambda path: (*source, *path))
+        return False
+    known = [*Scene.model_fields, *SceneLayout.model_fields, "parameters", "cells", "format"]
+    for field in entry:
+        at = fragment.place_of((*source, field))
+        if field in NOT_IN_VARIANTS:
+            report(at, "given in a variant, expected in the scene")
+            return False
+        if field not in known:
+            report(at, f"no such field, {did_you_mean(str(field), known)}")
+            return False
+    return True
 
 
 def _check_format(fragment: Fragment, name: Any, report: Report) -> None:
@@ -72,9 +81,13 @@ def _check_format(fragment: Fragment, name: Any, report: Report) -> None:
             report(at, f"no such field, {did_you_mean(str(field), ['bottle', 'set'])}")
         elif field == "set":
             _check_parameters(fragment, value, (*path, field), report)
+            known = _named(fragment.data, "parameters")
+            for parameter, quantity in value.items() if isinstance(value, dict) else ():
+                if parameter in known and (fault := value_fault(quantity, known)):
+                    report(fragment.place_of((*path, field, parameter)), fault)
         elif not isinstance(value, str) or value not in _named(fragment.data, "bottle_types"):
-            known = [str(one) for one in _named(fragment.data, "bottle_types")]
-            report(at, f"{shown(value)} given, {did_you_mean(str(value), known)}: names of bottle_types")
+            types = [str(one) for one in _named(fragment.data, "bottle_types")]
+            report(at, f"{shown(value)} given, {did_you_mean(str(value), types)}: names of bottle_types")
 
 
 def _check_parameters(fragment: Fragment, values: Any, path: Path, report: Report) -> None:

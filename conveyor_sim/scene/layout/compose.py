@@ -19,7 +19,7 @@ from conveyor_sim.scene.layout.cells import (
 from conveyor_sim.scene.layout.choices import set_bottle, with_choices
 from conveyor_sim.scene.layout.expanded_parts import expanded_parts
 from conveyor_sim.scene.layout.files import MOST_NESTED, Files
-from conveyor_sim.scene.layout.fragments import Fragment
+from conveyor_sim.scene.layout.fragments import LISTS, Fragment
 from conveyor_sim.scene.layout.parameters import Scope, scope_of, scoped, unknown, with_value
 from conveyor_sim.scene.overrides import holds, merged
 from conveyor_sim.scene.problems import Path, Problem, dotted
@@ -300,7 +300,9 @@ class _Composer:
             self._report(cell.fragment.place_of(fault.path), fault.text)
         else:
             for field in part.data:
-                result.join(part, field, self._report)
+                # An override of a list replaces all of it.
+                if not (field in LISTS and field in own.sources.changes):
+                    result.join(part, field, self._report)
 
     def _data_of(self, file: SceneFile) -> dict[Any, Any]:
         """Return the data of a file, with paths of tables from the scene's folder."""

@@ -92,6 +92,9 @@ class ConveyorExpansion:
         self._belts(laid, conveyor, path)
         if conveyor.plate is not None:
             laid.plates = list(plates_of(conveyor, laid.plan, self.plans[str(dependency(conveyor))]))
+            if not laid.plates:
+                text = f"{shown(conveyor.plate)} given, expected a path that begins parallel to {dependency(conveyor)}"
+                raise LayoutFault((*path, "plate"), text)
         laid.rails = list(rails_of_conveyor(conveyor, laid.plan, self.raw[name].get("guides", ()), (*path, "guides")))
         return laid
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from graphlib import CycleError, TopologicalSorter
 from typing import Any
 
+from conveyor_sim.scene import quantities
 from conveyor_sim.scene.problems import Path
 from conveyor_sim.scene.quantities import Quantity, Scoped, evaluate
 from conveyor_sim.scene.units import UNITS
@@ -43,8 +44,25 @@ def with_value(entry: Any, value: Any) -> Any:
     return value
 
 
+def value_fault(value: Any, known: Mapping[Any, Any]) -> str:
+    """Return why a value can't be that of a parameter among known ones, whatever they are; "" if it can."""
+    if isinstance(value, str):
+        try:
+            wrong = [name for name in quantities.names_in(value) if name not in known]
+        except ValueError as error:
+            return f"{shown(value)} given, which is {error}, {_EXAMPLE}"
+        return f"{shown(value)} given, {unknown(wrong[0], known)}" if wrong else ""
+    return "" if _is_number(value) else f"{shown(value)} given, {_EXAMPLE}"
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+
+
 def unknown(name: Any, known: Mapping[Any, Any]) -> str:
     """Return the words for a parameter that does not exist."""
+    if not known:
+        return "no such parameter, expected none: there are no parameters"
     return f"no such parameter, {did_you_mean(str(name), [str(one) for one in known])}"
 
 
@@ -112,7 +130,7 @@ def _value(value: Any, scope: Scope, at: Path, report: Callable[[Path, str], Non
             return evaluate(value if isinstance(value, Scoped) else Scoped(value, scope))
         except ValueError as error:
             text = f"{shown(value)} given, which is {error}, {_EXAMPLE}"
-    elif isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value):
+    elif _is_number(value):
         return Quantity.of(value)
     report(at, text)
     return None

@@ -177,3 +177,10 @@ def test_shipped_scenes_have_no_faults(path: Path) -> None:
     findings = [finding.path for finding in flow_of(load_scene(path)).findings if finding.level == "warning"]
     # Its bottles stand in one column before the stop, which keeps the first example short.
     assert findings == ([("infeeds", "filler")] if path.stem == "push" else [])
+
+
+def test_a_belt_that_was_moved_out_of_the_plant_is_noticed() -> None:
+    finding, counter = found(changed(("start: [1, -0.05]", "start: [11, -0.05]")))
+    assert counter.startswith(f"warning line.yaml:{PLACES['passed']}: counters.passed: ")
+    assert finding.startswith(f"warning line.yaml:{PLACES['filler']}: infeeds.filler: ")
+    assert missing(finding, "no exit", "first", "(1.00, 0.00)") == []
