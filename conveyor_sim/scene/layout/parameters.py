@@ -44,7 +44,7 @@ def with_value(entry: Any, value: Any) -> Any:
 
 
 def value_fault(value: Any, known: Mapping[Any, Any]) -> str:
-    """Return why a value can't be that of a parameter among known ones, whatever they are; "" if it can."""
+    """Return why a value can't be that of a parameter among known ones with any text; "" if it can."""
     if isinstance(value, str):
         try:
             wrong = [name for name in quantities.names_in(value) if name not in known]
