@@ -76,6 +76,8 @@ class DrawnPlan:
     """Content of a plan."""
 
     unit: str
+    file: str = ""
+    """Name of the file, for errors."""
     strokes: list[Stroke] = field(default_factory=list)
     symbols: list[Symbol] = field(default_factory=list)
     texts: list[DrawnText] = field(default_factory=list)
@@ -100,6 +102,7 @@ def read_plan(
 
 def plan_in(path: Path, document: Any, scale: float, plan: DrawnPlan, is_symbol: IsSymbol) -> DrawnPlan:
     """Return a plan with the content of the model space. scale: unit of the drawing in m. Raise ConveyorError."""
+    plan.file = str(path)
     reader = _Reader(path, document, scale, is_symbol, plan)
     try:
         for layout in document.blocks:

@@ -75,7 +75,9 @@ class _Importer:
         self._sort()
         count = sum(map(len, self._strokes.values())) + sum(map(len, self._symbols.values()))
         if count > _MOST_PARTS:
-            raise ConveyorError(f"{count} entities on the layers of the map, expected at most {_MOST_PARTS}")
+            raise ConveyorError(
+                f"{self._plan.file}: {count} entities on the layers of the map, expected at most {_MOST_PARTS}"
+            )
         numbered = list(enumerate(self._rules.rules))
         for number_, rule in sorted(numbered, key=lambda entry: entry[1].kind not in ("conveyor", "belt")):
             self._parts(rule, self._strokes[number_], self._symbols[number_])
@@ -107,7 +109,8 @@ class _Importer:
                 layers[stroke.source.layer].append(stroke)
         for layer, strokes in layers.items():
             if len(texts[layer]) > _MOST_TEXTS:
-                raise ConveyorError(f"{len(texts[layer])} texts on layer {layer}, expected at most {_MOST_TEXTS}")
+                text = f"{len(texts[layer])} texts on layer {layer}, expected at most {_MOST_TEXTS}"
+                raise ConveyorError(f"{self._plan.file}: {text}")
             self._give_names(strokes, texts[layer])
 
     def _give_names(self, strokes: list[Stroke], texts: list[DrawnText]) -> None:
@@ -130,7 +133,7 @@ class _Importer:
         """Return indices of curves whose distance is computed. Raise ConveyorError if that takes too long."""
         self._pairs += len(indices)
         if self._pairs > _MOST_PAIRS:
-            raise ConveyorError("too many curves lie beside each other, expected a plan with fewer")
+            raise ConveyorError(f"{self._plan.file}: too many curves lie beside each other, expected a plan with fewer")
         return indices
 
     def _parts(self, rule: Rule, strokes: list[Stroke], symbols: list[Symbol]) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from conveyor_sim.drawings import importing
 from conveyor_sim.drawings.entities import read_plan
 from conveyor_sim.drawings.importing import Imported, imported
 from conveyor_sim.drawings.layer_map import read_map
@@ -279,3 +280,16 @@ def test_invalid_maps(run: Import, text: str, expected: str) -> None:
 
     with pytest.raises(ConveyorError, match=expected.replace("[", r"\[").replace("]", r"\]")):
         run(draw, text)
+
+
+@pytest.mark.parametrize("limit", ["_MOST_PARTS", "_MOST_TEXTS", "_MOST_PAIRS"])
+def test_plans_beyond_a_limit(run: Import, monkeypatch: pytest.MonkeyPatch, limit: str) -> None:
+    monkeypatch.setattr(importing, limit, 3)
+
+    def draw(_: Any, space: Any) -> None:
+        for number in range(4):
+            space.add_line((0, number), (1000, number), **on("AXES"))
+            space.add_text(f"t{number}", **on("AXES", insert=(0, number)))
+
+    with pytest.raises(ConveyorError, match="plan.dxf: "):
+        run(draw, AXES)
