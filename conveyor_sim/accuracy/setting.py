@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from conveyor_sim.accuracy.stiffness import scaled_contacts
-from conveyor_sim.scene import Scene, parse_overrides, parse_scene
+from conveyor_sim.scene import Scene, parse_again, parse_overrides
 from conveyor_sim.scene.accuracy import explicit
 
 
@@ -46,7 +46,7 @@ def with_setting(scene: Scene, setting: Setting, **fields: Any) -> Scene:
     overrides["accuracy"] = explicit(setting.integrator, setting.per_tick, setting.error)
     if setting.stiffness != 1.0:
         overrides["contacts"] = scaled_contacts(scene, setting.stiffness)
-    return parse_scene(scene.source_text, scene.source_name, overrides)
+    return parse_again(scene.source_text, scene.source_name, overrides)
 
 
 def _merged(data: Any, changes: Any) -> Any:

@@ -19,7 +19,7 @@ from conveyor_sim.page.block import SECONDS, BlockContent, block_ticks, pack
 from conveyor_sim.page.head import head
 from conveyor_sim.page.stamps import Stamps
 from conveyor_sim.page.story import TOPICS_READ, Story
-from conveyor_sim.scene import parse_overrides, parse_scene
+from conveyor_sim.scene import parse_again, parse_overrides
 
 DRAWN = ("bottles", "contacts", "belts", "signals")
 """Topics that blocks contain."""
@@ -110,7 +110,7 @@ class PageRecording:
         self._bag = bag
         self._detail = detail
         self._tick_ns = int(bag.line.tick_ns)
-        self._scene = parse_scene(
+        self._scene = parse_again(
             bag.line.scene_text, f"{bag.path} (recorded scene)", parse_overrides(bag.line.overrides)
         )
         self._stamps = Stamps(bag, (*DRAWN, *TOPICS_READ))

@@ -21,7 +21,7 @@ from conveyor_sim.scene.geometry import (
 )
 from conveyor_sim.scene.moving import movers_of, moving_shape
 from conveyor_sim.scene.overlaps import near_pieces, overlapping
-from conveyor_sim.scene.parts.device_part import Entry
+from conveyor_sim.scene.parts.device_part import Entry, Giver
 from conveyor_sim.scene.problems import Path, Problem
 from conveyor_sim.scene.rails import PolylineRail, SegmentRail
 from conveyor_sim.scene.schema import Grid, Scene, Single
@@ -29,6 +29,7 @@ from conveyor_sim.scene.types import COORDINATE_LIMIT, TOUCH, XY
 from conveyor_sim.scene.words import shown
 
 _MOST_BOTTLES = 1_000_000  # of one grid
+_MOST_PLACES = 1000  # that are checked for new bottles of one device
 
 
 def shape_problems(scene: Scene) -> list[Problem]:
@@ -224,7 +225,7 @@ def _infeeds_in_rails(scene: Scene, rails: list[RailShape]) -> Iterator[Problem]
         radius = radii.get(feed.bottle) if isinstance(feed, Entry) else max(radii.values())
         if radius is not None:
             feeds.append(feed)
-            groups.append(_Group((*path, "position"), np.array(feed.births()), radius))
+            groups.append(_Group((*path, "position"), _births(feed, radius), radius))
     for index, rail, _, apart in _inside(_All.of(groups), rails):
         group, feed = groups[index], feeds[index]
         jitter = ", lateral_jitter included" if len(group.points) > 1 and np.ptp(group.points, axis=0).any() else ""
@@ -233,6 +234,14 @@ def _infeeds_in_rails(scene: Scene, rails: list[RailShape]) -> Iterator[Problem]
             f"{shown(feed.position)} given, expected at least {group.radius:g} m between a bottle's axis "
             f"and rail {rail.name} ({_metres(apart.min())}{jitter})",
         )
+
+
+def _births(feed: Giver, radius: float) -> Array:
+    """Return places of new bottles, (n, 2): no rail lies between two neighbouring ones without touching a bottle."""
+    ends = np.array(feed.births())
+    first, last = ends[0], ends[-1]
+    steps = math.ceil(min(math.dist(first, last) / radius, _MOST_PLACES))
+    return np.vstack([ends, first + np.linspace(0.0, 1.0, steps + 1)[1:-1, None] * (last - first)])
 
 
 def _inside(every: _All, rails: list[RailShape]) -> Iterator[tuple[int, RailShape, NDArray[np.intp], Array]]:

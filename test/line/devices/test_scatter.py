@@ -143,11 +143,12 @@ def test_a_column_of_bottles_on_a_table_breaks_with_scatter(scatter: dict[str, A
     assert np.ptp(scattered.bottles().y) > 0.2
 
 
-def test_scatter_into_a_rail_is_refused() -> None:
-    """A source whose bottles could be born in a rail is refused by its position."""
+@pytest.mark.parametrize("jitter", [0.02, 0.5])
+def test_scatter_into_a_rail_is_refused(jitter: float) -> None:
+    """A source whose bottles could be born in a rail is refused by its position, also if they could be beyond it."""
     with pytest.raises(SceneError, match="lateral_jitter included") as error:
         line(
-            machines={"filler": source(lateral_jitter=0.02)},
+            machines={"filler": source(lateral_jitter=jitter)},
             rails={"side": segment((-0.1, 0.075), (0.1, 0.075))},
         )
     assert "machines.filler.position" in str(error.value)
