@@ -27,6 +27,7 @@ DRAWN = ("belts", "rails", "photo_eyes", "counters", "zones", "outfeeds", "infee
 MAP = """
 CONVEYORS: {as: conveyor, material: $BELT}
 BELTS: {as: belt, material: $BELT}
+PLATES: {as: plate, material: $BELT}
 RAILS: {as: rail, material: $RAIL}
 PHOTO_EYES: {as: photo_eye}
 COUNTERS: {as: counter}
