@@ -13,6 +13,7 @@ from conveyor_sim.scene.words import did_you_mean, shown
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,99}")
 _WORD = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+_MOST_IN_CYCLE = 10  # names of a cycle that are listed
 _FIELDS = ("default", "min", "max", "description")
 _EXAMPLE = "expected a number, a quantity such as 2.4 m, or an expression of parameters"
 
@@ -76,7 +77,9 @@ def scope_of(entries: Any, report: Callable[[Path, str], None]) -> dict[str, Qua
         order = list(TopologicalSorter(needs).static_order())
     except CycleError as error:
         cycle = [str(name) for name in error.args[1]][::-1]
-        report((cycle[0],), f"refers to itself: {' -> '.join(cycle)}")
+        more = len(cycle) - _MOST_IN_CYCLE
+        names = [*cycle[:_MOST_IN_CYCLE], f"{more} others", cycle[0]] if more > 1 else cycle
+        report((cycle[0],), f"refers to itself: {' -> '.join(names)}")
         return {}
     scope: dict[str, Quantity] = {}
     failed: set[str] = set()

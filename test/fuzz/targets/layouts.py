@@ -36,11 +36,11 @@ LONGEST = 30.0
 """s of CPU time for one scene; the largest layouts take a tenth of it."""
 
 VALUES: tuple[Any, ...] = (
-    None, True, 0, -1, 1, 0.5, 3, -0.0, 1e-9, 1e5, 1e20, 1e300, math.nan, math.inf, 10**30, 2**1024 - 1, "", "none", "end",
-    [], {}, [[]], [0, 0], [0, 0, 0], [[0, 0]], [[0, 0], [0, 0]], [[0, 0.1], [1, 0.1]], [[1, 0.1], [0, 0.1]], {"": 1},
-    {"a": {"b": 1}}, [0] * 2000, "table", "lane", "comb", "next", "nowhere", "table.end", "block.out", "block.in",
-    "block_exit", "m1", "z1", "gap", "length", "left", "right", "33 mm", "-33 mm", "90 deg", "-90", -90, 360,
-    "24 000 /h", "2 m/s", "5 kN/m", "1e400 m", "nan", "33 mn", "gap/2", "-gap/2", "length/0", "gap/(gap-gap)",
+    None, True, 0, -1, 1, 0.5, 3, -0.0, 1e-9, 1e5, 1e20, 1e300, math.nan, math.inf, 10**30, 2**1024 - 1, "", "none",
+    "end", [], {}, [[]], [0, 0], [0, 0, 0], [[0, 0]], [[0, 0], [0, 0]], [[0, 0.1], [1, 0.1]], [[1, 0.1], [0, 0.1]],
+    {"": 1}, {"a": {"b": 1}}, [0] * 2000, "table", "lane", "comb", "next", "nowhere", "table.end", "block.out",
+    "block.in", "block_exit", "m1", "z1", "gap", "length", "left", "right", "33 mm", "-33 mm", "90 deg", "-90", -90,
+    360, "24 000 /h", "2 m/s", "5 kN/m", "1e400 m", "nan", "33 mn", "gap/2", "-gap/2", "length/0", "gap/(gap-gap)",
     "length - 3*gap", "length * length", "1/gap", "(" * 150, "-" * 150 + "gap", "gap^2", "1e999*" * 30 + "1",
     "length deg", "\x00", "\u2009", "\ud7ff", "x" * 5000, "cell.yaml", "scene.yaml", "../secret",
 )  # fmt: skip
