@@ -109,8 +109,8 @@ class _Importer:
                 layers[stroke.source.layer].append(stroke)
         for layer, strokes in layers.items():
             if len(texts[layer]) > _MOST_TEXTS:
-                text = f"{len(texts[layer])} texts on layer {layer}, expected at most {_MOST_TEXTS}"
-                raise ConveyorError(f"{self._plan.file}: {text}")
+                problem = f"{len(texts[layer])} texts on layer {layer}, expected at most {_MOST_TEXTS}"
+                raise ConveyorError(f"{self._plan.file}: {problem}")
             self._give_names(strokes, texts[layer])
 
     def _give_names(self, strokes: list[Stroke], texts: list[DrawnText]) -> None:

@@ -291,5 +291,5 @@ def test_plans_beyond_a_limit(run: Import, monkeypatch: pytest.MonkeyPatch, limi
             space.add_line((0, number), (1000, number), **on("AXES"))
             space.add_text(f"t{number}", **on("AXES", insert=(0, number)))
 
-    with pytest.raises(ConveyorError, match="plan.dxf: "):
+    with pytest.raises(ConveyorError, match=r"plan\.dxf: "):
         run(draw, AXES)
