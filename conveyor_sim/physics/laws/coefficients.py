@@ -30,7 +30,7 @@ class BaseSprings(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Laws:
-    """Coefficients of the present laws. T bottle types, M rail materials, H surfaces."""
+    """Coefficients of the laws that the scene enables. T bottle types, M rail materials, H surfaces."""
 
     pair: ContactLaw | None
     """(T * T,), bottle and bottle; None if bottles do not touch bottles."""

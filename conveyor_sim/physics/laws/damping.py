@@ -9,7 +9,7 @@ DAMPING_BY_NAME: Mapping[str, DampingLaw] = {law.name: law for law in DAMPING}
 
 
 def elastic_law(contact: Contact) -> ElasticLaw:
-    """Return the elastic law whose field is given."""
+    """Return the elastic law whose field the scene sets."""
     return next(law for law in ELASTIC if getattr(contact, law.field) is not None)
 
 
