@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from drawings.test_underlay import png
+from page.drawings.test_underlay import png
 from page.pixels import canvas, settled
 
 from conveyor_sim.page.check_server import CheckServer

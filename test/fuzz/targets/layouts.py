@@ -26,6 +26,7 @@ from conveyor_sim.physics.model import build_model
 from conveyor_sim.scene import Scene, load_scene
 from conveyor_sim.scene.json_schema import scene_schema
 from conveyor_sim.scene.load import reread
+from conveyor_sim.scene.quantities import is_finite
 from conveyor_sim.scene.yaml_lines import Document
 
 Rng = np.random.Generator
@@ -180,7 +181,7 @@ def _change(draw: Rng, data: Data) -> None:
             for part in _one(draw, list(_paths(data))):
                 other = other[part]
             holder[key] = copy.deepcopy(other)
-        case "scaled" if isinstance(holder[key], (int, float)):
+        case "scaled" if is_finite(holder[key]):
             holder[key] *= _one(draw, [-1, 0, 1e-6, 0.5, 2, 1e3, 1e9])
         case "text" if isinstance(holder[key], str):
             holder[key] = _mutated(draw, holder[key])

@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from conveyor_sim.drawings.pieces import DrawnPiece, arc, reversed_curve
+from conveyor_sim.page.drawings.pieces import DrawnPiece, arc, reversed_curve
 from conveyor_sim.scene.geometry import ArcPiece, BeltShape, RailShape, rail_shapes, surface_shapes
 from conveyor_sim.scene.layout.plan import ConveyorPlan
 from conveyor_sim.scene.layout.routes import Bend

@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
-from conveyor_sim.drawings.entities import EntityRef, Stroke
-from conveyor_sim.drawings.pieces import JOIN, SMOOTH, DrawnPiece, corner, reversed_curve
+from conveyor_sim.page.drawings.entities import EntityRef, Stroke
+from conveyor_sim.page.drawings.pieces import JOIN, SMOOTH, DrawnPiece, corner, reversed_curve
 from conveyor_sim.scene.types import XY
 
 End = tuple[int, bool]

@@ -8,8 +8,8 @@ from xml.etree import ElementTree
 import pytest
 from scenes import SHIPPED, shipped_name
 
-from conveyor_sim.drawings.plan import LAYERS, plan_of
-from conveyor_sim.drawings.svg_plan import svg_of
+from conveyor_sim.page.drawings.plan import LAYERS, plan_of
+from conveyor_sim.page.drawings.svg_plan import svg_of
 from conveyor_sim.scene import load_scene
 
 SVG = "{http://www.w3.org/2000/svg}"

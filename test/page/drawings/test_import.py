@@ -9,11 +9,11 @@ from typing import Any
 
 import pytest
 
-from conveyor_sim.drawings import importing
-from conveyor_sim.drawings.entities import read_plan
-from conveyor_sim.drawings.importing import Imported, imported
-from conveyor_sim.drawings.layer_map import read_map
 from conveyor_sim.errors import ConveyorError
+from conveyor_sim.page.drawings import importing
+from conveyor_sim.page.drawings.entities import read_plan
+from conveyor_sim.page.drawings.importing import Imported, imported
+from conveyor_sim.page.drawings.layer_map import read_map
 
 ezdxf = pytest.importorskip("ezdxf", reason="ezdxf is not installed: pip install conveyor-sim[cad]")
 

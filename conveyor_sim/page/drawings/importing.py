@@ -12,13 +12,13 @@ from typing import Any, Final
 
 import numpy as np
 
-from conveyor_sim.drawings.chains import Chain, joined
-from conveyor_sim.drawings.conveyor_path import path_of
-from conveyor_sim.drawings.entities import DrawnPlan, DrawnText, EntityRef, Stroke, Symbol
-from conveyor_sim.drawings.layer_map import LayerMap, Rule
-from conveyor_sim.drawings.numbers import degrees, number, point
-from conveyor_sim.drawings.pieces import DrawnPiece, box_of, length_of, nearest, within
 from conveyor_sim.errors import ConveyorError
+from conveyor_sim.page.drawings.chains import Chain, joined
+from conveyor_sim.page.drawings.conveyor_path import path_of
+from conveyor_sim.page.drawings.entities import DrawnPlan, DrawnText, EntityRef, Stroke, Symbol
+from conveyor_sim.page.drawings.layer_map import LayerMap, Rule
+from conveyor_sim.page.drawings.numbers import degrees, number, point
+from conveyor_sim.page.drawings.pieces import DrawnPiece, box_of, length_of, nearest, within
 from conveyor_sim.scene.quantities import to_si
 from conveyor_sim.scene.types import TOUCH, XY
 

@@ -10,9 +10,9 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
 
-from conveyor_sim.drawings.dxf_file import MOST_ENTITIES, metres_per_unit, open_dxf
-from conveyor_sim.drawings.pieces import DrawnPiece, arc
 from conveyor_sim.errors import ConveyorError
+from conveyor_sim.page.drawings.dxf_file import MOST_ENTITIES, metres_per_unit, open_dxf
+from conveyor_sim.page.drawings.pieces import DrawnPiece, arc
 from conveyor_sim.scene.types import COORDINATE_LIMIT, TOUCH, XY
 from conveyor_sim.support.files import FileError
 
