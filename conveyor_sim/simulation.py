@@ -100,7 +100,7 @@ class Simulation:
     ) -> "Simulation":
         """Continue from a checkpoint with the same bits as if the run had not stopped, on any number of threads.
 
-        scene: the saved one, except for `duration` and `description`; None: the one in the file.
+        scene: equal to the saved one except in `duration` and `description`; None: the one in the file.
         folder: base of relative paths, which no path may leave; None: no restriction.
         Raises CheckpointError for a file that is missing, no checkpoint, damaged, or of another version or scene.
         """

@@ -18,7 +18,7 @@ DAMPING_BY_NAME: Mapping[str, DampingLaw] = {law.name: law for law in DAMPING}
 
 
 def elastic_law(contact: Contact) -> ElasticLaw:
-    """Return the elastic law whose field is given."""
+    """Return the elastic law whose field the scene sets."""
     return next(law for law in ELASTIC if getattr(contact, law.field) is not None)
 
 
@@ -57,7 +57,7 @@ class BaseSprings(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Laws:
-    """Coefficients of the present laws. T bottle types, M rail materials, H surfaces."""
+    """Coefficients of the laws that the scene enables. T bottle types, M rail materials, H surfaces."""
 
     pair: ContactLaw | None
     """(T * T,), bottle and bottle; None if bottles do not touch bottles."""
