@@ -18,7 +18,7 @@ def _sum(columns: Sequence[str], functions: Sequence[Callable[..., float]], inpu
     """Return a part (law, e, total, args...) that adds functions of entry e of the columns to the total."""
     places = range(len(columns))
     arguments = "".join(f"column_{n}, " for n in places)
-    # Numba prunes a branch only if it tests an argument for None.
+    # Columns are passed as arguments, so that numba prunes the branches of absent ones.
     body = [f"    if column_{n} is not None: total += force_{n}(column_{n}[e], {inputs})" for n in places]
     head = f"def function(total, {arguments}e, {inputs}):"
     forces = {f"force_{n}": part(function) for n, function in enumerate(functions)}

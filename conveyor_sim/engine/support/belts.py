@@ -14,7 +14,7 @@ from conveyor_sim.engine.threads.workers import UNIT
 
 @part
 def belt_distance(belts: Belts, sectors: Any, h: int, x: float, y: float) -> float:
-    """Return a signed distance (m) to the edge of belt h, >= 0 on the belt. It never exceeds the true one in magnitude."""
+    """Return a signed distance (m) to the edge of belt h, >= 0 on the belt; its magnitude is a lower bound."""
     if sectors is not None:
         if sectors.reach[h] >= 0:  # a test for None is pruned only if it stands alone
             return _sector_distance(sectors, h, x, y)
