@@ -33,10 +33,9 @@ from conveyor_sim.line.process_image import ProcessImage
 from conveyor_sim.physics.accounts.accounts import Accounts
 from conveyor_sim.physics.model import build_model
 from conveyor_sim.physics.state.checkpoint import Checkpoint, damaged, read_checkpoint, write_checkpoint
-from conveyor_sim.physics.state.full_state_hash import full_state_hash
+from conveyor_sim.physics.state.hashes import COLUMNS, full_state_hash, state_hash
 from conveyor_sim.physics.state.snapshot import entries, typed
 from conveyor_sim.physics.state.state import FIRST_SLOTS, Held, State
-from conveyor_sim.physics.state.state_hash import COLUMNS, state_hash
 from conveyor_sim.physics.state.world_arrays import changing_arrays
 from conveyor_sim.physics.stepping.tick import Integration
 from conveyor_sim.scene.geometry import RailShape
@@ -312,7 +311,7 @@ class Simulation:
         return state_hash(self.tick, columns, self._state)
 
     def full_state_hash(self) -> int:
-        """Return 64 bits over everything that decides how the run continues (`physics/state/full_state_hash.py`)."""
+        """Return 64 bits over everything that decides how the run continues (`physics/state/hashes.py`)."""
         return full_state_hash(self._snapshot(), changing_arrays(self._state.world), self.scene.limits)
 
     def _snapshot(self) -> dict[str, Any]:
