@@ -44,7 +44,8 @@ conveyors:
   slow: {start: [0, 0.075], heading: 0 deg, path: [{straight: 2}], width: 0.15, speed: 0.2, material: chain}
   fast: {beside: slow, side: left, path: [{straight: 2}], width: 0.15, speed: 0.3, material: chain}
 infeeds:
-  filler: {along: slow, at: 0.05, offset: 75 mm, bottle: half_litre, count: 20, rate: 3, lateral_jitter: 0, angular_jitter: 0}
+  filler: {along: slow, at: 0.05, offset: 75 mm, bottle: half_litre, count: 20, rate: 3,
+    lateral_jitter: 0, angular_jitter: 0}                           # on the edge of both conveyors, without scatter
 effects: {contact_arrays: off, peaks: off}                          # without a reader
 ```
 
