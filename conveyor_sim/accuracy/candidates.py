@@ -3,13 +3,12 @@
 import math
 from typing import Any
 
-from conveyor_sim.accuracy.setting import Setting, with_setting
-from conveyor_sim.accuracy.stiffness import scaled_contacts
+from conveyor_sim.accuracy.setting import Setting, scaled_contacts, with_setting
 from conveyor_sim.engine.integrators import INTEGRATORS
 from conveyor_sim.errors import SceneError
 from conveyor_sim.physics.model import build_model
 from conveyor_sim.physics.timestep.presets import PRESETS
-from conveyor_sim.scene import Scene, parse_overrides, parse_scene
+from conveyor_sim.scene import Scene, parse_again, parse_overrides
 from conveyor_sim.scene.accuracy import Preset, explicit
 from conveyor_sim.scene.geometry import belt_shapes
 
@@ -35,7 +34,7 @@ def preset_setting(scene: Scene, preset: Preset, stiffness: float = 1.0) -> Sett
     overrides = {**parse_overrides(scene.overrides_text), "accuracy": {**_NOTHING, "preset": preset}}
     if stiffness != 1.0:
         overrides["contacts"] = scaled_contacts(scene, stiffness)
-    model = build_model(parse_scene(scene.source_text, scene.source_name, overrides))
+    model = build_model(parse_again(scene.source_text, scene.source_name, overrides))
     return Setting(model.integrator, model.steps_per_tick, stiffness)
 
 

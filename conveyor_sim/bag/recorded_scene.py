@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import Any
 
-from conveyor_sim.scene import Scene, parse_overrides, parse_scene
+from conveyor_sim.scene import Scene, parse_again, parse_overrides
 
 
 def recorded_scene(line: Any, name: str) -> Scene:
@@ -17,6 +17,6 @@ def recorded_scene(line: Any, name: str) -> Scene:
     others = accuracy if isinstance(accuracy, dict) else {}  # such as `error`; the steps replace preset and tolerance
     recorded = {"integrator": str(line.integrator), "per_tick": int(line.steps_per_tick)}
     pinned = {**others, "preset": None, "tolerance": None, "dt": None, **recorded}
-    scene = parse_scene(line.scene_text, name, {**overrides, "accuracy": pinned})
+    scene = parse_again(line.scene_text, name, {**overrides, "accuracy": pinned})
     scene._source = replace(scene._source, streams_by_index=not hasattr(line, "tag_names"))
     return scene

@@ -20,7 +20,7 @@ from conveyor_sim.bag.recorded_scene import recorded_scene
 from conveyor_sim.columns.image import NOTHING_FORCED, Image
 from conveyor_sim.errors import BagError, SceneError
 from conveyor_sim.line.commands.inputs import ARRIVAL
-from conveyor_sim.scene import parse_overrides, parse_scene
+from conveyor_sim.scene import parse_again, parse_overrides
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.printable import printable
 
@@ -221,7 +221,7 @@ def _signals_by_name(bag: Bag, simulation: Simulation) -> NDArray[np.int64]:
 def _from_checkpoint(bag: Bag, start: Path) -> Simulation:
     # With the present defaults, unlike `recorded_scene`, because a checkpoint is of this version.
     name, overrides = f"{bag.path} (recorded scene)", parse_overrides(bag.line.overrides)
-    simulation = Simulation.load(start, scene=parse_scene(bag.line.scene_text, name, overrides))
+    simulation = Simulation.load(start, scene=parse_again(bag.line.scene_text, name, overrides))
     if simulation.tick != bag.line.tick:
         raise BagError(
             f"{start}: a checkpoint at tick {simulation.tick}, expected the one at tick {bag.line.tick}, "

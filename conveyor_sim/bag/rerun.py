@@ -17,7 +17,7 @@ from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.errors import BagError, SimulationError
 from conveyor_sim.line.commands.inputs import Input
 from conveyor_sim.line.run_state import ENDED, RUNNING, STOPPED, RunState
-from conveyor_sim.scene import Scene, parse_overrides, parse_scene
+from conveyor_sim.scene import Scene, parse_again, parse_overrides
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.files import MB, FileError, read_file
 from conveyor_sim.support.printable import SENTENCE, printable
@@ -191,7 +191,7 @@ def _read(path: Path) -> _Run:
         if header["format"] != FORMAT:
             raise BagError(f"{path}: format {header['format']!r} of inputs, expected {FORMAT}")
         source = {key: str(header["scene"][key]) for key in ("text", "name", "overrides")}
-        scene = parse_scene(source["text"], source["name"], parse_overrides(source["overrides"]))
+        scene = parse_again(source["text"], source["name"], parse_overrides(source["overrides"]))
         from_checkpoint, environment = bool(header["start"]), [str(entry) for entry in header["environment"]]
         for line in lines[1:]:
             entry = json.loads(line)

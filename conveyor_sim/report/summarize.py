@@ -25,11 +25,10 @@ from conveyor_sim.physics.model.remedies import StepLimit, step_limit
 from conveyor_sim.physics.model.step_choice import choose_steps
 from conveyor_sim.physics.plant import Plant
 from conveyor_sim.report.alarm_figures import AlarmTally
-from conveyor_sim.report.load_history import LoadHistory
-from conveyor_sim.report.summary import BeltFlow, Energy, Loop, Summary
+from conveyor_sim.report.summary import BeltFlow, Energy, LoadHistory, Loop, Summary
 from conveyor_sim.run.force_check import PressWatch, achieved, pressed
 from conveyor_sim.run.speed import TopicCount
-from conveyor_sim.scene import parse_overrides, parse_scene
+from conveyor_sim.scene import parse_again, parse_overrides
 from conveyor_sim.support.printable import SENTENCE, printable
 
 GUARD_TEXTS = 3
@@ -198,7 +197,7 @@ def _model(line: Any) -> Model | None:
 def _step_limit(line: Any) -> StepLimit | None:
     """Return the step limit of a recorded scene; None if this version would choose another number of steps."""
     try:
-        scene = parse_scene(line.scene_text, line.scene_name, parse_overrides(line.overrides))
+        scene = parse_again(line.scene_text, line.scene_name, parse_overrides(line.overrides))
         choice = choose_steps(Plant.of(scene))
     except SceneError:
         return None

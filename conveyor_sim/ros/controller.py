@@ -35,7 +35,7 @@ from conveyor_sim.ros.direct import Aside, WaitSet, send_request, take_response
 from conveyor_sim.ros.publishers import ros_qos
 from conveyor_sim.ros.spinner import Spinner
 from conveyor_sim.run.alarm_changes import AlarmChanges
-from conveyor_sim.scene import parse_overrides, parse_scene
+from conveyor_sim.scene import parse_again, parse_overrides
 from conveyor_sim.support.printable import SENTENCE, printable
 from conveyor_sim.support.stop_request import StopRequest
 
@@ -365,5 +365,5 @@ def _refusal(outcome: Any) -> str:
 
 def _last_tick(line: Any) -> int:
     """Return the tick at which the run ends."""
-    scene = parse_scene(line.scene_text, line.scene_name, parse_overrides(line.overrides))
+    scene = parse_again(line.scene_text, line.scene_name, parse_overrides(line.overrides))
     return scene.duration_ticks

@@ -1,6 +1,8 @@
 """Conversion of texts such as `33 mm` in the data of a part, by the units of its fields."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
 from functools import lru_cache
 from typing import Any, Literal, NamedTuple, get_args, get_origin
 
@@ -10,6 +12,19 @@ from conveyor_sim.scene.quantities import angle_refused, converted
 from conveyor_sim.scene.words import unit_of
 
 _PLAIN = (float, int, bool, type(None))
+
+
+_any_angle: ContextVar[bool] = ContextVar("any_angle", default=False)
+
+
+@contextmanager
+def any_angle() -> Iterator[None]:
+    """Accept numbers of more than a full turn for angles inside this context: those of a recording are in rad."""
+    token = _any_angle.set(True)
+    try:
+        yield
+    finally:
+        _any_angle.reset(token)
 
 
 class _Field(NamedTuple):
@@ -51,7 +66,7 @@ def _number(field: _Field, value: Any, unit: str) -> Any:
         return value if all(new is old for new, old in zip(items, value, strict=True)) else items
     if isinstance(value, dict):
         return {key: _number(field, item, unit) for key, item in value.items()}
-    if field.is_angle and type(value) in (int, float):
+    if field.is_angle and type(value) in (int, float) and not _any_angle.get():
         return angle_refused(value) or value
     return value
 

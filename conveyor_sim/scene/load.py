@@ -10,6 +10,7 @@ from typing import Any
 from conveyor_sim.errors import SceneError
 from conveyor_sim.scene.beside import Beside
 from conveyor_sim.scene.checks import problems_of
+from conveyor_sim.scene.conversion import any_angle
 from conveyor_sim.scene.layout.compose import chosen, compose
 from conveyor_sim.scene.overrides import FILES, in_quotes, parse_overrides, plain, yaml_text
 from conveyor_sim.scene.part import validated
@@ -91,6 +92,12 @@ def parse_scene(
     scene._source = Origin(text, name, changes_text, stored_text, files=files)
     scene._layout = reading.expansion.plan
     return scene
+
+
+def parse_again(text: str, name: str, overrides: Mapping[str, Any]) -> Scene:
+    """Read a scene from the text and the overrides of a recording, a checkpoint or a loaded scene. Raise SceneError."""
+    with any_angle():
+        return parse_scene(text, name, overrides)
 
 
 def _with_stored(beside: Beside | None, stored: Any) -> Beside:

@@ -9,7 +9,7 @@ import pytest
 from facts import missing
 
 from conveyor_sim.errors import SceneError
-from conveyor_sim.scene import parse_scene
+from conveyor_sim.scene import parse_again, parse_scene
 from conveyor_sim.scene.conversion import in_si_units
 from conveyor_sim.scene.part import Part, part_from
 from conveyor_sim.scene.quantities import LONGEST, Quantity, Scoped, dimensions, evaluate, to_si
@@ -246,3 +246,11 @@ def test_a_bare_angle_beyond_a_full_turn_is_refused_with_its_line() -> None:
     with pytest.raises(SceneError) as error:
         parse_scene(SCENE.replace("-90 deg", "-90"), "plant.yaml")
     assert missing(str(error.value), ["plant.yaml:6", "belts.a.angle", "-90", "-90 deg?"]) == []
+
+
+def test_an_earlier_text_may_have_bare_angles_beyond_a_full_turn() -> None:
+    belt = parse_again(SCENE.replace("-90 deg", "7"), "recorded", {}).belts["a"]
+    assert belt.kind == "straight"
+    assert belt.angle == 7.0
+    with pytest.raises(SceneError):
+        parse_scene(SCENE.replace("-90 deg", "7"))

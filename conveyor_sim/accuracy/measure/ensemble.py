@@ -16,7 +16,7 @@ from conveyor_sim.accuracy.measure.sample_file import SampleFile
 from conveyor_sim.accuracy.results import Sample
 from conveyor_sim.accuracy.setting import Setting, with_setting
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.scene import Scene, parse_overrides, parse_scene
+from conveyor_sim.scene import Scene, parse_again, parse_overrides
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.worker_pool import DIED, DiedError, WorkerPool, free_cores
 
@@ -39,7 +39,7 @@ class _Work:
 
     def scene(self) -> Scene:
         """Build the scene of the run. Raise SceneError if it can't be simulated with this setting."""
-        scene = parse_scene(self.text, self.name, parse_overrides(self.overrides))
+        scene = parse_again(self.text, self.name, parse_overrides(self.overrides))
         return with_setting(scene, self.setting, **measuring(scene), **jittered(scene, self.seed))
 
 

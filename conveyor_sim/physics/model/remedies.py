@@ -15,7 +15,7 @@ from conveyor_sim.physics.timestep.bounds import Bound, fewest_steps
 from conveyor_sim.physics.timestep.presets import DEFAULT
 from conveyor_sim.scene.accuracy import MANY_STEPS, MOST_STEPS
 from conveyor_sim.scene.contacts import DAMPING_CHOICES
-from conveyor_sim.scene.load import parse_scene
+from conveyor_sim.scene.load import parse_again
 from conveyor_sim.scene.overrides import parse_overrides
 from conveyor_sim.scene.schema import Scene
 
@@ -149,7 +149,7 @@ def step_limit(scene: Scene, choice: StepChoice | None = None) -> StepLimit:
 
 def with_remedy(scene: Scene, overrides: Mapping[str, Any]) -> Scene:
     """Return the scene with overrides. Raise SceneError if they are not valid for it."""
-    return parse_scene(scene.source_text, scene.source_name, {**parse_overrides(scene.overrides_text), **overrides})
+    return parse_again(scene.source_text, scene.source_name, {**parse_overrides(scene.overrides_text), **overrides})
 
 
 def too_many(scene: Scene, choice: StepChoice) -> str:

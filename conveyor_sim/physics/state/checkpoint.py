@@ -25,7 +25,7 @@ from conveyor_sim.errors import CheckpointError, SceneError
 from conveyor_sim.physics.model.model import versions_here
 from conveyor_sim.physics.state.snapshot import wrong
 from conveyor_sim.physics.state.world_arrays import Arrays
-from conveyor_sim.scene import Scene, parse_overrides, parse_scene
+from conveyor_sim.scene import Scene, parse_again, parse_overrides
 from conveyor_sim.scene.difference import scene_difference
 from conveyor_sim.support.files import MB, FileError, in_mb, read_file, write_file
 from conveyor_sim.support.printable import printable
@@ -224,7 +224,7 @@ def _array(content: bytes) -> NDArray[Any]:
 
 def _scene(path: Path, source: _Source) -> Scene:
     try:
-        return parse_scene(source.text, source.name, parse_overrides(source.overrides))
+        return parse_again(source.text, source.name, parse_overrides(source.overrides))
     except SceneError as error:
         raise damaged(path, f"its scene is refused: {str(error).splitlines()[0]}") from error
 

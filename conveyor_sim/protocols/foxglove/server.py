@@ -23,7 +23,7 @@ from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.bag.messages.typestore import default_distro
 from conveyor_sim.protocols.server.interface import ServerError, Status
 from conveyor_sim.protocols.tags.line_mirror import DRAWING_TOPICS, STATE_TOPICS, DrawableProvider
-from conveyor_sim.scene import parse_overrides, parse_scene
+from conveyor_sim.scene import parse_again, parse_overrides
 from conveyor_sim.scene.geometry import rail_shapes, surface_shapes
 from conveyor_sim.scene.marks import marks_of
 from conveyor_sim.scene.moving import moving_shapes
@@ -187,7 +187,7 @@ class FoxgloveServer:
     def _scene(self) -> Any:
         line = self._source.frame.line
         if self._parsed[0] is not line:
-            scene = parse_scene(line.scene_text, "the scene of the line", parse_overrides(line.overrides))
+            scene = parse_again(line.scene_text, "the scene of the line", parse_overrides(line.overrides))
             self._parsed = line, scene
         return self._parsed[1]
 

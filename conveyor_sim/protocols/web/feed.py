@@ -23,7 +23,7 @@ from conveyor_sim.page.story import Story
 from conveyor_sim.protocols.tags.line_mirror import DrawableFrame, DrawableProvider
 from conveyor_sim.protocols.tags.tag_provider import LineSnapshot
 from conveyor_sim.protocols.web.viewer import Viewer
-from conveyor_sim.scene import parse_overrides, parse_scene
+from conveyor_sim.scene import parse_again, parse_overrides
 from conveyor_sim.support.printable import SENTENCE, printable
 
 COUNTERS = 0.5
@@ -176,7 +176,7 @@ class Feed:
         """Send the complete present state of the line to a page."""
         drawable, line = self._drawable, self._drawable.line
         if self._head[0] is not line:
-            scene = parse_scene(line.scene_text, "the scene of the line", parse_overrides(line.overrides))
+            scene = parse_again(line.scene_text, "the scene of the line", parse_overrides(line.overrides))
             self._head = line, head(line, scene)
         times = {
             "first": drawable.tick,

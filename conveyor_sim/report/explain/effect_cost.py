@@ -12,7 +12,7 @@ from conveyor_sim.errors import ConveyorError, SimulationError
 from conveyor_sim.physics.effects.choice import EFFECTS
 from conveyor_sim.physics.model import Model
 from conveyor_sim.physics.model.remedies import step_limit, with_remedy
-from conveyor_sim.scene import Scene, parse_overrides, parse_scene
+from conveyor_sim.scene import Scene, parse_again, parse_overrides
 from conveyor_sim.scene.accuracy import explicit
 from conveyor_sim.simulation import Simulation
 
@@ -195,7 +195,7 @@ def _variant(scene: Scene, model: Model, off: Sequence[str]) -> Scene:
     overrides = parse_overrides(scene.overrides_text)
     overrides["effects"] = {**scene.effects, **dict.fromkeys(off, "off")}
     overrides["accuracy"] = explicit(model.integrator, model.steps_per_tick, scene.accuracy.error)
-    return parse_scene(scene.source_text, scene.source_name, overrides)
+    return parse_again(scene.source_text, scene.source_name, overrides)
 
 
 def _ticks_of(simulation: Simulation, warm: Simulation) -> int:

@@ -28,7 +28,7 @@ from conveyor_sim.report.figures.data import (
     StaticGeometry,
     Velocity,
 )
-from conveyor_sim.scene import Scene, parse_overrides, parse_scene
+from conveyor_sim.scene import Scene, parse_again, parse_overrides
 from conveyor_sim.scene.geometry import RailShape, initial_bottles
 from conveyor_sim.scene.moving import moving_shapes
 
@@ -315,4 +315,4 @@ def _peak(ids: Integers, peak_force: Floats) -> tuple[float, float, int]:
 
 def _scene(bag: Bag) -> Scene:
     """Return the scene of the run, from the recorded text and the overrides at loading."""
-    return parse_scene(bag.line.scene_text, f"{bag.path} (recorded scene)", parse_overrides(bag.line.overrides))
+    return parse_again(bag.line.scene_text, f"{bag.path} (recorded scene)", parse_overrides(bag.line.overrides))

@@ -71,7 +71,7 @@ def ports_of(data: Mapping[Any, Any], declared: Any, inner: Ports) -> dict[str, 
         elif (match := _PORT.fullmatch(value)) is None:
             raise CellFault(("ports", name), f"{shown(value)} given, {_TEXT}")
         elif not isinstance(conveyors, dict) or match[1] not in conveyors:
-            known = [f"{one}.{match[2]}" for one in conveyors]
+            known = [f"{one}.{match[2]}" for one in conveyors] if isinstance(conveyors, dict) else []
             raise CellFault(("ports", name), f"{shown(value)} given, {did_you_mean(value, known)}")
         else:
             ports[name] = Port(match[1], match[2])
