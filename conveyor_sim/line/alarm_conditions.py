@@ -114,7 +114,7 @@ class LimitConditions:
     def __init__(self, alarms: Alarms) -> None:
         """Find the limit alarms.
 
-        alarms: all, limits included.
+        alarms: all alarms, limit alarms included.
         """
         self._alarms = [alarm for alarm in alarms if alarm.own and alarm.id.startswith(LIMITS)]
         self._all = alarms
@@ -122,7 +122,7 @@ class LimitConditions:
     def changes(self, passed: Sequence[DamageEvent], clogged: Mapping[str, bool]) -> dict[str, bool]:
         """Return the conditions that have begun or ended, by id.
 
-        passed: limits passed in the tick that ends. clogged: by outfeed.
+        passed: limits passed in the tick that ends. clogged: True if clogged, by name of the outfeed.
         """
         if not (self._alarms or clogged):
             return {}

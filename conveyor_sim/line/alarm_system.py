@@ -25,7 +25,8 @@ class AlarmSystem:
     def __init__(self, scene: Scene, devices: Sequence[Device], modes: Signals, note: Note) -> None:
         """Declare the alarms of the line and the scene.
 
-        devices: all others. modes: control modes of these. Raise SceneError for invalid alarms of the scene.
+        devices: all devices of the line except that of the alarms. modes: control modes of these devices.
+        Raise SceneError for invalid alarms of the scene.
         """
         sources = (*devices, modes)
         signals = [tag.name for source in sources for tag in source.signals]
@@ -80,7 +81,7 @@ class AlarmSystem:
     ) -> None:
         """End a tick.
 
-        passed: limits passed in it. clogged: by outfeed. forced: values of forced signals.
+        passed: limits passed in it. clogged: True if clogged, by name of the outfeed. forced: values of forced signals.
         """
         if measured := self._measured.changes(now, forced):
             now.conditions |= measured
@@ -151,7 +152,7 @@ class AlarmsDevice(Device):
     def __init__(self, alarms: Alarms) -> None:
         """Build the signals.
 
-        alarms: those of line and scene only.
+        alarms: alarms of line and scene, before controllers declare any.
         """
         most = len(alarms) + MOST_ALARMS
         standing = "alarms that stand, of controllers too."

@@ -135,7 +135,7 @@ class Views:
         subtypes: bool,
         cache: dict[tuple[ua.NodeId, bool], frozenset[ua.NodeId] | None],
     ) -> frozenset[ua.NodeId] | None:
-        """Return the reference types that a request accepts; None: all. cache: of one request."""
+        """Return the reference types that a request accepts; None: all. cache: results so far of this request."""
         if kind.is_null():
             return None
         key = kind, bool(subtypes)
