@@ -27,6 +27,7 @@ from conveyor_sim.line.run_state import ENDED, RUNNING, STOPPED, RunState
 from conveyor_sim.protocols.tags.tag_provider import SCADA_SOURCES, SteppedTagProvider
 from conveyor_sim.run.scan_loop import AttachedController, LocalController, ScanLoop
 from conveyor_sim.scene import Scene
+from conveyor_sim.scene.recorded import sources_of
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.modbus_rows import Row
 from conveyor_sim.support.printable import SENTENCE, printable
@@ -223,7 +224,7 @@ class Scenario(AbstractContextManager["Scenario"]):
         self.failure = ""
         """Sentence about that failure."""
         self._read: dict[str, None] = {}
-        self._recorder = None if bag is None else Recorder(bag, start=copier(start))
+        self._recorder = None if bag is None else Recorder(bag, start=copier(start), sources=sources_of(self.scene))
         self._outputs = OutputWriter(
             self.simulation, [self._recorder] if self._recorder else [], run_id=uuid.uuid4().hex
         )
