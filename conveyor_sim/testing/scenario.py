@@ -21,6 +21,7 @@ from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.control.scan import ALARMS, ControlError, Controller, Inputs
 from conveyor_sim.errors import CommandError, SimulationError
+from conveyor_sim.line.changeover import changeover
 from conveyor_sim.line.commands.authority import MODES
 from conveyor_sim.line.commands.inputs import DISOWN, FAULT, FORCE, INJECT, MODE, SET, UNFORCE, Input, WriterKind
 from conveyor_sim.line.run_state import ENDED, RUNNING, STOPPED, RunState
@@ -405,6 +406,16 @@ class Scenario(AbstractContextManager["Scenario"]):
         Raises CommandError if it would be refused.
         """
         self._give(Input(TEST, TEST, "test", SET, (name,), (value,)))
+
+    def changeover(self, format: str) -> None:
+        """Give the commands that set speeds, rates and bottle types of another format of the scene at the next tick.
+
+        A controller that gives the same commands in its scans overwrites them. Raise SceneError for an unknown format,
+        and for one that commands can't set.
+        """
+        commands = changeover(self.scene, format)
+        if commands:
+            self._give(Input(TEST, TEST, "test", SET, tuple(commands), tuple(commands.values())))
 
     def inject(self, fault: str, value: float = 1.0) -> None:
         """Begin a fault at the next tick, or end it with value 0. Raise CommandError if it would be refused."""
