@@ -147,6 +147,8 @@ def test_places_name_file_line_and_cell(plant: Path) -> None:
     assert places.of(("machines", "block_filler", "rate")) == f"{plant.parent / 'cells' / 'filler.yaml'}:9 (cell block)"
     assert places.line_of(("contacts", 0, "table")) == line_of(MATERIALS, "table")
     assert places.line_of(("belts", "main", "speed")) == line_of(PLANT, "long:")
+    assert places.elsewhere(("belts", "main", "width")) == ""
+    assert places.elsewhere(("belts", "block_feed", "width")).endswith("filler.yaml:4 (cell block)")
     assert places.line_of(("belts", "main", "width")) == line_of(PLANT, "main: {kind")
 
 
@@ -223,6 +225,8 @@ def test_a_cell_continues_a_conveyor(plant: Path) -> None:
         ({"cells": 3}, ["cells", "3"]),
         ({"include": 3}, ["include", "3"]),
         ({"include": ["gone.yaml"]}, ["include[0]", '"gone.yaml"']),
+        ({"belts": 3}, ["belts", "3", "a mapping"]),
+        ({"contacts": 3}, ["contacts", "3", "a list"]),
         ({"variants": 3}, ["variants", "3"]),
         ({"formats": {"small": {"bottle": "b5"}}}, ["formats.small.bottle", '"b5"', "b05"]),
         ({"formats": {"small": {"set": {"gp": 1}}}}, ["formats.small.set.gp", "gap"]),

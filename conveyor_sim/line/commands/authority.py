@@ -19,7 +19,7 @@ from conveyor_sim.line.commands.inputs import (
 from conveyor_sim.support.printable import printable
 
 PEOPLE: tuple[WriterKind, ...] = ("operator", "engineer")
-"""Kinds of writer that act through the service `operate`."""
+"""Kinds of writer that are persons. They act through the ROS service `operate` or a protocol server."""
 
 
 class Right(NamedTuple):
@@ -38,14 +38,16 @@ MAY: Mapping[str, Right] = {
     DISOWN: Right(("controller",), "Releases ownership."),
     FORCE: Right((*PEOPLE, "test"), "Forces signals to values."),
     UNFORCE: Right((*PEOPLE, "test"), "Ends forcing of the named signals; of all if no names are given."),
-    "acknowledge": Right((*PEOPLE, "test"), "Acknowledges alarms, without names all of them."),
-    "reset": Right((*PEOPLE, "test"), "Clears latched alarms, without names all of them."),
+    "acknowledge": Right((*PEOPLE, "test"), "Acknowledges the named alarms; all if no names are given."),
+    "reset": Right((*PEOPLE, "test"), "Clears the named latched alarms; all if no names are given."),
     "shelve": Right((*PEOPLE, "test"), "Shelves alarms for a time in seconds (values), or once."),
-    "unshelve": Right((*PEOPLE, "test"), "Ends shelving of alarms, without names of all."),
+    "unshelve": Right((*PEOPLE, "test"), "Ends shelving of the named alarms; of all if no names are given."),
     "remove_from_service": Right(("engineer", "test"), "Takes alarms out of service."),
     "return_to_service": Right(("engineer", "test"), "Returns alarms to service."),
     "declare": Right(("controller", "test"), "Declares a controller's alarms."),
-    "reset_counters": Right(("controller", *PEOPLE, "test"), "Resets counters and times, without names of all."),
+    "reset_counters": Right(
+        ("controller", *PEOPLE, "test"), "Resets counters and times of the named devices; of all if no names are given."
+    ),
 }
 """Rights by operation. An operation that is not listed is forbidden."""
 
@@ -103,7 +105,7 @@ def pattern_problem(patterns: Sequence[str], devices: Collection[str], where: st
 
 
 def hand_over_problem(request: Input) -> str:
-    """Return why such an input can't take or release the line, whichever controller owns it; "" if it can."""
+    """Return why an OWN or DISOWN input is invalid for any owner of the line; "" if it is valid."""
     if request.names or request.values or (request.texts and request.operation == DISOWN):
         expected = "texts alone, patterns of devices" if request.operation == OWN else "nothing beside its writer"
         counts = f"{len(request.names)} names, {len(request.values)} values, {len(request.texts)} texts"

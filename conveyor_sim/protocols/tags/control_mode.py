@@ -46,7 +46,8 @@ def objection(source: TagProvider, command: Tag, value: float, kind: WriterKind,
 def refused_for_good(source: TagProvider, receipt: Receipt, request: Input) -> Refusal | None:
     """Return why the line would refuse an input in every state; None if it might accept it.
 
-    Such an input is still passed on if its writer may use the operation: the line then records the refusal.
+    If its writer may use the operation, such an input is still passed on, and the line records the refusal.
+    Commands (SET) are not passed on.
     """
     refusal = receipt.refusal(request)
     # An input with commands is not passed on, because the line might accept a part of it.

@@ -2,7 +2,7 @@
 
 Modbus has no sessions and no names. So the first write of a client takes the line. The line is released when the
 connection ends or is idle for too long, so that absent clients do not block it. A restart of the protocol server ends
-all connections, but gives nothing up: for GRACE seconds only the holder's machine can go on with the line.
+all connections, but not ownership: for GRACE seconds only clients on the holder's machine can take the line over.
 """
 
 from __future__ import annotations

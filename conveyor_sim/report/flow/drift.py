@@ -17,23 +17,28 @@ STEP = 0.05
 """m"""
 
 MOST_STEPS = 4000
-"""Steps of an estimate, 200 m."""
+"""Steps of all estimates of a scene, 200 m."""
 
 LANE = 1.0
 """m, farthest guide that leads a bottle."""
 
 
 def drift(
-    start: Array, along: Array, surfaces: SurfaceMap, guides: Guides, takers: Sequence[tuple[Path, Sequence[XY]]]
+    start: Array,
+    along: Array,
+    surfaces: SurfaceMap,
+    guides: Guides,
+    takers: Sequence[tuple[Path, Sequence[XY]]],
+    steps: int,
 ) -> tuple[Array, Array, Path | None]:
     """Return times (k,) s and places (k, 2) of a bottle that moves with the belts, and the device that takes it.
 
     start: place, m. along: unit vector of its motion. takers: devices with their regions. It follows the middle between
-    guides, and ends after MOST_STEPS or beside the belts, without a device (None).
+    guides, and ends after a number of steps or beside the belts, without a device (None).
     """
     place, time, speed = start.copy(), 0.0, 0.0
     times, places = [], []
-    for _ in range(MOST_STEPS):
+    for _ in range(steps):
         carrier = int(surfaces.under(place[None])[0])
         if carrier != NONE and not surfaces[carrier].rests:
             along, speed = surfaces[carrier].heading(place[None])[0], abs(surfaces[carrier].running)

@@ -64,8 +64,8 @@ def perfect_columns(
             if any((other.carriers == carrier).any() for other in others):
                 continue
             text = (
-                f"no scatter: bottles meet in one exact column on {surfaces[carrier].name}, which is wide enough for "
-                f"several rows; expected a scatter such as lateral_jitter: 0.5 mm"
+                f"no scatter: bottles meet in one exact column on {surfaces[carrier].name}, with room for several; "
+                "expected lateral_jitter, such as 0.5 mm, or 0 on purpose"
             )
             yield Finding(leg.start.path, text)
             break
@@ -73,7 +73,8 @@ def perfect_columns(
 
 def _scatters(scene: Scene, leg: Leg) -> bool:
     part = scene.named()[str(leg.start.path[0])][str(leg.start.path[1])]
-    return isinstance(part, Scattered) and (part.lateral_jitter > 0.0 or part.angular_jitter > 0.0)
+    # A scatter of 0 that is written is meant.
+    return isinstance(part, Scattered) and not {"lateral_jitter", "angular_jitter"}.isdisjoint(part.model_fields_set)
 
 
 def _straight(leg: Leg, carrier: int) -> bool:

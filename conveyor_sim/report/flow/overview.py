@@ -17,7 +17,7 @@ from conveyor_sim.run.speed import expected_factor
 from conveyor_sim.scene import Scene
 from conveyor_sim.scene.places import Places
 from conveyor_sim.scene.problems import dotted
-from conveyor_sim.support.printable import printable
+from conveyor_sim.support.printable import SENTENCE, printable
 
 MOST_LINES = 12
 """Lines of the overview, with one about the picture that the caller adds."""
@@ -55,11 +55,11 @@ def finding_lines(scene: Scene, model: Model, flow: LineFlow) -> list[str]:
 def _finding_lines(scene: Scene, findings: Sequence[Finding]) -> Iterator[str]:
     places = Places(scene)
     for finding in findings:
-        yield _row(finding.level, printable(finding.line(places)))
+        yield _row(finding.level, finding.line(places))
 
 
 def _row(label: str, text: str) -> str:
-    return f"{label:<{_LABEL}}{text}"
+    return f"{label:<{_LABEL}}{printable(text, SENTENCE)}"
 
 
 def _contents(scene: Scene, model: Model) -> str:

@@ -86,8 +86,11 @@ class SurfaceMap(Sequence[FlowSurface]):
     def __init__(self, surfaces: Sequence[FlowSurface]) -> None:
         self._surfaces = tuple(surfaces)
         outlines = [surface.shape.outline() for surface in surfaces]
-        # Chords of 64 points cut less than a tenth of a radius off the box of an arc.
-        spare = [0.1 * float(np.ptp(outline, axis=0).max()) for outline in outlines]
+        # Chords of 64 points stay within a hundredth of the size inside an arc.
+        spare = [
+            0.01 * np.ptp(outline, axis=0).max() * (surface.shape.kind == "curved") + TOUCH
+            for surface, outline in zip(surfaces, outlines, strict=True)
+        ]
         self._low = np.array([o.min(axis=0) - more for o, more in zip(outlines, spare, strict=True)]).reshape(-1, 2)
         self._high = np.array([o.max(axis=0) + more for o, more in zip(outlines, spare, strict=True)]).reshape(-1, 2)
 

@@ -14,7 +14,7 @@ from conveyor_sim.line.devices.belt_surfaces import BeltSurfaces
 from conveyor_sim.physics.model import build_model
 from conveyor_sim.physics.state import State
 from conveyor_sim.physics.stepping.tick import Integration
-from conveyor_sim.report.flow.drift import drift
+from conveyor_sim.report.flow.drift import MOST_STEPS, drift
 from conveyor_sim.report.flow.guides import Guides
 from conveyor_sim.report.flow.surfaces import NONE, Indices, SurfaceMap, running_speeds
 from conveyor_sim.report.flow.trace_scene import trace_scene
@@ -160,7 +160,9 @@ class _Tracer:
         while len(legs) < count:
             active = [index for index in range(count) if index not in legs]
             if work > MOST_WORK:
-                legs.update({index: self._estimated(self._leg(index, tracks[index], None, "cap")) for index in active})
+                steps = MOST_STEPS // len(active)
+                capped = {index: self._leg(index, tracks[index], None, "cap") for index in active}
+                legs.update({index: self._estimated(leg, steps) for index, leg in capped.items()})
                 break
             chunk, wrong = self._chunk(count)
             if wrong is not None:
@@ -218,12 +220,12 @@ class _Tracer:
             return self._leg(index, track, count_to, "circulates")
         return None
 
-    def _estimated(self, leg: Leg) -> Leg:
+    def _estimated(self, leg: Leg, steps: int) -> Leg:
         """Return a leg that ends at the cap with the rest of its way by the speeds of the belts."""
         step = leg.points[-1] - leg.points[-2]
         along = step / max(float(np.hypot(*step)), 1e-12)
         takers = [*self._exits, *self._stations]
-        times, points, taker = drift(leg.points[-1], along, self._surfaces, self._guides, takers)
+        times, points, taker = drift(leg.points[-1], along, self._surfaces, self._guides, takers, steps)
         end: End = "cap" if taker is None else "station" if taker in dict(self._stations) else "exit"
         return replace(
             leg,

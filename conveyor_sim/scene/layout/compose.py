@@ -22,6 +22,7 @@ from conveyor_sim.scene.layout.files import MOST_NESTED, Files
 from conveyor_sim.scene.layout.fragments import LISTS, Fragment
 from conveyor_sim.scene.layout.parameters import Scope, scope_of, scoped, unknown, with_value
 from conveyor_sim.scene.overrides import holds, merged
+from conveyor_sim.scene.problem_count import MOST_SAID
 from conveyor_sim.scene.problems import Path, Problem, dotted
 from conveyor_sim.scene.provenance import FieldPlace, SceneFile, Sources, inside
 from conveyor_sim.scene.quantities import Scoped
@@ -35,7 +36,7 @@ _UNSCOPED = ("parameters", "ports", "variants", "formats", "variant", "format")
 """Fields whose texts do not refer to the parameters of the file, or do so before the others."""
 _FIRST = ("include", "variants", "formats")
 """Fields whose overrides decide which others there are."""
-_MOST_VALUES = 1_000_000
+_MOST_VALUES = 250_000
 """Largest number of values in all cells of a scene."""
 
 
@@ -119,6 +120,8 @@ class _Composer:
 
     def _report(self, place: FieldPlace, text: str) -> None:
         self._problems.append((place, text))
+        if len(self._problems) > MOST_SAID:
+            self._raise_problems()
 
     def _raise_problems(self) -> None:
         if self._problems:
@@ -285,7 +288,8 @@ class _Composer:
             return cell.outer_ports[port].conveyor
         others = [cell] if cell is not None else [one for one in cells.values() if one is not None]
         known = [f"{one.name}.{name}" for one in others for name, joint in one.ports.items() if joint.end in ends]
-        self._report(own.place_of(path), f"{shown(value)} given, {did_you_mean(value, known)}: ports of cells")
+        kind = "no port at an end of a cell" if fields[-1] == "after" else "no port of a cell"
+        self._report(own.place_of(path), f"{shown(value)} given, which is {kind}, {did_you_mean(value, known)}")
         return value
 
     def _join(self, result: Fragment, own: Fragment, name: str, cell: "_Cell | None") -> None:

@@ -6,10 +6,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from conveyor_sim.report.figures import style
-from conveyor_sim.studies.figures.response_data import Indices, Map, Response
+from conveyor_sim.studies.figures.data import Indices, Map, Response, TrialsData
 from conveyor_sim.studies.figures.responses import indices_figure, map_figure, responses_figure
 from conveyor_sim.studies.figures.trials import trials_figure
-from conveyor_sim.studies.figures.trials_data import TrialsData
 
 
 def plot_study(
@@ -30,7 +29,7 @@ def plot_study(
         figures = {"response": responses_figure(effects, name)}
         for metric, panels in interactions.items():
             figures[f"interactions_{metric}"] = responses_figure(panels, f"{name}: interactions")
-        figures |= {f"map_{metric}": map_figure(found, name) for metric, found in maps.items()}
+        figures |= {f"map_{metric}": map_figure(data, name) for metric, data in maps.items()}
         if indices:
             figures["indices"] = indices_figure(indices, f"{name}: Sobol indices")
         return [path for stem, figure in figures.items() for path in style.save(figure, Path(out_dir) / stem)]

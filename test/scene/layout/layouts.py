@@ -53,7 +53,9 @@ def layouts(draw: st.DrawFn) -> Data:
                 conveyor |= {"back": draw(_sizes(0.0, 0.15))}
         else:
             side = draw(st.sampled_from(["left", "right"]))
-            conveyor |= {"beside": f"c{index - 1}", "side": side, "gap": draw(_sizes(0.001, 0.02)), "plate": "nylon"}
+            conveyor |= {"beside": f"c{index - 1}", "side": side, "gap": draw(_sizes(0.001, 0.02))}
+            if "straight" in conveyor["path"][0] and "straight" in conveyors[f"c{index - 1}"]["path"][0]:
+                conveyor["plate"] = "nylon"
         if draw(st.booleans()):
             conveyor["width"] = draw(_sizes(0.2, 0.6))
         else:
