@@ -152,7 +152,7 @@ def test_a_rate_of_zero_stops_and_is_not_caught_up(line: Scene) -> None:
     ("format", "facts"),
     [
         ("narrow", ["formats.narrow", "rails.lane_", "at the start"]),
-        ("thin", ["thin", "names of formats"]),
+        ("thin", ["thin", "formats"]),
     ],
 )
 def test_what_commands_can_not_do_is_refused(line: Scene, format: str, facts: list[str]) -> None:
