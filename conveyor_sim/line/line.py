@@ -17,10 +17,9 @@ from conveyor_sim.line.commands.authority import MAY, PEOPLE, unauthorized
 from conveyor_sim.line.commands.forcing import Forcing
 from conveyor_sim.line.commands.inputs import FAULT, INJECT, SET, WATCHDOG, CommandOutcome, Input, normalized
 from conveyor_sim.line.commands.modes import Modes
-from conveyor_sim.line.commands.moved import moved_belts
 from conveyor_sim.line.commands.operation import Operation
 from conveyor_sim.line.commands.read_back import ReadBack
-from conveyor_sim.line.commands.refusal import refusal, shown
+from conveyor_sim.line.commands.refusal import moved_belts, refusal, shown
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.device_kinds import build_devices
 from conveyor_sim.line.devices.belt_surfaces import BeltSurfaces

@@ -26,8 +26,7 @@ from conveyor_sim.ros.publishers import message_class, published_hashes, ros_qos
 from conveyor_sim.ros.services import settled
 from conveyor_sim.ros.spinner import Spinner
 from conveyor_sim.run.calls import CallQueue
-from conveyor_sim.run.playback import Playback, PlayedMessage, PlayedTopic
-from conveyor_sim.run.player import Player
+from conveyor_sim.run.playback import Playback, PlayedMessage, PlayedTopic, Player
 from conveyor_sim.support.printable import printable
 
 T = TypeVar("T")

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from conveyor_sim.line.machines.time_account import CATEGORIES
+from conveyor_sim.line.machines.efficiency import CATEGORIES
 from conveyor_sim.report.figures import style
 from conveyor_sim.report.periods import Period, shares
 

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from conveyor_sim.line.machines.time_account import CATEGORIES
+from conveyor_sim.line.machines.efficiency import CATEGORIES
 from conveyor_sim.report.figures import style
 from conveyor_sim.report.figures.state_bars import COLOURS
 from conveyor_sim.report.periods import StopReason
