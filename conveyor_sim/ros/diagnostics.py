@@ -10,8 +10,7 @@ from rclpy.clock_type import ClockType
 from rclpy.node import Node
 
 from conveyor_sim.bag.messages.topics import TOPICS
-from conveyor_sim.ros.clock import to_time
-from conveyor_sim.ros.graph_watch import GraphWatch
+from conveyor_sim.ros.clock import GraphWatch, to_time
 from conveyor_sim.ros.observer import TICK, WALL
 from conveyor_sim.ros.publishers import RosSink, ros_qos
 from conveyor_sim.run.run_state import SimulationState

@@ -19,9 +19,8 @@ from std_srvs.srv import Trigger
 
 from conveyor_sim.bag.reader import Bag
 from conveyor_sim.errors import BagError, ConveyorError
-from conveyor_sim.ros.clock import ClockPublisher
+from conveyor_sim.ros.clock import ClockPublisher, GraphWatch
 from conveyor_sim.ros.context import new_node
-from conveyor_sim.ros.graph_watch import GraphWatch
 from conveyor_sim.ros.publishers import message_class, published_hashes, ros_qos
 from conveyor_sim.ros.services import settled
 from conveyor_sim.ros.spinner import Spinner

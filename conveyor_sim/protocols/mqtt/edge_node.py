@@ -36,7 +36,7 @@ from conveyor_sim.protocols.mqtt.link import (
 )
 from conveyor_sim.protocols.mqtt.session import BETWEEN, SparkplugSession, SparkplugTopics, death
 from conveyor_sim.protocols.server.interface import ServerError, Stamps, Status
-from conveyor_sim.protocols.tags.holding import HoldingService
+from conveyor_sim.protocols.tags.control_mode import HoldingService
 from conveyor_sim.protocols.tags.tag_provider import LineSnapshot, TagProvider
 from conveyor_sim.protocols.tags.tick_clock import TickClock
 from conveyor_sim.support.checked_json import parsed

@@ -13,7 +13,7 @@ from asyncua.common.events import get_event_obj_from_type_node
 
 from conveyor_sim.columns.alarms import AlarmColumns
 from conveyor_sim.line.alarms.alarm import NEVER, WAITING, AlarmState
-from conveyor_sim.protocols.opcua.emitter import Emitter
+from conveyor_sim.protocols.opcua.line_events import Emitter
 from conveyor_sim.protocols.opcua.methods import ALARM_METHODS, ALARM_STATES, add_alarm_methods
 from conveyor_sim.protocols.opcua.nodes import LINE, Nodes, node_id, nothing
 from conveyor_sim.protocols.opcua.values import status_of

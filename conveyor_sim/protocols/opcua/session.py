@@ -27,9 +27,8 @@ from conveyor_sim.line.commands.inputs import SET
 from conveyor_sim.protocols.opcua.bounds import Bounds
 from conveyor_sim.protocols.opcua.limits import OpcUaLimits
 from conveyor_sim.protocols.opcua.nodes import WRITE, name_of
-from conveyor_sim.protocols.opcua.ownership import REFRESH, OwnedSession, Owners
+from conveyor_sim.protocols.opcua.ownership import REFRESH, OwnedSession, Owners, Refusals
 from conveyor_sim.protocols.opcua.passwords import Passwords
-from conveyor_sim.protocols.opcua.refusals import Refusals
 from conveyor_sim.protocols.opcua.requests import Codes, Requests
 from conveyor_sim.protocols.opcua.subscriptions import Subscriptions
 from conveyor_sim.protocols.opcua.transport import Connection, channel
