@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import ChainMap
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -124,12 +124,8 @@ class Constant:
 
 
 @dataclass(frozen=True)
-class _Together:
+class _Several:
     controllers: tuple[Controller, ...]
-
-    @property
-    def declared_alarms(self) -> tuple[Alarm, ...]:
-        return tuple(alarm for controller in self.controllers for alarm in declared_alarms(controller))
 
     def bind(self, tags: LineTags) -> None:
         """Pass the line's tags on."""
@@ -139,12 +135,19 @@ class _Together:
     @property
     def variables(self) -> Mapping[str, float]:
         """Variables of all controllers."""
-        return _variables(self.controllers)
+        shown: Any = [getattr(controller, "variables", {}) for controller in self.controllers]
+        return ChainMap(*shown)  # read-only view
 
     @property
     def record(self) -> tuple[str, ...]:
         """Patterns of all controllers."""
-        return _record(self.controllers)
+        return tuple(pattern for controller in self.controllers for pattern in getattr(controller, "record", ()))
+
+
+class _Together(_Several):
+    @property
+    def declared_alarms(self) -> tuple[Alarm, ...]:
+        return tuple(alarm for controller in self.controllers for alarm in declared_alarms(controller))
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
         merged: dict[str, float] = {}
@@ -159,10 +162,7 @@ class _Together:
         return merged
 
 
-@dataclass(frozen=True)
-class _Priority:
-    controllers: tuple[Controller, ...]
-
+class _Priority(_Several):
     @property
     def declared_alarms(self) -> tuple[Alarm, ...]:
         declared: dict[str, Alarm] = {}
@@ -171,36 +171,12 @@ class _Priority:
                 declared.setdefault(alarm.id, alarm)
         return tuple(declared.values())
 
-    def bind(self, tags: LineTags) -> None:
-        """Pass the line's tags on."""
-        for controller in self.controllers:
-            bind(controller, tags)
-
-    @property
-    def variables(self) -> Mapping[str, float]:
-        """Variables of all controllers."""
-        return _variables(self.controllers)
-
-    @property
-    def record(self) -> tuple[str, ...]:
-        """Patterns of all controllers."""
-        return _record(self.controllers)
-
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
         merged: dict[str, float] = {}
         for answer in [controller.scan(inputs) for controller in self.controllers]:
             for name, value in answer.items():
                 merged.setdefault(name, value)
         return merged
-
-
-def _variables(controllers: Iterable[Controller]) -> Mapping[str, float]:
-    shown: Any = [getattr(controller, "variables", {}) for controller in controllers]
-    return ChainMap(*shown)  # read-only view
-
-
-def _record(controllers: Iterable[Controller]) -> tuple[str, ...]:
-    return tuple(pattern for controller in controllers for pattern in getattr(controller, "record", ()))
 
 
 def together(*controllers: Controller) -> Controller:

@@ -18,8 +18,7 @@ from conveyor_sim.line.run_state import ENDED, PAUSED, STOPPED
 from conveyor_sim.line.tag import COMMANDS, SIGNALS, Tag, count, seconds
 from conveyor_sim.protocols.tags.control_mode import is_mode
 from conveyor_sim.protocols.tags.handshake import TICK
-from conveyor_sim.protocols.tags.tag_provider import LineInfo, LineSnapshot
-from conveyor_sim.protocols.tags.tick_clock import TickClock
+from conveyor_sim.protocols.tags.tag_provider import LineInfo, LineSnapshot, TickClock
 from conveyor_sim.support.rounded_limit import at_limit
 
 INT32, INT64, DOUBLE, BOOLEAN, STRING = 3, 4, 10, 11, 12

@@ -15,8 +15,7 @@ from asyncua.server.internal_server import InternalServer
 
 from conveyor_sim.columns.events import Event
 from conveyor_sim.protocols.opcua.nodes import LINE, Nodes, node_id
-from conveyor_sim.protocols.tags.tag_provider import LineSnapshot, TagProvider
-from conveyor_sim.protocols.tags.tick_clock import TickClock
+from conveyor_sim.protocols.tags.tag_provider import LineSnapshot, TagProvider, TickClock
 
 _AT_ONCE = 2000
 """Work units of an event after which other tasks run."""

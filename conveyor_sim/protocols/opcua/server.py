@@ -32,8 +32,7 @@ from conveyor_sim.protocols.server.certificates import default_folder, identity
 from conveyor_sim.protocols.server.interface import HERE, ServerError, Stamps, Status, require_free
 from conveyor_sim.protocols.server.quotas import QUOTA, ConnectionSlots, Quota
 from conveyor_sim.protocols.server.users import Logins, LoginService, User
-from conveyor_sim.protocols.tags.tag_provider import OPCUA, TagProvider
-from conveyor_sim.protocols.tags.tick_clock import TickClock
+from conveyor_sim.protocols.tags.tag_provider import OPCUA, TagProvider, TickClock
 
 _CAPABILITIES = "Server_ServerCapabilities_"
 
