@@ -12,7 +12,7 @@ from pathlib import Path, PurePath
 from mcap.records import Channel
 from mcap.records import Schema as SchemaRecord
 
-from conveyor_sim.bag.lock import alone
+from conveyor_sim.bag.folder import alone
 from conveyor_sim.bag.mcap.index import Index, is_complete, read_index
 from conveyor_sim.bag.mcap.line_copy import NAME as LINE_COPY
 from conveyor_sim.bag.mcap.metadata import (

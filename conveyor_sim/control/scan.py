@@ -4,11 +4,28 @@ from __future__ import annotations
 
 from collections import ChainMap
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from conveyor_sim.control.alarm import Alarm
-from conveyor_sim.control.line_tags import LineTags, bind
+
+
+@dataclass(frozen=True)
+class LineTags:
+    """Signals and commands of a line by name, with their kinds: "bool", "count", "number" or "enumeration"."""
+
+    signals: Mapping[str, str]
+    commands: Mapping[str, str]
+    limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    """Accepted minimum and maximum by command; empty: not known."""
+
+
+def bind(controller: object, tags: LineTags) -> None:
+    """Pass the line's tags to a controller that has a method `bind`, before its first scan. Raise its exceptions."""
+    method = getattr(controller, "bind", None)
+    if callable(method):
+        method(tags)
+
 
 ALARMS = "alarms/"
 """Prefix of a key that is an alarm (0 or 1), not a command, in the answer of a scan."""
@@ -66,7 +83,7 @@ class Controller(Protocol):
     Optional attributes:
 
     - `declared_alarms`: a sequence of Alarm. Alarms without a declaration have defaults.
-    - `bind`: a method that receives the line's tags (`line_tags.py`) before the first scan.
+    - `bind`: a method that receives the line's tags (`LineTags`) before the first scan.
     - `variables`: numbers by name, available to conditions of tests.
     - `record`: patterns of the variables to record (`recorded.py`).
     - `left_over`: sentences about tags without use, available after `bind`.

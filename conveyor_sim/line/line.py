@@ -27,9 +27,8 @@ from conveyor_sim.line.devices.photo_eye import PhotoEyeDevice
 from conveyor_sim.line.devices.setpoint import SetpointDevice
 from conveyor_sim.line.event_log import EventLog
 from conveyor_sim.line.machines.counters import RESET_COUNTERS, ProductionCounters
-from conveyor_sim.line.process_image import ProcessImage
 from conveyor_sim.line.run_state import RUN_TAGS
-from conveyor_sim.line.tag import Adds
+from conveyor_sim.line.tag import Adds, ProcessImage
 from conveyor_sim.physics.model import build_model
 from conveyor_sim.physics.state import State
 from conveyor_sim.physics.state.snapshot import entries, restore, snapshot, typed

@@ -16,8 +16,7 @@ from typing import Any
 from conveyor_sim.support.interrupt import while_importing
 
 with while_importing():
-    from conveyor_sim.control.line_tags import LineTags, bind
-    from conveyor_sim.control.scan import ControlError, Controller
+    from conveyor_sim.control.scan import ControlError, Controller, LineTags, bind
     from conveyor_sim.control.st.load import load
     from conveyor_sim.errors import ConveyorError
     from conveyor_sim.ros.context import new_node, running_ros

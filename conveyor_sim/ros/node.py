@@ -28,8 +28,7 @@ from conveyor_sim.ros.clock import ClockPublisher, GraphWatch
 from conveyor_sim.ros.commands import subscribe_commands
 from conveyor_sim.ros.context import new_node, one_sentence
 from conveyor_sim.ros.diagnostics import Diagnostics
-from conveyor_sim.ros.intake import Intake
-from conveyor_sim.ros.lockstep_service import LockstepService
+from conveyor_sim.ros.lockstep_service import Intake, LockstepService
 from conveyor_sim.ros.publishers import RosSink
 from conveyor_sim.ros.services import CheckpointServices, Services, settled
 from conveyor_sim.ros.spinner import Spinner

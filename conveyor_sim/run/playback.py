@@ -12,8 +12,8 @@ from conveyor_sim.bag.messages.qos import EVENTS, LATCHED, Qos
 from conveyor_sim.bag.reader import Bag
 from conveyor_sim.errors import BagError
 from conveyor_sim.line.commands.inputs import SET
-from conveyor_sim.line.process_image import speed_topics
 from conveyor_sim.line.run_state import REPLAYING, RunState
+from conveyor_sim.line.tag import speed_topics
 from conveyor_sim.run.lockstep import Refused
 from conveyor_sim.run.pacing import Pacer
 from conveyor_sim.support.printable import printable

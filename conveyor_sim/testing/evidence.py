@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
+from conveyor_sim.bag.folder import alone
 from conveyor_sim.bag.input_log import input_folders
-from conveyor_sim.bag.lock import alone
 from conveyor_sim.bag.rerun import rerun
 from conveyor_sim.control.scan import ALARMS
 from conveyor_sim.errors import BagError
