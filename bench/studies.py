@@ -14,11 +14,10 @@ from bench.markdown import table as markdown
 from bench.measure import Effort, say
 from bench.rows import Row, Rows
 from conveyor_sim.simulation import Simulation
-from conveyor_sim.studies.engine import Engine
 from conveyor_sim.studies.line_of import scene_of
 from conveyor_sim.studies.load import load_study
 from conveyor_sim.studies.row import Job
-from conveyor_sim.studies.runs import Runs
+from conveyor_sim.studies.runs import Engine, Runs
 from conveyor_sim.studies.setup import Setup
 from conveyor_sim.support.worker_pool import WorkerPool
 

@@ -33,10 +33,9 @@ from conveyor_sim.line.tag import ProcessImage
 from conveyor_sim.physics.accounts.accounts import Accounts
 from conveyor_sim.physics.model import build_model
 from conveyor_sim.physics.state.checkpoint import Checkpoint, damaged, read_checkpoint, write_checkpoint
-from conveyor_sim.physics.state.full_state_hash import full_state_hash
+from conveyor_sim.physics.state.hashes import COLUMNS, full_state_hash, state_hash
 from conveyor_sim.physics.state.snapshot import entries, typed
 from conveyor_sim.physics.state.state import FIRST_SLOTS, Held, State
-from conveyor_sim.physics.state.state_hash import COLUMNS, state_hash
 from conveyor_sim.physics.state.world_arrays import changing_arrays
 from conveyor_sim.physics.stepping.tick import Integration
 from conveyor_sim.scene.geometry import RailShape
@@ -101,7 +100,7 @@ class Simulation:
     ) -> "Simulation":
         """Continue from a checkpoint with the same bits as if the run had not stopped, on any number of threads.
 
-        scene: the saved one, except for `duration` and `description`; None: the one in the file.
+        scene: equal to the saved one except in `duration` and `description`; None: the one in the file.
         folder: base of relative paths, which no path may leave; None: no restriction.
         Raises CheckpointError for a file that is missing, no checkpoint, damaged, or of another version or scene.
         """
@@ -312,7 +311,7 @@ class Simulation:
         return state_hash(self.tick, columns, self._state)
 
     def full_state_hash(self) -> int:
-        """Return 64 bits over everything that decides how the run continues (`physics/state/full_state_hash.py`)."""
+        """Return 64 bits over everything that decides how the run continues (`physics/state/hashes.py`)."""
         return full_state_hash(self._snapshot(), changing_arrays(self._state.world), self.scene.limits)
 
     def _snapshot(self) -> dict[str, Any]:

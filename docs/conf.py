@@ -46,8 +46,8 @@ NAVIGATION = {
             *("docs/scada", "docs/opcua", "docs/plc"),
         ],
         "A line": [
-            *("docs/scene", "docs/layout", "docs/conveyors", "docs/placement", "docs/check", "docs/line", "docs/alarms"),
-            *("docs/report", "docs/studies", "docs/view", "docs/drawings"),
+            *("docs/scene", "docs/layout", "docs/conveyors", "docs/placement", "docs/check", "docs/line"),
+            *("docs/alarms", "docs/report", "docs/studies", "docs/view", "docs/drawings"),
             *("docs/effects", "docs/base", "docs/energy_and_damage", "docs/glossary"),
         ],
         "What to rely on": ["docs/accuracy", "docs/stability", "docs/reliability", "docs/performance", "docs/paper"],

@@ -25,7 +25,7 @@ class StopBehind:
 
 
 def controller() -> Controller:
-    """Return the stop, level control of the table by its count of bottles, and rejection tracked by the drive's encoder."""
+    """Return the controllers of comb, infeeds and reject as one."""
     level = LevelControl(
         level=Count("belts/table/bottles"),
         feeder="drives/feed",

@@ -20,7 +20,7 @@ RULES, WITHIN = import_rules.RULES, import_rules.WITHIN
 
 SOURCES = sorted(PACKAGE.rglob("*.py"))
 
-MOST_PACKAGES, MOST_LEVELS, MOST_IMPORTS = 20, 11, 126
+MOST_PACKAGES, MOST_LEVELS, MOST_IMPORTS = 20, 11, 120
 """Limits that keep the design readable; raising one needs a reason."""
 
 

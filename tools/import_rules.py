@@ -19,16 +19,14 @@ RULES: Mapping[str, str] = {
     "support": "errors | numpy rich",
     "control": "support | lark",
     "scene": "errors support | annotated_types numpy pydantic pydantic_core ruamel yaml",
-    "drawings": "errors scene support | ezdxf numpy ruamel",
     "physics": "columns engine errors scene support | llvmlite numpy pydantic",
     "line": "columns engine errors physics scene support | numpy",
     "simulation": "columns engine line physics scene | numpy",
     "__init__": "scene simulation",
     "bag": "columns errors line scene simulation support | lz4 mcap numpy rosbags yaml zstandard",
-    "page": "bag columns drawings errors scene simulation support | numpy",
+    "page": "bag columns errors scene simulation support | ezdxf numpy ruamel",
     "run": "bag columns control engine errors line physics scene simulation support | click numpy",
-    "report": "bag columns drawings errors line page physics run scene simulation support | "
-    "click matplotlib numpy rich",
+    "report": "bag columns errors line page physics run scene simulation support | click matplotlib numpy rich",
     "protocols": "bag columns errors line page run scene simulation support | "
     "aiohttp asyncua cryptography foxglove google numpy paho pymodbus",
     "accuracy": "columns engine errors line physics report scene simulation statistics support | "
@@ -38,8 +36,7 @@ RULES: Mapping[str, str] = {
     "ros": "bag columns control errors line protocols report run scene simulation support | "
     "builtin_interfaces click conveyor_msgs diagnostic_msgs numpy rcl_interfaces rclpy rosgraph_msgs std_msgs std_srvs",
     "testing": "bag control errors line page protocols report ros run scene simulation support | numpy pytest",
-    "cli": "accuracy bag control drawings errors page physics protocols report ros run scene studies support | "
-    "click rich",
+    "cli": "accuracy bag control errors page physics protocols report ros run scene studies support | click rich",
 }
 """Packages and modules from the lowest up: what each may import of this package | of third-party packages."""
 
@@ -56,6 +53,7 @@ WITHIN: Mapping[str, Mapping[str, str]] = {
         "stepping": "accounts model state",
     },
     "bag": {"mcap": "", "messages": "", "": "mcap messages"},
+    "page": {"drawings": "", "": "drawings"},
     "line": {
         "tag": "",
         "alarms": "",
@@ -101,14 +99,13 @@ LABELS: Mapping[str, str] = {
     "report": "summaries, figures",
     "protocols": "OPC UA, Modbus, MQTT, web, Foxglove",
     "run": "stepping, wall time, lockstep",
-    "page": "page of a recording",
+    "page": "plans, page of a recording",
     "bag": "MCAP recordings",
     "simulation": "advance, command, observe",
     "line": "devices, commands, alarms",
     "physics": "effects, time step, model, state, tick",
     "scene": "YAML schema, geometry",
     "control": "controllers, Structured Text",
-    "drawings": "plans as DXF and SVG",
     "engine": "kernels over arrays",
     "columns": "observations",
     "statistics": "intervals, comparisons",

@@ -3,8 +3,7 @@
 import math
 from typing import Any
 
-from conveyor_sim.accuracy.setting import Setting, with_setting
-from conveyor_sim.accuracy.stiffness import scaled_contacts
+from conveyor_sim.accuracy.setting import Setting, scaled_contacts, with_setting
 from conveyor_sim.engine.integrators import INTEGRATORS
 from conveyor_sim.errors import SceneError
 from conveyor_sim.physics.model import build_model

@@ -1,13 +1,24 @@
-"""Budget of processor time of a study."""
+"""Budget of processor time of a study, and the progress display that shows what is left of it."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
+from typing import Protocol
 
-from conveyor_sim.accuracy.bars import Bar, Bars
+
+class Bar(Protocol):
+    """Progress of one stage."""
+
+    def update(self, done: float, total: float | None = None, left: float | None = None) -> None:
+        """Take in what is done, the whole, and the time left (s), where it is known."""
+
+
+Bars = Callable[[str, str], AbstractContextManager[Bar]]
+"""Opens the bar of a stage: what it does, and what is counted."""
+
 
 PROCESSORS = 2
 """Free ones that a study counts on: while one process measures, the other processor is idle."""

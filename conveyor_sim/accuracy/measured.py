@@ -8,17 +8,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import cast
 
-from conveyor_sim.accuracy.bars import Bars
 from conveyor_sim.accuracy.candidates import candidates, compared, forbidden, own_setting, preset_setting
 from conveyor_sim.accuracy.cases import closed_forms
-from conveyor_sim.accuracy.effort import PROCESSORS, Effort, bars_with_left
+from conveyor_sim.accuracy.effort import PROCESSORS, Bars, Effort, bars_with_left
 from conveyor_sim.accuracy.measure.cpu import Meter
 from conveyor_sim.accuracy.measure.precision import COST_BUDGET, FIRST_COST_BUDGET, FIRST_WORK, MOST_WORK, WorkPrecision
 from conveyor_sim.accuracy.measure.sample_file import check_origin, fingerprint
-from conveyor_sim.accuracy.report.files import write
+from conveyor_sim.accuracy.report.files import Unlike, plain, typed, write
 from conveyor_sim.accuracy.report.forecast import forecast, foretold
 from conveyor_sim.accuracy.report.no_contact import NoContact
-from conveyor_sim.accuracy.report.plain import Unlike, plain, typed
 from conveyor_sim.accuracy.report.words import setting_name
 from conveyor_sim.accuracy.results import Horizon, Order, Point, Reference, Rest
 from conveyor_sim.accuracy.setting import Setting

@@ -8,8 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from types import FrameType
 
-from conveyor_sim.accuracy.bars import Bars
-from conveyor_sim.accuracy.effort import PROCESSORS, Effort
+from conveyor_sim.accuracy.effort import PROCESSORS, Bars, Effort
 from conveyor_sim.accuracy.report.forecast import forecast
 from conveyor_sim.accuracy.report.interim import PRELIMINARY, Interim, predicted
 from conveyor_sim.accuracy.report.lines import summary

@@ -8,9 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from conveyor_sim.accuracy.bars import Bars
 from conveyor_sim.accuracy.candidates import own_setting, softer
-from conveyor_sim.accuracy.effort import Effort
+from conveyor_sim.accuracy.effort import Bars, Effort
 from conveyor_sim.accuracy.measure.equivalence import decide, run_until_decided
 from conveyor_sim.accuracy.measure.sample_file import SampleFile, fingerprint
 from conveyor_sim.accuracy.measured import Measured, measured_once

@@ -52,7 +52,7 @@ class OutputWriter:
         self._write_state()
 
     def after_tick(self) -> list[CommandOutcome]:
-        """Write the outcomes of the tick's commands, then every topic that is due. Return the outcomes."""
+        """Write the results of the tick's commands, then every topic that is due. Return the command results."""
         outcomes = self.after_failure()
         self._write_state()
         return outcomes

@@ -25,11 +25,11 @@ def import_(plan: Path, map_: Path, out: Path, base: Path | None, unit: str | No
 
     Conveyors, rails and devices are what the map says of their layers. What could not be used is listed.
     """
-    from conveyor_sim.drawings.entities import read_plan
-    from conveyor_sim.drawings.importing import imported
-    from conveyor_sim.drawings.layer_map import read_map
-    from conveyor_sim.drawings.listing import skipped_lines
-    from conveyor_sim.drawings.scene_text import scene_text
+    from conveyor_sim.page.drawings.entities import read_plan
+    from conveyor_sim.page.drawings.importing import imported
+    from conveyor_sim.page.drawings.layer_map import read_map
+    from conveyor_sim.page.drawings.listing import skipped_lines
+    from conveyor_sim.page.drawings.scene_text import scene_text
     from conveyor_sim.support.files import FileError, write_file
 
     rules = read_map(map_)
@@ -57,9 +57,9 @@ def import_(plan: Path, map_: Path, out: Path, base: Path | None, unit: str | No
 @scene_options
 def draw(scene: str, dxf: Path | None, svg: Path | None, options: SceneOptions) -> None:
     """Write the plan of SCENE: belts, rails and devices, with their names, on layers."""
-    from conveyor_sim.drawings.dxf_plan import dxf_of
-    from conveyor_sim.drawings.plan import plan_of
-    from conveyor_sim.drawings.svg_plan import svg_of
+    from conveyor_sim.page.drawings.dxf_plan import dxf_of
+    from conveyor_sim.page.drawings.plan import plan_of
+    from conveyor_sim.page.drawings.svg_plan import svg_of
     from conveyor_sim.support.files import FileError, write_file
 
     if dxf is None and svg is None:

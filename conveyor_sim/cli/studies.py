@@ -16,8 +16,7 @@ from conveyor_sim.support.garbage import collected_later
 
 if TYPE_CHECKING:
     from conveyor_sim.studies.display import Display
-    from conveyor_sim.studies.engine import Engine
-    from conveyor_sim.studies.runs import Runs
+    from conveyor_sim.studies.runs import Engine, Runs
     from conveyor_sim.studies.setup import Setup
 
 
@@ -120,7 +119,7 @@ def _sweep(setup: Setup, out: Path | None, engine: Callable[[], Engine]) -> None
 
 
 def _alone(setup: Setup, given: tuple[str, ...], seed: int, warm_up: float | None, record: Path | None) -> None:
-    from conveyor_sim.studies.alone import job_of, run_alone
+    from conveyor_sim.studies.run import job_of, run_alone
     from conveyor_sim.studies.study import MSER
 
     if warm_up is None and setup.study.warm_up == MSER:

@@ -38,8 +38,8 @@ def pack_all(world: World, worker: Worker) -> None:
 def pair_phase(world: World, worker: Worker, dt: float, spring_dt: float) -> None:
     """Compute the forces of this worker's share of the pairs; on return all pairs are done.
 
-    All bottles must be packed. dt: s, of the step, for the implicit solver. spring_dt: s, time of slip by which the
-    tangential springs are elongated, or by `World.path` if there is one; 0: the elongations are not stored.
+    All bottles must be packed. dt: step, s, for the implicit solver. spring_dt: s; tangential springs are elongated by
+    spring_dt times the slip, or by `World.path` if it is not None. 0: elongations are not stored.
     """
     _count_closed(world, worker, dt)
     pair_forces(world, worker, spring_dt)
@@ -49,9 +49,9 @@ def pair_phase(world: World, worker: Worker, dt: float, spring_dt: float) -> Non
 
 @part
 def bottle_forces(world: World, worker: Worker, dt: float, spring_dt: float, first: int, end: int) -> None:
-    """Fill `world.load` (N) and `world.spin.moment` (N m) of bottles first to end (eq. 22), except skipped ones.
+    """Fill `world.load` (N) and `world.spin.moment` (N m) of bottles first to end (eq. 22), except riding ones.
 
-    First to end is a block (`riding.py`).
+    First to end is a block; riding bottles are skipped (`riding.py`).
     """
     lag = world.settings.lag * dt
     clear_belt_powers(world.ledger, first, end)

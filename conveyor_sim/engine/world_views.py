@@ -1,4 +1,5 @@
-"""Views of the World with fewer groups, for kernels that Python calls: one kernel serves Worlds that differ elsewhere.
+"""Views of the World with fewer groups, for kernels that Python calls. One compiled kernel then serves all Worlds that
+differ only in the omitted groups.
 
 Lists need no arrays that only forces need, and a list of contacts needs neither kind. Kernels and parts that kernels
 call need no view, because they are compiled for the members that they read (`compiler/reads.py`).
@@ -26,17 +27,17 @@ NOT_FOR_ENERGY = NOT_FOR_CONTACTS - {"static_friction"} | {
 
 
 def lists_of(world: World) -> World:
-    """Return the World for `rebuild` and for `probe_overlaps`."""
+    """Return a view of the World for `rebuild` and for `probe_overlaps`."""
     return _fewer(world, NOT_FOR_LISTS)
 
 
 def contacts_of(world: World) -> World:
-    """Return the World for a list of contacts."""
+    """Return a view of the World for a list of contacts."""
     return _fewer(world, NOT_FOR_CONTACTS)
 
 
 def energy_of(world: World) -> World:
-    """Return the World for its stored energy."""
+    """Return a view of the World for its stored energy."""
     return _fewer(world, NOT_FOR_ENERGY)
 
 

@@ -38,7 +38,7 @@ class ScanContext:
     attributes: dict[str, dict[int, float]] = field(default_factory=dict)
     """Values that stations have set on bottles, by attribute, then by bottle id; 0 if not set."""
     conditions: dict[str, bool] = field(default_factory=dict)
-    """Alarm conditions that have begun or ended and are not taken yet, by alarm id."""
+    """Alarm conditions that began or ended and are not processed yet, by alarm id; True: began."""
     _carriers: NDArray[np.int32] = field(default_factory=lambda: np.empty(0, dtype=np.int32))
     _carried: NDArray[np.int32] = field(default_factory=lambda: np.empty(0, dtype=np.int32))
     _counts: list[int] | None = None  # None: not counted since the bottles moved
@@ -90,7 +90,7 @@ class ScanContext:
         self._counts = None
 
     def carriers(self) -> NDArray[np.int32]:
-        """Return the belt index of each slot, (slots,); -1 for free slots and what rests. Valid until the next scan."""
+        """Return the belt index of each slot, (slots,), until the next scan; -1 if free, on the floor or on a plate."""
         self._count()
         plant = self.state.model.plant
         return self._carriers if plant.one_surface_per_belt else plant.belt_of_surface[self._carriers]

@@ -210,7 +210,7 @@ class Line:
         return outcomes
 
     def begin(self, tick: int) -> None:
-        """Apply queued inputs, then let devices act before the steps from a tick."""
+        """Apply queued inputs, then let devices act before the steps that start from a tick."""
         self._at(tick)
         self._log.begin()
         self.read_back.begin()
@@ -275,7 +275,7 @@ class Line:
     def close(self, passed: Sequence[DamageEvent], clogged: Mapping[str, bool]) -> None:
         """End a tick.
 
-        passed: load limits exceeded in the tick. clogged: True for clogged ones, by name of a monitored outfeed.
+        passed: load limits exceeded in the tick. clogged: True if clogged, by name of the monitored outfeeds.
         """
         for limit in passed:
             self._log.note(limit.tick, "limit_passed", limit.kind, limit.value, limit.bottle, limit.text)

@@ -15,7 +15,7 @@ from conveyor_sim.bag.messages.topics import COMPARED, TOPICS, Topic
 from conveyor_sim.bag.reader import Bag
 from conveyor_sim.columns.bottles import BottleColumns
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.page.stamps import Stamps
+from conveyor_sim.page.recording import Stamps
 
 KINDS = {
     "commands": ("outcomes", "readback"),

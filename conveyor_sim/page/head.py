@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from conveyor_sim.drawings.underlay import ShownUnderlay, shown_underlay
 from conveyor_sim.page.block import FORCE_FRAMES, LEAST_FORCE, LEVELS, MM, SIGNAL_STEPS, UNKNOWN
+from conveyor_sim.page.drawings.underlay import ShownUnderlay, shown_underlay
 from conveyor_sim.page.story import fields
 from conveyor_sim.scene import Scene
 from conveyor_sim.scene.geometry import BeltShape, named_surfaces, rail_shapes, surface_shapes

@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
 
-from conveyor_sim.drawings.plan import plan_of
 from conveyor_sim.errors import ConveyorError
+from conveyor_sim.page.drawings.plan import plan_of
 from conveyor_sim.page.head import plan_head
 from conveyor_sim.physics.model import build_model
 from conveyor_sim.physics.model.remedies import step_limit

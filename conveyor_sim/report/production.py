@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -13,10 +14,34 @@ from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.bag.reader import Bag, Frame, open_bag
 from conveyor_sim.columns.counters import CounterColumns
 from conveyor_sim.errors import BagError
-from conveyor_sim.report.alarm_figures import AlarmTally
+from conveyor_sim.report.alarm_figures import AlarmFigures, AlarmTally
 from conveyor_sim.report.periods import Period
-from conveyor_sim.report.production_record import Production
 from conveyor_sim.support.printable import printable
+
+
+@dataclass(frozen=True)
+class Production:
+    """Production of one recording."""
+
+    scene: str
+    start: float
+    """s, of the first counters."""
+    end: float
+    """s"""
+    counters: CounterColumns
+    """The last ones."""
+    resets: int
+    """Number of resets of the line's counters."""
+    periods: Mapping[str, Sequence[Period]]
+    """By machine, one after the other from start to end."""
+    alarms: AlarmFigures
+    time: NDArray[np.float64]
+    """(n,), s, of each counters message."""
+    good: NDArray[np.float64]
+    """(n,), good bottles that had left the line by then, since the start of the recording."""
+    forced: Sequence[str] = ()
+    """Signals that were forced at any time."""
+
 
 CATEGORY, REASON = "category", "stop_reason"
 """Suffixes of signals whose changes are events, and names of the counter columns with their initial values."""

@@ -25,8 +25,7 @@ from conveyor_sim.physics.model.remedies import StepLimit, step_limit
 from conveyor_sim.physics.model.step_choice import choose_steps
 from conveyor_sim.physics.plant import Plant
 from conveyor_sim.report.alarm_figures import AlarmTally
-from conveyor_sim.report.load_history import LoadHistory
-from conveyor_sim.report.summary import BeltFlow, Energy, Loop, Summary
+from conveyor_sim.report.summary import BeltFlow, Energy, LoadHistory, Loop, Summary
 from conveyor_sim.run.force_check import PressWatch, achieved, pressed
 from conveyor_sim.run.speed import TopicCount
 from conveyor_sim.scene import parse_again, parse_overrides

@@ -28,7 +28,7 @@ class CallQueue:
         self._wake = threading.Condition()
 
     def request(self, function: Callable[[], T]) -> Future[T]:
-        """Queue a function. Return a future of its result, or of Refused if too many wait, or after the end."""
+        """Queue a function. Return a future of its result. It raises Refused if too many wait, or after `end`."""
         future: Future[T] = Future()
 
         def run() -> None:
@@ -55,7 +55,7 @@ class CallQueue:
             self._wake.notify()
 
     def end(self) -> None:
-        """End the stepping thread after the function that it is in."""
+        """End the stepping thread once the function that it executes has returned."""
         with self._wake:
             self.ended = True
             self._wake.notify()
@@ -66,7 +66,7 @@ class CallQueue:
             self._waiting.popleft()()
 
     def drain(self) -> None:
-        """Call all functions that wait at the end."""
+        """Call all functions that still wait after `end`."""
         while self._waiting:
             self._waiting.popleft()()
 

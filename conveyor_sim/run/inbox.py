@@ -1,4 +1,4 @@
-"""`Inbox`: counts of the commands sent to a node, and bounds for those that wait for the next tick.
+"""`Inbox`: counts of the commands sent to a run, and limits on those that wait for the next tick.
 
 While the simulation is paused, no tick takes commands from the queue. Their number and bytes are therefore bounded.
 Commands beyond the bounds, unreadable ones, and ones lost by DDS are counted. One command result reports many of them,
@@ -33,7 +33,7 @@ TOO_LARGE = f"larger than {MESSAGE_BYTES} bytes, expected at most that for one c
 
 @dataclass(frozen=True)
 class InboxCounts:
-    """Commands since the start of the node, including those of lockstep requests."""
+    """Commands since the start of the process, including those of lockstep requests."""
 
     received: int
     lost: int

@@ -1,6 +1,6 @@
 """`Stepper`: a thread that steps a simulation, and the requests that other threads may make of it.
 
-The stepping thread alone touches the run; a request from another thread returns a future. The kernels release the GIL,
+Only the stepping thread accesses the run. `call` returns a future to the requesting thread. Kernels release the GIL,
 and nothing here waits for a callback, so simulated time may run at full speed beside the ROS executor.
 """
 
@@ -140,7 +140,9 @@ class Stepper:
         beat: Callable[[int, float], None],
         died: Callable[[Exception], None],
     ) -> None:
-        """beat: called after each tick and while idle, with the simulated time in ns and the wall time in s.
+        """Prepare the thread; `start` starts it.
+
+        beat: called after each tick and while idle, with the simulated time in ns and the wall time in s.
         died: called if the thread can't go on.
         """
         self.run = run
@@ -219,7 +221,7 @@ class Stepper:
     def reset(self) -> None:
         """Close this run and its recording and open the next at tick 0; a run that was playing goes on playing.
 
-        Raises ConveyorError if the next run can't be opened; there is none to step then, until a reset succeeds.
+        Raises ConveyorError if the next run can't be opened; no ticks are taken until a later reset succeeds.
         """
         self.run.reset()
         self.pacer.restart()

@@ -24,6 +24,11 @@ class Places:
         """Return the place of a field of the expanded scene, or of the nearest one above it."""
         return self._reading.place_of(path)
 
+    def elsewhere(self, path: Path) -> str:
+        """Return the place of a field in another file such as `cells/filler.yaml:4 (cell block)`; else ""."""
+        place = self._reading.place_of(path)
+        return "" if place.file == self._reading.composition.sources.main.name else str(place)
+
     def unwritten(self, path: Path) -> str:
         """Return the origin of a field without a line: `override` or `default`."""
         return "override" if self._reading.place_of(path).line is None else "default"

@@ -22,6 +22,7 @@ FULL_TURN = 2.0 * math.pi * (1.0 + 1e-9)
 """Largest angle (rad) that is read from a number without unit. Beyond, degrees may have been meant."""
 _MOST_BITS = 256
 """Size of a fraction beyond which it is rounded, so that parameters made of parameters stay small."""
+_MOST_PIS = 8  # powers of pi, likewise
 _LARGEST_EXPONENT = 6  # of a unit
 _LONGEST_NAME = 40  # characters of an unknown name in an error
 
@@ -126,6 +127,12 @@ def evaluate(text: str, unit: str = "") -> Quantity:
     return _short(stack.pop())
 
 
+def is_finite(value: Any) -> bool:
+    """Return True for a number, no bool, that a double can hold. An int may be larger."""
+    most = sys.float_info.max
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and -most <= value <= most
+
+
 def names_in(text: str) -> list[str]:
     """Return the names of parameters in an expression. Raise ValueError for a text that is none."""
     return [token.text for token in _postfix(text) if token.kind == "name"]
@@ -226,7 +233,8 @@ def _rounded(factor: Fraction, pis: int) -> float:
 def _short(quantity: Quantity) -> Quantity:
     """Return a quantity, rounded to a double if its fraction is long."""
     factor = quantity.factor
-    if max(factor.numerator.bit_length(), factor.denominator.bit_length()) <= _MOST_BITS:
+    is_short = max(factor.numerator.bit_length(), factor.denominator.bit_length()) <= _MOST_BITS
+    if is_short and abs(quantity.pis) <= _MOST_PIS:
         return quantity
     return Quantity.of(quantity.value, quantity.dimension)
 

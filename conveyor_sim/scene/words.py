@@ -19,6 +19,8 @@ from conveyor_sim.scene.types import Holds
 _LONGEST_VALUE = 60
 _LONGEST_NAME = 100
 """Longest unknown name for which a similar one is looked up. The time grows with its length."""
+_MOST_NAMES = 500
+"""Largest number of names among which a similar one is looked up."""
 _LISTED = 20
 """Largest number of names that a sentence lists."""
 
@@ -206,7 +208,8 @@ def _unknown(name: str, names: list[str]) -> str:
 
 def did_you_mean(name: str, names: list[str]) -> str:
     """Return the expectation for an unknown name: the one that it resembles, or all of them."""
-    close = difflib.get_close_matches(name, names, n=1) if len(name) <= _LONGEST_NAME else []
+    is_short = len(name) <= _LONGEST_NAME and len(names) <= _MOST_NAMES
+    close = difflib.get_close_matches(name, names, n=1) if is_short else []
     if close:
         return f"did you mean {close[0]}?"
     return f"expected {listed(names)}" if len(names) <= _LISTED and names else f"expected {some_of(names) or 'none'}"

@@ -14,7 +14,7 @@ from conveyor_sim.errors import StudyError
 from conveyor_sim.scene import parse_overrides
 from conveyor_sim.statistics.intervals import mean_interval
 from conveyor_sim.studies.design import salib_problem
-from conveyor_sim.studies.figures.response_data import Indices, Map, Response, level_text
+from conveyor_sim.studies.figures.data import Indices, Map, Response, level_text
 from conveyor_sim.studies.results import Results
 from conveyor_sim.studies.row import RunRow
 from conveyor_sim.studies.table import with_unit

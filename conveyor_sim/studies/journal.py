@@ -17,16 +17,18 @@ from conveyor_sim.studies.row import BAGS, Job, Pilot, RunRow
 from conveyor_sim.studies.run_file import (
     MADE_WITH,
     RUNS,
+    UNITS,
+    Units,
     content_of,
     made_with,
     name_of,
     objection,
     read_row,
+    read_units,
     run_files,
 )
 from conveyor_sim.studies.setup import Setup
 from conveyor_sim.studies.study import Study
-from conveyor_sim.studies.units_file import UNITS, Units, read_units
 from conveyor_sim.support.checked_json import CheckedJson, with_checksum
 from conveyor_sim.support.file_lock import lock
 from conveyor_sim.support.files import MB, FileError, read_file, write_file

@@ -20,9 +20,8 @@ from conveyor_sim.scene import parse_overrides
 from conveyor_sim.studies.journal import SOURCE, read_rows, unusable
 from conveyor_sim.studies.origin import ORIGIN, VERSION, WARM_UP, read_origin
 from conveyor_sim.studies.row import RunRow
-from conveyor_sim.studies.run_file import row_of
+from conveyor_sim.studies.run_file import UNITS, read_units, row_of
 from conveyor_sim.studies.study import HALF_WIDTH, Seeds, Until
-from conveyor_sim.studies.units_file import UNITS, read_units
 from conveyor_sim.support.checked_json import CHECKSUM, parsed
 from conveyor_sim.support.files import MB, FileError, read_file, write_file
 

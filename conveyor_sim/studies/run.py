@@ -5,21 +5,23 @@ from __future__ import annotations
 import shutil
 import time
 import uuid
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.recorder import Recorder
-from conveyor_sim.errors import BagError, ConveyorError, StudyError
+from conveyor_sim.errors import BagError, ConveyorError, SceneError, StudyError
 from conveyor_sim.line.commands.inputs import Input
 from conveyor_sim.line.run_state import ENDED, RUNNING, STOPPED, RunState
 from conveyor_sim.physics.model import Model
 from conveyor_sim.run.compilation import compile_kernels
 from conveyor_sim.run.scan_loop import ScanLoop
-from conveyor_sim.scene import Scene
+from conveyor_sim.scene import Scene, parse_overrides
+from conveyor_sim.scene.words import listed
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.studies.gauges import Averaged, Gauge, half_width
 from conveyor_sim.studies.line_of import controller_of, scene_of
@@ -234,3 +236,30 @@ class _Clock:
 def _sentence(error: BaseException) -> str:
     kind = "" if isinstance(error, ConveyorError) else f"{type(error).__name__}: "
     return printable(" ".join(f"{kind}{error}".split()) or kind, SENTENCE)
+
+
+def job_of(setup: Setup, given: Sequence[str], seed: int) -> Job:
+    """given: "name=value" for each parameter, as YAML. Raises StudyError for others than those of the study."""
+    values: dict[str, Any] = {}
+    wanted = list(setup.study.parameters)
+    for text in given:
+        name, sign, value = text.partition("=")
+        if not sign or name not in wanted:
+            raise StudyError(f"--set {text}: given, expected name=value of {listed(wanted)}")
+        try:
+            values[name] = parse_overrides(f"value: {value}")["value"]
+        except SceneError:
+            raise StudyError(f"--set {text}: given, expected a number, a text, true or false as its value") from None
+    missing = [name for name in wanted if name not in values]
+    if missing:
+        raise StudyError(f"--set: {listed(missing)} missing, expected a value for each parameter")
+    return Job(0, {name: values[name] for name in wanted}, seed)
+
+
+def run_alone(setup: Setup, job: Job, bag: Path | None) -> RunRow:
+    """Repeat one run of a study, with the same bits, in this process.
+
+    bag: folder to record to. Raise any exception of the run.
+    """
+    start = None if setup.study.warm_start is None else warm_start(Work(setup, job))
+    return simulate(Work(setup, job, start), bag)

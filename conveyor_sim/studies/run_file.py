@@ -1,4 +1,4 @@
-"""The file of one finished run: its row, its origin, and a checksum."""
+"""Files of a study folder: one per finished run, with row, origin and checksum, and the file of units."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, Field, FiniteFloat, ValidationError
 
-from conveyor_sim.studies.origin import WARM_UP, StudyOrigin, read_study_json
+from conveyor_sim.studies.origin import ORIGIN, WARM_UP, StudyOrigin, read_study_json
 from conveyor_sim.studies.row import Job, RunRow, Status
 from conveyor_sim.support.checked_json import CheckedJson, with_checksum
 from conveyor_sim.support.files import FileError
@@ -100,3 +100,39 @@ def objection(row: RunRow, kept: CheckedJson, origin: StudyOrigin) -> str:
 def run_files(folder: Path) -> list[Path]:
     """Return the files of finished runs in a folder, ordered by name. Raises OSError."""
     return sorted(file for file in (folder / RUNS).iterdir() if file.suffix == ".json")
+
+
+UNITS = "units.json"
+
+
+class Units(BaseModel, strict=True, extra="forbid"):
+    """Content of the file of units: units of metrics and parameters, definitions of metrics, path of the study."""
+
+    path: str
+    """Path of the study's file when it was run."""
+    asked: dict[str, str]
+    """Definitions of the metrics."""
+    units: dict[str, str]
+    """Units of the metrics."""
+    parameters: dict[str, str]
+    """Units of the parameters; "": without a unit."""
+
+
+def read_units(file: Path, fields: Mapping[str, str], sealed: bool) -> Units:
+    """Return the content of a file of units.
+
+    fields, sealed: of the `study.json` beside it. Raises FileError if it is damaged or of another study.
+    """
+    kept = read_study_json(file)
+    made = kept.data.pop(MADE_WITH, None)
+    if kept.has_checksum is not sealed:
+        raise FileError("has no checksum" if sealed else f"has a checksum, which {ORIGIN} has not")
+    if sealed and not (isinstance(made, dict) and fields.items() <= made.items()):
+        raise FileError("was made with another study")
+    try:
+        units = Units.model_validate(kept.data)
+    except ValidationError:
+        raise FileError("has other fields than conveyor-sim sweep writes") from None
+    if units.units.keys() != units.asked.keys():
+        raise FileError("has units of other metrics than it names")
+    return units

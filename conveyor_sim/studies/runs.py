@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack
 from dataclasses import replace
 from pathlib import Path
+from types import TracebackType
+from typing import Protocol, TypeVar
 
 import numpy as np
 
@@ -15,7 +17,6 @@ from conveyor_sim.run.compilation import Compilation
 from conveyor_sim.run.scan_loop import ScanLoop
 from conveyor_sim.statistics.warm_up import warm_up
 from conveyor_sim.studies.check import parameter_units, units_of
-from conveyor_sim.studies.engine import Engine
 from conveyor_sim.studies.journal import Journal
 from conveyor_sim.studies.line_of import controller_of, scene_of
 from conveyor_sim.studies.row import Job, Pilot, RunRow, Status, point_text
@@ -33,6 +34,27 @@ from conveyor_sim.studies.run import (
 from conveyor_sim.studies.setup import Setup
 from conveyor_sim.studies.study import MSER
 from conveyor_sim.support.worker_pool import DiedError, WorkerPool
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+
+class Engine(Protocol):
+    """A context: leaving it by an exception ends at once what is under way."""
+
+    processes: int
+    """Runs at a time, as far as it is known."""
+    is_here: bool
+    """True if all workers are on this machine, with its files."""
+
+    def each(self, function: Callable[[T], R], tasks: Iterable[T]) -> Iterator[tuple[T, R | DiedError]]:
+        """Yield each task with the result of `function`, in order of completion."""
+
+    def __enter__(self) -> Engine: ...
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None, /
+    ) -> None: ...
+
 
 PARTS = 200
 """Equal times that a pilot run is cut into; MSER-5 leaves out whole fives of them."""

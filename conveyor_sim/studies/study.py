@@ -65,8 +65,8 @@ class Parameter(Part):
     values: Annotated[tuple[_Value, ...], Len(1), Holds("a list of values, at least one")] | None = quantity(
         "Its values: all of a grid, one a point of a list.", default=None
     )
-    low: Number | None = quantity("Least value of a range, for the other designs.", default=None)
-    high: Number | None = quantity("Greatest value of a range.", default=None)
+    low: Number | None = quantity("Least value of a range, for the other designs.", "that of the field", default=None)
+    high: Number | None = quantity("Greatest value of a range.", "that of the field", default=None)
     unit: Text | None = quantity("Unit of its values. Left out: that of the field.", default=None)
     log: Flag = quantity("Whether the range is divided by ratio.", default=False)
     whole: Flag = quantity("Whether values of the range are whole numbers.", default=False)

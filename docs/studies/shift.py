@@ -19,7 +19,7 @@ with while_importing():
     from conveyor_sim.report.figures.draw import plot_production
     from conveyor_sim.report.periods import stop_reasons
     from conveyor_sim.report.production import read_production
-    from conveyor_sim.report.production_table import render
+    from conveyor_sim.report.production_report import render
     from conveyor_sim.run.compilation import Compilation
     from conveyor_sim.run.runner import run_scene
     from conveyor_sim.scene import load_scene

@@ -11,7 +11,7 @@ from hard_cases.case import Case, read_table
 from hard_cases.measures import residual
 from stability_matrix import SOURCES
 
-from conveyor_sim.accuracy.energy import energies
+from conveyor_sim.accuracy.trajectory import energies
 from conveyor_sim.simulation import Simulation
 
 HOUR = 3600.0

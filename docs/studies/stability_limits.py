@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from hard_cases.case import with_annex
 
-from conveyor_sim.accuracy.displacement import displace
+from conveyor_sim.accuracy.trajectory import displace
 from conveyor_sim.columns.bottles import BottleColumns
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.physics.model import build_model

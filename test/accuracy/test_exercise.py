@@ -6,8 +6,7 @@ from typing import Any
 
 from scenes import base, bottle, contact, scene
 
-from conveyor_sim.accuracy.measure.exercise import Exercise
-from conveyor_sim.accuracy.measure.starts import STROKED, find_starts
+from conveyor_sim.accuracy.measure.starts import STROKED, Exercise, find_starts
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.accuracy.trajectory import variant
 from conveyor_sim.scene import Scene

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scenes import NO_FLOOR, RADIUS, bottle, contact, kind, scene, segment, stiffness_for
 
-from conveyor_sim.accuracy.displacement import displace
 from conveyor_sim.accuracy.measure.horizon import GROWTH, NUDGE, HorizonFinder
 from conveyor_sim.accuracy.measure.starts import Start
 from conveyor_sim.accuracy.results import Horizon
+from conveyor_sim.accuracy.trajectory import displace
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
 

@@ -8,14 +8,12 @@ import pytest
 from scenes import NO_FLOOR, base, belt, bottle, contact, scene, segment, stiffness_for
 
 from conveyor_sim.accuracy.candidates import candidates, forbidden, own_setting, softer, standard_steps
-from conveyor_sim.accuracy.displacement import displace
-from conveyor_sim.accuracy.energy import energies
 from conveyor_sim.accuracy.measure.precision import HORIZON, WorkPrecision, errors_of
 from conveyor_sim.accuracy.measure.reference import reference_setting
 from conveyor_sim.accuracy.measure.starts import find_starts
 from conveyor_sim.accuracy.measure.timing import costs_of
 from conveyor_sim.accuracy.setting import Setting, with_setting
-from conveyor_sim.accuracy.trajectory import follow, variant
+from conveyor_sim.accuracy.trajectory import displace, energies, follow, variant
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
 

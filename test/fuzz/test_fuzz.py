@@ -20,7 +20,7 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 from scenes import bottle, contact, kind, scene, segment
 
-from conveyor_sim.accuracy.displacement import displace
+from conveyor_sim.accuracy.trajectory import displace
 from conveyor_sim.errors import SceneError
 from conveyor_sim.scene import parse_scene
 from conveyor_sim.scene.geometry import ArcPiece, SegmentPiece

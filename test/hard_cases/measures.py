@@ -14,10 +14,9 @@ import numpy as np
 from hard_cases.case import Case
 from numpy.typing import NDArray
 
-from conveyor_sim.accuracy.displacement import displace
 from conveyor_sim.accuracy.measure.precision import STEPS
 from conveyor_sim.accuracy.setting import Setting
-from conveyor_sim.accuracy.trajectory import variant
+from conveyor_sim.accuracy.trajectory import displace, variant
 from conveyor_sim.columns.bottles import BottleColumns
 from conveyor_sim.engine.lists.riding import skipped_slots
 from conveyor_sim.errors import SimulationError

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from drawings.test_underlay import png
+from page.drawings.test_underlay import png
 from page.pixels import canvas, settled
 
 from conveyor_sim.page.check_server import CheckServer
@@ -142,6 +142,19 @@ def test_a_finding_leads_to_its_place(shown: Any, scene: Path) -> None:
     assert shown.locator("#problems li.chosen").count() == 1
     spot = shown.locator('#spots button[data-path^="photo_eyes.full"]')
     assert json.loads(spot.get_attribute("data-at")) == pytest.approx([1.0, 3.5])
+
+
+def test_included_files_are_followed(shown: Any, scene: Path) -> None:
+    """A file that is missing at first counts as well."""
+    part = scene.parent / "parts" / "more.yaml"
+    saved(shown, lambda: scene.write_text(f"include: parts/more.yaml\n{SCENE}"))
+    assert shown.locator("#state").get_attribute("class") == "invalid"
+    part.parent.mkdir()
+    saved(shown, lambda: part.write_text("zones:\n  area: {region: [[0, 0], [1, 0], [1, 0.1]]}\n"))
+    assert shown.locator("#state").inner_text() == "valid"
+    saved(shown, lambda: replaced(part, "zones:\n  area: {region: [[0, 0], [1, 0]]}\n"))
+    assert "more.yaml:2" in problems(shown)[0]
+    assert json.loads(shown.locator("#spots button.error").get_attribute("data-at"))
 
 
 def test_an_underlay_is_shown(shown: Any, scene: Path) -> None:

@@ -23,7 +23,7 @@ from scenes import (
     with_bends,
 )
 
-from conveyor_sim.accuracy.displacement import displace
+from conveyor_sim.accuracy.trajectory import displace
 from conveyor_sim.columns.ledger import Ledger
 from conveyor_sim.physics.model import build_model
 from conveyor_sim.physics.state import State

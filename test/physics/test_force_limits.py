@@ -11,7 +11,7 @@ import pytest
 from physics.test_moving_rails import INTEGRATORS, SPEED, ledger_of, plant, pusher, queue, signal, with_integrator
 from scenes import MASS, RADIUS, bottle, contact, segment
 
-from conveyor_sim.accuracy.displacement import displace
+from conveyor_sim.accuracy.trajectory import displace
 from conveyor_sim.simulation import Simulation
 
 LIMIT, PLATE, ACCELERATION = 20.0, 1.0, 8.0

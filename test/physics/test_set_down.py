@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scenes import base, belt, bottle, order, phases, rms, simulation
 
-from conveyor_sim.accuracy.displacement import displace
+from conveyor_sim.accuracy.trajectory import displace
 from conveyor_sim.simulation import Simulation
 
 MU, G = 0.4, 9.81

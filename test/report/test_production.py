@@ -20,8 +20,7 @@ from conveyor_sim.line.commands.inputs import FORCE, Input
 from conveyor_sim.line.machines.counters import RESET_COUNTERS
 from conveyor_sim.line.machines.efficiency import CATEGORIES
 from conveyor_sim.report.periods import longest_stops, stop_reasons
-from conveyor_sim.report.production import read_production
-from conveyor_sim.report.production_record import Production
+from conveyor_sim.report.production import Production, read_production
 from conveyor_sim.scene import Scene, load_scene
 from conveyor_sim.simulation import Simulation
 

@@ -147,6 +147,8 @@ def test_places_name_file_line_and_cell(plant: Path) -> None:
     assert places.of(("machines", "block_filler", "rate")) == f"{plant.parent / 'cells' / 'filler.yaml'}:9 (cell block)"
     assert places.line_of(("contacts", 0, "table")) == line_of(MATERIALS, "table")
     assert places.line_of(("belts", "main", "speed")) == line_of(PLANT, "long:")
+    assert places.elsewhere(("belts", "main", "width")) == ""
+    assert places.elsewhere(("belts", "block_feed", "width")).endswith("filler.yaml:4 (cell block)")
     assert places.line_of(("belts", "main", "width")) == line_of(PLANT, "main: {kind")
 
 

@@ -5,8 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from conveyor_sim.statistics.comparisons import best, bonferroni, compare_paired, holm
-from conveyor_sim.statistics.paired import paired_probability
+from conveyor_sim.statistics.comparisons import best, bonferroni, compare_paired, holm, paired_probability
 
 STUDIES, POINTS, SEEDS = 400, 5, 10
 

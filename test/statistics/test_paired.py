@@ -8,8 +8,8 @@ import scipy.stats
 from facts import stating
 from lindley import waits
 
+from conveyor_sim.statistics.comparisons import paired_difference, paired_probability, pairing_gain
 from conveyor_sim.statistics.intervals import mean_interval
-from conveyor_sim.statistics.paired import paired_difference, paired_probability, pairing_gain
 from conveyor_sim.statistics.sample_size import runs_for, runs_to_tell
 
 

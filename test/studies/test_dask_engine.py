@@ -21,10 +21,10 @@ pytest.importorskip("distributed")
 
 from conveyor_sim.errors import StudyError
 from conveyor_sim.studies import dask_engine
-from conveyor_sim.studies.alone import run_alone
 from conveyor_sim.studies.dask_engine import DaskEngine
 from conveyor_sim.studies.results import read_results
 from conveyor_sim.studies.row import Job, RunRow
+from conveyor_sim.studies.run import run_alone
 from conveyor_sim.studies.runs import Runs
 from conveyor_sim.studies.setup import Setup
 from conveyor_sim.studies.sweep import sweep

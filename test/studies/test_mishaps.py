@@ -14,9 +14,9 @@ from studies.small import setup_of, write_study
 from studies.waiting import PATIENCE, until
 from warm import Warm, run
 
-from conveyor_sim.studies.alone import run_alone
 from conveyor_sim.studies.journal import read_rows
 from conveyor_sim.studies.row import Job
+from conveyor_sim.studies.run import run_alone
 from conveyor_sim.studies.runs import Runs
 from conveyor_sim.studies.sweep import sweep
 from conveyor_sim.support.worker_pool import WorkerPool

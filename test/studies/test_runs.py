@@ -19,12 +19,11 @@ from studies.small import CODE, Here, setup_of, write_study
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.cli import main
 from conveyor_sim.errors import StudyError
-from conveyor_sim.studies.alone import job_of, run_alone
 from conveyor_sim.studies.journal import read_rows
 from conveyor_sim.studies.load import load_study
 from conveyor_sim.studies.results import read_results, run_command, write_parquet
 from conveyor_sim.studies.row import Job, RunRow
-from conveyor_sim.studies.run import Work, make_row, warm_start
+from conveyor_sim.studies.run import Work, job_of, make_row, run_alone, warm_start
 from conveyor_sim.studies.runs import Runs
 from conveyor_sim.studies.setup import Setup
 from conveyor_sim.studies.sweep import sweep

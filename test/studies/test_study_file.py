@@ -10,8 +10,10 @@ from facts import stating
 from studies.small import setup_of, write_study
 
 from conveyor_sim.errors import StudyError
+from conveyor_sim.scene.part import part_from
 from conveyor_sim.studies.check import check_study
 from conveyor_sim.studies.load import load_study
+from conveyor_sim.studies.study import Parameter
 
 UNTIL = {"metric": "stops", "half_width": 1.0}
 RATE = {"argument": "rate", "values": [4.0]}
@@ -143,3 +145,9 @@ def test_scenes_are_found_beside_the_study_or_by_name(tmp_path: Path) -> None:
     (tmp_path / "two_bottles").write_text(load_study(write_study(tmp_path)).source)  # which is no scene
     with pytest.raises(Exception, match="two_bottles:"):
         setup_of(tmp_path, function=None, scene="two_bottles", parameters=parameters)
+
+
+def test_ranges_take_quantities_with_units() -> None:
+    parameter = part_from(Parameter, {"field": "belts.main.speed", "low": "6 m/min", "high": "0.4 m/s"})
+    assert isinstance(parameter, Parameter)
+    assert (parameter.low, parameter.high) == (0.1, 0.4)

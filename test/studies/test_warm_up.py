@@ -13,9 +13,9 @@ from studies.small import Here, setup_of
 
 from conveyor_sim.cli import main
 from conveyor_sim.errors import StudyError
-from conveyor_sim.studies.alone import job_of, run_alone
 from conveyor_sim.studies.results import read_results, write_parquet
 from conveyor_sim.studies.row import RunRow
+from conveyor_sim.studies.run import job_of, run_alone
 from conveyor_sim.studies.runs import Runs
 from conveyor_sim.studies.setup import Setup
 from conveyor_sim.studies.sweep import sweep

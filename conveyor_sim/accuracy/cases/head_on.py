@@ -9,7 +9,7 @@ import numpy as np
 
 from conveyor_sim.accuracy.cases.aside import PHASES, RAIL, corner, phases, pitch, rms, simulation_aside
 from conveyor_sim.accuracy.cases.collision import Collision, damping_ratio, duration, peak_force, rebound
-from conveyor_sim.accuracy.displacement import displace
+from conveyor_sim.accuracy.trajectory import displace
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.engine.contact.laws.hertz import HERTZ
 from conveyor_sim.engine.contact.laws.table import TABLE

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import bisect
 
 from conveyor_sim.accuracy.cases.aside import PHASES, phases, rms, simulation_aside
-from conveyor_sim.accuracy.displacement import displace
+from conveyor_sim.accuracy.trajectory import displace
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
 

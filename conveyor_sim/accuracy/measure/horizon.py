@@ -12,12 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conveyor_sim.accuracy.candidates import standard_steps
-from conveyor_sim.accuracy.displacement import displace
 from conveyor_sim.accuracy.measure.reference import reference_setting, reference_simulation
 from conveyor_sim.accuracy.measure.starts import Start
 from conveyor_sim.accuracy.results import Horizon
 from conveyor_sim.accuracy.setting import Setting
-from conveyor_sim.accuracy.trajectory import variant
+from conveyor_sim.accuracy.trajectory import displace, variant
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.scene import Scene

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.accuracy.displacement import displace
+from conveyor_sim.accuracy.trajectory import displace
 from conveyor_sim.scene import Scene, rail_shapes
 from conveyor_sim.scene.overlaps import near_pieces, overlapping
 from conveyor_sim.scene.parts.infeed import Infeed

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.accuracy.energy import BOTTLE_BOTTLE
 from conveyor_sim.accuracy.measure.failures import failure_of, place
 from conveyor_sim.accuracy.measure.horizon import HorizonFinder
 from conveyor_sim.accuracy.measure.reference import reference_setting, reference_simulation
@@ -16,7 +15,7 @@ from conveyor_sim.accuracy.measure.starts import Start, find_starts
 from conveyor_sim.accuracy.measure.timing import costs_of
 from conveyor_sim.accuracy.results import Errors, Horizon, Point, Reference, Rest
 from conveyor_sim.accuracy.setting import Setting
-from conveyor_sim.accuracy.trajectory import Trajectory, follow, variant
+from conveyor_sim.accuracy.trajectory import BOTTLE_BOTTLE, Trajectory, follow, variant
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.physics.stepping.guard.chatter import ChatterMeter

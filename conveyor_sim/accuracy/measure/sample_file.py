@@ -9,7 +9,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from conveyor_sim.accuracy import setting, stiffness
+from conveyor_sim.accuracy import setting
 from conveyor_sim.accuracy.measure import jitter, observables
 from conveyor_sim.accuracy.measure.observables import OBSERVABLES
 from conveyor_sim.accuracy.results import Sample
@@ -130,7 +130,7 @@ def _origin(scene: Scene) -> dict[str, str]:
         "scene": _hash(scene.source_text.encode(), scene.overrides_text.encode()),
         "engine": ENGINE_HASH,
         "version of conveyor_sim": sources_hash(),
-        "definition of settings": _hash_of_sources(setting, stiffness),
+        "definition of settings": _hash_of_sources(setting),
         "definition of observables": _hash_of_sources(observables, jitter, itinerary),
     }
 

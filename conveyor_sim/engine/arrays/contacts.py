@@ -20,8 +20,8 @@ class ContactLaw(_with_columns()):  # type: ignore[misc]
     """Coefficients of contact as flat columns; None if no contact of the scene has that law.
 
     As a table by type: (T * T,), entry a * T + b, or (T * M,), entry type * M + material. By pair: (P,). A contact
-    without a law has 0 in its column, because the laws are added up. First the columns of the laws in `contact/laws/`,
-    then
+    without a law has 0 in its column (tables: -1), because the laws are added up. The columns of the laws in
+    `contact/laws/` are followed by
 
     - friction: mu
     - tangential_stiffness: N/m, of the spring with history; 0, not None, if there are only Mindlin springs
@@ -102,7 +102,7 @@ class Gathered(NamedTuple):
     rim: F8
     """R omega of i plus that of j, m/s, for different radii, (BLOCK,)."""
     compliance: F8
-    """dt/m_t, s/kg, for the implicit solver, (BLOCK,)."""
+    """Sum of `Implicit.compliance` of both bottles, s/kg, (BLOCK,)."""
     displacement: F8
     """Displacements of j minus those of i: x, y (m); sums of rotations (rad) and rim displacements (m), (4 * BLOCK,).
     """

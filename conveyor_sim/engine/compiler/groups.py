@@ -1,7 +1,7 @@
 """Groups of arrays: NamedTuples that kernels receive by address.
 
-The memory at the address is laid out in Python, once per group. Numba's own code, which takes about 150 arrays apart in
-every call, was up to half of a kernel. The place of a member depends neither on its type nor on other members, so code
+The memory at the address is laid out in Python, once per group. Numba's own code, which unpacks about 150 arrays in
+every call, made up to half of a kernel. The place of a member depends neither on its type nor on other members, so code
 that reads a few members is compiled once for all groups in which these are alike (`narrowed`).
 """
 

@@ -38,7 +38,7 @@ def contact_force(
 ) -> tuple[float, float]:
     """Return (N, T) in N by entry e of the law; both are 0 for an overlap (m) of 0 or less.
 
-    share: effective divided by geometric overlap, 1 for a single contact; it scales the law as a whole. closing: m/s,
+    share: effective overlap over geometric overlap, 1 for a single contact; N and T are scaled by it. closing: m/s,
     relative velocity (a minus b) along n. slip: m/s, relative velocity of the contact points along t. atan: selects the
     friction curve (`friction.py`). spring: m, elongation of the tangential spring, or None. implicit: (dt/m_t times
     `EngineSettings.ahead`, s/kg, `EngineSettings.at_once`) for implicit friction, or None.
@@ -137,7 +137,7 @@ def carried(law: ContactLaw, e: int, spring: Any, overlap: float, deeper: float,
 
     A spring that has become stiffer keeps its force, because the added contact area carries no tangential load yet. One
     that has become softer keeps its elongation (Thornton, Cummins and Cleary 2013). So a change of stiffness never adds
-    energy. further: m, elongation in the same step, to which a stiffening spring responds with its mean stiffness.
+    energy. further: m, elongation added in the same step; its force is computed with the mean stiffness of the step.
     """
     if spring is None:
         return None
@@ -171,7 +171,7 @@ def stretched(spring: Any, slip: float, dt: float) -> Any:
 def spring_after(
     law: ContactLaw, e: int, spring: float, overlap: float, slip: float, dt: float, normal: float, share: float
 ) -> float:
-    """Return the elongation (m) of the tangential spring after dt (s) of slip (m/s), cut to mu N.
+    """Return the elongation (m) of the tangential spring after dt (s) of slip (m/s), with its force limited to mu N.
 
     overlap: m. normal: N, of the contact; 0, as without contact, resets the spring. The result is 0 for a pair without
     a spring (Cundall and Strack 1979).

@@ -1,17 +1,17 @@
-"""Coulomb friction, regularised at low slip so that it has a direction at rest (paper eqs. 7-10).
+"""Coulomb friction, regularised at low slip because Coulomb's law has no direction at rest (paper eqs. 7-10).
 
-The force is -mu N p(s) v/s, s = |v|. There are two curves p, both with slope 2/v_lim at rest: the paper's polynomial 2
-s/v_lim - (s/v_lim)^2, 1 from v_lim on, and (2/pi) atan(pi s/v_lim). `atan`: None selects the polynomial, anything else
-the arctangent.
+The force is -mu N p(s) v/s, s = |v|. There are two curves p, both with slope 2/v_lim at rest.
+One is the paper's polynomial 2 s/v_lim - (s/v_lim)^2, which is 1 from v_lim on; the other is (2/pi) atan(pi s/v_lim).
+`atan`: None selects the polynomial, anything else the arctangent.
 
 Implicit: the force is that of the slip *after* the step, s + b v_lim p(s) = s_0 with b = dt mu N/(m_t v_lim), where
 1/m_t is the slip per unit of impulse. It never reverses the slip, at any step size.
 
 This form is used by semi-implicit Euler and leapfrog. For velocity Verlet and rk4 the same equation is solved with B =
-max(0, ahead b - at_once) in place of b (`integrators.AHEAD`). At rest the force then removes at most 1/ahead of the
-slip in a step. Velocity Verlet, which uses the slip at the end of the step, reverses no slip for 1/ahead up to 2/3, rk4
-for 1/ahead up to 1. For b up to at_once/ahead, force and order equal those of explicit friction. For larger b, a
-contact pulled steadily by f mu N creeps too fast by B f v_lim (semi-implicit Euler: by b f v_lim, at any b).
+max(0, ahead b - at_once) in place of b (`integrators.AHEAD`). At low slip the force then removes at most 1/ahead of
+the slip in a step. Velocity Verlet, which uses the slip at the end of the step, reverses no slip for 1/ahead up to 2/3,
+rk4 for 1/ahead up to 1. For b up to at_once/ahead, force and order equal those of explicit friction. For larger b, a
+contact under a steady load f mu N (f < 1) creeps too fast by B f v_lim (semi-implicit Euler: b f v_lim, at any b).
 
 The formulas have no branches and no division by a slip that may be 0, so that loops over them are vectorised.
 """
@@ -28,7 +28,7 @@ _LEAST = 1e-100
 
 @part
 def regularisation(slip: float, slip_limit: float, atan: Any) -> float:
-    """Return p(s)/s in s/m for a slip speed s >= 0. The force is -mu N v times it. At rest it is 2/v_lim."""
+    """Return p(s)/s (unit s/m) for a slip speed s >= 0; 2/v_lim at rest. The force is its product with -mu N v."""
     if atan is not None:
         least = _LEAST * slip_limit
         slip = least if least > slip else slip
@@ -49,7 +49,7 @@ def friction_share(slip: float, slip_limit: float, atan: Any) -> float:
 
 @part
 def implicit_regularisation(slip: float, b: float, slip_limit: float, atan: Any) -> float:
-    """Return p(s)/s_0 in s/m, s the slip speed after the step, s_0 = slip >= 0 before it. With b = 0 it is explicit."""
+    """Return p(s)/s_0 (unit s/m): s is the slip speed after the step, s_0 = slip >= 0 before it. b = 0: explicit."""
     t = slip / slip_limit
     if atan is not None:
         t = _LEAST if t < _LEAST else t
@@ -104,9 +104,9 @@ def _implicit_quotient(t: float, b: float) -> float:
 def _implicit_atan(t: float, b: float) -> tuple[float, float]:
     """Return s/v_lim after the step and p there, on the arctangent, t = s_0/v_lim.
 
-    Newton's method rises towards the root, because the curve is concave and the start is below it: p is at most 2 s and
-    at most that of the hyperbola k s/(1 + k s), k = pi^2/2, with which the equation is quadratic. Four rounds leave
-    6e-12 of s and 2e-12 in p for any b from 1e-4 to 1e6.
+    Newton's method rises monotonically to the root, because the curve is concave and the start lies below the root. The
+    start is the larger root for two upper bounds of p: 2 s, and the hyperbola k s/(1 + k s) with k = pi^2/2. Four
+    iterations leave a relative error of 6e-12 in s and an error of 2e-12 in p, for any b from 1e-4 to 1e6.
     """
     k = 0.5 * math.pi * math.pi
     q = 1.0 + k * (b - t)

@@ -1,7 +1,7 @@
 """Sums of the laws of a contact, written out for kernels from the list of laws.
 
-The laws of a pair of materials are added up. A law that a pair lacks has 0 in its column; one that no pair of the scene
-has is None and not in the machine code. Numba can't loop over a list of functions.
+The laws of a pair of materials are added up. The column of a law holds 0 (tables: -1) for a pair without it. If no
+pair of the scene has a law, its column is None and its code is omitted. Numba can't loop over a list of functions.
 """
 
 from collections.abc import Callable, Sequence
@@ -18,7 +18,7 @@ def _sum(columns: Sequence[str], functions: Sequence[Callable[..., float]], inpu
     """Return a part (law, e, total, args...) that adds functions of entry e of the columns to the total."""
     places = range(len(columns))
     arguments = "".join(f"column_{n}, " for n in places)
-    # A branch is pruned only if its test is of an argument.
+    # Columns are passed as arguments, so that numba prunes the branches of absent ones.
     body = [f"    if column_{n} is not None: total += force_{n}(column_{n}[e], {inputs})" for n in places]
     head = f"def function(total, {arguments}e, {inputs}):"
     forces = {f"force_{n}": part(function) for n, function in enumerate(functions)}

@@ -1,10 +1,10 @@
 """Contact of two bottles: overlap delta = R_i + R_j - |r_i - r_j|, for all listed pairs, block by block.
 
-The fast layout, step by step. Pairs p = 0, 1, ... are listed by (i, j); a block is some of them:
+The fast layout, step by step. Pairs p = 0, 1, ... are sorted by (i, j); a block is up to BLOCK consecutive pairs:
 
     packed   | x y vx vy | x y vx vy | x y vx vy | ...          one row per bottle, renewed before every evaluation
                   i            j                                 1. gather: row j minus row i, one packed load each
-    gathered | dx dy du dv | dx dy du dv | ...                   of this block only: it stays in the first-level cache
+    gathered | dx dy du dv | dx dy du dv | ...                   (du, dv: velocity) of this block only, to stay in L1
                   v v v v v v v v                                2. law: eight pairs at a time, no branches; separate
     pairs.fx | on i: 0 .. P-1 | on j: P .. 2P-1 | 0 |               pairs get 0. Written twice, once per partner:
                   ^     ^            ^                               no thread adds to another one's entry
@@ -28,7 +28,7 @@ from conveyor_sim.engine.contact.contact import carried, contact_force, spring_a
 from conveyor_sim.engine.contact.path import displacement_in_touch, slip_time_of
 from conveyor_sim.engine.threads.workers import BLOCK, share
 
-# Unsigned constants: a signed index would be tested for wrap-around, and the lanes would not be constants.
+# Unsigned, because numba tests signed indices for wrap-around. The offsets in a row would then not be constants.
 _1, _2, _3, _4 = uint64(1), uint64(2), uint64(3), uint64(4)
 
 
@@ -226,7 +226,7 @@ def _drawn_out(world: World, gathered: Gathered, c: int, p: int, overlap: float,
     displacement: Any = gathered.displacement
     row: Any = c * _4
     approach = -(displacement[row] * nx + displacement[row + _1] * ny)
-    # The normal turns during the displacement. Its mean is that at half of it: |r| n of its end over |r| of its middle.
+    # The normal turns during the displacement d. The normal at its middle is used: d x n_mid = |r| (d x n) / |r_mid|.
     distance = _reach(settings, reach, p) - overlap
     along = (displacement[row] * ny - displacement[row + _1] * nx) * (distance / (distance + 0.5 * approach))
     shorter = 0.5 * settings.lever * (overlap - 0.5 * approach)

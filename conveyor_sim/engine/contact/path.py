@@ -1,8 +1,8 @@
 """Displacements of bottles since the last update of the tangential springs, from which integrators elongate springs.
 
-Semi-implicit Euler elongates a spring by dt times the slip at which it evaluates forces. The other integrators evaluate
-forces at velocities that are not those that move the bottles. There springs follow the displacements of bottles
-(`World.path`), and are as exact as positions are.
+Semi-implicit Euler and leapfrog elongate a spring by dt times the slip at which they evaluate forces. Velocity Verlet
+and rk4 evaluate forces at velocities other than those that move the bottles. Their springs follow the displacements of
+bottles (`World.path`), and are as accurate as the positions.
 """
 
 from typing import Any
@@ -18,7 +18,7 @@ from conveyor_sim.engine.threads.workers import share
 
 @part
 def note_path(path: Any, stage: Stage, dt: float, first: int, end: int) -> None:
-    """Add to the displacements of bottles first to end a motion of dt (s) at the velocities in `stage`."""
+    """Set the displacements of bottles first to end to the motion in dt (s) at the velocities in `stage`."""
     if path is None:
         return
     for i in range(uint64(first), uint64(end)):
@@ -47,7 +47,7 @@ def note_stage(world: World, times: F8, squared: F8, s: int, h: float, first: in
 
 @part
 def reset_path(path: Any, moving: Any, worker: Worker) -> None:
-    """Reset all displacements, which springs now contain. All workers see it after the next `wait_for_all`."""
+    """Reset all displacements; springs already include them. All workers see this after the next `wait_for_all`."""
     if path is None:
         return
     begin, stop = share(worker, path.x.size)

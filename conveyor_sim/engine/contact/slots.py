@@ -1,8 +1,8 @@
 """Sums of pair forces by bottle, through a table of WIDTH slots per bottle (drawn in `pairs.py`).
 
-A slot holds an index into the columns of pair forces. Slots are in order of the partner, so a bottle's sum does not
-depend on when the lists were rebuilt: entries of separate pairs are 0. More than WIDTH neighbours, which unequal
-bottles can have, continue in a list of their own.
+A slot holds an index into the columns of pair forces. Slots are sorted by partner, and separate pairs contribute 0, so
+a bottle's sum does not depend on the time of the last rebuild. Bottles of different sizes can have more than WIDTH
+neighbours; their further entries are in a separate list.
 """
 
 from typing import Any
@@ -36,7 +36,7 @@ def fill_slots(pairs: Any, slots: Any) -> int:
     slots.more_start[slots.filled.size] = min(total, slots.more_entry.size)
     fill(slots.entry, 2 * capacity)
     fill(slots.filled, 0)
-    # By (i, j): lower partners, of which the bottle is the second, come before those of which it is the first.
+    # In the order of (i, j), pairs with a lower partner (bottle is j) precede pairs with a higher one (bottle is i).
     for p in range(used):
         _enter(slots, pairs.j[p], capacity + p)
         _enter(slots, pairs.i[p], p)

@@ -13,7 +13,7 @@ REBUILD, PROBE = 0, 1
 
 
 def find_callees(world: World, worker: Worker) -> None:
-    """Write addresses for Worlds of this one's types to `worker.callees`, which the workers of a group share.
+    """Write addresses of the kernels for the types of `world` to `worker.callees`, which the workers of a group share.
 
     Compiles the kernels if necessary.
     """

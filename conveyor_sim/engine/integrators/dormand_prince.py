@@ -81,7 +81,8 @@ LEAST = 1e-13
 FLOOR = 1e-9
 """Shortest substep as a share of dt; it is taken even with a larger error.
 
-At this length a force jump costs less than 1e-9 of the impact speed, and non-finite states must terminate.
+At this length a force jump causes an error below 1e-9 of the impact speed. The limit also ends the search for a
+finite state.
 """
 
 

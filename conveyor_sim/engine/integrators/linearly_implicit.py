@@ -87,7 +87,7 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
             _move(bottles, linear, dt, theta, first, end)
             _turn(world.spin, linear, dt, theta, first, end)
             accumulate_peaks(world.load, world.peaks, dt, first, end)
-            # Half of the distance that other methods allow, because contacts are evaluated as far ahead again.
+            # Half of the distance that other methods allow: contacts are evaluated ahead, by up to the other half.
             if moved_too_far(bottles, world.neighbourhood, 0.5 * world.settings.skin, first, end) or _fast(
                 bottles, 0.25 * world.settings.skin / dt, first, end
             ):

@@ -27,7 +27,7 @@ def sort_into_cells(bottles: Bottles, hood: Neighbourhood, cell: float) -> None:
     for b in range(buckets + 1):
         total += hood.bucket[b]
         hood.bucket[b] = total
-    # Backwards, so that each bucket ends at its start and in the order of slots.
+    # Backwards: each entry of `bucket` ends as the start of its bucket, and slots ascend within a bucket.
     for i in range(bottles.x.size - 1, -1, -1):
         if bottles.id[i] >= 0:
             b = bucket_of(hood.cell[i, 0], hood.cell[i, 1], buckets)

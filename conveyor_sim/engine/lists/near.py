@@ -105,7 +105,7 @@ def _has_near(near: Any, i: int) -> bool:
 
 @part
 def _copy_springs(near: Near, springs: Any) -> None:
-    """Copy the springs by bottle and piece, unless that is done and the list was too short."""
+    """Copy the springs by bottle and piece, unless a previous attempt with a shorter list has done so."""
     if springs is None:
         return
     if springs.kept_count[0] >= 0:
@@ -123,7 +123,7 @@ def _copy_springs(near: Near, springs: Any) -> None:
 
 @part
 def _restore_springs(near: Near, springs: Any) -> None:
-    """Restore the springs of entries that are still listed; both lists are by bottle."""
+    """Restore the springs of entries that are still listed; both lists are sorted by bottle."""
     if springs is None:
         return
     k, kept = 0, springs.kept_count[0]

@@ -1,6 +1,6 @@
 """Rebuild of all neighbour lists together, which is due once a bottle has moved by half of the skin.
 
-Its time follows from the state alone, never from the division of a run into calls.
+The time of a rebuild depends on the state alone, not on the division of a run into calls.
 """
 
 from typing import Any

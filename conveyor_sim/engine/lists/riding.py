@@ -1,14 +1,14 @@
 """Riding bottles: alone on a straight belt, with a velocity that a step leaves unchanged to the bit.
 
-Such a bottle needs no forces. They depend on its velocity alone, which the next step leaves unchanged again, so a step
-only adds x += dt v. It rides until the next rebuild: until then nothing is within its reach (the lists hold no pair and
-no rail for it, moving ones included) and it stays on its belt (which is certain). Everything else that changes its
-motion happens between ticks: speeds of belts, bottles that come or go, faults, edits. So each call of an integrator
-starts with all bottles stepped, and so does the time after a rebuild; the first step is examined.
+The forces on such a bottle depend on its velocity alone, and the next step leaves that unchanged again. So they need
+not be evaluated, and a step only adds x += dt v. The bottle rides until the next rebuild. Until then the lists hold no
+pair and no rail for it, moving rails included, and its belt is certain. Everything else that changes its motion happens
+between ticks: speeds of belts, bottles that come or go, faults, edits. So all bottles are stepped at the start of each
+call of an integrator and after each rebuild, and the step that follows is examined.
 
-Riding changes no bit. So it is optional: only LEAST or more riding bottles in adjacent slots are left out of the loops,
-because a loop over few costs more than they do. The rest of a block is some runs of stepped bottles. The force of a
-rider and its velocities within a step stay as the last step left them, which is what each step would write.
+Riding changes no bit, so it is optional. The loops skip only LEAST or more riding bottles in adjacent slots, because
+skipping fewer costs more than it saves. The other bottles of a block form runs of stepped bottles. Force and
+velocities of a riding bottle keep the values of the last step, which each further step would write again.
 """
 
 from typing import Any
@@ -25,7 +25,7 @@ from conveyor_sim.engine.contact.pairs import pack
 from conveyor_sim.engine.threads.workers import BLOCK, UNIT, share, units, wait_for_all
 
 LEAST = 8
-"""Adjacent bottles that can ride, the number on which one instruction works."""
+"""Smallest number of adjacent riding bottles that is skipped; the number of doubles in one vector instruction."""
 
 STEPPED, EXAMINED, PLANNED = 0, 1, 2
 """State of a block: all its bottles are stepped; its velocities are stored for comparison; riders are determined."""
@@ -73,7 +73,7 @@ def stepped_run(riding: Any, first: int, end: int, run: int) -> tuple[int, int]:
 
 
 def skipped_slots(riding: Riding | None, slots: int) -> NDArray[np.bool_]:
-    """Return which of all slots the next step would skip, free ones included; with blocks as on one thread."""
+    """Return a mask of the slots that the next step skips, free ones included, with the blocks of a single thread."""
     rides = np.zeros(slots, np.bool_)
     if riding is None:
         return rides
@@ -175,7 +175,7 @@ def _plan(riding: Riding, first: int, end: int) -> None:
 
 @part
 def ride(bottles: Bottles, spin: Any, riding: Any, dt: float, first: int, end: int) -> None:
-    """Move the riding bottles of first to end by dt seconds, with the additions of a step."""
+    """Move the riding bottles of first to end by dt seconds, with the same additions as in a step."""
     if riding is None:
         return
     begin = first

@@ -24,7 +24,7 @@ def build_static_grid(
 
     segments, arcs, belts: (n, 4) bounding boxes x_min, y_min, x_max, y_max, m. rail_reach: m, largest distance of an
     axis from a rail at which the rail matters (radius and skin); belt_reach likewise for belts. cell: m, desired edge
-    of a cell; it is larger if the plant would need more than MOST_CELLS. Belts are listed last first, rails in order.
+    of a cell; it is larger if the plant would need more than MOST_CELLS. Rails are listed in order, belts in reverse.
     """
     rails = np.concatenate([segments, arcs]) + np.array([-rail_reach, -rail_reach, rail_reach, rail_reach])
     carriers = belts + np.array([-belt_reach, -belt_reach, belt_reach, belt_reach])

@@ -21,7 +21,7 @@ from conveyor_sim.engine.threads.workers import units
 def add_base_friction(world: World, spin: Any, load: ForceSums, implicit: Any, dt: float, first: int, end: int) -> None:
     """Add the friction of belts and floor on bottles first to end, straddling rings excepted, to their load and moment.
 
-    spin, load, implicit: those of the World, or others.
+    spin, load, implicit: groups of the World, or other arrays of the same shape; implicit None: explicit friction.
     """
     if world.footing is None:
         return

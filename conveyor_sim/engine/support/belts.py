@@ -14,7 +14,7 @@ from conveyor_sim.engine.threads.workers import UNIT
 
 @part
 def belt_distance(belts: Belts, sectors: Any, h: int, x: float, y: float) -> float:
-    """Return a signed distance (m) to the edge of belt h, >= 0 on the belt and at most the true distance in size."""
+    """Return a signed distance (m) to the edge of belt h, >= 0 on the belt; its magnitude is a lower bound."""
     if sectors is not None:
         if sectors.reach[h] >= 0:  # a test for None is pruned only if it stands alone
             return _sector_distance(sectors, h, x, y)
@@ -66,7 +66,7 @@ def surface_velocity(h: int, x: float, y: float, surface: Any, turn: Any) -> tup
 
 @part
 def list_belts(bottles: Bottles, grid: Any, belts: Any, ring: Any, floor: int, margin: float) -> int:
-    """Store the belt that covers each base and its `margin`, or list candidates; return the number of candidates."""
+    """Store the belt that covers a base and the `margin` (m) around it, or list candidates. Return their number."""
     if belts is None:
         return 0
     count = 0

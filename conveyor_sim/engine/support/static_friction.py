@@ -1,8 +1,8 @@
 """Static friction with memory: a spring from each base to a point of its belt (Cundall and Strack 1979).
 
 The point, the anchor, moves with the belt's surface, so on a turning belt the spring turns with it. The spring pulls
-with k e + c v, at most mu m g; e from the anchor to the axis, v the velocity relative to the belt. Elongated to mu m g
-/ k, the base slides and drags the anchor along. On another belt the spring starts anew, without load.
+with k e + c v, at most mu m g; e from the anchor to the axis, v the velocity relative to the belt. At an
+elongation of mu m g / k, the base slides and drags the anchor along. On another belt a new spring starts without load.
 
 Anchors are stored, not elongations, so the length of a spring is exact for any integrator.
 """

@@ -16,14 +16,14 @@ from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.compiler.numba_internals.atomics import add_atomic, load_atomic, sched_yield, store_atomic
 
 UNIT = 64
-"""Pairs or bottles that stay together: few enough for even shares; no two threads write to the same cache line."""
+"""Pairs or bottles per unit: few enough for even shares, enough that no two threads write to one cache line."""
 
 BLOCK = 8 * UNIT
 """Pairs or bottles that are processed at a time, at most: their scratch fits into the first-level cache."""
 
 MOST_CONTACTS = 32
-"""Contacts of one bottle with rails at a time, the deepest ones. More touch only in a pocket drawn as a fine polyline.
-"""
+"""Largest number of simultaneous rail contacts of one bottle; only the deepest act. A bottle touches more rail pieces
+only in a pocket drawn as a fine polyline."""
 
 # Indices in `Worker.sync`, one cache line apart.
 ARRIVED, TURN, MOVED = 0, 8, 16

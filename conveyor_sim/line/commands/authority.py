@@ -19,7 +19,7 @@ from conveyor_sim.line.commands.inputs import (
 from conveyor_sim.support.printable import printable
 
 PEOPLE: tuple[WriterKind, ...] = ("operator", "engineer")
-"""Kinds of writer that act through the service `operate`."""
+"""Kinds of writer that are persons. They act through the ROS service `operate` or a protocol server."""
 
 
 class Right(NamedTuple):
@@ -103,7 +103,7 @@ def pattern_problem(patterns: Sequence[str], devices: Collection[str], where: st
 
 
 def hand_over_problem(request: Input) -> str:
-    """Return why such an input can't take or release the line, whichever controller owns it; "" if it can."""
+    """Return why an OWN or DISOWN input is invalid for any owner of the line; "" if it is valid."""
     if request.names or request.values or (request.texts and request.operation == DISOWN):
         expected = "texts alone, patterns of devices" if request.operation == OWN else "nothing beside its writer"
         counts = f"{len(request.names)} names, {len(request.values)} values, {len(request.texts)} texts"

@@ -15,33 +15,33 @@ from conveyor_sim.scene.types import Unchecked
 from conveyor_sim.support.printable import SENTENCE, printable
 
 WriterKind = Literal["controller", "operator", "engineer", "test", "line"]
-"""Kind of writer. "line" is the line itself: replay and rerun produce its inputs again without reading them."""
+"""Kind of writer. "line" is the line itself; replay and rerun generate its inputs instead of reading them."""
 
 WRITER_KINDS: tuple[WriterKind, ...] = get_args(WriterKind)
 
 SET = "set"
-"""Operation: commands by name, and alarms of a controller ("alarms/<name>", 0 or 1)."""
+"""Operation that writes commands by name, and alarms of a controller ("alarms/<name>", 0 or 1)."""
 
 INJECT = "inject"
-"""Operation: faults by name."""
+"""Operation that starts or ends faults by name."""
 
 MODE = "mode"
-"""Operation: devices by name, and a mode for each."""
+"""Operation that sets the control mode of each device by name."""
 
 OWN = "own"
-"""Operation: a controller takes ownership of the line; texts are patterns of devices that it leaves to others."""
+"""Operation by which a controller takes ownership of the line; texts: patterns of the devices that it releases."""
 
 DISOWN = "disown"
-"""Operation: the owner releases the line."""
+"""Operation by which the owner releases the line."""
 
 FORCE = "force"
-"""Operation: signals by name, and values that controllers read in place of the measured ones."""
+"""Operation that forces signals by name: controllers read its values in place of the measured ones."""
 
 UNFORCE = "unforce"
-"""Operation: signals by name; without names, all forced signals."""
+"""Operation that ends the forcing of signals by name; without names, of all forced signals."""
 
 DECLARE = "declare"
-"""Operation: alarms of a controller, with ids as names and one JSON object per alarm as texts."""
+"""Operation that declares alarms of a controller: ids as names, one JSON object per alarm as texts."""
 
 FAULT = "fault"
 """Source of injected faults."""
@@ -53,7 +53,7 @@ WATCHDOG = "watchdog"
 """Source of stops by a watchdog when a controller sends no more commands."""
 
 ARRIVAL = "arrival"
-"""Source of results that report inputs which never reached the line, several in one."""
+"""Source of results on inputs that never reached the line. One result may report several inputs."""
 
 
 class Input(NamedTuple):
@@ -120,7 +120,7 @@ class CommandOutcome:
 
 
 def normalized(request: Input) -> Input:
-    """Return an input as it can be displayed and as a replay reads it: escaped, and shortened where it is too long.
+    """Return an input with its texts escaped, and shortened where they are too long, for display and for replays.
 
     Names of commands stay as they are, because unknown ones are refused. Raise CommandError for a field of another
     type.
@@ -147,7 +147,7 @@ def _normalized(request: Input) -> Input:
 
 
 def _of_wrong_type(request: Input) -> str | None:
-    """Return which part of an input is neither text nor number, in words; None if all types are correct."""
+    """Return an error message for the first name, text or value of a wrong type; None if all types are correct."""
     for field, texts in (("names", request.names), ("texts", request.texts)):
         for text in texts:
             if not isinstance(text, str):
@@ -162,7 +162,9 @@ def _of_wrong_type(request: Input) -> str | None:
 
 
 def recorded_input(source: str, names: tuple[str, ...], values: tuple[float, ...]) -> Input:
-    """Return the input of a result from an old recording without writer and operation; its source determines both."""
+    """Return the input of a result in an old recording. Such a result has no writer or operation; both follow from
+    its source.
+    """
     if source == FAULT:
         return Input(source, source, "test", INJECT, names, values)
     kind = "line" if source in (WATCHDOG, ARRIVAL) else "controller"

@@ -141,7 +141,7 @@ class Modes:
         return later
 
     def report(self, request: Input) -> bool:
-        """Return True if a refusal is new for this kind of writer and one of the devices, and remember it."""
+        """Record a refusal. Return True if it is the first for this kind of writer at one of the devices."""
         devices = {self._device_of[name] for name in request.names if name in self._device_of}
         entries = {f"{device}:{request.writer_kind}" for device in devices}
         new = sorted(entries.difference(self.reported))

@@ -25,8 +25,8 @@ from conveyor_sim.line.tag import COMMANDS, SIGNALS, Tag
 from conveyor_sim.support.printable import printable
 
 Cause = Literal["operation", "role", "name", "value", "form"]
-"""Cause of a refusal. operation: not allowed for this kind of writer. role: value not allowed for it. name: unknown.
-value: out of range, or not of the tag's kind. form: anything else about the input.
+"""Cause of a refusal. operation: not allowed for this kind of writer. role: this value is not allowed for it.
+name: unknown. value: out of range, or of a wrong kind. form: any other defect of the input.
 """
 
 RESET_COUNTERS = "reset_counters"

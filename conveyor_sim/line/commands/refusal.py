@@ -83,7 +83,7 @@ def shown(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def _of_drive(name: str, known: Mapping[str, Tag], what: str, moved: Mapping[str, str]) -> str:
-    """Return why a name of a belt, or one below it, belongs to its drive; "" for other names."""
+    """Return the refusal of a tag of a belt that a named drive moves; "" for other names."""
     field, _, rest = name.partition("/")
     belt, _, tag = rest.partition("/")
     drive = moved.get(f"{field}/{belt}")

@@ -13,14 +13,14 @@ from conveyor_sim.scene.drives import SpeedSetpoint
 
 @dataclass
 class Watchdog:
-    """Watchdog that stops a belt if no command was accepted within its time-out (simulated time)."""
+    """Watchdog that stops a belt or named drive if no command was accepted within its time-out (simulated time)."""
 
     timeout_ticks: int
     last: int = 0
     """Tick of the last accepted command."""
     tripped: bool = False
     rests: bool = False
-    """True while no controller is in control of the belt."""
+    """True while the device is not in automatic mode."""
 
     def command(self, tick: int) -> None:
         """Restart the time-out, because a command was accepted."""
@@ -116,7 +116,7 @@ class SetpointDevice(SpeedDevice):
         now.setpoints[self._index] = value
 
     def take_mode(self, mode: int, now: ScanContext) -> None:
-        """Let the watchdog rest outside automatic mode."""
+        """Suspend the watchdog outside automatic mode."""
         if self.watchdog is not None:
             self.watchdog.rest(now.tick, mode != AUTOMATIC)
 

@@ -1,6 +1,7 @@
 """All effects in order, the choice of those that a scene needs, and their joint bounds and predictions."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 
 from conveyor_sim.errors import SceneError
 from conveyor_sim.physics.effects.base import BASE_FRICTION, BELTS, CURVED_BELTS, RING_BASE
@@ -10,7 +11,6 @@ from conveyor_sim.physics.effects.damping import DAMPING_EFFECTS
 from conveyor_sim.physics.effects.declaration import Effect, EffectChoice
 from conveyor_sim.physics.effects.friction import ATAN_FRICTION, CONTACT_FRICTION, IMPLICIT_FRICTION, TANGENTIAL_SPRING
 from conveyor_sim.physics.effects.geometry import ARC_RAILS, MOVING_RAILS, SEGMENT_RAILS, UNEQUAL_RADII
-from conveyor_sim.physics.effects.impacts import impact_bounds, impacts
 from conveyor_sim.physics.effects.observers import (
     CONTACT_ARRAYS,
     CRUSHING,
@@ -21,7 +21,7 @@ from conveyor_sim.physics.effects.observers import (
     TIPPING,
 )
 from conveyor_sim.physics.effects.static_friction import STATIC_FRICTION
-from conveyor_sim.physics.effects.terms import Terms
+from conveyor_sim.physics.effects.terms import Meeting, Terms, deepest, duration, meetings, overlap_at
 from conveyor_sim.physics.plant import Plant
 from conveyor_sim.physics.timestep.bounds import Bound
 from conveyor_sim.physics.timestep.prediction import Impact, Prediction, predict
@@ -82,14 +82,31 @@ def choose_effects(plant: Plant) -> tuple[EffectChoice, ...]:
 
 
 def impacts_of(terms: Terms) -> tuple[Impact, ...]:
-    """Return the expected impacts with the errors that the present effects contribute."""
-    return impacts(terms, EFFECTS)
+    """Return one expected impact per pair of bottle types that can touch, and per bottle type and rail material.
+
+    Each has the errors that the present effects contribute.
+    """
+    adding = [effect.shares for effect in EFFECTS if effect.shares is not None and effect.name in terms.on]
+    speed = terms.plant.impact_speed
+    return tuple(
+        Impact(
+            what=meeting.what,
+            at=_at(meeting, terms, speed),
+            duration=duration(meeting, terms, speed),
+            shares=tuple(share for shares in adding for share in shares(meeting, terms)),
+            left=terms.method.own_error * terms.step_error / speed,
+            force=deepest(meeting, terms, speed)[1],
+            diameter=2.0 * min(kind.radius for kind in (meeting.first, meeting.second) if kind is not None),
+            overlap=partial(overlap_at, meeting, terms),
+        )
+        for meeting in meetings(terms)
+    )
 
 
 def bounds_of(terms: Terms, expected: Sequence[Impact]) -> tuple[Bound, ...]:
     """Return the bounds on dt by effects and impacts, each the tightest over bottle types and materials."""
     by_effect = [effect.bounds(terms) for effect in EFFECTS if effect.bounds is not None and effect.name in terms.on]
-    return (*impact_bounds(expected, terms.tolerance), *(bound for bounds in by_effect for bound in bounds))
+    return (*_impact_bounds(expected, terms.tolerance), *(bound for bounds in by_effect for bound in bounds))
 
 
 def prediction_of(terms: Terms, expected: Sequence[Impact], dt: float) -> Prediction:
@@ -129,3 +146,18 @@ def _refusals(scene: Scene, absent: Mapping[EffectName, str]) -> list[str]:
             reason = f'"off" given, expected "on": what calls for {name} makes no sense without it'
         lines.append(f"{places.of(('effects', name))}: effects.{name}: {reason}")
     return lines
+
+
+def _impact_bounds(expected: Sequence[Impact], tolerance: float) -> list[Bound]:
+    """Return the tightest bound of impacts between bottles, and that of impacts on rails."""
+    tightest: dict[str, Bound] = {}
+    for impact in expected:
+        bound = impact.bound(tolerance)
+        if impact.what not in tightest or bound.dt < tightest[impact.what].dt:
+            tightest[impact.what] = bound
+    return list(tightest.values())
+
+
+def _at(meeting: Meeting, terms: Terms, speed: float) -> str:
+    law, k = meeting.elastic
+    return f"{law.coefficient_text(k, terms.laws.curves)} {speed:g} m/s"

@@ -7,7 +7,7 @@ from conveyor_sim.engine.contact.laws import DAMPING, DampingLaw
 from conveyor_sim.physics.effects.contacts import contacts_in_use
 from conveyor_sim.physics.effects.declaration import Cause, Effect
 from conveyor_sim.physics.effects.terms import Meeting, Terms, deepest, drag_bound, frequency, meetings, tightest
-from conveyor_sim.physics.laws.damping import damping_law
+from conveyor_sim.physics.laws.coefficients import damping_law
 from conveyor_sim.physics.plant import Plant
 from conveyor_sim.physics.timestep.bounds import Bound, damping_bound
 from conveyor_sim.physics.timestep.methods import Share

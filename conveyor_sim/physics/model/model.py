@@ -49,7 +49,7 @@ class Model:
     tick_ns: int
     dt_reason: str
     bounds: tuple[Bound, ...]
-    """Bounds for the preset or tolerance of the scene; for `standard` where it gives the time step."""
+    """Bounds on the time step for the preset or tolerance of the scene; for `standard` if the scene sets the step."""
     accuracy: str
     """Choice of the scene, in words."""
     impacts: tuple[Impact, ...]

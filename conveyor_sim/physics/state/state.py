@@ -1,4 +1,4 @@
-"""State of the bottles: slots, lists between bottles, speeds of belts. Nothing else of the physics changes."""
+"""`State`: all of the physics that changes in a run: bottles, neighbour lists, springs, surfaces, moving rails."""
 
 import heapq
 from collections.abc import Iterator
@@ -162,7 +162,7 @@ class State:
         self._free = np.flatnonzero(self.world.bottles.id < 0).tolist()
 
     def _equip(self, slots: "slice | NDArray[np.int64]") -> None:
-        """Set the constants of their types for the bottles in some slots."""
+        """Set radius, mass and the other constants of the bottle type for the bottles in some slots."""
         world, model = self.world, self.model
         kind = world.bottles.type[slots]
         mass, radius, inertia = model.type_mass[kind], model.type_radius[kind], model.type_inertia[kind]

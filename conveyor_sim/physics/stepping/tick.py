@@ -103,7 +103,7 @@ class Integration:
         self._report_once(tick + 1)
 
     def _repeat(self, tick: int, seconds: float, wrong: Violation) -> None:
-        """Repeat the tick in shorter steps. The guard has put back the state at its beginning."""
+        """Repeat the tick in shorter steps. The guard has restored the state at the beginning of the tick."""
         tried, first = 1, wrong
         for factor in self._shorter if wrong.curable else ():
             self._take_steps(factor)

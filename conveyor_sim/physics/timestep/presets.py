@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from conveyor_sim.physics.laws.damping import DAMPING_BY_NAME
+from conveyor_sim.physics.laws.coefficients import DAMPING_BY_NAME
 from conveyor_sim.physics.timestep.bounds import least_steps
 from conveyor_sim.physics.timestep.methods import METHODS, Method
 from conveyor_sim.physics.timestep.prediction import Impact, percent

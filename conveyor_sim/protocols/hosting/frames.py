@@ -27,7 +27,7 @@ class Frames:
     """
 
     def __init__(self, view: DrawableProvider, servers: Callable[[], tuple[Health, ...]] | None = None) -> None:
-        """Collect from now on; the first frame holds everything that the view shows.
+        """Collect from now on; the first frame holds everything that the mirror shows.
 
         servers: returns the health of all protocol servers, which frames then carry every HEALTH seconds.
         """

@@ -93,8 +93,9 @@ class RemoteTagProvider(LineMirror):
     """Mirror of a line, updated by frames from the parent; one thread applies them."""
 
     def __init__(self, task: ServerTask, calls: ParentCalls, decode: Decode, history: TagHistory | None) -> None:
-        """Start without data. decode: decodes the message of a topic. history: of the recording that is played
-        back, if it is one.
+        """Start without data. decode: decodes the message of a topic.
+
+        history: history of the recording that is played back; None: the line is not a recording.
         """
         super().__init__()
         self._task, self._calls, self._decode, self._history = task, calls, decode, history
@@ -162,7 +163,7 @@ class RemoteLogins:
         self._calls, self.has_users = calls, has_users
 
     def enter(self, name: str, password: str, origin: str, now: float) -> User | None:
-        """Return the user if the parent accepts the password, None otherwise. The parent has its own `now`."""
+        """Return the user if the parent accepts the password, None otherwise. The parent uses its own clock."""
         try:
             user: User | None = self._calls.ask("enter", name, password, origin, patience=LOGIN_PATIENCE)
         except NoAnswerError:

@@ -50,8 +50,8 @@ CLOSING = 1.5
 """s of wall time that a protocol server has for an orderly end."""
 
 FIRST_WAIT, LONGEST_WAIT = 1.0, 60.0
-"""s of wall time before a restart that is not the first one: it doubles up to the longest, until a process has served
-for that long.
+"""s of wall time before restarts. The first restart is immediate; then the wait doubles up to the longest. It starts
+again at 0 after a process that lived for longer than the longest wait.
 """
 
 LOOK = 0.5
@@ -125,7 +125,7 @@ class ServerHost:
         return None if self._process is None else self._process.pid
 
     def status(self, fresh: bool = False) -> Status:
-        """Return its activity over all its processes, as of the last heartbeat; fresh: as of now, if it answers."""
+        """Return the activity of all its processes, as of the last heartbeat. fresh: request a heartbeat first."""
         if fresh:
             self._reported.clear()
             self._send(StatusRequest())

@@ -21,7 +21,7 @@ class ServerThread(AbstractContextManager["ServerThread"]):
         self._thread.start()
 
     def run(self, coroutine: Coroutine[Any, Any, T]) -> T:
-        """Run a coroutine in the thread. Return or raise what it does."""
+        """Run a coroutine in the thread. Return its result or raise its exception."""
         return asyncio.run_coroutine_threadsafe(coroutine, self._loop).result()
 
     def close(self) -> None:

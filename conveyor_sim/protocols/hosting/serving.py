@@ -24,8 +24,8 @@ from conveyor_sim.protocols.tags.tag_provider import TagProvider
 class ThreadHost:
     """Host that serves from its start until `end` and `join`, as a `ServerHost` does.
 
-    Two protocol servers run this way: those of a test's line (`SteppedTagProvider`), because the test steps it, and the
-    only one of `attach`. All others run in processes (server_host.py). A protocol server in a thread is not restarted.
+    Two kinds of protocol servers run this way: servers of a line that a test steps (`SteppedTagProvider`), and the
+    single server of `attach`. All others run in processes (server_host.py). A server in a thread is not restarted.
     """
 
     def __init__(
@@ -52,7 +52,7 @@ class ThreadHost:
         """Return at once, because it is started."""
 
     def status(self, fresh: bool = False) -> Status:
-        """Return its activity, which is always fresh."""
+        """Return the present activity; `fresh` has no effect."""
 
         async def ask() -> Status:
             return Status(0, 0, 0, 0, 0.0) if self._server is None else self._server.status()
@@ -95,7 +95,7 @@ class Serving(AbstractContextManager["Serving"]):
     ) -> None:
         """Start all servers. chosen: protocols and their ports, 0 for any free one; for MQTT the URL of the broker.
         say: called with a sentence for the user when a protocol server restarts, by a thread.
-        ready: processes that were started in advance, by protocol; they end with this.
+        ready: processes that were started in advance, by protocol; `close` ends them.
 
         Raises ConveyorError, in one sentence, if one of them can't serve; then none does.
         """

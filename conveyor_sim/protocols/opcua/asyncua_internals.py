@@ -49,7 +49,7 @@ class OpenProtocol(OPCUAProtocol):
 
 
 class OpenPort(BinaryServer):
-    """Listening port with connections of another class, which the library can't be given."""
+    """Listening port with connections of another class. The library has no parameter for that class."""
 
     @property
     def policies(self) -> Any:
@@ -200,7 +200,7 @@ class OpenSubscription(InternalSubscription):
 
 
 class OpenSubscriptions(SubscriptionService):
-    """Subscriptions of another class, which the library can't be given."""
+    """Subscriptions of another class. The library has no parameter for that class."""
 
     @property
     def conditions(self) -> dict[ua.NodeId, Any]:

@@ -67,7 +67,7 @@ class Views:
         return [self._translate(path, kinds) for path in paths]
 
     def _page(self, result: ua.BrowseResult, references: list[ua.ReferenceDescription], most: int, left: int) -> int:
-        """Put the first references into a result, the others behind a continuation point. Return their number."""
+        """Put the first references into a result, the others behind a continuation point. Return how many it put in."""
         count = min(most or len(references), len(references), max(left, 0))
         if count < len(references) and len(self._points) >= self._limits.continuation_points:
             result.StatusCode, result.References = ua.StatusCode(Codes.BadNoContinuationPoints), []

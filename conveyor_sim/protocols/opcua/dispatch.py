@@ -136,7 +136,7 @@ class Dispatcher(OpenProcessor):
         return True
 
     def _step_back(self, requesthdr: Any) -> None:
-        """Detach from a session that could not be activated here, and return its notifications to its connection.
+        """Detach from a session that could not be activated here. Its notifications go to its old connection again.
 
         The library joins a session, and redirects its subscriptions, before it checks the client.
         """

@@ -18,7 +18,7 @@ CHANGE_UNITS, FIELD_UNITS = 4, 2
 """Work units of a change of a value, and of each field or operand of an event."""
 
 _AT_ONCE = 100
-"""Items that are created, or whose values are sent again, before other tasks run."""
+"""Number of items that are created or resent before other tasks run."""
 
 
 class Items(OpenItems):
@@ -57,10 +57,7 @@ class Items(OpenItems):
         return results
 
     async def datachange_callback(self, handle: int, value: ua.DataValue, error: ua.StatusCode | None = None) -> None:
-        """Queue a value if it has changed enough.
-
-        Queue a value if it has changed enough, without a copy, because values never change.
-        """
+        """Queue a value if it has changed enough. It is not copied, because a DataValue is never modified."""
         if error is not None:
             await self.trigger_statuschange(error)
             return
@@ -80,7 +77,7 @@ class Items(OpenItems):
     async def resend(self) -> None:
         """Queue the present value of each item once more, for a session that takes over (OPC 10000-4, 5.14.7).
 
-        That is work like a change of each value, and other tasks run in between.
+        Each value costs as many work units as a change. Other tasks run in between.
         """
         for place, mid in enumerate(list(self.ids_by_handle.values())):
             item = self.by_id.get(mid)

@@ -63,13 +63,13 @@ class OpcUaLimits:
     unacknowledged: int = 10_000
     """Values and events that a subscription retains for Republish."""
     publishes_per_second: int = 200
-    """Publishing cycles per second of all subscriptions of one session; longer intervals are granted beyond."""
+    """Publishing cycles per second of all subscriptions of one session; the server revises intervals to stay within."""
     message_bytes: int = 1_000_000
     """Bytes of one message."""
     message_bytes_before_login: int = 65_536
     """Bytes of one message from a client whose session is not activated."""
     decoding_steps: int = 40_000
-    """Elementary values of one message, as `decoding` counts them."""
+    """Elementary values of one message, as `processor.Allowance` counts them."""
     decoding_steps_before_login: int = 1000
     """Elementary values of one message from a client whose session is not activated."""
     array_length: int = 10_000

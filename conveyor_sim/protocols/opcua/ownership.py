@@ -93,7 +93,7 @@ class OwnedSession(InternalSession):
                 each.pub_request_callback = _no_request  # another session may begin on the same connection
 
     async def create_subscription(self, params: ua.CreateSubscriptionParameters, *others: Any, **named: Any) -> Any:
-        """Create a subscription and store its owner, which outlives its session for a later transfer."""
+        """Create a subscription and store its owner. The entry outlives the session, for a later transfer."""
         result = await super().create_subscription(params, *others, **named)
         self.owners.of[self.subscription_service.subscriptions[result.SubscriptionId]] = self
         return result

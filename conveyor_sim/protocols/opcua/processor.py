@@ -173,7 +173,7 @@ class BoundedBuffer(OpenBuffer):
 
 
 CHUNK = 65_535
-"""Bytes of a part of a message, at most."""
+"""Largest size of a message chunk, bytes."""
 
 SMALLEST_CHUNK = 8192
 """Bytes that a client must be able to receive and send at once (OPC 10000-6, 7.1.2.3)."""
@@ -193,7 +193,7 @@ class ConnectionLimits(TransportLimits):
 
     is_logged_in: bool = False
     before_login: int = 65_536
-    """Bytes of one message."""
+    """Bytes of one message before a session is activated."""
 
     @classmethod
     def of(cls, limits: OpcUaLimits) -> ConnectionLimits:
@@ -208,7 +208,7 @@ class ConnectionLimits(TransportLimits):
         return super().create_acknowledge_and_set_limits(msg)
 
     def is_msg_size_within_limit(self, sz: int) -> bool:
-        """Return True for a size within the limit. Raise ServiceError otherwise; the library has another code."""
+        """Return True for a size within the limit. Raise ServiceError otherwise; the library has another status."""
         if sz > self.max_message_size or not (self.is_logged_in or sz <= self.before_login):
             raise ServiceError(Codes.BadTcpMessageTooLarge)
         return True
@@ -257,7 +257,7 @@ class Processor(Dispatcher):
         return await super().process(header, body)
 
     def open_secure_channel(self, algohdr: Any, seqhdr: Any, body: Any) -> None:
-        """Open a channel, by a message that is decoded within the limits before a login."""
+        """Open a channel. Its message is decoded within the limits that apply before a login."""
         super().open_secure_channel(algohdr, seqhdr, BoundedBuffer(bytes(body), self._allowance(False)))
 
     async def process_message(self, seqhdr: Any, body: Any) -> bool:

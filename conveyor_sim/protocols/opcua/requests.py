@@ -38,7 +38,7 @@ CODES: Mapping[Cause, int] = {
     "value": Codes.BadOutOfRange,
     "form": Codes.BadInvalidArgument,
 }
-"""Status code of an input that no state of the line allows, by the cause of its refusal."""
+"""Status code by cause of refusal, for inputs that are invalid in every state of the line."""
 
 
 @dataclass
@@ -111,11 +111,11 @@ class Requests:
         values: tuple[float, ...] = (),
         texts: tuple[str, ...] = (),
     ) -> int:
-        """Queue an operation of the line. Return a status code, which is not counted."""
+        """Queue an operation of the line. Return a status code; the caller counts the request."""
         return self._give(client, operation, names, values, texts)
 
     def control(self, client: User, what: Control, value: float) -> int:
-        """Control the run. Return a status code, which is not counted."""
+        """Control the run. Return a status code; the caller counts the request."""
         if not self.may_control(client):
             return int(Codes.BadUserAccessDenied)
         if what not in self._source.controls:
@@ -207,7 +207,7 @@ class Requests:
 
 
 def _judge_form(value: ua.WriteValue, kind: ua.VariantType) -> int:
-    """Return the status code of the form of a write, which must be one complete value of a type."""
+    """Return Good if a write has one complete value of type `kind`, otherwise the status code of the error."""
     if value.AttributeId != ua.AttributeIds.Value:
         return int(Codes.BadNotWritable)
     if value.IndexRange:

@@ -80,7 +80,7 @@ class OpcUaServer:
     ) -> None:
         """Prepare the server. users: users by name, who may do more than read. anonymous: True if clients without a
         user may read.
-        stamps: kind of SourceTimestamp. certificates: folder of the server's own; None: `default_folder()`.
+        stamps: kind of SourceTimestamp. certificates: folder of certificate and key; None: `default_folder()`.
         history: patterns of the tags whose latest values are stored. port: 0 for any free one.
         limits: of each client. quota: limits of the connections. logins: checks passwords, in place of `users`.
 
@@ -168,7 +168,7 @@ class OpcUaServer:
         return server
 
     async def _fill(self, server: BoundedServer) -> Updates:
-        """Add the nodes of the line. Return what updates them."""
+        """Add the nodes of the line. Return the object that updates them."""
         internal, source, requests = server.iserver, self._source, self._requests
         await publish(internal, self._limits, self._quota)
         if await server.register_namespace(NAMESPACE) != INDEX:

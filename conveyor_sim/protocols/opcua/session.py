@@ -89,7 +89,7 @@ class SafeServer(InternalServer):
         return ClientSession(self, self.aspace, self.subscription_service, name, user, peer)
 
     def lookup_external_session(self, auth_token: ua.NodeId) -> InternalSession | None:
-        """Return the session of a client on a new connection; None if its certificate is another one."""
+        """Return the session of a client on a new connection; None if the client certificate differs."""
         session, connection = super().lookup_external_session(auth_token), channel.get()
         if not isinstance(session, OpcUaSession) or connection is None or session.peer != connection.peer:
             return None
@@ -297,7 +297,7 @@ class ClientSession(WellFormedSession, OwnedSession, OpcUaSession):
     """Session of one client: its requests are checked for their form, then for ownership, then for limits."""
 
     def republish(self, params: ua.RepublishParameters) -> ua.NotificationMessage:
-        """Return a retained message, which costs as much as its values and events did."""
+        """Return a retained message, and charge the session for its values and events again."""
         message = super().republish(params)
         self.bounds.charge_message(message)
         return message
@@ -310,7 +310,7 @@ class ClientSession(WellFormedSession, OwnedSession, OpcUaSession):
     def activate_session(
         self, params: ua.ActivateSessionParameters, peer_certificate: bytes | None
     ) -> ua.ActivateSessionResult:
-        """Activate the session, and send its notifications over the connection on which that succeeded."""
+        """Activate the session. If that succeeds, send its notifications over the present connection."""
         result = super().activate_session(params, peer_certificate)
         if (connection := channel.get()) is not None:
             self.bind(connection.processor)

@@ -20,7 +20,7 @@ from conveyor_sim.protocols.opcua.processor import CHUNK, ConnectionLimits, Proc
 from conveyor_sim.protocols.server.quotas import GREETED, OPENED, Budget, ConnectionSlot, ConnectionSlots
 
 ACTIVATION = 30.0
-"""Time in which a connection must activate a session, and may stay without one, s."""
+"""Longest time that a connection may be without an active session, s."""
 
 _SIZE = slice(4, 8)
 """Bytes of a message that hold its length (OPC 10000-6, 7.1.2.2)."""
@@ -94,7 +94,7 @@ class Connection(OpenProtocol):
         return without_issuers(policy.peer_certificate)
 
     def require_place(self, user: str) -> None:
-        """Raise ServiceError and end the connection if a session of a user, or of a guest (""), gets no place."""
+        """End the connection and raise ServiceError if no slot is free for a session of `user` ("": a guest)."""
         if self.place is None:
             return
         if not (self.places.admit_user(self.place, user) if user else self.places.admit_guest(self.place)):
@@ -165,7 +165,7 @@ class Connection(OpenProtocol):
         if not self._is_guest:
             return await self._answer(header, buf)
         async with self.turn:
-            # One at a time, so that others are answered between the requests of many guests that waited.
+            # One at a time, so that requests of users are answered between those of many waiting guests.
             await asyncio.sleep(self.guests.delay())
             return await self._answer(header, buf)
 
@@ -218,7 +218,7 @@ class Connection(OpenProtocol):
             self._close()
 
     def _close(self) -> None:
-        """Close the connection; at once if the client has not read everything, because waiting for it may never end."""
+        """Close the connection. Discard unread data of a client that does not read, because it may never do so."""
         if self.transport is None:
             return
         if self.transport.get_write_buffer_size():
@@ -254,7 +254,7 @@ class BoundedServer(OpenServer):
         self.longest = [0.0]
         self.bounds, self.places = bounds, places
         self.limits = ConnectionLimits.of(bounds)
-        # `places` bounds the connections; here a connection that makes room counts until it has ended.
+        # `places` limits connections. The library's limit would also count those that are being closed to make room.
         self.iserver.max_connections = 1_000_000
         self.iserver.max_pending_activation_seconds = ACTIVATION
         self.iserver.max_pending_messages_per_connection = 0  # `Connection` stops reading instead

@@ -42,7 +42,7 @@ class Updates:
         self._last: LineSnapshot | None = None
         self._read_back: ReadBackColumns | None = None
         self.longest = 0.0
-        """Longest wall time from a change of the tags to their nodes, s, since this was set to 0."""
+        """Longest wall time from a change of the tags to the write of their nodes, s, since this was set to 0."""
         self.left_out = 0
         """Ticks so far that were not written."""
         self._written: dict[str, tuple[int, str]] = {}

@@ -80,7 +80,7 @@ class WellFormedSession(InternalSession):
         )
 
     async def call(self, params: list[ua.CallMethodRequest]) -> list[ua.CallMethodResult]:
-        """Return a status code for each ConditionRefresh with other arguments than one or two ids."""
+        """Return a status code for each ConditionRefresh whose arguments are not one id (ConditionRefresh2: two)."""
         return await _each(
             params,
             lambda request: _refresh_code(request) if request.MethodId in REFRESH else Codes.Good,

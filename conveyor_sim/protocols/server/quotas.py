@@ -90,7 +90,7 @@ class ConnectionSlot:
 
 
 def share_of_guests(places: int) -> int:
-    """Return how many of `places` guests may hold."""
+    """Return the number of `places` that guests may hold."""
     return max(1, int(places * (1.0 - RESERVED)))
 
 
@@ -173,7 +173,7 @@ class ConnectionSlots:
         return [one for one in those if one.active < before]
 
     def _drop_first(self, those: list[ConnectionSlot]) -> bool:
-        """Drop the connection that comes first in the order of the module. Return False if there are only users."""
+        """Drop the first connection in the order described in the module. Return False if there are only users."""
         kept = set(those) - set(self._idle(those)) if self._keeps_active else set()
         may = (one for one in those if one.stage < GUEST or (one.stage == GUEST and one not in kept))
         first = min(may, key=lambda one: (not one.has_failed, one.stage, one.active), default=None)

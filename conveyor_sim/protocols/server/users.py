@@ -147,7 +147,7 @@ class Logins:
         ] = {}  # count, and time of the first, s; ordered by the latest
 
     def enter(self, name: str, password: str, origin: str, now: float) -> User | None:
-        """Return the user, or None: wrong name or password, or too many wrong passwords before, which are not checked.
+        """Return the user; None for a wrong name or password. After too many wrong passwords, None without a check.
 
         origin: the client's machine. now: time of any steady clock, s.
         """

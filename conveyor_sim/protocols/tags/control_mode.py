@@ -49,7 +49,8 @@ class Holding:
 
     Modbus has no sessions and no names. So the first write of a client takes the line. The line is released when the
     connection ends or is idle for too long, so that absent clients do not block it. A restart of the protocol server
-    ends all connections, but gives nothing up: for GRACE seconds only the holder's machine can go on with the line.
+    ends all connections, but not ownership: for GRACE seconds only clients on the holder's machine can take the line
+    over.
     """
 
     def __init__(self, source: TagProvider, protocol: str) -> None:
@@ -167,7 +168,8 @@ def objection(source: TagProvider, command: Tag, value: float, kind: WriterKind,
 def refused_for_good(source: TagProvider, receipt: Receipt, request: Input) -> Refusal | None:
     """Return why the line would refuse an input in every state; None if it might accept it.
 
-    Such an input is still passed on if its writer may use the operation: the line then records the refusal.
+    If its writer may use the operation, such an input is still passed on, and the line records the refusal.
+    Commands (SET) are not passed on.
     """
     refusal = receipt.refusal(request)
     # An input with commands is not passed on, because the line might accept a part of it.

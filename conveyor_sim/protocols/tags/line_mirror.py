@@ -252,11 +252,11 @@ class LineMirror:
         self._run = run
 
     def forget(self) -> None:
-        """Discard the present state, because time in the recording jumps."""
+        """Discard the present state, because the recording jumps or another run begins."""
         self._forget(self._run_id)
 
     def show(self, at: float | None = None) -> None:
-        """Publish a snapshot of all updates, unless no signals have come yet. The new snapshot has no reason in `lost`.
+        """Publish a snapshot of all updates, once signals have arrived. Its `lost` is empty.
 
         at: wall time of its tick, s since 1970; None: now.
         """

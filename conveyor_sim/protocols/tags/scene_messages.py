@@ -23,7 +23,7 @@ class SceneTask:
     record: Path | None
     """Folder of the recordings; None: not recorded."""
     number: int
-    """Number of the first run; it and those after resets number the folders of the recordings."""
+    """Number of the first run. Resets increase it, and it determines the name of the recording folder."""
     real_time_factor: float
     threads: int | None
     playing: bool = True

@@ -42,7 +42,7 @@ SILENCE = 5.0
 """Wall time without a message after which the line counts as lost, s."""
 
 LOOK = 0.5
-"""Wall time between two checks of that, s."""
+"""Wall time between two checks for silence, s."""
 
 ENDED_HERE = "serving has ended"
 

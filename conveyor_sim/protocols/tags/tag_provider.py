@@ -139,7 +139,7 @@ class TagProvider(Protocol):
         """Return the number of events so far, and the events after the first `after`, unless they are too old."""
 
     def listen(self, heard: Callable[[], None]) -> Callable[[], None]:
-        """Call `heard` after each change of `snapshot`, from any thread. Return a function that ends this.
+        """Call `heard`, in any thread, after each change of `snapshot`. Return a function that removes `heard`.
 
         `heard` must not block and must not raise.
         """
@@ -160,7 +160,7 @@ class Listeners:
         self._changing = threading.Lock()
 
     def add(self, heard: Callable[..., None]) -> Callable[[], None]:
-        """Call a function from now on. Return a function that ends this."""
+        """Add a function. Return a function that removes it."""
         with self._changing:
             self._all = (*self._all, heard)
 

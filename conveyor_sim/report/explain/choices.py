@@ -110,6 +110,8 @@ def _effects(scene: Scene, model: Model) -> Table:
         why = choice.why
         if choice.path is not None and line is None:
             why += f" ({places.unwritten(choice.path)})"
+        elif choice.path is not None and (elsewhere := places.elsewhere(choice.path)):
+            why, line = f"{why} ({elsewhere})", None
         law = f"{declared[choice.name].law}; {declared[choice.name].source}"
         table.add_row(
             choice.name,

@@ -22,8 +22,8 @@ from conveyor_sim.bag.reader import Bag, open_bag
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.report.figures import style
 from conveyor_sim.report.figures.data import Velocity
+from conveyor_sim.report.figures.draw import Figures, figures_of
 from conveyor_sim.report.figures.files import PNG, Picture
-from conveyor_sim.report.figures.pictures import Figures, figures_of
 from conveyor_sim.report.figures.series import velocity_figure
 from conveyor_sim.scene import Scene
 from conveyor_sim.support.child_process import end_with, pipes_of_child

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conveyor_sim.columns.damage import RailWearColumns
-from conveyor_sim.drawings.underlay import ShownUnderlay, shown_underlay
+from conveyor_sim.page.drawings.underlay import ShownUnderlay, shown_underlay
 from conveyor_sim.scene.driven import belt_speeds
 from conveyor_sim.scene.geometry import BeltShape, RailShape, initial_bottles, rail_shapes, surface_shapes
 from conveyor_sim.scene.marks import marks_of

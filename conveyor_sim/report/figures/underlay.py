@@ -13,7 +13,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.image import imread
 from matplotlib.transforms import Affine2D
 
-from conveyor_sim.drawings.underlay import ShownUnderlay
+from conveyor_sim.page.drawings.underlay import ShownUnderlay
 from conveyor_sim.scene.underlay import underlay_bytes
 
 Z_UNDERLAY: Final = 0.5

@@ -18,6 +18,9 @@ SPACING = 0.5
 WIDEST = 3.0
 """m, farthest edge of belts that is looked for."""
 
+MOST_OFFSETS = 100
+"""Largest number of places across belts that are compared with them."""
+
 TWO_ROWS = 2.0 + math.sqrt(3.0)
 """Clear width over radius from which two staggered rows of bottles fit side by side."""
 
@@ -90,7 +93,8 @@ def clearance(leg: Leg, surfaces: SurfaceMap, guides: Guides) -> Clearance | Non
 def _edges(points: Array, directions: Array, surfaces: SurfaceMap, radius: float) -> Array:
     """Return the distance (k,) from points along directions to the edge of the belts side by side, to half a radius."""
     reach = min(WIDEST, max((surface.shape.width for surface in surfaces), default=0.0) * 2.0)
-    offsets = np.arange(0.0, reach + radius, SPACING * radius)
+    step = max(SPACING * radius, reach / MOST_OFFSETS)
+    offsets = np.arange(0.0, reach + radius, step)
     every = max(1, round(1.0 / SPACING))  # a sample per radius is enough for edges
     some = np.unique(np.append(np.arange(0, len(points), every), len(points) - 1))
     probes = points[some, None, :] + offsets[None, :, None] * directions[some, None, :]
@@ -98,7 +102,7 @@ def _edges(points: Array, directions: Array, surfaces: SurfaceMap, radius: float
     # The first offset beyond the belts; a seam between two belts is no edge.
     on[:, :-1] |= on[:, 1:]
     first_off = np.where(on.all(axis=1), len(offsets) - 1, np.argmin(on, axis=1))
-    edges = np.maximum(offsets[first_off] - 0.5 * SPACING * radius, 0.0)
+    edges = np.maximum(offsets[first_off] - 0.5 * step, 0.0)
     # Between two samples the larger edge holds, so that no edge comes before a guide where belts widen.
     after = np.minimum(np.searchsorted(some, np.arange(len(points))), len(some) - 1)
     before = np.maximum(after - 1, 0)

@@ -55,11 +55,11 @@ def finding_lines(scene: Scene, model: Model, flow: LineFlow) -> list[str]:
 def _finding_lines(scene: Scene, findings: Sequence[Finding]) -> Iterator[str]:
     places = Places(scene)
     for finding in findings:
-        yield _row(finding.level, printable(finding.line(places), SENTENCE))
+        yield _row(finding.level, finding.line(places))
 
 
 def _row(label: str, text: str) -> str:
-    return f"{label:<{_LABEL}}{text}"
+    return f"{label:<{_LABEL}}{printable(text, SENTENCE)}"
 
 
 def _contents(scene: Scene, model: Model) -> str:

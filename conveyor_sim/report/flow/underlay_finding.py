@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from conveyor_sim.drawings.underlay import shown_underlay
+from conveyor_sim.page.drawings.underlay import shown_underlay
 from conveyor_sim.report.flow.finding import Finding
 from conveyor_sim.scene.schema import Scene
 

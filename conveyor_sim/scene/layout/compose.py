@@ -22,6 +22,7 @@ from conveyor_sim.scene.layout.files import MOST_NESTED, Files
 from conveyor_sim.scene.layout.fragments import LISTS, Fragment
 from conveyor_sim.scene.layout.parameters import Scope, scope_of, scoped, unknown, with_value
 from conveyor_sim.scene.overrides import holds, merged
+from conveyor_sim.scene.problem_count import MOST_SAID
 from conveyor_sim.scene.problems import Path, Problem, dotted
 from conveyor_sim.scene.provenance import FieldPlace, SceneFile, Sources, inside
 from conveyor_sim.scene.quantities import Scoped
@@ -119,6 +120,8 @@ class _Composer:
 
     def _report(self, place: FieldPlace, text: str) -> None:
         self._problems.append((place, text))
+        if len(self._problems) > MOST_SAID:
+            self._raise_problems()
 
     def _raise_problems(self) -> None:
         if self._problems:

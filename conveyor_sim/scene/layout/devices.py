@@ -108,7 +108,7 @@ class Placement:
 
     plan: LayoutPlan
     conveyors: Collection[str]
-    """Names of all conveyors as written. One without a plan has problems of its own."""
+    """Names of all conveyors as written. One without a plan has separate problems."""
     scene: Mapping[str, Any] = field(default_factory=dict)
     """The scene with expanded conveyors."""
     sources: dict[Path, Path] = field(default_factory=dict)

@@ -8,7 +8,7 @@ from typing import Any
 from conveyor_sim.scene.layout.along import AlongPoint
 from conveyor_sim.scene.layout.plan import ConveyorPlan
 from conveyor_sim.scene.layout.site import Coordinate, Site
-from conveyor_sim.scene.quantities import to_si
+from conveyor_sim.scene.quantities import is_finite, to_si
 
 LATERAL_SCATTER = 5e-4
 """Default scatter to each side of bottles placed along a conveyor (m): less than guides usually leave."""
@@ -86,5 +86,4 @@ def _number(value: Any, unit: str) -> float:
         with suppress(ValueError):
             return float(to_si(value, unit))
         return 0.0
-    is_number = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
-    return float(value) if is_number else 0.0
+    return float(value) if is_finite(value) else 0.0

@@ -1,6 +1,5 @@
 """Parameters of a scene or a cell: quantities that texts in it may refer to by name."""
 
-import math
 import re
 from collections.abc import Callable, Iterator, Mapping
 from graphlib import CycleError, TopologicalSorter
@@ -8,12 +7,13 @@ from typing import Any
 
 from conveyor_sim.scene import quantities
 from conveyor_sim.scene.problems import Path
-from conveyor_sim.scene.quantities import Quantity, Scoped, evaluate
+from conveyor_sim.scene.quantities import Quantity, Scoped, evaluate, is_finite
 from conveyor_sim.scene.units import UNITS
 from conveyor_sim.scene.words import did_you_mean, shown
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,99}")
 _WORD = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+_MOST_IN_CYCLE = 10  # names of a cycle that are listed
 _FIELDS = ("default", "min", "max", "description")
 _EXAMPLE = "expected a number, a quantity such as 2.4 m, or an expression of parameters"
 
@@ -45,18 +45,14 @@ def with_value(entry: Any, value: Any) -> Any:
 
 
 def value_fault(value: Any, known: Mapping[Any, Any]) -> str:
-    """Return why a value can't be that of a parameter among known ones, whatever they are; "" if it can."""
+    """Return why a value can't be that of a parameter among known ones with any text; "" if it can."""
     if isinstance(value, str):
         try:
             wrong = [name for name in quantities.names_in(value) if name not in known]
         except ValueError as error:
             return f"{shown(value)} given, which is {error}, {_EXAMPLE}"
         return f"{shown(value)} given, {unknown(wrong[0], known)}" if wrong else ""
-    return "" if _is_number(value) else f"{shown(value)} given, {_EXAMPLE}"
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+    return "" if is_finite(value) else f"{shown(value)} given, {_EXAMPLE}"
 
 
 def unknown(name: Any, known: Mapping[Any, Any]) -> str:
@@ -81,7 +77,9 @@ def scope_of(entries: Any, report: Callable[[Path, str], None]) -> dict[str, Qua
         order = list(TopologicalSorter(needs).static_order())
     except CycleError as error:
         cycle = [str(name) for name in error.args[1]][::-1]
-        report((cycle[0],), f"refers to itself: {' -> '.join(cycle)}")
+        more = len(cycle) - _MOST_IN_CYCLE
+        names = [*cycle[:_MOST_IN_CYCLE], f"{more} others", cycle[0]] if more > 1 else cycle
+        report((cycle[0],), f"refers to itself: {' -> '.join(names)}")
         return {}
     scope: dict[str, Quantity] = {}
     failed: set[str] = set()
@@ -130,7 +128,7 @@ def _value(value: Any, scope: Scope, at: Path, report: Callable[[Path, str], Non
             return evaluate(value if isinstance(value, Scoped) else Scoped(value, scope))
         except ValueError as error:
             text = f"{shown(value)} given, which is {error}, {_EXAMPLE}"
-    elif _is_number(value):
+    elif is_finite(value):
         return Quantity.of(value)
     report(at, text)
     return None

@@ -6,10 +6,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from conveyor_sim.report.figures import style
-from conveyor_sim.studies.figures.response_data import Indices, Map, Response
+from conveyor_sim.studies.figures.data import Indices, Map, Response, TrialsData
 from conveyor_sim.studies.figures.responses import indices_figure, map_figure, responses_figure
 from conveyor_sim.studies.figures.trials import trials_figure
-from conveyor_sim.studies.figures.trials_data import TrialsData
 
 
 def plot_study(

@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from conveyor_sim.report.figures import style
 from conveyor_sim.report.figures.data import Floats
 from conveyor_sim.report.figures.heading import heading
-from conveyor_sim.studies.figures.response_data import Indices, Map, Response, level_text
+from conveyor_sim.studies.figures.data import Indices, Map, Response, level_text
 
 _BAND: Final = 0.25
 _NUMBERED: Final = 150  # cells of a map that have their number written in

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from conveyor_sim.report.figures import style
 from conveyor_sim.report.figures.data import Floats
 from conveyor_sim.report.figures.heading import heading
-from conveyor_sim.studies.figures.trials_data import TrialsData
+from conveyor_sim.studies.figures.data import TrialsData
 
 _BEST: Final = style.SERIES[1]
 _KEPT: Final = style.SERIES[0]

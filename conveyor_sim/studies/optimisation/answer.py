@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from conveyor_sim.statistics.comparisons import paired_difference
 from conveyor_sim.statistics.intervals import mean_interval
-from conveyor_sim.statistics.paired import paired_difference
 from conveyor_sim.statistics.words import plus_minus, told
-from conveyor_sim.studies.figures.trials_data import TrialsData
+from conveyor_sim.studies.figures.data import TrialsData
 from conveyor_sim.studies.optimisation.objective import Constraint, Objective
 from conveyor_sim.studies.optimisation.optimise import Optimum
 from conveyor_sim.studies.optimisation.trials import Trial, feasible

@@ -17,8 +17,8 @@ with while_importing():
     from line import MACHINE, closed_form
 
     from conveyor_sim.report.figures import style
+    from conveyor_sim.statistics.comparisons import paired_difference, pairing_gain
     from conveyor_sim.statistics.intervals import mean_interval
-    from conveyor_sim.statistics.paired import paired_difference, pairing_gain
     from conveyor_sim.statistics.words import plus_minus, told
     from conveyor_sim.studies.results import read_results
 

@@ -26,6 +26,7 @@ from conveyor_sim.physics.model import build_model
 from conveyor_sim.scene import Scene, load_scene
 from conveyor_sim.scene.json_schema import scene_schema
 from conveyor_sim.scene.load import reread
+from conveyor_sim.scene.quantities import is_finite
 from conveyor_sim.scene.yaml_lines import Document
 
 Rng = np.random.Generator
@@ -36,11 +37,11 @@ LONGEST = 30.0
 """s of CPU time for one scene; the largest layouts take a tenth of it."""
 
 VALUES: tuple[Any, ...] = (
-    None, True, 0, -1, 1, 0.5, 3, -0.0, 1e-9, 1e5, 1e20, 1e300, math.nan, math.inf, 10**30, "", "none", "end", [], {},
-    [[]], [0, 0], [0, 0, 0], [[0, 0]], [[0, 0], [0, 0]], [[0, 0.1], [1, 0.1]], [[1, 0.1], [0, 0.1]], {"": 1},
-    {"a": {"b": 1}}, [0] * 2000, "table", "lane", "comb", "next", "nowhere", "table.end", "block.out", "block.in",
-    "block_exit", "m1", "z1", "gap", "length", "left", "right", "33 mm", "-33 mm", "90 deg", "-90", -90, 360,
-    "24 000 /h", "2 m/s", "5 kN/m", "1e400 m", "nan", "33 mn", "gap/2", "-gap/2", "length/0", "gap/(gap-gap)",
+    None, True, 0, -1, 1, 0.5, 3, -0.0, 1e-9, 1e5, 1e20, 1e300, math.nan, math.inf, 10**30, 2**1024 - 1, "", "none",
+    "end", [], {}, [[]], [0, 0], [0, 0, 0], [[0, 0]], [[0, 0], [0, 0]], [[0, 0.1], [1, 0.1]], [[1, 0.1], [0, 0.1]],
+    {"": 1}, {"a": {"b": 1}}, [0] * 2000, "table", "lane", "comb", "next", "nowhere", "table.end", "block.out",
+    "block.in", "block_exit", "m1", "z1", "gap", "length", "left", "right", "33 mm", "-33 mm", "90 deg", "-90", -90,
+    360, "24 000 /h", "2 m/s", "5 kN/m", "1e400 m", "nan", "33 mn", "gap/2", "-gap/2", "length/0", "gap/(gap-gap)",
     "length - 3*gap", "length * length", "1/gap", "(" * 150, "-" * 150 + "gap", "gap^2", "1e999*" * 30 + "1",
     "length deg", "\x00", "\u2009", "\ud7ff", "x" * 5000, "cell.yaml", "scene.yaml", "../secret",
 )  # fmt: skip
@@ -180,7 +181,7 @@ def _change(draw: Rng, data: Data) -> None:
             for part in _one(draw, list(_paths(data))):
                 other = other[part]
             holder[key] = copy.deepcopy(other)
-        case "scaled" if isinstance(holder[key], (int, float)):
+        case "scaled" if is_finite(holder[key]):
             holder[key] *= _one(draw, [-1, 0, 1e-6, 0.5, 2, 1e3, 1e9])
         case "text" if isinstance(holder[key], str):
             holder[key] = _mutated(draw, holder[key])

@@ -38,7 +38,7 @@ from scenes import (
     with_bends,
 )
 
-from conveyor_sim.accuracy.displacement import displace
+from conveyor_sim.accuracy.trajectory import displace
 from conveyor_sim.engine.arrays.world import World
 from conveyor_sim.errors import CheckpointError
 from conveyor_sim.physics.state.checkpoint import FORMAT, to_bytes, versions

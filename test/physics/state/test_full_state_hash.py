@@ -14,7 +14,7 @@ from line.machines.test_station import LOADED, stationed
 from physics.state.test_checkpoint import INTEGRATORS, queue, run
 from scenes import SPRINGS_AND_RINGS, line, scene
 
-from conveyor_sim.physics.state.full_state_hash import MEMORY, full_state_hash
+from conveyor_sim.physics.state.hashes import MEMORY, full_state_hash
 from conveyor_sim.physics.state.world_arrays import FIXED, LIMITED, OBSERVERS, SCRATCH, changing_arrays
 from conveyor_sim.scene import Scene
 from conveyor_sim.scene.limits import Limits

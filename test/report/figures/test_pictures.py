@@ -7,7 +7,7 @@ from bag.test_hands import INPUTS, play
 
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.report.figures import style
-from conveyor_sim.report.figures.pictures import figures_of
+from conveyor_sim.report.figures.draw import figures_of
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 

@@ -12,9 +12,13 @@ from matplotlib.figure import Figure
 from conveyor_sim.columns.counters import CounterColumns
 from conveyor_sim.line.machines.efficiency import CATEGORIES
 from conveyor_sim.report.figures import style
-from conveyor_sim.report.figures.line_efficiency import efficiency_figure
-from conveyor_sim.report.figures.state_bars import COLOURS, state_bars_figure
-from conveyor_sim.report.figures.stop_reasons import MOST, stop_reasons_figure
+from conveyor_sim.report.figures.production import (
+    COLOURS,
+    MOST,
+    efficiency_figure,
+    state_bars_figure,
+    stop_reasons_figure,
+)
 from conveyor_sim.report.periods import Period, longest_stops, shares, stop_reasons
 
 FILLER = [

@@ -41,10 +41,10 @@ class ElasticLaw:
 
 @dataclass(frozen=True)
 class DampingLaw:
-    """A force against the velocity, of one of two kinds.
+    """A force against the velocity: along the normal, or isotropic.
 
-    One along the normal is added to the elastic force, and the sum never pulls. An isotropic one acts along the tangent
-    as well, and may pull.
+    A damping force along the normal is added to the elastic force, and the sum never pulls. An isotropic one also acts
+    along the tangent, and may pull.
     """
 
     name: str
@@ -72,30 +72,31 @@ class DampingLaw:
     The overlap is not negative; at 0 there is no force.
     """
     exponent: float
-    """Power of the overlap with which it grows from first touch; 0: it starts with a jump, 1: like the elastic force.
-    """
+    """Exponent of the overlap in the force at first touch; 0: the force jumps, 1: it grows like the elastic force."""
     coefficient: Callable[[float, float, float, float], float]
     """Coefficient from a restitution, its impact speed (m/s), the elastic coefficient and the reduced mass (kg)."""
     rebound: Callable[[str, float, float, float, float], float | str | None]
-    """Restitution of an impact; None if it has no closed form; a text that states why there is none.
+    """Restitution of an impact; None if it has no closed form; a text with the reason if there is no rebound.
 
-    Arguments: the name of the elastic law, the elastic coefficient, its own, the reduced mass (kg) and a speed (m/s).
+    Arguments: name of the elastic law, elastic and damping coefficient, reduced mass (kg) and speed (m/s).
     """
     order: Callable[[float], float]
-    """Order in dt of an impact's error, from the integrator's order for smooth forces."""
+    """Order of convergence of an impact, as a function of the integrator's order for smooth forces."""
     stiffness_power: Callable[[str], float]
-    """Power of the stiffness that scales it at constant restitution, by the name of the elastic law."""
+    """Exponent of the stiffness in the coefficient at constant restitution, by the name of the elastic law."""
     rate: str = "c"
     """Equivalent dashpot, kg/s, as a formula."""
     rate_at: str = ""
-    """Point of an impact at which that is largest, in words; empty for a constant."""
+    """Point of an impact at which `rate` is largest, in words; empty for a constant."""
     ratio: Callable[[float, float, float, float], float] | None = None
-    """Damping ratio of its impact, or of the equivalent linear one; None: its order is always that of smooth forces.
+    """Damping ratio of an impact, or of the equivalent linear impact; None: not defined for this law.
 
-    Arguments: the elastic coefficient, its own, the reduced mass (kg) and the speed (m/s).
+    Arguments: elastic and damping coefficient, reduced mass (kg) and speed (m/s).
     """
     applies: Callable[[str, bool], bool] = lambda elastic, by_restitution: True
-    """True if a contact that chooses the name gets this law, by the elastic law's name and the choice by restitution.
+    """True if a contact that names `chosen_as` gets this law.
+
+    Arguments: name of the elastic law; True if the contact states a restitution, not a coefficient.
     """
     isotropic: bool = False
 

@@ -16,7 +16,8 @@ def clamped_restitution(zeta: float) -> float:
     """Return e of a linear spring and dashpot that never pull: the contact ends when its force does.
 
     The force vanishes at the angle 2 acos(zeta) of the damped oscillation (Schwager and Poeschel, Granular Matter 9,
-    2007), where e = exp(-2 zeta acos(zeta) / sqrt(1 - zeta^2)); beyond critical damping acosh and zeta^2 - 1.
+    2007), where e = exp(-2 zeta acos(zeta) / sqrt(1 - zeta^2)). Above critical damping, acosh and zeta^2 - 1 replace
+    acos and 1 - zeta^2.
     """
     if abs(zeta - 1.0) < 1e-9:
         return math.exp(-2.0)

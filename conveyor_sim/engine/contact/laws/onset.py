@@ -60,7 +60,7 @@ ONSET = DampingLaw(
     exponent=1.0,
     coefficient=lambda e, speed, stiffness, reduced_mass: onset_damping(e, speed),
     rebound=lambda elastic, stiffness, c, reduced_mass, speed: onset_restitution(c * speed),
-    # Semi-implicit Euler's first-order error, dt/2 (da/dv) a, is that of another elastic law, which has the same e.
+    # The first-order error of semi-implicit Euler acts like another elastic law, and e does not depend on that law.
     order=lambda smooth: max(2.0, smooth),
     stiffness_power=lambda elastic: 0.0,
     rate="lambda N",

@@ -18,8 +18,8 @@ def force(c: float, elastic: float, depth: float, closing: float) -> float:
 def tsuji_damping(restitution: float, stiffness: float, reduced_mass: float) -> float:
     """Return c of N = max(0, k delta^1.5 + c delta^0.25 v), in kg/(s m^0.25), from k in N/m^1.5 and m_r in kg.
 
-    With x = 0.8 delta^1.25 and time in units of delta^0.25 dt, it is the linear contact of stiffness 1.25 k, with the
-    same speeds and the same end (Antypov and Elliott, EPL 94, 2011): e is the clamped one, at any speed.
+    With x = 0.8 delta^1.25 and a time T with dT = delta^0.25 dt, it is a linear contact of stiffness 1.25 k, with the
+    same speeds and the same end (Antypov and Elliott, EPL 94, 2011). So e is that of the clamped dashpot, at any speed.
     """
     return normal_damping(restitution, 1.25 * stiffness, reduced_mass)
 

@@ -1,8 +1,8 @@
 """Viscoelastic spheres: a Hertz contact whose restitution falls with the speed of impact, as on glass.
 
 N = max(0, k delta^1.5 + c sqrt(delta) v_n), c in kg/(s m^0.5) (Kuwabara and Kono 1987, Brilliantov et al. 1996). With
-overlaps in units of (m_r v^2 / k)^0.4 and time in those over v, an impact has one number, a = c v^0.2 m_r^-0.4 k^-0.6.
-At low speeds 1 - e = 1.15344 a (Schwager and Poeschel 1998), so it falls as v^0.2.
+overlaps in units of L = (m_r v^2 / k)^0.4 and time in units of L / v, an impact has one dimensionless parameter,
+a = c v^0.2 m_r^-0.4 k^-0.6. At low speeds 1 - e = 1.15344 a (Schwager and Poeschel 1998), so 1 - e grows as v^0.2.
 """
 
 import math
@@ -12,10 +12,10 @@ from conveyor_sim.engine.contact.laws.bisection import root
 from conveyor_sim.engine.contact.laws.declaration import DampingLaw
 
 FIRST_ORDER = 1.15344
-"""(1 - e) / a at low speeds; e is never lower than that."""
+"""Limit of (1 - e) / a at low speeds; e is at least 1 - FIRST_ORDER a at any speed."""
 
 CREEPING = 1e5
-"""From this a on the contact only creeps back, and e is 1.5^(2/3) a^(-5/3) to within 1e-7 of it."""
+"""From this a on the contact only creeps back, and e is 1.5^(2/3) a^(-5/3) with a relative error of 1e-7."""
 
 STEP = 0.01
 """Step of `restitution_at`, which leaves an error of 1e-8."""
@@ -34,8 +34,8 @@ def strength(stiffness: float, c: float, reduced_mass: float, speed: float) -> f
 def restitution_at(a: float) -> float:
     """Return e of an impact that ends when its force does, because contacts never pull (Schwager and Poeschel 2008).
 
-    With q the root of the overlap, and time in units of 2 q dt, q' = v, v' = -2 q^2 (q^2 + a v) from q = 0 and v = 1.
-    That is a polynomial, which the fourth-order Runge-Kutta method follows in full. No power of a has a closed form.
+    q is the root of the overlap, and T a time with dt = 2 q dT. Then q' = v, v' = -2 q^2 (q^2 + a v), from q = 0 and
+    v = 1. The right-hand side is a polynomial, so the Runge-Kutta method has its full order 4.
     """
     if a > CREEPING:
         return math.pow(1.5, 2.0 / 3.0) * math.pow(a, -5.0 / 3.0)

@@ -29,7 +29,7 @@ from scenes import (
     with_bends,
 )
 
-from conveyor_sim.accuracy.displacement import displace
+from conveyor_sim.accuracy.trajectory import displace
 from conveyor_sim.columns.events import GuardEvent
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.physics.stepping.guard.chatter import EVERY

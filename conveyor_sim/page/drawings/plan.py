@@ -9,8 +9,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from conveyor_sim.drawings.pieces import DrawnPiece, arc
-from conveyor_sim.scene.geometry import ArcPiece, BeltShape, RailShape, belt_shapes, rail_shapes
+from conveyor_sim.page.drawings.pieces import DrawnPiece, arc, reversed_curve
+from conveyor_sim.scene.geometry import ArcPiece, BeltShape, RailShape, rail_shapes, surface_shapes
 from conveyor_sim.scene.layout.plan import ConveyorPlan
 from conveyor_sim.scene.layout.routes import Bend
 from conveyor_sim.scene.marks import marks_of
@@ -22,6 +22,7 @@ from conveyor_sim.scene.types import XY
 LAYERS: dict[str, tuple[str, int]] = {
     "CONVEYORS": ("#98a4b0", 8),
     "BELTS": ("#98a4b0", 8),
+    "PLATES": ("#cbd2d9", 9),
     "RAILS": ("#111827", 7),
     "GATES": ("#a3447f", 6),
     "PUSHERS": ("#a3447f", 6),
@@ -86,7 +87,9 @@ def _belts(scene: Scene) -> Iterator[DrawnShape]:
     conveyors = scene.layout.conveyors if scene.layout is not None else {}
     laid_out = {belt for conveyor in conveyors.values() for belt in (*conveyor.belts, *conveyor.surfaces)}
     yield from (_conveyor(conveyor) for conveyor in conveyors.values())
-    yield from (_belt(shape) for shape in belt_shapes(scene) if shape.name not in laid_out)
+    for shape in surface_shapes(scene):
+        if shape.name not in laid_out:
+            yield _belt(shape, "PLATES" if shape.belt is None else "BELTS")
 
 
 def _conveyor(conveyor: ConveyorPlan) -> DrawnShape:
@@ -101,14 +104,15 @@ def _conveyor(conveyor: ConveyorPlan) -> DrawnShape:
     return DrawnShape("CONVEYORS", conveyor.name, tuple(pieces), left - right)
 
 
-def _belt(shape: BeltShape) -> DrawnShape:
+def _belt(shape: BeltShape, layer: str) -> DrawnShape:
     if shape.kind == "straight":
         cos, sin = math.cos(shape.angle), math.sin(shape.angle)
         x, y = shape.corner[0] - sin * shape.width / 2, shape.corner[1] + cos * shape.width / 2
-        pieces = [DrawnPiece((x, y), (x + shape.length * cos, y + shape.length * sin))]
-        return DrawnShape("BELTS", shape.name, tuple(pieces), shape.width)
+        straight = [DrawnPiece((x, y), (x + shape.length * cos, y + shape.length * sin))]
+        return DrawnShape(layer, shape.name, tuple(straight), shape.width)
     axis = ArcPiece(shape.centre, shape.centre_radius, shape.start_angle, shape.span)
-    return DrawnShape("BELTS", shape.name, tuple(_arc(axis)), shape.width, shape.span >= 2 * math.pi - 1e-12)
+    pieces = reversed_curve(_arc(axis)) if shape.clockwise else tuple(_arc(axis))
+    return DrawnShape(layer, shape.name, pieces, shape.width, shape.span >= 2 * math.pi - 1e-12)
 
 
 def _arc(piece: ArcPiece) -> list[DrawnPiece]:

@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
-from conveyor_sim.drawings import dxf_file, entities
-from conveyor_sim.drawings.entities import read_plan
 from conveyor_sim.errors import ConveyorError
+from conveyor_sim.page.drawings import dxf_file, entities
+from conveyor_sim.page.drawings.entities import read_plan
 
 ezdxf = pytest.importorskip("ezdxf", reason="ezdxf is not installed: pip install conveyor-sim[cad]")
 

@@ -7,6 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
+from numpy.typing import NDArray
+
 from conveyor_sim.scene.types import XY
 
 JOIN = 1.5e-4
@@ -92,6 +95,22 @@ def nearest(pieces: Sequence[DrawnPiece], point: XY) -> tuple[float, float]:
             best = away, before + station
         before += piece.length
     return best
+
+
+def box_of(pieces: Sequence[DrawnPiece]) -> tuple[float, float, float, float]:
+    """Return least x and y, and greatest, of a box that holds a curve."""
+    points = [at for piece in pieces for at in (piece.start, piece.end)]
+    reach = max((2.0 * piece.radius for piece in pieces if piece.bulge), default=0.0)
+    xs, ys = [x for x, _ in points], [y for _, y in points]
+    return min(xs) - reach, min(ys) - reach, max(xs) + reach, max(ys) + reach
+
+
+def within(boxes: NDArray[np.float64], at: XY, reach: float) -> list[int]:
+    """Return the indices of the boxes (n, 4) that a point lies in, or at most `reach` (m) beside."""
+    (x, y), (x0, y0, x1, y1) = at, boxes.T
+    inside = (x >= x0 - reach) & (x <= x1 + reach) & (y >= y0 - reach) & (y <= y1 + reach)
+    indices: list[int] = np.flatnonzero(inside).tolist()
+    return indices
 
 
 def reversed_curve(pieces: Sequence[DrawnPiece]) -> tuple[DrawnPiece, ...]:

@@ -86,7 +86,7 @@ def delivered(scene: Scene) -> int:
 
 
 def test_drawing_a_scene_without_ezdxf_or_format(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("conveyor_sim.drawings.dxf_file.find_spec", lambda name: None)
+    monkeypatch.setattr("conveyor_sim.page.drawings.dxf_file.find_spec", lambda name: None)
     for arguments in (["draw", "funnel", "--dxf", tmp_path / "a.dxf"], ["import", PLANS / "freecad.dxf"]):
         (tmp_path / "map.yaml").write_text(MAP)
         more = ["--map", tmp_path / "map.yaml", "-o", tmp_path / "x.yaml"] if arguments[0] == "import" else []

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
-from conveyor_sim.drawings.entities import EntityRef, Stroke
-from conveyor_sim.drawings.pieces import JOIN, SMOOTH, DrawnPiece, corner, reversed_curve
+from conveyor_sim.page.drawings.entities import EntityRef, Stroke
+from conveyor_sim.page.drawings.pieces import JOIN, SMOOTH, DrawnPiece, corner, reversed_curve
 from conveyor_sim.scene.types import XY
 
 End = tuple[int, bool]
@@ -55,16 +55,28 @@ def _partners(strokes: Sequence[Stroke], smooth: bool) -> dict[End, End]:
     cells: dict[tuple[int, int], list[End]] = defaultdict(list)
     ends = [(number, last) for number, stroke in enumerate(strokes) if not stroke.is_closed for last in (False, True)]
     for end in ends:
-        x, y = _point(strokes, end)
-        cells[math.floor(x / JOIN), math.floor(y / JOIN)].append(end)
-    near: dict[End, list[End]] = {}
-    for end in ends:
-        x, y = _point(strokes, end)
-        i, j = math.floor(x / JOIN), math.floor(y / JOIN)
-        around = (other for di in (-1, 0, 1) for dj in (-1, 0, 1) for other in cells.get((i + di, j + dj), ()))
-        near[end] = [other for other in around if other != end and math.dist((x, y), _point(strokes, other)) <= JOIN]
+        cells[_cell(_point(strokes, end))].append(end)
+    near = {end: _neighbours(strokes, end, cells) for end in ends}
     pairs = {end: others[0] for end, others in near.items() if len(others) == 1 and near[others[0]] == [end]}
     return {end: other for end, other in pairs.items() if _fit(strokes, end, other, smooth)}
+
+
+def _cell(at: XY) -> tuple[int, int]:
+    return math.floor(at[0] / JOIN), math.floor(at[1] / JOIN)
+
+
+def _neighbours(strokes: Sequence[Stroke], end: End, cells: Mapping[tuple[int, int], list[End]]) -> list[End]:
+    """Return the other ends within JOIN; two of them if there are more, because these are not joined."""
+    at = _point(strokes, end)
+    i, j = _cell(at)
+    found: list[End] = []
+    for cell in ((i + di, j + dj) for di in (-1, 0, 1) for dj in (-1, 0, 1)):
+        for other in cells.get(cell, ()):
+            if other != end and math.dist(at, _point(strokes, other)) <= JOIN:
+                found.append(other)
+                if len(found) > 1:
+                    return found
+    return found
 
 
 def _fit(strokes: Sequence[Stroke], end: End, other: End, smooth: bool) -> bool:

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from conveyor_sim.drawings.numbers import degrees, number
-from conveyor_sim.drawings.pieces import SMOOTH, DrawnPiece, corner, turned_by
+from conveyor_sim.page.drawings.numbers import degrees, number
+from conveyor_sim.page.drawings.pieces import SMOOTH, DrawnPiece, corner, turned_by
 from conveyor_sim.scene.types import TOUCH, XY
 
 _ROUND = 1e-9  # m, rad

@@ -9,10 +9,11 @@ from typing import Any
 
 import pytest
 
-from conveyor_sim.drawings.entities import read_plan
-from conveyor_sim.drawings.importing import Imported, imported
-from conveyor_sim.drawings.layer_map import read_map
 from conveyor_sim.errors import ConveyorError
+from conveyor_sim.page.drawings import importing
+from conveyor_sim.page.drawings.entities import read_plan
+from conveyor_sim.page.drawings.importing import Imported, imported
+from conveyor_sim.page.drawings.layer_map import read_map
 
 ezdxf = pytest.importorskip("ezdxf", reason="ezdxf is not installed: pip install conveyor-sim[cad]")
 
@@ -279,3 +280,16 @@ def test_invalid_maps(run: Import, text: str, expected: str) -> None:
 
     with pytest.raises(ConveyorError, match=expected.replace("[", r"\[").replace("]", r"\]")):
         run(draw, text)
+
+
+@pytest.mark.parametrize("limit", ["_MOST_PARTS", "_MOST_TEXTS", "_MOST_PAIRS"])
+def test_plans_beyond_a_limit(run: Import, monkeypatch: pytest.MonkeyPatch, limit: str) -> None:
+    monkeypatch.setattr(importing, limit, 3)
+
+    def draw(_: Any, space: Any) -> None:
+        for number in range(4):
+            space.add_line((0, number), (1000, number), **on("AXES"))
+            space.add_text(f"t{number}", **on("AXES", insert=(0, number)))
+
+    with pytest.raises(ConveyorError, match=r"plan\.dxf: "):
+        run(draw, AXES)

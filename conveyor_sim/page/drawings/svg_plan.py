@@ -8,8 +8,8 @@ from itertools import groupby
 from typing import Final
 from xml.sax.saxutils import escape, quoteattr
 
-from conveyor_sim.drawings.pieces import DrawnPiece
-from conveyor_sim.drawings.plan import LAYERS, DrawnShape
+from conveyor_sim.page.drawings.pieces import DrawnPiece
+from conveyor_sim.page.drawings.plan import LAYERS, DrawnShape
 from conveyor_sim.scene.types import XY
 
 _MM: Final = 1000.0

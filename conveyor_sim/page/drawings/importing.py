@@ -10,17 +10,23 @@ from dataclasses import dataclass, field
 from itertools import count, pairwise
 from typing import Any, Final
 
-from conveyor_sim.drawings.chains import Chain, joined
-from conveyor_sim.drawings.conveyor_path import path_of
-from conveyor_sim.drawings.entities import DrawnPlan, DrawnText, EntityRef, Stroke, Symbol
-from conveyor_sim.drawings.layer_map import LayerMap, Rule
-from conveyor_sim.drawings.numbers import degrees, number, point
-from conveyor_sim.drawings.pieces import DrawnPiece, length_of, nearest
+import numpy as np
+
 from conveyor_sim.errors import ConveyorError
+from conveyor_sim.page.drawings.chains import Chain, joined
+from conveyor_sim.page.drawings.conveyor_path import path_of
+from conveyor_sim.page.drawings.entities import DrawnPlan, DrawnText, EntityRef, Stroke, Symbol
+from conveyor_sim.page.drawings.layer_map import LayerMap, Rule
+from conveyor_sim.page.drawings.numbers import degrees, number, point
+from conveyor_sim.page.drawings.pieces import DrawnPiece, box_of, length_of, nearest, within
 from conveyor_sim.scene.quantities import to_si
 from conveyor_sim.scene.types import TOUCH, XY
 
 _NAMED_WITHIN: Final = 0.5  # m; a text names the nearest curve of its layer within this distance
+_MOST_TEXTS: Final = 2000  # of a layer
+_MOST_PARTS: Final = 20_000
+_MOST_PAIRS: Final = 1_000_000
+"""Largest number of distances that are computed; each takes some microseconds."""
 _BESIDE: Final = 0.1  # m; symbols such as photo-eyes stand beside the conveyor
 _EXACT: Final = 1e-6  # m
 _NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
@@ -57,13 +63,21 @@ class _Importer:
         self._plan, self._rules = plan, rules
         self._result = Imported(skipped=list(plan.skipped))
         self._axes: list[_Axis] = []
+        self._boxes, self._reach = np.empty((0, 4)), 0.0
+        self._pairs = 0
         self._taken: dict[str, set[str]] = defaultdict(set)
+        self._numbers: dict[tuple[str, str], Iterator[int]] = defaultdict(lambda: count(1))
         self._strokes: dict[int, list[Stroke]] = defaultdict(list)  # by the number of their rule
         self._symbols: dict[int, list[Symbol]] = defaultdict(list)
 
     def run(self) -> Imported:
         """Return the parts: conveyors first, because devices lie along them."""
         self._sort()
+        count = sum(map(len, self._strokes.values())) + sum(map(len, self._symbols.values()))
+        if count > _MOST_PARTS:
+            raise ConveyorError(
+                f"{self._plan.file}: {count} entities on the layers of the map, expected at most {_MOST_PARTS}"
+            )
         numbered = list(enumerate(self._rules.rules))
         for number_, rule in sorted(numbered, key=lambda entry: entry[1].kind not in ("conveyor", "belt")):
             self._parts(rule, self._strokes[number_], self._symbols[number_])
@@ -94,7 +108,33 @@ class _Importer:
             for stroke in strokes:
                 layers[stroke.source.layer].append(stroke)
         for layer, strokes in layers.items():
-            _give_names(strokes, texts[layer])
+            if len(texts[layer]) > _MOST_TEXTS:
+                problem = f"{len(texts[layer])} texts on layer {layer}, expected at most {_MOST_TEXTS}"
+                raise ConveyorError(f"{self._plan.file}: {problem}")
+            self._give_names(strokes, texts[layer])
+
+    def _give_names(self, strokes: list[Stroke], texts: list[DrawnText]) -> None:
+        """Name strokes by the texts of their layer: each text the nearest stroke that has no name yet."""
+        boxes = np.array([box_of(stroke.pieces) for stroke in strokes]).reshape(-1, 4) if texts else np.empty((0, 4))
+        pairs = []
+        for t, text in enumerate(texts):
+            for s in self._counted(within(boxes, text.position, _NAMED_WITHIN)):
+                away, station = nearest(strokes[s].pieces, text.position)
+                if away <= _NAMED_WITHIN and not strokes[s].name:
+                    from_middle = abs(station - length_of(strokes[s].pieces) / 2)
+                    pairs.append((round(away, 6), round(from_middle, 6), t, s))
+        used: set[int] = set()
+        for _, _, t, s in sorted(pairs):
+            if t not in used and not strokes[s].name:
+                strokes[s].name = texts[t].text.strip()
+                used.add(t)
+
+    def _counted(self, indices: list[int]) -> list[int]:
+        """Return indices of curves whose distance is computed. Raise ConveyorError if that takes too long."""
+        self._pairs += len(indices)
+        if self._pairs > _MOST_PAIRS:
+            raise ConveyorError(f"{self._plan.file}: too many curves lie beside each other, expected a plan with fewer")
+        return indices
 
     def _parts(self, rule: Rule, strokes: list[Stroke], symbols: list[Symbol]) -> None:
         shape = rule.target.shape
@@ -163,7 +203,7 @@ class _Importer:
         The beam of a photo-eye has no direction; the other lines have one, which must be that of travel.
         """
         middle = (line.start[0] + line.end[0]) / 2, (line.start[1] + line.end[1]) / 2
-        for axis in self._axes if rule.kind in ("photo_eye", "counter", "inspection") else ():
+        for axis in self._axes_near(middle) if rule.kind in ("photo_eye", "counter", "inspection") else ():
             away, station = nearest(axis.pieces, middle)
             over = (line.chord - axis.width) / 2
             if away > _EXACT or over < -_EXACT or not 0.0 < station < length_of(axis.pieces):
@@ -193,8 +233,8 @@ class _Importer:
             self._skip(symbol.source, f"expected a curve for a {rule.kind}")
             return
         named = symbol.attributes.get(rule.name, "") if rule.name else next(iter(symbol.attributes.values()), "")
-        nearby = [(*nearest(axis.pieces, symbol.position), axis) for axis in self._axes]
-        nearby = [entry for entry in nearby if entry[0] <= entry[2].width / 2 + _BESIDE]
+        close = [(*nearest(axis.pieces, symbol.position), axis) for axis in self._axes_near(symbol.position)]
+        nearby = [entry for entry in close if entry[0] <= entry[2].width / 2 + _BESIDE]
         if nearby:
             away, station, axis = min(nearby, key=lambda entry: entry[0] - entry[2].width / 2)
             fields: dict[str, Any] = {"along": axis.name, "at": number(station)}
@@ -219,6 +259,13 @@ class _Importer:
             else:
                 self._add(rule, named, {"region": region})
 
+    def _axes_near(self, at: XY) -> list[_Axis]:
+        """Return the conveyors that may reach to a point, or beside it."""
+        if len(self._boxes) != len(self._axes):
+            self._boxes = np.array([box_of(axis.pieces) for axis in self._axes]).reshape(-1, 4)
+            self._reach = max(axis.width for axis in self._axes) / 2 + _BESIDE
+        return [self._axes[index] for index in self._counted(within(self._boxes, at, self._reach))]
+
     def _add(self, rule: Rule, wished: str, fields: dict[str, Any]) -> str:
         name = self._name(rule, wished)
         self._result.sections[rule.target.section][name] = {**rule.target.fields, **fields, **rule.fields}
@@ -227,17 +274,15 @@ class _Importer:
     def _name(self, rule: Rule, wished: str) -> str:
         """Return a name that the section does not have yet, made of a text of the plan."""
         # Conveyors and belts share their names.
-        taken = self._taken["belts" if rule.kind == "conveyor" else rule.target.section]
+        section = "belts" if rule.kind == "conveyor" else rule.target.section
+        taken = self._taken[section]
         base = re.sub(r"[^A-Za-z0-9_]+", "_", wished.strip()).strip("_")[:_LONGEST_NAME]
-        if not base:
-            name = next(name for number_ in count(1) if (name := f"{rule.kind}_{number_}") not in taken)
-        else:
-            base = base if _NAME.fullmatch(base) else f"{rule.kind}_{base}"
-            name = next(
-                name for number_ in count(1) if (name := f"{base}_{number_}" if number_ > 1 else base) not in taken
-            )
-            if name != wished.strip():
-                self._note(f"{wished.strip()!r} is named {name}")
+        stem = base if not base or _NAME.fullmatch(base) else f"{rule.kind}_{base}"
+        numbers = self._numbers[section, stem or rule.kind]
+        names = (f"{stem or rule.kind}_{number_}" if number_ > 1 or not stem else stem for number_ in numbers)
+        name = next(name for name in names if name not in taken)
+        if stem and name != wished.strip():
+            self._note(f"{wished.strip()!r} is named {name}")
         taken.add(name)
         return name
 
@@ -246,22 +291,6 @@ class _Importer:
 
     def _note(self, text: str) -> None:
         self._result.notes.append(text)
-
-
-def _give_names(strokes: list[Stroke], texts: list[DrawnText]) -> None:
-    """Name strokes by the texts of their layer: each text the nearest stroke that has no name yet."""
-    pairs = []
-    for t, text in enumerate(texts):
-        for s, stroke in enumerate(strokes):
-            away, station = nearest(stroke.pieces, text.position)
-            if away <= _NAMED_WITHIN and not stroke.name:
-                from_middle = abs(station - length_of(stroke.pieces) / 2)
-                pairs.append((round(away, 6), round(from_middle, 6), t, s))
-    used: set[int] = set()
-    for _, _, t, s in sorted(pairs):
-        if t not in used and not strokes[s].name:
-            strokes[s].name = texts[t].text.strip()
-            used.add(t)
 
 
 def _width(rule: Rule, drawn: Chain | Stroke) -> float | None:

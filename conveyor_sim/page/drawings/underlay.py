@@ -9,10 +9,10 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
-from conveyor_sim.drawings.dxf_file import metres_per_unit, parse_dxf, require_ezdxf
-from conveyor_sim.drawings.entities import DrawnPlan, Stroke, plan_in
-from conveyor_sim.drawings.numbers import point
 from conveyor_sim.errors import ConveyorError
+from conveyor_sim.page.drawings.dxf_file import metres_per_unit, parse_dxf, require_ezdxf
+from conveyor_sim.page.drawings.entities import DrawnPlan, Stroke, plan_in
+from conveyor_sim.page.drawings.numbers import point
 from conveyor_sim.scene import Scene
 from conveyor_sim.scene.types import XY
 from conveyor_sim.scene.underlay import underlay_bytes

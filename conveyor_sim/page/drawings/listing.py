@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 
-from conveyor_sim.drawings.entities import EntityRef
+from conveyor_sim.page.drawings.entities import EntityRef
 from conveyor_sim.support.printable import printable
 
 _HANDLES = 8

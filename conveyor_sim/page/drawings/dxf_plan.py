@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from io import StringIO
 from typing import Final
 
-from conveyor_sim.drawings.dxf_file import require_ezdxf
-from conveyor_sim.drawings.plan import LAYERS, DrawnShape
+from conveyor_sim.page.drawings.dxf_file import require_ezdxf
+from conveyor_sim.page.drawings.plan import LAYERS, DrawnShape
 from conveyor_sim.scene.types import XY
 
 _MM: Final = 1000.0

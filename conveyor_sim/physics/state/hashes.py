@@ -1,14 +1,19 @@
-"""Hash of everything that decides how a run continues: the content of a checkpoint without observers.
+"""Hashes of a state at a tick: of its visible part, and of everything that decides how a run continues.
 
-The list is that of the checkpoint (`changing_arrays` and the memory beside them), so new state is covered unless it is
-named here. `test/physics/state/test_full_state_hash.py` changes each of its parts.
+The latter is the content of a checkpoint without observers. Its list is that of the checkpoint (`changing_arrays` and
+the memory beside them), so new state is covered unless it is named here. `test/physics/state/test_full_state_hash.py`
+changes each of its parts.
 """
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from conveyor_sim.physics.state.state import State
 from conveyor_sim.physics.state.world_arrays import FIXED, LIMITED, OBSERVERS, SCRATCH, Arrays
 from conveyor_sim.scene.limits import Limits
 
@@ -59,3 +64,24 @@ def _memory(memory: Mapping[str, Any], decides: bool) -> str:
     if not decides:
         kept["held"] = [(bottle, tuple(one)[:2]) for bottle, one in kept["held"]]
     return json.dumps(kept)
+
+
+COLUMNS = ("id", "type", "x", "y", "theta", "vx", "vy", "omega")
+"""Columns of the bottles on the line, ordered by id."""
+
+
+def state_hash(tick: int, columns: Iterable[NDArray[Any]], state: State) -> int:
+    """Return 64 bits over a tick, columns, tangential springs that are not slack, and positions and speeds of rails.
+
+    A Simulation passes COLUMNS, and setpoints and speeds of belts. Recordings contain this hash, so its definition must
+    not change. Other state also decides the next ticks, and only `full_state_hash` covers it: memories of devices and
+    random streams, waiting commands, bottles that machines hold, the next id, neighbour lists and contact laws. The
+    same holds for motion profiles and drives of moving rails, and for histories of impacts.
+    """
+    digest = hashlib.blake2b(np.int64(tick).tobytes(), digest_size=8)
+    for column in columns:
+        digest.update(column.tobytes())
+    digest.update(state.springs())
+    if (moving := state.world.moving) is not None:
+        digest.update(moving.position.tobytes() + moving.speed.tobytes())
+    return int.from_bytes(digest.digest(), "little")

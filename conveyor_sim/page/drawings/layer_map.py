@@ -37,6 +37,7 @@ class ImportTarget:
 TARGETS: Final[Mapping[str, ImportTarget]] = {
     "conveyor": ImportTarget("conveyors", "path", {}),
     "belt": ImportTarget("belts", "belt", {}),
+    "plate": ImportTarget("plates", "belt", {}),
     "rail": ImportTarget("rails", "rail", {}),
     "photo_eye": ImportTarget("photo_eyes", "line", {}),
     "counter": ImportTarget("counters", "line", {}),
@@ -87,6 +88,7 @@ class LayerMap:
 
     def __init__(self, rules: list[Rule]) -> None:
         self.rules = rules
+        self._known: dict[str, list[Rule]] = {}
 
     def of(self, layer: str, block: str = "") -> Rule | None:
         """Return the rule of an entity; None without one. block: name of its block; "": it is no block.
@@ -118,8 +120,11 @@ class LayerMap:
         return [rule.block for rule in self._of_layer(layer) if rule.block]
 
     def _of_layer(self, layer: str) -> list[Rule]:
-        exact = [rule for rule in self.rules if rule.layer.lower() == layer.lower()]
-        return exact or [rule for rule in self.rules if fnmatchcase(layer.lower(), rule.layer.lower())]
+        name = layer.lower()
+        if name not in self._known:
+            exact = [rule for rule in self.rules if rule.layer.lower() == name]
+            self._known[name] = exact or [rule for rule in self.rules if fnmatchcase(name, rule.layer.lower())]
+        return self._known[name]
 
 
 def read_map(path: Path) -> LayerMap:

@@ -10,9 +10,9 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
 
-from conveyor_sim.drawings.dxf_file import MOST_ENTITIES, metres_per_unit, open_dxf
-from conveyor_sim.drawings.pieces import DrawnPiece, arc
 from conveyor_sim.errors import ConveyorError
+from conveyor_sim.page.drawings.dxf_file import MOST_ENTITIES, metres_per_unit, open_dxf
+from conveyor_sim.page.drawings.pieces import DrawnPiece, arc
 from conveyor_sim.scene.types import COORDINATE_LIMIT, TOUCH, XY
 from conveyor_sim.support.files import FileError
 
@@ -76,6 +76,8 @@ class DrawnPlan:
     """Content of a plan."""
 
     unit: str
+    file: str = ""
+    """Name of the file, for errors."""
     strokes: list[Stroke] = field(default_factory=list)
     symbols: list[Symbol] = field(default_factory=list)
     texts: list[DrawnText] = field(default_factory=list)
@@ -100,6 +102,7 @@ def read_plan(
 
 def plan_in(path: Path, document: Any, scale: float, plan: DrawnPlan, is_symbol: IsSymbol) -> DrawnPlan:
     """Return a plan with the content of the model space. scale: unit of the drawing in m. Raise ConveyorError."""
+    plan.file = str(path)
     reader = _Reader(path, document, scale, is_symbol, plan)
     try:
         for layout in document.blocks:
