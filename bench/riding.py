@@ -31,14 +31,8 @@ SCENES = (
 )
 LONG = "zoned_line, 290 bottles on 90 m"
 LONG_LINE: Mapping[str, Any] = {
-    "belts": {"zone6": {"length": 90.0}},
-    "rails": {
-        "left": {"to": [100.0, 0.045]},
-        "end": {"from": [100.0, 0.045], "to": [100.0, -0.045]},
-        "right": {"from": [100.0, -0.045]},
-    },
-    "machines": {"packer": {"region": [[99.9, -0.05], [100.0, -0.05], [100.0, 0.05], [99.9, 0.05]]}},
-    "bottles": [{"grid": {"type": "bottle", "origin": [10.5, 0.0], "rows": 1, "columns": 290, "pitch": 0.3}}],
+    "conveyors": {"zone6": {"path": [{"straight": 90.0}]}},
+    "bottles": [{"grid": {"type": "bottle", "along": "zone6", "at": 0.5, "rows": 1, "columns": 290, "pitch": 0.3}}],
 }
 SECONDS, QUICK_SECONDS = 20.0, 1.0
 """Simulated, from the start of the scene."""

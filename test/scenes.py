@@ -34,6 +34,11 @@ NO_FLOOR: dict[str, Any] = {"floor": "none"}
 PEAKS: dict[str, Any] = {"effects": {"peaks": "on"}}
 COMMON: dict[str, Any] = dict.fromkeys(["peaks", "rotation", "unequal_radii", "energy_ledger"], "on")
 """Effects of all hard cases; see `with_bends`."""
+SHARED_KERNELS: dict[str, Any] = {
+    **dict.fromkeys(("buffer_lane", "reject_line", "watched_eyes"), PEAKS),
+    "turntable": {"effects": COMMON},
+}
+"""Overrides of shipped scenes that change no bit, with which they share compiled kernels."""
 NO_OUTPUTS = dict.fromkeys(Scene.TOPICS, 0)
 
 

@@ -1,10 +1,9 @@
 """Every scene that is shipped or shown runs without the guard's remark, within the forces its prediction rests on."""
 
 from pathlib import Path
-from typing import Any
 
 import pytest
-from scenes import COMMON, SHIPPED, shipped_name
+from scenes import SHARED_KERNELS, SHIPPED, shipped_name
 
 from conveyor_sim.run.force_check import HARDER, PeakWatch, achieved
 from conveyor_sim.scene import load_scene
@@ -16,18 +15,13 @@ BEYOND = {"buffer_lane", "two_stations"}
 """Scenes that press harder than expected, and say why."""
 WORDS = "more than its predicted error rests on"
 """With which they say so."""
-MORE: dict[str, Any] = {
-    **{name: {"effects": {"peaks": "on"}} for name in ("buffer_lane", "reject_line", "watched_eyes")},
-    "turntable": {"effects": COMMON},
-}
-"""What is on besides, which changes no bit."""
 
 
 @pytest.mark.parametrize("path", SHIPPED, ids=shipped_name)
 def test_it_runs_as_its_prediction_expects(path: Path) -> None:
     name = shipped_name(path)
     # Effects as the scene has them, or more where other scenes have the same kernels with them.
-    scene = load_scene(path, MORE.get(name, {}))
+    scene = load_scene(path, SHARED_KERNELS.get(name, {}))
     simulation = Simulation(scene, threads=1)
     peaks = PeakWatch(simulation)
     for _ in range(round(min(SECONDS.get(name, scene.duration), scene.duration) / scene.tick)):

@@ -296,7 +296,7 @@ def _node(namespace: str, console: Console, drawn: bool) -> Iterator[NodeSource]
 
 
 def watch(serving: Serving, console: Console, greeting: Sequence[str]) -> None:
-    """Print the greeting, then the progress until a signal arrives. From then on, a signal ends serving cleanly."""
+    """Print the greeting, then the progress until a signal arrives (Ctrl-C, SIGTERM), which ends serving in order."""
     from conveyor_sim.support.stop_request import StopRequest
 
     with StopRequest() as stop:

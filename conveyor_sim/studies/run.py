@@ -238,11 +238,14 @@ def _sentence(error: BaseException) -> str:
     return printable(" ".join(f"{kind}{error}".split()) or kind, SENTENCE)
 
 
-def job_of(setup: Setup, given: Sequence[str], seed: int) -> Job:
-    """given: "name=value" for each parameter, as YAML. Raises StudyError for others than those of the study."""
+def job_of(setup: Setup, texts: Sequence[str], seed: int) -> Job:
+    """Return one run of a study. texts: "name=value" for each parameter, as YAML.
+
+    Raise StudyError unless they name the study's parameters.
+    """
     values: dict[str, Any] = {}
     wanted = list(setup.study.parameters)
-    for text in given:
+    for text in texts:
         name, sign, value = text.partition("=")
         if not sign or name not in wanted:
             raise StudyError(f"--set {text}: given, expected name=value of {listed(wanted)}")

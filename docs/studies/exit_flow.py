@@ -21,9 +21,9 @@ with while_importing():
 DURATION = 50.0  # s
 WINDOW = 5.0  # s
 LEFT = {
-    "23 deg": [[0, 1.2], [0.6, 1.2], [2.4, 0.445], [2.6, 0.445]],
-    "28 deg": [[0, 1.2], [1.0, 1.2], [2.4, 0.445], [2.6, 0.445]],
-    "37 deg": [[0, 1.2], [1.4, 1.2], [2.4, 0.445], [2.6, 0.445]],
+    "23 deg": [[0, 0.6], [0.6, 0.6], [2.4, -0.155]],
+    "28 deg": [[0, 0.6], [1.0, 0.6], [2.4, -0.155]],
+    "37 deg": [[0, 0.6], [1.4, 0.6], [2.4, -0.155]],
 }
 
 
@@ -59,8 +59,8 @@ def main() -> None:
         table.writerow(["left guide", "table m/s", "steps a tick", "integrator", *windows])
         for guide, speed, steps, method in track(cases(), "exit_flow"):
             changes = {
-                "rails": {"funnel_left": {"points": LEFT[guide]}},
-                "belts": {"table": {"speed": speed}},
+                "guides": {"funnel": {"left": LEFT[guide]}},
+                "conveyors": {"table": {"speed": speed}},
                 "accuracy": {"per_tick": steps, "integrator": method},
             }
             table.writerow([guide, speed, steps, method, *entries(changes)])

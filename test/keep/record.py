@@ -22,6 +22,7 @@ from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.resources import scene_path
 
 RECORD = Path(__file__).with_name("record.json")
+OLD = Path(__file__).parents[1] / "scene" / "layout" / "old"
 
 TIMES = {
     "paper_plant": (2.0, 3.0, 3.8),
@@ -45,6 +46,12 @@ SHIFT = 8.0
 """m. A scene moved by it rounds its positions otherwise, and more coarsely."""
 
 Instant = dict[str, Any]
+
+
+def recorded_path(name: str) -> Path:
+    """Return the file of a shipped scene as it was written for the record, which has indices of rails."""
+    old = OLD / f"{name}.yaml"
+    return old if old.exists() else scene_path(name)
 
 
 def as_recorded(scene: Scene) -> Scene:
@@ -99,7 +106,7 @@ def record() -> None:
     """Write record.json."""
     found: dict[str, Any] = {}
     for name, times in TIMES.items():
-        simulation = Simulation(load_scene(scene_path(name)))
+        simulation = Simulation(load_scene(recorded_path(name)))
         found[name] = {"dt": simulation.model.dt, "instants": instants(simulation, times)}
     RECORD.write_text(json.dumps(found, indent=1) + "\n")
 
@@ -108,7 +115,7 @@ def horizon() -> None:
     """Print how a nudge grows, and how far rounding alone takes a scene that was moved from itself."""
     print("scene, time: growth of a nudge | apart by rounding alone: m, m/s, rad/s, N")
     for name, times in TIMES.items():
-        raw = load_scene(scene_path(name)).model_dump(mode="json", by_alias=True, exclude_none=True)
+        raw = load_scene(recorded_path(name)).model_dump(mode="json", by_alias=True, exclude_none=True)
         here, nudged, moved = (_simulation(raw, change) for change in (_same, _nudge, _move))
         for time in times:
             for simulation in (here, nudged, moved):

@@ -12,12 +12,11 @@ import json
 from typing import Any
 
 import pytest
-from keep.record import RECORD, as_recorded, contact_forces, instants
+from keep.record import RECORD, as_recorded, contact_forces, instants, recorded_path
 
 from conveyor_sim.scene import load_scene
 from conveyor_sim.scene.accuracy import explicit
 from conveyor_sim.simulation import Simulation
-from conveyor_sim.support.resources import scene_path
 
 TOLERANCE = {"x": 2e-9, "y": 2e-9, "theta": 2e-8, "vx": 1e-7, "vy": 1e-7, "omega": 2e-7}
 """m, rad, m/s, rad/s"""
@@ -29,7 +28,7 @@ RECORDED: dict[str, Any] = json.loads(RECORD.read_text())
 @pytest.mark.parametrize("name", RECORDED)
 def test_a_shipped_scene_does_what_it_did(name: str) -> None:
     """In the steps of the record; which this version would choose: test/physics/timestep/test_presets.py."""
-    path, dt = scene_path(name), RECORDED[name]["dt"]
+    path, dt = recorded_path(name), RECORDED[name]["dt"]
     steps = round(load_scene(path).tick / dt)
     accuracy = explicit("semi_implicit_euler", steps)
     simulation = Simulation(as_recorded(load_scene(path, {"accuracy": accuracy})))

@@ -319,7 +319,7 @@ def test_what_the_plc_calls_bad_is_no_command(free: FreeRunning) -> None:
 @pytest.mark.parametrize("plc", ["opcua"], indirect=True)
 def test_a_float_at_a_limit_is_the_limit(plc: Plc) -> None:
     """A REAL of 0.6 is 0.60000002384 on its way; a Double of as much is beyond the limit."""
-    limits = {"belts": {"zone1": {"speed_limits": [0.0, 0.6]}}}
+    limits = {"conveyors": {"zone1": {"speed_limits": [0.0, 0.6]}}}
     plc.thread.run(plc.made.halt())
     with Scenario(LINE, overrides=limits) as plant, ServerThread() as thread:
         free = FreeRunning(plant, plc, thread)

@@ -174,7 +174,7 @@ def test_a_refused_command_of_the_controller_is_an_error(table: Scenario) -> Non
 
 
 def test_overrides_are_for_files() -> None:
-    assert Scenario(TABLE, {"belts": {"table": {"speed": 0.1}}}).signals["belts/table/speed"] == 0.1
+    assert Scenario(TABLE, {"conveyors": {"table": {"speed": 0.1}}}).signals["belts/table/speed"] == 0.1
     with pytest.raises(ValueError, match=stating("overrides", "loaded")):
         Scenario(load_scene(TABLE), {"duration": 1.0})
 

@@ -3,7 +3,7 @@
 Row s of a tableau gives the state of a step of h after s evaluations with accelerations a_j = F_j/m:
     v = v_0 + h sum_j weights[s, j] a_j
     r = r_0 + h times[s] v_0 + h^2 sum_j squared[s, j] a_j,   squared = weights @ weights
-The last row is the new state. The second line results from inserting the first into the method's sum over velocities. So
+The last row is the new state. The second line is the method's sum over velocities, with the first line substituted. So
 free flight is exact, and no velocities are stored. Each part works on bottles first to end; `slopes` is the World's.
 """
 

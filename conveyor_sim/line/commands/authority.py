@@ -38,14 +38,16 @@ MAY: Mapping[str, Right] = {
     DISOWN: Right(("controller",), "Releases ownership."),
     FORCE: Right((*PEOPLE, "test"), "Forces signals to values."),
     UNFORCE: Right((*PEOPLE, "test"), "Ends forcing of the named signals; of all if no names are given."),
-    "acknowledge": Right((*PEOPLE, "test"), "Acknowledges alarms, without names all of them."),
-    "reset": Right((*PEOPLE, "test"), "Clears latched alarms, without names all of them."),
+    "acknowledge": Right((*PEOPLE, "test"), "Acknowledges the named alarms; all if no names are given."),
+    "reset": Right((*PEOPLE, "test"), "Clears the named latched alarms; all if no names are given."),
     "shelve": Right((*PEOPLE, "test"), "Shelves alarms for a time in seconds (values), or once."),
-    "unshelve": Right((*PEOPLE, "test"), "Ends shelving of alarms, without names of all."),
+    "unshelve": Right((*PEOPLE, "test"), "Ends shelving of the named alarms; of all if no names are given."),
     "remove_from_service": Right(("engineer", "test"), "Takes alarms out of service."),
     "return_to_service": Right(("engineer", "test"), "Returns alarms to service."),
     "declare": Right(("controller", "test"), "Declares a controller's alarms."),
-    "reset_counters": Right(("controller", *PEOPLE, "test"), "Resets counters and times, without names of all."),
+    "reset_counters": Right(
+        ("controller", *PEOPLE, "test"), "Resets counters and times of the named devices; of all if no names are given."
+    ),
 }
 """Rights by operation. An operation that is not listed is forbidden."""
 

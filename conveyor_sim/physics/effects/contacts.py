@@ -160,16 +160,17 @@ HERTZ = Effect(
     absent="no contact with hertz_stiffness",
     needs="k by pair of materials",
     bounds=_stable("Hertz ", _hertz),
-    bound="those of linear at the tangent stiffness, pressed by an impact at v or by belts as in contact_friction; v "
-    "is the speed of the fastest belt or infeed, or that by which bottles differ at the start, 1 m/s if all rest",
+    bound="those of linear at the tangent stiffness, at the overlap of an impact at v or of the load of belts as in "
+    "contact_friction; v is the speed of the fastest belt or infeed, or the largest difference of initial velocities, "
+    "plus the speed of the fastest moving rail; 1 m/s if everything rests",
     shares=_peak(_hertz),
-    share="(w dt)^2 / 8, with w = sqrt(1.5 k delta^0.5 / m_r) at the deepest of an impact at v: a peak between two "
-    "steps",
+    share="(w dt)^2 / 8, with w = sqrt(1.5 k delta^0.5 / m_r) at the largest overlap of an impact at v: a peak between "
+    "two steps",
     can_force_off=False,
 )
 TABLE = Effect(
     name="table",
-    law="N from points (delta, N), straight between them and on beyond the last",
+    law="N from points (delta, N), linear between them, with the last slope continued",
     source="allowed for at (23)",
     called_for=_elastic("table", ""),
     absent="no contact with table",

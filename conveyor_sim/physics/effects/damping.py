@@ -69,7 +69,7 @@ def _shares(law: DampingLaw) -> Callable[[Meeting, Terms], list[Share]]:
 
 def _share(law: DampingLaw) -> str:
     if law.exponent == 0.0:
-        return f"{law.rate} dt / m_r, or k dt / c if that is less: a jump at first touch that is met late"
+        return f"{law.rate} dt / m_r, or k dt / c if that is less: the jump at first touch acts up to a step late"
     power = "w dt" if law.exponent == 1.0 else f"(w dt)^{law.exponent:g}"
     return f"{law.rate} dt / m_r, times {power} with a method of second order"
 

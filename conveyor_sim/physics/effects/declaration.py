@@ -14,7 +14,7 @@ from conveyor_sim.scene.problems import Path, dotted
 
 @dataclass(frozen=True)
 class Cause:
-    """A field of a scene that calls for an effect, and its content."""
+    """A field of a scene that enables an effect, and its content."""
 
     path: Path
     what: str = ""
@@ -34,7 +34,7 @@ class Effect:
     called_for: Callable[[Plant, Collection[str]], Cause | None]
     """Returns the cause in a scene, given the earlier effects in EFFECTS that are on; None without a cause."""
     absent: str
-    """Reason for its absence where nothing calls for it."""
+    """Reason for its absence if no field enables it."""
     needs: str
     """State and parameters that it adds, in words."""
     absent_here: Callable[[Plant, Collection[str]], str] | None = None
@@ -58,7 +58,7 @@ class Effect:
     can_force_on: bool = False
     """True if it needs only parameters that every scene has."""
     can_force_off: bool = True
-    """True if a scene that calls for it is also valid without it."""
+    """True if a scene that enables it is also valid without it."""
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Collection
+from functools import partial
 
 from conveyor_sim.engine.contact.laws.linear import contact_time
 from conveyor_sim.physics.effects.contacts import contacts_in_use
@@ -76,18 +77,10 @@ def _curve_friction(meeting: Meeting) -> float:
     return 0.0 if meeting.has_spring else meeting.value(meeting.law.friction)
 
 
-def _chosen(field: str, value: str, plant: Plant, on: Collection[str]) -> Cause | None:
+def _chosen(plant: Plant, on: Collection[str], *, field: str, value: str) -> Cause | None:
     if getattr(plant.scene, field) == value and ("contact_friction" in on or "base_friction" in on):
         return Cause((field,), value)
     return None
-
-
-def _atan(plant: Plant, on: Collection[str]) -> Cause | None:
-    return _chosen("friction_curve", "atan", plant, on)
-
-
-def _implicit(plant: Plant, on: Collection[str]) -> Cause | None:
-    return _chosen("friction_solver", "implicit", plant, on)
 
 
 def _spring(plant: Plant, on: Collection[str]) -> Cause | None:
@@ -135,43 +128,43 @@ CONTACT_FRICTION = Effect(
     absent="no contact with friction",
     needs="mu by pair of materials",
     bounds=_contact_friction_bounds,
-    bound="v_lim / [2 mu (1/m + R^2/J) N], N what belts full of bottles press with on "
-    "a contact, at most all bottles there can be (physics/effects/load.py)",
+    bound="v_lim / [2 mu (1/m + R^2/J) N], with N the largest load of belts full of bottles on a contact, limited by "
+    "the largest number of bottles in the scene (physics/effects/load.py)",
     side=_kick,
-    beside="of the tangential speed after an impact, mu (w dt)^2 / 2 of the speed of impact, in fewer steps a contact "
-    "than 2 pi mu v / v_lim",
+    beside="in the tangential speed after an impact: mu (w dt)^2 / 2 times the speed of impact, if a contact lasts for "
+    "fewer than 2 pi mu v / v_lim steps",
 )
 ATAN_FRICTION = Effect(
     name="atan_friction",
     law="p(s) = 2/pi atan(pi s / v_lim), in contacts and under bottles that stand on points",
     source="named in the paper",
-    called_for=_atan,
+    called_for=partial(_chosen, field="friction_curve", value="atan"),
     absent="friction_curve is polynomial, or nothing has friction",
     needs="nothing beside v_lim",
     can_force_on=True,
 )
 IMPLICIT_FRICTION = Effect(
     name="implicit_friction",
-    law="friction of the slip at the end of a step, with the mass of a bottle split among its contacts; with "
-    "velocity Verlet and rk4 it is explicit friction, and as exact, up to gamma dt = 2/3 and 1, with gamma = 2 "
-    "mu N / (m_t v_lim) times the closed contacts; a longer step looks ahead by what it is longer: friction is "
-    "then full from a slip of 1.5 and 1 times mu N dt / m_t on, not from v_lim, and gives way to a pull the "
-    "faster; none with dormand_prince, which divides its steps, and linearly_implicit, which solves for "
-    "friction itself",
+    law="friction at the slip at the end of a step, with the mass of a bottle split among its contacts. With velocity "
+    "Verlet and rk4 it equals explicit friction, with the same accuracy, up to gamma dt = 2/3 and 1, where gamma is "
+    "2 mu N / (m_t v_lim) times the number of closed contacts. In longer steps friction reaches mu N at a slip of 1.5 "
+    "and 1 times mu N dt / m_t instead of v_lim, and a loaded contact creeps faster. Not available with "
+    "dormand_prince, which divides its steps, and linearly_implicit, which solves for friction itself",
     source="added",
-    called_for=_implicit,
+    called_for=partial(_chosen, field="friction_solver", value="implicit"),
     absent="friction_solver is explicit, or nothing has friction",
     needs="closed contacts and 1/m + R^2/J of each bottle",
-    bound="none, and lifts those of contact_friction and, under points, base_friction; with semi-implicit Euler not "
-    "that of belts that turn",
+    bound="none. It removes the bounds of contact_friction and, for bases that are points, of base_friction. With "
+    "semi-implicit Euler the bound of turning belts remains",
 )
 TANGENTIAL_SPRING = Effect(
     name="tangential_spring",
-    law="a spring along the contact, drawn out by the slip, its force at most mu N; with stiffness_ratio its stiffness "
-    "is that ratio times dN/d delta of a Hertz contact: where it grows the spring keeps its force, where it falls its "
-    "elongation; at rails that move by the slip along them; with leapfrog, semi-implicit Euler, velocity Verlet "
-    "(order 2) and rk4 (order 4 while it sticks, 2 where it begins to slide), which cut it once a step; dormand_prince "
-    "gives steps up and linearly_implicit solves for all velocities at once: they take none",
+    law="a spring along the contact, elongated by the slip, with a force of at most mu N. With stiffness_ratio its "
+    "stiffness is that ratio times dN/d delta of a Hertz contact. The spring keeps its force when the stiffness grows, "
+    "and its elongation when it falls. At moving rails the slip is relative to the rail. Available with leapfrog, "
+    "semi-implicit Euler, velocity Verlet (order 2) and rk4 (order 4 while sticking, 2 at the onset of sliding), which "
+    "limit the force once per step. Not available with dormand_prince, which rejects steps, and linearly_implicit, "
+    "which solves for all velocities at once",
     source="Cundall and Strack 1979; Mindlin 1949, Thornton, Cummins and Cleary 2013",
     called_for=_spring,
     absent="no contact with tangential, or no friction in contacts",

@@ -40,11 +40,12 @@ contacts:
 base: [{between: [glass, chain], friction: 0.3}]
 bottle_types:
   half_litre: {radius: 0.033, mass: 0.35, material: glass, base_radius: 0.028}  # m, kg: stands on a ring
-belts:
-  slow: {kind: straight, start: [0, 0], angle: 0 deg, length: 2, width: 0.15, speed: 0.2, material: chain}
-  fast: {kind: straight, start: [0, 0.15], angle: 0 deg, length: 2, width: 0.15, speed: 0.3, material: chain}
+conveyors:
+  slow: {start: [0, 0.075], heading: 0 deg, path: [{straight: 2}], width: 0.15, speed: 0.2, material: chain}
+  fast: {beside: slow, side: left, path: [{straight: 2}], width: 0.15, speed: 0.3, material: chain}
 infeeds:
-  filler: {bottle: half_litre, position: [0.05, 0.15], direction: 0 deg, speed: 0.2, count: 20, rate: 3}
+  filler: {along: slow, at: 0.05, offset: 75 mm, bottle: half_litre, count: 20, rate: 3,
+    lateral_jitter: 0, angular_jitter: 0}                           # on the edge of both conveyors, without scatter
 effects: {contact_arrays: off, peaks: off}                          # without a reader
 ```
 

@@ -18,9 +18,9 @@ class Bound:
 
 
 def least_steps(tolerance: float) -> float:
-    """Return the smallest number of steps in a contact, and in v_lim / (mu g): 20 at 1 %, as second-order errors fall.
+    """Return the smallest number of steps in a contact, and in v_lim / (mu g), for errors of second order: 20 at 1 %.
 
-    tolerance: relative error in contact force. A peak between two such steps is missed by a third of it.
+    tolerance: relative error in contact force. A peak between two such steps is missed by a third of the tolerance.
     """
     return 2.0 / math.sqrt(tolerance)
 

@@ -92,7 +92,7 @@ def _make(folder: Path) -> None:
         x509.IPAddress(ip_address("127.0.0.1")),
     ]
     # OPC 10000-6, 6.2.2: certificate of an application. asyncua.crypto.cert_gen was considered: its certificates are
-    # those of an authority (CA:TRUE, keyCertSign), which browsers and users should not trust for a server.
+    # those of an authority (CA:TRUE), which browsers and users should not trust for a server.
     certificate = (
         x509.CertificateBuilder()
         .subject_name(name)

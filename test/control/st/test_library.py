@@ -136,7 +136,7 @@ def test_a_real_at_a_limit_is_the_limit(tmp_path: Path) -> None:
     text = SHIM.read_text()
     assert text.count("data->TABLE_SPEED = 0.4;") == 1
     made = built(tmp_path, "real", text.replace("data->TABLE_SPEED = 0.4;", "data->TABLE_SPEED = (float)0.6;"))
-    plant = Scenario(TABLE, overrides={"belts": {"table": {"speed_limits": [0.0, 0.6]}}})
+    plant = Scenario(TABLE, overrides={"conveyors": {"table": {"speed_limits": [0.0, 0.6]}}})
     plant.attach(CompiledProgram(made, TAGS))
     plant.run_for(0.02)
     names = plant.simulation.process_image.command_names

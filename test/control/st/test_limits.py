@@ -15,7 +15,7 @@ from conveyor_sim.simulation import Simulation
 from conveyor_sim.testing import Scenario
 
 COMMAND = "belts/zone1/cmd_speed"
-LIMITS = {"belts": {"zone1": {"speed_limits": [-0.1, 0.6], "speed": 0.5}}}
+LIMITS = {"conveyors": {"zone1": {"speed_limits": [-0.1, 0.6], "speed": 0.5}}}
 PROGRAM = f"""PROGRAM main
 VAR {{tag: {COMMAND}}} speed : #; END_VAR
 speed := %;

@@ -80,15 +80,7 @@ def test_more_findings_than_lines_are_counted(tmp_path: Path) -> None:
 
 
 def test_a_long_line_is_estimated_by_the_speeds_of_its_belts() -> None:
-    overrides = {
-        "belts": {"lane": {"length": 300.0}},
-        "rails": {
-            "left": {"to": [300.0, 0.045]},
-            "right": {"from": [300.0, -0.045]},
-            "end": {"from": [300.0, 0.045], "to": [300.0, -0.045]},
-        },
-        "machines": {"packer": {"region": [[299.9, -0.05], [300.0, -0.05], [300.0, 0.05], [299.9, 0.05]]}},
-    }
+    overrides = {"conveyors": {"lane": {"path": [{"straight": 300.0}]}}}
     (route,) = flow_of(load_scene(ROOT / "config" / "scenarios" / "buffer_lane.yaml", overrides)).routes
     assert route.last.end == "exit"
     assert route.traced is not None
