@@ -16,8 +16,8 @@ from conveyor_sim.scene.yaml_lines import Document
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.studies.design import Point, points_of
 from conveyor_sim.studies.line_of import controller_of, scene_of, steps_of
+from conveyor_sim.studies.parameter import Parameter
 from conveyor_sim.studies.setup import Setup
-from conveyor_sim.studies.study import Parameter
 
 
 def check_study(setup: Setup, first: Point | None = None) -> None:

@@ -1,4 +1,4 @@
-"""Python code of a study: functions in files or modules, located relative to the study's folder."""
+"""Python code of a study: functions in files or modules, located relative to its folder, and optional packages."""
 
 from __future__ import annotations
 
@@ -75,6 +75,12 @@ def function(reference: str, arguments: Mapping[str, Any] | None = None) -> Any:
             expected = ", ".join(map(str, inspect.signature(found).parameters.values())) or "none"
             raise StudyError(f"{reference}: {error}; its arguments are {expected}") from None
     return found
+
+
+def require_package(package: str, subject: str) -> None:
+    """Raise StudyError unless an optional package is installed. subject: what needs it."""
+    if importlib.util.find_spec(package) is None:
+        raise StudyError(f"{subject}: {package} is not installed, expected it (pip install 'conveyor_sim[studies]')")
 
 
 def digest_of(file: Path) -> str:

@@ -5,14 +5,15 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from conveyor_sim.errors import StudyError
-from conveyor_sim.studies.study import Parameter, Study
+from conveyor_sim.studies.code import require_package
+from conveyor_sim.studies.parameter import Parameter
+from conveyor_sim.studies.study import Study
 
 Point = dict[str, Any]
 """Values by parameter."""
@@ -48,11 +49,11 @@ def value_at(parameter: Parameter, share: float) -> float | int:
 def _shares(study: Study, count: int) -> NDArray[np.float64]:
     """(points, parameters), each from 0 to 1."""
     wanted = study.points or 1
-    _require("scipy", study)
+    require_package("scipy", f"design: {study.design}")
     from scipy.stats import qmc
 
     if study.design == "saltelli":
-        return saltelli(names_of(study), wanted, study.design_seed)
+        return saltelli(list(study.parameters), wanted, study.design_seed)
     if study.design == "latin_hypercube":
         return np.asarray(qmc.LatinHypercube(count, rng=study.design_seed).random(wanted))
     # A sequence of Sobol is balanced over its first 2^m points: any number of the first ones is taken of such.
@@ -60,15 +61,9 @@ def _shares(study: Study, count: int) -> NDArray[np.float64]:
     return np.asarray(points[:wanted])
 
 
-def names_of(study: Study) -> list[str]:
-    """Names of the parameters."""
-    return list(study.parameters)
-
-
 def saltelli(names: Sequence[str], base: int, seed: int) -> NDArray[np.float64]:
     """Return base x (parameters + 2) points for SALib's analysis of first-order and total indices (Saltelli 2010)."""
-    if find_spec("SALib") is None:
-        raise StudyError("design: saltelli: SALib is not installed, expected it (pip install 'conveyor_sim[studies]')")
+    require_package("SALib", "design: saltelli")
     from SALib.sample import sobol
 
     return np.asarray(sobol.sample(salib_problem(names), base, calc_second_order=False, seed=seed))
@@ -77,10 +72,3 @@ def saltelli(names: Sequence[str], base: int, seed: int) -> NDArray[np.float64]:
 def salib_problem(names: Sequence[str]) -> dict[str, Any]:
     """Shares from 0 to 1, as SALib describes them."""
     return {"num_vars": len(names), "names": list(names), "bounds": [[0.0, 1.0]] * len(names)}
-
-
-def _require(package: str, study: Study) -> None:
-    if find_spec(package) is None:
-        raise StudyError(
-            f"design: {study.design}: {package} is not installed, expected it (pip install 'conveyor_sim[studies]')"
-        )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from importlib.util import find_spec
+from dataclasses import replace
 from itertools import combinations
 from typing import Any
 
@@ -13,10 +13,11 @@ import numpy as np
 from conveyor_sim.errors import StudyError
 from conveyor_sim.scene import parse_overrides
 from conveyor_sim.statistics.intervals import mean_interval
+from conveyor_sim.studies.code import require_package
 from conveyor_sim.studies.design import salib_problem
-from conveyor_sim.studies.figures.data import Indices, Map, Response, level_text
+from conveyor_sim.studies.figures.data import Indices, Map, Response
 from conveyor_sim.studies.results import Results
-from conveyor_sim.studies.row import RunRow
+from conveyor_sim.studies.row import RunRow, number
 from conveyor_sim.studies.table import with_unit
 
 MOST_LEVELS = 40
@@ -42,16 +43,16 @@ def maps(results: Results) -> dict[str, Map]:
         return {}
     one, other = results.parameters
     levels = levels_of(results.rows, one), levels_of(results.rows, other)
-    found = {}
+    by_metric = {}
     for metric in results.units:
         cells = [
             [_mean(_values(_at(_at(results.rows, one, level), other, also), metric)) for also in levels[1]]
             for level in levels[0]
         ]
-        found[metric] = Map(
+        by_metric[metric] = Map(
             (titled(results, one), titled(results, other)), titled(results, metric), levels, np.array(cells)
         )
-    return found
+    return by_metric
 
 
 def response(results: Results, parameter: str, metric: str, rows: Sequence[RunRow] | None = None) -> Response:
@@ -77,9 +78,9 @@ def response(results: Results, parameter: str, metric: str, rows: Sequence[RunRo
             if row.status == "finished" and math.isfinite(row.metrics[metric]):
                 by_point.setdefault(row.point, {})[row.seed] = row.metrics[metric]
         seeds = set.intersection(*map(set, by_point.values())) if by_point else set()
-        values = [_mean([found[seed] for found in by_point.values()]) for seed in sorted(seeds)]
+        values = [_mean([by_seed[seed] for by_seed in by_point.values()]) for seed in sorted(seeds)]
         # Without a seed that all have, each point counts as much as another, and nothing is known of the interval.
-        means.append(_mean(values or [_mean(list(found.values())) for found in by_point.values()]))
+        means.append(_mean(values or [_mean(list(by_seed.values())) for by_seed in by_point.values()]))
         halves.append(mean_interval(values).half_width if len(values) > 1 else _of_one_run(at_level, metric))
     return Response(across, title, levels, np.array(means), np.array(halves))
 
@@ -92,13 +93,12 @@ def indices(results: Results) -> list[Indices]:
     study = parse_overrides(results.study)
     if study.get("design") != "saltelli":
         raise StudyError("Sobol indices: the study's design is another, expected design: saltelli")
-    if find_spec("SALib") is None:
-        raise StudyError("Sobol indices: SALib is not installed, expected it (pip install 'conveyor_sim[studies]')")
+    require_package("SALib", "Sobol indices")
     from SALib.analyze import sobol
 
     names = list(results.parameters)
     points = int(study["points"]) * (len(names) + 2)
-    found = []
+    by_metric = []
     for metric in results.units:
         by_point: dict[int, list[RunRow]] = {}
         for row in results.rows:
@@ -110,8 +110,8 @@ def indices(results: Results) -> list[Indices]:
             continue  # nothing to share out
         shares = sobol.analyze(salib_problem(names), outcome, calc_second_order=False, seed=0)
         columns = [np.asarray(shares[key]) for key in ("S1", "S1_conf", "ST", "ST_conf")]
-        found.append(Indices(titled(results, metric), names, *columns))
-    return found
+        by_metric.append(Indices(titled(results, metric), names, *columns))
+    return by_metric
 
 
 def titled(results: Results, name: str) -> str:
@@ -121,9 +121,9 @@ def titled(results: Results, name: str) -> str:
 
 def levels_of(rows: Iterable[RunRow], parameter: str) -> list[Any]:
     """Numbers in rising order; with texts among them in the order of the points."""
-    found = list(dict.fromkeys(row.parameters[parameter] for row in sorted(rows, key=lambda row: row.point)))
-    numbers = all(isinstance(level, (int, float)) and not isinstance(level, bool) for level in found)
-    return sorted(found) if numbers else found
+    levels = list(dict.fromkeys(row.parameters[parameter] for row in sorted(rows, key=lambda row: row.point)))
+    numbers = all(isinstance(level, (int, float)) and not isinstance(level, bool) for level in levels)
+    return sorted(levels) if numbers else levels
 
 
 def _levelled(results: Results) -> list[str]:
@@ -142,9 +142,8 @@ def _levelled(results: Results) -> list[str]:
 def _lines(results: Results, metric: str, across: str, other: str) -> list[Response]:
     lines = []
     for level in levels_of(results.rows, other):
-        found = response(results, across, metric, _at(results.rows, other, level))
-        label = f"{other} {level_text(level)}"
-        lines.append(Response(found.parameter, found.metric, found.levels, found.mean, found.half_width, label))
+        line = response(results, across, metric, _at(results.rows, other, level))
+        lines.append(replace(line, label=f"{other} {number(level)}"))
     return lines
 
 

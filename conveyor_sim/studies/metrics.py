@@ -128,7 +128,9 @@ def metric_of(what: str) -> Metric:
     rest = rest.strip()
     if ":" in first and not rest:
         made = function(first)
-        return Metric(lambda simulation: gauges.OfFunction(simulation, made), str(getattr(made, "unit", "1")), _nothing)
+        return Metric(
+            lambda simulation: gauges.OfFunction(simulation, made), str(getattr(made, "unit", "1")), lambda _data: {}
+        )
     word = WORDS.get(first)
     if word is None:
         raise StudyError(f"{shown(what)} given, expected {', '.join(WORDS)} or file.py:function")
@@ -145,7 +147,3 @@ def metric_of(what: str) -> Metric:
         word.needs,
         None if series is None else lambda simulation: series(simulation, rest),
     )
-
-
-def _nothing(_data: Mapping[str, Any]) -> dict[str, Any]:
-    return {}

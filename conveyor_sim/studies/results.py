@@ -8,7 +8,6 @@ import math
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,7 @@ from pydantic import TypeAdapter
 from conveyor_sim import __version__
 from conveyor_sim.errors import SceneError, StudyError
 from conveyor_sim.scene import parse_overrides
+from conveyor_sim.studies.code import require_package
 from conveyor_sim.studies.journal import SOURCE, read_rows, unusable
 from conveyor_sim.studies.origin import ORIGIN, VERSION, WARM_UP, read_origin
 from conveyor_sim.studies.row import RunRow
@@ -79,9 +79,9 @@ class Results:
 
 def run_command(path: str, row: RunRow, warm_up: float | None = None) -> str:
     """Return the shell command that repeats one run of a study file. warm_up: s, if it comes from pilot runs."""
-    given = [f"--set {name}={shlex.quote(text_of(value))}" for name, value in row.parameters.items()]
-    found = [] if warm_up is None else [f"--warm-up {warm_up!r}"]
-    return " ".join(["conveyor-sim sweep", shlex.quote(path), *given, f"--seed {row.seed}", *found])
+    values = [f"--set {name}={shlex.quote(text_of(value))}" for name, value in row.parameters.items()]
+    warm_ups = [] if warm_up is None else [f"--warm-up {warm_up!r}"]
+    return " ".join(["conveyor-sim sweep", shlex.quote(path), *values, f"--seed {row.seed}", *warm_ups])
 
 
 def text_of(value: Any) -> str:
@@ -106,10 +106,10 @@ def read_results(path: Path) -> Results:
     rows = [_as_asked(row, about.asked) for row in rows]
     try:
         study = read_file(path / SOURCE, 8 * MB).decode() if origin.text is None else origin.text
-        found = Results(
+        results = Results(
             study, about.path, about.units, about.parameters, versions, rows, origin.warm_up, origin.has_checksum
         )
-        return _fitting(found)
+        return _fitting(results)
     except (FileError, ValueError, SceneError) as error:
         reason = error if isinstance(error, FileError) else "does not fit the runs beside it"
         raise unusable(path / (SOURCE if origin.text is None else ORIGIN), reason) from None
@@ -137,8 +137,7 @@ def _as_asked(row: RunRow, asked: Mapping[str, str]) -> RunRow:
 
 def write_parquet(results: Results, path: Path) -> Path:
     """One file, readable by itself. Raises StudyError if it can't be written or pyarrow is missing."""
-    if find_spec("pyarrow") is None:
-        raise StudyError("a Parquet file: pyarrow is not installed, expected it (pip install 'conveyor_sim[studies]')")
+    require_package("pyarrow", "a Parquet file")
     import pyarrow
     from pyarrow import parquet
 
@@ -196,8 +195,7 @@ def _table(results: Results) -> Any:
 
 
 def _of_parquet(path: Path) -> Results:
-    if find_spec("pyarrow") is None:
-        raise StudyError(f"{path}: pyarrow is not installed, expected it (pip install 'conveyor_sim[studies]')")
+    require_package("pyarrow", str(path))
     from pyarrow import ArrowException, BufferReader, parquet
 
     expected = "expected an intact Parquet file of conveyor-sim sweep"

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, Literal
 
 from annotated_types import Ge, Gt, Len, Lt
-from pydantic import AllowInfNan, BeforeValidator, Strict, StrictBool, StrictFloat, StrictInt, StrictStr
+from pydantic import BeforeValidator, Strict
 
 from conveyor_sim.scene.part import Part
 from conveyor_sim.scene.problems import Problem
@@ -18,15 +17,15 @@ from conveyor_sim.scene.types import (
     Holds,
     Name,
     NotNegative,
-    Number,
     Positive,
     Says,
     Seed,
     Text,
     quantity,
 )
-from conveyor_sim.scene.words import listed, shown
+from conveyor_sim.scene.words import shown
 from conveyor_sim.studies.optimisation.part import Optimise
+from conveyor_sim.studies.parameter import Parameter
 
 LAST_SEED = 2**64 - 1
 LEAST_BATCH = 10
@@ -46,49 +45,9 @@ RESERVED = ("point", "seed", "status", "error", "simulated", "dt", "wall", "cpu"
 
 Design = Literal["grid", "list", "latin_hypercube", "sobol", "saltelli"]
 
-_Value = Annotated[
-    StrictBool | StrictInt | Annotated[StrictFloat, AllowInfNan(False)] | StrictStr,
-    Says("a number that is finite, a text, true or false"),
-]
 _Batch = Annotated[int, Strict(), Ge(LEAST_BATCH), Says(f"a whole number, {LEAST_BATCH} or greater")]
 _WarmUp = Annotated[NotNegative | Literal["mser"], Says('a number, 0 or greater, or "mser"')]
 _Confidence = Annotated[float, Strict(), Gt(0), Lt(1), Says("a number between 0 and 1")]
-_Path = re.compile(r"[A-Za-z]\w*(\[\d+\])*(\.[A-Za-z]\w*(\[\d+\])*)*")
-
-
-class Parameter(Part):
-    """Something that varies from point to point."""
-
-    field: Text | None = quantity("Path of a field of the scene, such as `belts.main.speed`.", default=None)
-    controller: Text | None = quantity("Name of a parameter of the controller's factory.", default=None)
-    argument: Text | None = quantity("Name of an argument of the function that returns the scene.", default=None)
-    values: Annotated[tuple[_Value, ...], Len(1), Holds("a list of values, at least one")] | None = quantity(
-        "Its values: all of a grid, one a point of a list.", default=None
-    )
-    low: Number | None = quantity("Least value of a range, for the other designs.", "that of the field", default=None)
-    high: Number | None = quantity("Greatest value of a range.", "that of the field", default=None)
-    unit: Text | None = quantity("Unit of its values. Left out: that of the field.", default=None)
-    log: Flag = quantity("Whether the range is divided by ratio.", default=False)
-    whole: Flag = quantity("Whether values of the range are whole numbers.", default=False)
-
-    def problems(self, path: tuple[str, ...]) -> Iterator[Problem]:
-        """Yield the problems of this part by itself."""
-        given = [name for name in ("field", "controller", "argument") if getattr(self, name) is not None]
-        if len(given) != 1:
-            said = listed(given) if given else "nothing"
-            yield Problem(path, f"{said} given, expected one of field, controller and argument")
-        if self.field is not None and not _Path.fullmatch(self.field):
-            text = f"{shown(self.field)} given, expected a path such as belts.main.speed or contacts[0].friction"
-            yield Problem((*path, "field"), text)
-        ends = [end for end in ("low", "high") if getattr(self, end) is not None]
-        if (self.values is None) != (len(ends) == 2):
-            yield Problem(path, "expected either values, or low and high")
-        if self.low is None or self.high is None:
-            return
-        if not self.low < self.high:
-            yield Problem((*path, "high"), f"{shown(self.high)} given, expected more than low, {shown(self.low)}")
-        if self.log and self.low <= 0.0:
-            yield Problem((*path, "low"), f"{shown(self.low)} given, expected a number greater than 0, as log is true")
 
 
 class Until(Part):
@@ -289,10 +248,10 @@ class Study(Part):
                 what = ", ".join(f"{name} {shown(value)}" for name, value in zip(values, points[place], strict=True))
                 yield Problem(("design",), f"list given with the point {what} twice, expected each once")
         else:
-            for name, found in values.items():
-                for place in _repeated(found):
+            for name, own in values.items():
+                for place in _repeated(own):
                     path = ("parameters", name, "values", place)
-                    yield Problem(path, f"{shown(found[place])} given twice, expected each value once")
+                    yield Problem(path, f"{shown(own[place])} given twice, expected each value once")
 
     def _optimise_problems(self, wanted: Optimise) -> Iterator[Problem]:
         """Yield the problems of an optimisation."""

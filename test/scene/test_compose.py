@@ -225,6 +225,8 @@ def test_a_cell_continues_a_conveyor(plant: Path) -> None:
         ({"cells": 3}, ["cells", "3"]),
         ({"include": 3}, ["include", "3"]),
         ({"include": ["gone.yaml"]}, ["include[0]", '"gone.yaml"']),
+        ({"belts": 3}, ["belts", "3", "a mapping"]),
+        ({"contacts": 3}, ["contacts", "3", "a list"]),
         ({"variants": 3}, ["variants", "3"]),
         ({"formats": {"small": {"bottle": "b5"}}}, ["formats.small.bottle", '"b5"', "b05"]),
         ({"formats": {"small": {"set": {"gp": 1}}}}, ["formats.small.set.gp", "gap"]),

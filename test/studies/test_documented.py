@@ -11,8 +11,9 @@ from conveyor_sim.studies.check import check_study
 from conveyor_sim.studies.design import points_of
 from conveyor_sim.studies.load import load_study
 from conveyor_sim.studies.metrics import WORDS
+from conveyor_sim.studies.parameter import Parameter
 from conveyor_sim.studies.results import FIXED_UNITS, read_results
-from conveyor_sim.studies.study import RESERVED, Parameter, Seeds, Study, Until
+from conveyor_sim.studies.study import RESERVED, Seeds, Study, Until
 
 ROOT = Path(__file__).parent.parent.parent
 EXAMPLES = sorted((ROOT / "examples" / "studies").glob("*.yaml"))

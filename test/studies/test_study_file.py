@@ -13,7 +13,7 @@ from conveyor_sim.errors import StudyError
 from conveyor_sim.scene.part import part_from
 from conveyor_sim.studies.check import check_study
 from conveyor_sim.studies.load import load_study
-from conveyor_sim.studies.study import Parameter
+from conveyor_sim.studies.parameter import Parameter
 
 UNTIL = {"metric": "stops", "half_width": 1.0}
 RATE = {"argument": "rate", "values": [4.0]}

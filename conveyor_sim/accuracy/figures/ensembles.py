@@ -15,7 +15,6 @@ from conveyor_sim.accuracy.figures.integrators import setting_text
 from conveyor_sim.accuracy.report.words import percent, spread, with_unit
 from conveyor_sim.accuracy.results import AccuracyStudy, Comparison
 from conveyor_sim.report.figures import style
-from conveyor_sim.report.figures.heading import heading
 
 _COLUMNS: Final = 2
 _BAND: Final = "#dcebf5"
@@ -48,7 +47,7 @@ def ensembles_figure(study: AccuracyStudy) -> Figure:
         ax.set_ylim(len(settings) - 0.4, -0.6)
     for ax in axes[-1]:
         ax.set_xlabel("difference from the reference (%)")
-    heading(figure, f"Long runs against the reference: {study.scene}")
+    style.heading(figure, f"Long runs against the reference: {study.scene}")
     found = [verdict for verdict in _VERDICTS if any(row.verdict == verdict for row in rows)]
     handles: list[Line2D | Patch] = [
         Line2D([], [], marker=marker, color=colour, markersize=7.0, markeredgecolor="white", label=words)

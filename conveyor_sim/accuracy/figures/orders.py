@@ -16,7 +16,6 @@ from conveyor_sim.accuracy.figures.logarithmic import logarithmic_x, logarithmic
 from conveyor_sim.accuracy.report.words import digits
 from conveyor_sim.accuracy.results import Order
 from conveyor_sim.report.figures import style
-from conveyor_sim.report.figures.heading import heading
 
 _COLUMNS: Final = 2
 _MOST_STEPS: Final = 8  # on an axis
@@ -36,7 +35,7 @@ def orders_figure(orders: Sequence[Order], scene: str) -> Figure:
     for ax, ((case, quantity), own) in zip(axes.flat, cases.items(), strict=False):
         _panel(ax, sorted(own, key=lambda order: order_of(order.integrator)))
         ax.set_title(f"{case}: {quantity}")
-    heading(figure, f"Closed forms, how fast the error falls with the step: {scene}")
+    style.heading(figure, f"Closed forms, how fast the error falls with the step: {scene}")
     return figure
 
 

@@ -23,7 +23,6 @@ from conveyor_sim.accuracy.results import AccuracyStudy, Point
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.report.figures import style
 from conveyor_sim.report.figures.data import Floats
-from conveyor_sim.report.figures.heading import heading
 
 _LEAST_RESTING: Final = 1e-6  # relative; what is below it stands at the lower edge
 
@@ -40,7 +39,7 @@ def pareto_figure(study: AccuracyStudy) -> Figure:
     ax, side = figure.subplots(1, 2, width_ratios=(3.3, 1.0))
     side.axis("off")
     placed = [point for point in study.points if place_of(point) is not None]
-    heading(figure, f"What accuracy costs: {study.scene}")
+    style.heading(figure, f"What accuracy costs: {study.scene}")
     ax.set_title(_subtitle(study), fontsize=9.5, fontweight="normal", pad=10.0)
     ax.set_xlabel("cost: processor time per simulated second (s/s)")
     figure.supxlabel(f"Costs on {study.machine}", x=0.01, ha="left", fontsize=8.0, color=style.MUTED, wrap=True)

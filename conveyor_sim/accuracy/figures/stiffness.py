@@ -17,7 +17,6 @@ from conveyor_sim.accuracy.measure.observables import OBSERVABLES
 from conveyor_sim.accuracy.report.words import percent, unit_of
 from conveyor_sim.accuracy.results import DEEP, StiffnessRow
 from conveyor_sim.report.figures import style
-from conveyor_sim.report.figures.heading import heading
 
 _COLUMNS: Final = 3
 _IMPACT: Final = "peak force"
@@ -44,7 +43,7 @@ def stiffness_figure(rows: Sequence[StiffnessRow], scene: str) -> Figure:
     _overlap(panels[1], rows)
     for ax, name in zip(panels[2:], names, strict=True):
         _observable(ax, rows, name)
-    heading(figure, f"Softer contacts at the same restitution, what changes and what it saves: {scene}")
+    style.heading(figure, f"Softer contacts at the same restitution, what changes and what it saves: {scene}")
     handles = [
         Line2D([], [], color=style.SERIES[0], marker="|", markersize=9.0, label="bars: standard error over seeds")
     ]

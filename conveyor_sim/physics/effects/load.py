@@ -2,11 +2,11 @@
 
 A belt drags a bottle with at most mu m g. Only the bottles along its running length press on one contact; bottles
 beside each other press on different ones. In a pile the load is shared unevenly, and a bottle is loaded from several
-sides. The factors below are measured: an equivalent load, divided by mu m g and by the number of bottles in a file along
-the pile. At the equivalent load, two bottles alone need the same time step as the whole pile, by the largest eigenvalue
-of the friction of all its contacts at rest. Hoppers of 400 to 1 000 bottles with walls at 20 to 90 degrees: 1.9 to 3.2; files between
-rails 1.05 to 1.2 diameters apart: 1.0 to 1.2; zigzags in lanes of 1.35 to 2.5 diameters: 1.7 to 3.3, and up to 2.6 over
-the number of bottles (test/physics/effects/test_load.py). Impacts are not included.
+sides. The factors below are measured: an equivalent load, divided by mu m g and by the number of bottles in a file
+along the pile. At the equivalent load, two bottles alone need the same time step as the whole pile, by the largest
+eigenvalue of the friction of all its contacts at rest. Hoppers of 400 to 1 000 bottles with walls at 20 to 90 degrees:
+1.9 to 3.2; files between rails 1.05 to 1.2 diameters apart: 1.0 to 1.2; zigzags in lanes of 1.35 to 2.5 diameters: 1.7
+to 3.3, and up to 2.6 over the number of bottles (test/physics/effects/test_load.py). Impacts are not included.
 """
 
 import math

@@ -17,7 +17,6 @@ from matplotlib.ticker import MaxNLocator
 from conveyor_sim.columns.damage import RailWearColumns
 from conveyor_sim.report.figures import style
 from conveyor_sim.report.figures.data import Damage, Floats, StaticGeometry
-from conveyor_sim.report.figures.heading import heading
 from conveyor_sim.report.figures.marks import draw_entries, draw_exits
 from conveyor_sim.report.figures.plant import Z_RAIL, draw_belts, draw_rails, draw_travel
 
@@ -66,7 +65,7 @@ def rails_figure(plant: StaticGeometry, damage: Damage, title: str) -> Figure:
         ax.set_ylim(y0 - margin, y1 + margin)
         ax.set_xlabel("x (m)")
         ax.set_ylabel("y (m)")
-    heading(figure, f"{title}: rails after {damage.time:g} s")
+    style.heading(figure, f"{title}: rails after {damage.time:g} s")
     return figure
 
 
@@ -81,7 +80,7 @@ def bottles_figure(damage: Damage, title: str) -> Figure:
         _draw_spread(ax, name, values, damage.limits.get(name))
     for ax in axes.flat[len(shown) :]:
         ax.set_visible(False)
-    heading(figure, f"{title}: the worst of each of {damage.bottles} bottles in {damage.time:g} s")
+    style.heading(figure, f"{title}: the worst of each of {damage.bottles} bottles in {damage.time:g} s")
     return figure
 
 

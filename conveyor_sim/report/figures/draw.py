@@ -15,7 +15,6 @@ from conveyor_sim.report.figures.data import PlantFrame, StaticGeometry
 from conveyor_sim.report.figures.energy import energy_figure
 from conveyor_sim.report.figures.files import write
 from conveyor_sim.report.figures.flow import flow_figure, force_figure
-from conveyor_sim.report.figures.heading import note_forced
 from conveyor_sim.report.figures.production import efficiency_figure, state_bars_figure, stop_reasons_figure
 from conveyor_sim.report.figures.recording import Recording
 from conveyor_sim.report.figures.series import velocity_figure
@@ -59,7 +58,7 @@ def figures_of(bag: Bag, times: Sequence[float] | None, bottles: Sequence[int] |
 
 def _noted(draw: Callable[[], Figure], forced: Sequence[str]) -> Figure:
     figure = draw()
-    note_forced(figure, forced)
+    style.note_forced(figure, forced)
     return figure
 
 
@@ -97,7 +96,7 @@ def plot_production(production: Production, out_dir: str | Path) -> list[Path]:
             "efficiency": efficiency_figure(production.counters, production.time, production.good, name),
         }
         for figure in figures.values():
-            note_forced(figure, production.forced)
+            style.note_forced(figure, production.forced)
         return [path for stem, figure in figures.items() for path in style.save(figure, Path(out_dir) / stem)]
 
 

@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 
 from conveyor_sim.report.figures import style
 from conveyor_sim.report.figures.data import EnergySeries, Floats
-from conveyor_sim.report.figures.heading import heading
 
 _BELTS: Final = len(style.SERIES) - 2  # that have a curve of their own, beside bottles and the other belts
 
@@ -55,7 +54,7 @@ def energy_figure(energy: EnergySeries, belts: Sequence[str]) -> Figure:
         ax.set_xlabel("time (s)")
         ax.set_xlim(energy.time[0], energy.time[-1] if len(energy.time) > 1 else energy.time[0] + 1.0)
     end = f"{energy.residual[-1]:.2g} J of a turnover of {energy.turnover[-1]:.4g} J, {100.0 * share[-1]:.2g} %"
-    heading(figure, f"Energy: what does not close at the end is {end}")
+    style.heading(figure, f"Energy: what does not close at the end is {end}")
     return figure
 
 

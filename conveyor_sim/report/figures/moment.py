@@ -18,7 +18,6 @@ from conveyor_sim.line.tag import Kind
 from conveyor_sim.report.figures import style
 from conveyor_sim.report.figures.bottles import speed_scale
 from conveyor_sim.report.figures.data import Floats, PlantFrame, StaticGeometry
-from conveyor_sim.report.figures.heading import heading, note_forced
 from conveyor_sim.report.figures.labels import belt_labels, mark_labels, place, sensor_labels
 from conveyor_sim.report.figures.marks import Z_LINE
 from conveyor_sim.report.figures.views import WIDTH, colour_bar, draw_view, force_scale, instant, whole_region
@@ -69,8 +68,8 @@ def moment_figure(
     inches = WIDTH - 0.8
     height = float(np.clip(inches * (box[3] - box[1]) / (box[2] - box[0]), 2.0, 7.0))
     figure = style.new_figure(WIDTH, height + 2.6 + (_ROW + _NAME) * len(traces))
-    heading(figure, title)
-    note_forced(figure, forced)
+    style.heading(figure, title)
+    style.note_forced(figure, forced)
     happened = "\n".join([instant(frame), *wrap(text, _LETTERS)])
     grid = figure.add_gridspec(1 + len(traces), 1, height_ratios=[height, *[_ROW] * len(traces)])
     view = figure.add_subplot(grid[0])

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
+from textwrap import wrap
 from typing import Any, Final
 
 import matplotlib
@@ -13,6 +14,7 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import Colormap, LinearSegmentedColormap
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 from numpy.typing import NDArray
 
 from conveyor_sim.errors import ConveyorError
@@ -74,6 +76,9 @@ _RC: Final[dict[Any, Any]] = {
     "svg.fonttype": "path",
     "path.simplify": True,
 }
+_AIR = 0.09  # inches above and below axes
+_LISTED = 10
+_LETTERS_PER_INCH = 12
 
 
 @contextmanager
@@ -151,3 +156,20 @@ def nice_above(value: float) -> float:
     """Return the smallest of 1, 2, 5 times a power of ten that is not below `value` > 0."""
     power = 10.0 ** np.floor(np.log10(value))
     return float(min(step * power for step in (1.0, 2.0, 5.0, 10.0) if step * power >= value * (1.0 - 1e-12)))
+
+
+def heading(figure: Figure, text: str) -> None:
+    """Above all axes, at the left, in as many lines as it takes."""
+    figure.suptitle(text, x=0.01, ha="left", fontsize=13.0, fontweight="bold", wrap=True)
+    engine = figure.get_layout_engine()
+    assert isinstance(engine, ConstrainedLayoutEngine)
+    engine.set(h_pad=_AIR)
+
+
+def note_forced(figure: Figure, forced: Sequence[str]) -> None:
+    """Below all axes, where any signals are or were forced: controllers did not read what the line had."""
+    if not forced:
+        return
+    more = f" and {len(forced) - _LISTED} more" if len(forced) > _LISTED else ""
+    lines = wrap(f"forced: {', '.join(forced[:_LISTED])}{more}", int(_LETTERS_PER_INCH * figure.get_figwidth()))
+    figure.supxlabel("\n".join(lines), x=0.01, ha="left", fontsize=9.0, color=FORCE)

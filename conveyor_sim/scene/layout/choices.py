@@ -48,7 +48,7 @@ def _choice(fragment: Fragment, changes: Mapping[str, Any], field: str, report: 
     if name is None or (isinstance(name, str) and name in known):
         return name
     expected = did_you_mean(str(name), [str(one) for one in known])
-    report(fragment.place_of((field,)), f"{shown(name)} given, {expected}: names of {field}s")
+    report(fragment.place_of((field,)), f"{shown(name)} given, which is none of {field}s, {expected}")
     return None
 
 
@@ -87,7 +87,7 @@ def _check_format(fragment: Fragment, name: Any, report: Report) -> None:
                     report(fragment.place_of((*path, field, parameter)), fault)
         elif not isinstance(value, str) or value not in _named(fragment.data, "bottle_types"):
             types = [str(one) for one in _named(fragment.data, "bottle_types")]
-            report(at, f"{shown(value)} given, {did_you_mean(str(value), types)}: names of bottle_types")
+            report(at, f"{shown(value)} given, which is none of bottle_types, {did_you_mean(str(value), types)}")
 
 
 def _check_parameters(fragment: Fragment, values: Any, path: Path, report: Report) -> None:

@@ -36,7 +36,7 @@ _UNSCOPED = ("parameters", "ports", "variants", "formats", "variant", "format")
 """Fields whose texts do not refer to the parameters of the file, or do so before the others."""
 _FIRST = ("include", "variants", "formats")
 """Fields whose overrides decide which others there are."""
-_MOST_VALUES = 1_000_000
+_MOST_VALUES = 250_000
 """Largest number of values in all cells of a scene."""
 
 
@@ -288,7 +288,8 @@ class _Composer:
             return cell.outer_ports[port].conveyor
         others = [cell] if cell is not None else [one for one in cells.values() if one is not None]
         known = [f"{one.name}.{name}" for one in others for name, joint in one.ports.items() if joint.end in ends]
-        self._report(own.place_of(path), f"{shown(value)} given, {did_you_mean(value, known)}: ports of cells")
+        kind = "no port at an end of a cell" if fields[-1] == "after" else "no port of a cell"
+        self._report(own.place_of(path), f"{shown(value)} given, which is {kind}, {did_you_mean(value, known)}")
         return value
 
     def _join(self, result: Fragment, own: Fragment, name: str, cell: "_Cell | None") -> None:

@@ -24,7 +24,7 @@ def expanded_parts(data: Any, changes: Mapping[str, Any]) -> Iterator[tuple[Path
             elif field in _OF_CONVEYORS and isinstance(part, dict) and "kind" not in part:
                 for owners in ("conveyors", "guides"):
                     if (owner := _owner(name, data.get(owners))) is not None:
-                        yield (field, name), f"a part of {owners}.{owner} given, expected that path"
+                        yield (field, name), f"a part of {owners}.{owner} given, expected a field of {owners}.{owner}"
                         break
 
 

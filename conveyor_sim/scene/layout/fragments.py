@@ -7,6 +7,7 @@ from conveyor_sim.scene.layout.parameters import names_in
 from conveyor_sim.scene.problems import Path
 from conveyor_sim.scene.provenance import FieldPlace, Sources
 from conveyor_sim.scene.schema import Scene
+from conveyor_sim.scene.words import shown
 
 LISTS = ("contacts", "base", "bottles")
 """Lists of a scene that join. Equal entries are stored once, except those of `bottles`."""
@@ -56,8 +57,15 @@ class Fragment:
         elif field not in SINGLE and isinstance(present, dict) and isinstance(value, dict):
             for name, part in value.items():
                 self._add(other, field, name, part, report)
-        else:
+        elif field in SINGLE:
             report(other.place_of((field,)), _TWICE.format(self.place_of((field,))))
+        else:
+            kind = list if field in LISTS else dict
+            wrong, owner = (value, other) if isinstance(present, kind) else (present, self)
+            expected = "a list" if field in LISTS else "a mapping of names to parts"
+            report(owner.place_of((field,)), f"{shown(wrong)} given, expected {expected}")
+            if owner is self:
+                self.data[field] = kind()  # reported once, however many files join
 
     def _extend(self, other: "Fragment", field: str, present: list[Any], new: list[Any]) -> None:
         equal = self._equal.setdefault(field, set())

@@ -1,6 +1,6 @@
 """Guides of a layout: rails on both sides of conveyors or of a line through points."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -73,6 +73,7 @@ def _rails_along(
     guide: GuideSides, way: JoinedRoute, shift: float, order: Iterable[str], path: Path
 ) -> Iterator[GuideRail]:
     """Yield the rails of a guide along a path. shift: station of the path where stations of the guide begin (m)."""
+    profiles: list[GuideProfile] = []
     for side in sorted(_sides(guide, path), key=[*(name for name in order if name in SIDES), *SIDES].index):
         corners = guide.corners(side)
         field: Path = ("clearance",) if corners is None else (side,)
@@ -87,6 +88,9 @@ def _rails_along(
         first, last = _stretch(guide, corners[0][0], way.route.length - shift, path)
         moved = tuple((s + shift, offset) for s, offset in corners)
         profile = GuideProfile(side, moved, first + shift, last + shift)
+        for other in profiles:
+            _check_order({side: profile, other.side: other}, shift, path)
+        profiles.append(profile)
         parts = [(begin + shift, end + shift) for begin, end in _closed(guide, side, first, last, path)]
         for data in rails_along(way.route, profile, parts, (*path, *field)):
             yield GuideRail(side, data, (*path, *field))
@@ -131,6 +135,16 @@ def _check_corners(corners: Sequence[XY], length: float, path: Path) -> None:
             text = f"{shown((s, offset))} given, expected a station from {least:.6g} to {length:.6g} (m)"
             raise LayoutFault((*path, index), text)
         least = s + _APART
+
+
+def _check_order(sides: Mapping[Side, GuideProfile], shift: float, path: Path) -> None:
+    """Raise LayoutFault where the left side of a guide lies to the right of its right side. shift: as above."""
+    left, right = sides["left"], sides["right"]
+    begin, end = max(left.begin, right.begin), min(left.end, right.end)
+    for s in sorted({begin, end, *(station for station, _ in (*left.corners, *right.corners))}):
+        if begin <= s <= end and left.offset(s) < right.offset(s) - TOUCH:
+            text = f"the offset is {left.offset(s):.6g} m at station {s - shift:.6g} m"
+            raise LayoutFault((*path, "left"), f"{text}, expected at least that of right, {right.offset(s):.6g} m")
 
 
 def _stretch(guide: GuideSides, first: float, length: float, path: Path) -> XY:

@@ -56,11 +56,6 @@ class Indices:
     total_half_width: Floats
 
 
-def level_text(level: Any) -> str:
-    """Return a level of a parameter as text for an axis or a legend."""
-    return f"{level:.4g}" if isinstance(level, float) else str(level)
-
-
 @dataclass(frozen=True)
 class TrialsData:
     """Points that were tried, in their order."""

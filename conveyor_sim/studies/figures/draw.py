@@ -29,7 +29,7 @@ def plot_study(
         figures = {"response": responses_figure(effects, name)}
         for metric, panels in interactions.items():
             figures[f"interactions_{metric}"] = responses_figure(panels, f"{name}: interactions")
-        figures |= {f"map_{metric}": map_figure(found, name) for metric, found in maps.items()}
+        figures |= {f"map_{metric}": map_figure(data, name) for metric, data in maps.items()}
         if indices:
             figures["indices"] = indices_figure(indices, f"{name}: Sobol indices")
         return [path for stem, figure in figures.items() for path in style.save(figure, Path(out_dir) / stem)]

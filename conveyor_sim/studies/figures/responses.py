@@ -12,8 +12,8 @@ from matplotlib.ticker import MaxNLocator
 
 from conveyor_sim.report.figures import style
 from conveyor_sim.report.figures.data import Floats
-from conveyor_sim.report.figures.heading import heading
-from conveyor_sim.studies.figures.data import Indices, Map, Response, level_text
+from conveyor_sim.studies.figures.data import Indices, Map, Response
+from conveyor_sim.studies.row import number
 
 _BAND: Final = 0.25
 _NUMBERED: Final = 150  # cells of a map that have their number written in
@@ -27,15 +27,15 @@ def responses_figure(panels: Sequence[Sequence[Sequence[Response]]], title: str)
     axes = figure.subplots(rows, columns, squeeze=False, sharey="row")
     for row, line in zip(axes, panels, strict=True):
         for ax, responses in zip(row, line, strict=True):
-            for number, response in enumerate(responses[:_MOST_LINES]):
-                _draw(ax, response, style.SERIES[number % len(style.SERIES)])
+            for index, response in enumerate(responses[:_MOST_LINES]):
+                _draw(ax, response, style.SERIES[index % len(style.SERIES)])
             ax.set_xlabel(responses[0].parameter)
             ax.grid(True, axis="y")
             if responses[0].label:
                 more = len(responses) - _MOST_LINES
                 ax.legend(fontsize=8.0, title=f"and {more} more" if more > 0 else None)
         row[0].set_ylabel(line[0][0].metric)
-    heading(figure, title)
+    style.heading(figure, title)
     return figure
 
 
@@ -64,40 +64,40 @@ def _places(ax: Axes, levels: Sequence[Any]) -> Floats:
     return np.arange(len(levels), dtype=float)
 
 
-def map_figure(found: Map, title: str) -> Figure:
+def map_figure(data: Map, title: str) -> Figure:
     """Draw one cell per pair of levels."""
-    across, up = (len(levels) for levels in found.levels)
+    across, up = (len(levels) for levels in data.levels)
     figure = style.new_figure(3.0 + min(0.9 * across, 9.0), 1.8 + min(0.55 * up, 7.0))
     ax = figure.subplots()
-    mesh = ax.pcolormesh(np.arange(across + 1) - 0.5, np.arange(up + 1) - 0.5, found.mean.T, cmap="viridis", gid="map")
-    figure.colorbar(mesh, ax=ax, label=found.metric)
+    mesh = ax.pcolormesh(np.arange(across + 1) - 0.5, np.arange(up + 1) - 0.5, data.mean.T, cmap="viridis", gid="map")
+    figure.colorbar(mesh, ax=ax, label=data.metric)
     if across * up <= _NUMBERED:
-        middle = np.nanmean([np.nanmin(found.mean), np.nanmax(found.mean)]) if np.isfinite(found.mean).any() else 0.0
-        for (i, j), value in np.ndenumerate(found.mean):
+        middle = np.nanmean([np.nanmin(data.mean), np.nanmax(data.mean)]) if np.isfinite(data.mean).any() else 0.0
+        for (i, j), value in np.ndenumerate(data.mean):
             text = f"{value:.3g}" if np.isfinite(value) else "-"
             ax.text(i, j, text, ha="center", va="center", fontsize=8.0, color="white" if value < middle else style.INK)
-    ax.set_xticks(range(across), [level_text(level) for level in found.levels[0]])
-    ax.set_yticks(range(up), [level_text(level) for level in found.levels[1]])
+    ax.set_xticks(range(across), [number(level) for level in data.levels[0]])
+    ax.set_yticks(range(up), [number(level) for level in data.levels[1]])
     ax.tick_params(length=0.0)
-    ax.set_xlabel(found.parameters[0])
-    ax.set_ylabel(found.parameters[1])
-    heading(figure, title)
+    ax.set_xlabel(data.parameters[0])
+    ax.set_ylabel(data.parameters[1])
+    style.heading(figure, title)
     return figure
 
 
-def indices_figure(found: Sequence[Indices], title: str) -> Figure:
+def indices_figure(indices: Sequence[Indices], title: str) -> Figure:
     """Draw one panel per metric: each parameter's share of the variance, alone and with interactions."""
-    figure = style.new_figure(8.0, 1.2 + sum(0.9 + 0.45 * len(one.parameters) for one in found))
-    axes = figure.subplots(len(found), 1, squeeze=False)[:, 0]
-    for ax, one in zip(axes, found, strict=True):
+    figure = style.new_figure(8.0, 1.2 + sum(0.9 + 0.45 * len(one.parameters) for one in indices))
+    axes = figure.subplots(len(indices), 1, squeeze=False)[:, 0]
+    for ax, one in zip(axes, indices, strict=True):
         rows = np.arange(len(one.parameters))
         bars: Mapping[str, tuple[Floats, Floats]] = {
             "alone (first order)": (one.first, one.first_half_width),
             "with all interactions (total)": (one.total, one.total_half_width),
         }
-        for number, (label, (share, half)) in enumerate(bars.items()):
-            place = rows + 0.38 * (number - 0.5)
-            ax.barh(place, share, 0.34, xerr=half, color=style.SERIES[number], label=label, ecolor=style.MUTED)
+        for index, (label, (share, half)) in enumerate(bars.items()):
+            place = rows + 0.38 * (index - 0.5)
+            ax.barh(place, share, 0.34, xerr=half, color=style.SERIES[index], label=label, ecolor=style.MUTED)
         ax.set_yticks(rows, one.parameters)
         ax.set_ylim(len(rows) - 0.5, -0.5)
         ax.axvline(0.0, color=style.MUTED, linewidth=0.8)
@@ -105,5 +105,5 @@ def indices_figure(found: Sequence[Indices], title: str) -> Figure:
         ax.grid(True, axis="x")
     axes[-1].set_xlabel("share of the variance, with 95 % confidence")
     axes[0].legend(loc="upper left", bbox_to_anchor=(1.01, 1.0))
-    heading(figure, title)
+    style.heading(figure, title)
     return figure

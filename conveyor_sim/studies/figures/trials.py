@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from conveyor_sim.report.figures import style
 from conveyor_sim.report.figures.data import Floats
-from conveyor_sim.report.figures.heading import heading
 from conveyor_sim.studies.figures.data import TrialsData
 
 _BEST: Final = style.SERIES[1]
@@ -23,7 +22,7 @@ def trials_figure(data: TrialsData) -> Figure:
     """Two goals against each other, or one over the trials."""
     figure = style.new_figure(9.0, 5.6)
     ax = figure.subplots()
-    heading(figure, data.name)
+    style.heading(figure, data.name)
     ax.set_title(data.objective, fontsize=9.5, fontweight="normal")
     ax.grid(True)
     two = data.means.shape[1] == 2

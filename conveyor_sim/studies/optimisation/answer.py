@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any
 
 import numpy as np
 
@@ -14,6 +13,7 @@ from conveyor_sim.studies.figures.data import TrialsData
 from conveyor_sim.studies.optimisation.objective import Constraint, Objective
 from conveyor_sim.studies.optimisation.optimise import Optimum
 from conveyor_sim.studies.optimisation.trials import Trial, feasible
+from conveyor_sim.studies.row import point_text
 
 Units = Mapping[str, str]
 """Units of metrics by name; "1" or "": dimensionless."""
@@ -96,11 +96,7 @@ def _kept(constraint: Constraint, trial: Trial) -> str:
 
 
 def _point(trial: Trial) -> str:
-    return f"point {trial.number} ({', '.join(f'{name} {_short(value)}' for name, value in trial.parameters.items())})"
-
-
-def _short(value: Any) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    return f"point {trial.number} ({point_text(trial.parameters)})"
 
 
 def _seeds(trial: Trial) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Annotated, Any, Protocol
+from typing import Annotated, Any
 
 from conveyor_sim.errors import StudyError
 from conveyor_sim.scene.part import Part
@@ -11,26 +11,7 @@ from conveyor_sim.scene.problems import Problem
 from conveyor_sim.scene.types import Count, Holds, Seed, Text, quantity
 from conveyor_sim.scene.words import listed, shown
 from conveyor_sim.studies.optimisation.objective import parse_objective
-
-
-class Varied(Protocol):
-    """A parameter, as far as its values go."""
-
-    @property
-    def values(self) -> Sequence[Any] | None:
-        """Return all admissible values; None: the range from low to high."""
-
-    @property
-    def low(self) -> float | None:
-        """Least value."""
-
-    @property
-    def high(self) -> float | None:
-        """Greatest value."""
-
-    @property
-    def whole(self) -> bool:
-        """Return True if only whole numbers are admissible."""
+from conveyor_sim.studies.parameter import Parameter
 
 
 class Optimise(Part):
@@ -47,13 +28,16 @@ class Optimise(Part):
     )
     sampler_seed: Seed = quantity("Of what chooses points.", "1", default=0)
 
-    def first(self, parameters: Mapping[str, Varied]) -> dict[str, Any]:
+    def first(self, parameters: Mapping[str, Parameter]) -> dict[str, Any]:
         """Return the first point to try: `start`, or an admissible point without it."""
         if self.start is not None:
             return dict(self.start)
-        return {name: varied.low if varied.values is None else varied.values[0] for name, varied in parameters.items()}
+        return {
+            name: parameter.low if parameter.values is None else parameter.values[0]
+            for name, parameter in parameters.items()
+        }
 
-    def problems(self, parameters: Mapping[str, Varied], metrics: Sequence[str]) -> Iterator[Problem]:
+    def problems(self, parameters: Mapping[str, Parameter], metrics: Sequence[str]) -> Iterator[Problem]:
         """Yield the problems of this part in a study with these parameters and metrics."""
         try:
             parse_objective(self.objective, metrics)
@@ -62,8 +46,8 @@ class Optimise(Part):
         if self.start is None:
             return
         if set(self.start) != set(parameters):
-            given = listed([shown(name) for name in self.start]) if self.start else "nothing"
-            yield Problem(("optimise", "start"), f"{given} given, expected a value for each of {', '.join(parameters)}")
+            names = listed([shown(name) for name in self.start]) if self.start else "nothing"
+            yield Problem(("optimise", "start"), f"{names} given, expected a value for each of {', '.join(parameters)}")
             return
         for name, value in self.start.items():
             expected = _expected(parameters[name], value)
@@ -71,7 +55,7 @@ class Optimise(Part):
                 yield Problem(("optimise", "start", name), f"{shown(value)} given, expected {expected}")
 
 
-def _expected(parameter: Varied, value: Any) -> str:
+def _expected(parameter: Parameter, value: Any) -> str:
     """Return the expectation for an inadmissible value; "" for an admissible one."""
     if parameter.values is not None:
         return "" if value in parameter.values else listed([shown(one) for one in parameter.values])

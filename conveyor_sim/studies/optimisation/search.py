@@ -9,11 +9,11 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping, Sequence
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.studies.optimisation.objective import Objective
-from conveyor_sim.studies.optimisation.part import Varied
+from conveyor_sim.studies.parameter import Parameter
 
 if TYPE_CHECKING:
     from optuna.distributions import BaseDistribution
@@ -22,19 +22,11 @@ if TYPE_CHECKING:
 _VIOLATIONS = "violations"
 
 
-class Ranged(Varied, Protocol):
-    """A parameter whose range may be divided by ratio."""
-
-    @property
-    def log(self) -> bool:
-        """Return True if the scale is logarithmic."""
-
-
 class Search:
     """Search strategy: proposes the points to try."""
 
     def __init__(
-        self, parameters: Mapping[str, Ranged], objective: Objective, start: Mapping[str, Any] | None, seed: int
+        self, parameters: Mapping[str, Parameter], objective: Objective, start: Mapping[str, Any] | None, seed: int
     ) -> None:
         """start: the first point, if given. Raises ConveyorError where Optuna is not installed."""
         require_optuna()
@@ -85,11 +77,11 @@ def require_optuna() -> None:
 
 
 def _violations(trial: FrozenTrial) -> Sequence[float]:
-    found: list[float] = trial.user_attrs[_VIOLATIONS]
-    return found
+    violations: list[float] = trial.user_attrs[_VIOLATIONS]
+    return violations
 
 
-def _distribution(parameter: Ranged) -> BaseDistribution:
+def _distribution(parameter: Parameter) -> BaseDistribution:
     from optuna.distributions import CategoricalDistribution, FloatDistribution, IntDistribution
 
     if parameter.values is not None:
