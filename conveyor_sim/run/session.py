@@ -12,6 +12,7 @@ from conveyor_sim.errors import CheckpointError, SimulationError
 from conveyor_sim.line.commands.inputs import CommandOutcome, Input
 from conveyor_sim.line.commands.refusal import shown
 from conveyor_sim.run.force_check import PeakWatch, achieved
+from conveyor_sim.scene.recorded import sources_of
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.printable import SENTENCE, printable
 
@@ -49,7 +50,8 @@ class RunSession:
         self.simulation = simulation
         self._began = simulation.time
         keep_start = simulation.save if simulation.tick > 0 else None
-        self._recorder = Recorder(bag, distro=distro, start=keep_start) if bag else None
+        sources = sources_of(simulation.scene)
+        self._recorder = Recorder(bag, distro=distro, start=keep_start, sources=sources) if bag else None
         sinks = [sink] if self._recorder is None else [self._recorder, sink]
         self.outputs = OutputWriter(self.simulation, sinks, frame_id=frame_id, run_id=self.run_id)
         self.outputs.start()
