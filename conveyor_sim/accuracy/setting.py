@@ -31,11 +31,7 @@ def _scaled(contact: Contact, factor: float) -> dict[str, Any]:
             data[field] *= factor
     if contact.table is not None:
         data["table"] = [[overlap, force * factor] for overlap, force in contact.table]
-    damping = contact.damping
-    if damping.restitution is not None:
-        # A scene gives one of the two.
-        del data["damping"]["coefficient"]
-    elif (law := damping_law(contact)) is not None:
+    if contact.damping.restitution is None and (law := damping_law(contact)) is not None:
         data["damping"]["coefficient"] *= factor ** law.stiffness_power(elastic_law(contact).name)
     if contact.tangential is not None:
         if contact.tangential.stiffness is not None:

@@ -1,7 +1,7 @@
 """Log of a run's start and inputs, from which the run can be simulated again (`rerun.py`).
 
-A file of JSON lines. The first line holds the scene. The copy of a checkpoint at which the run began lies beside the
-file. Further lines:
+A file of JSON lines. The first line holds the scene, and in base64 its sources if it is expanded. The copy of a
+checkpoint at which the run began lies beside the file. Further lines:
 
 - `{"tick": t, "inputs": [[source, writer, writer_kind, operation, names, values, texts], ...]}`: inputs applied
   at t and at each tick after it, until the next such line;
@@ -15,6 +15,7 @@ from __future__ import annotations
 import contextlib
 import json
 import shutil
+from base64 import b64encode
 from collections.abc import Callable, Sequence
 from functools import partial
 from os import PathLike
@@ -22,6 +23,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from conveyor_sim.errors import BagError
+from conveyor_sim.scene.recorded import recorded_source, sources_of
 from conveyor_sim.support.file_lock import lock
 
 if TYPE_CHECKING:
@@ -64,9 +66,12 @@ class InputLog(contextlib.AbstractContextManager["InputLog"]):
         self._names: Sequence[str] = ()
         self._values: Sequence[float] = ()
         scene = simulation.scene
+        text, overrides = recorded_source(scene)
+        sources = {path: b64encode(content).decode() for path, content in sources_of(scene).items()}
         header = {
             "format": FORMAT,
-            "scene": {"text": scene.source_text, "name": scene.source_name, "overrides": scene.overrides_text},
+            "scene": {"text": text, "name": scene.source_name, "overrides": overrides},
+            **({"sources": sources} if sources else {}),
             "start": start is not None,
             "environment": environment_of(simulation),
         }

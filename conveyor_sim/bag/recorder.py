@@ -7,8 +7,8 @@ import errno
 import os
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
-from pathlib import Path
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from pathlib import Path, PurePath
 
 from conveyor_sim.bag.channels import ENCODING, metadata_of, schema_of
 from conveyor_sim.bag.folder import make_folder, remove_folders
@@ -23,6 +23,13 @@ from conveyor_sim.errors import BagError, CheckpointError
 from conveyor_sim.support.file_lock import lock
 
 LINE_TOPIC = "line"
+_MEDIA_TYPES = {
+    ".yaml": "application/yaml",
+    ".csv": "text/csv",
+    ".png": "image/png",
+    ".jpg": "image/jpeg",
+    ".jpeg": "image/jpeg",
+}
 FLUSH_INTERVAL = 0.5
 """Wall time that a message waits at most until it is handed to the operating system, s. A killed process loses the
 messages of this time, and of the delay that a loaded machine adds: less than a second."""
@@ -33,6 +40,7 @@ class Recorder(contextlib.AbstractContextManager["Recorder"]):
 
     path: the folder to create, which must not exist or be empty. topics: names of OUTPUTS to record (default: all).
     start: writes the checkpoint at which the run begins to a path, because a replay begins there; None: tick 0.
+    sources: files that the scene was read from, by path from its folder; they are attached to the file.
     A separate thread flushes, also when no more messages come. Any thread may call the methods.
     Raise BagError before the simulation starts if the folder can't be written; then the folder is removed.
     """
@@ -44,8 +52,10 @@ class Recorder(contextlib.AbstractContextManager["Recorder"]):
         topics: Iterable[str] | None = None,
         distro: str | None = None,
         start: Callable[[Path], object] | None = None,
+        sources: Mapping[str, bytes] | None = None,
     ) -> None:
         self.path = Path(path)
+        self._sources = sources or {}
         self._distro = distro or default_distro()
         self._ended = False
         self._failure: BagError | None = None
@@ -92,6 +102,9 @@ class Recorder(contextlib.AbstractContextManager["Recorder"]):
                 if topic == LINE_TOPIC and not self._begun:
                     line = LineCopy(f"/{topic}", OUTPUTS[topic].type, stamp_ns, data)
                     self._file.add_metadata(LINE_COPY, line.to_record())
+                    for name, content in self._sources.items():
+                        kind = _MEDIA_TYPES.get(PurePath(name).suffix, "text/plain")
+                        self._file.add_attachment(name, kind, content, stamp_ns, create_time=0)
                 self._file.add_message(self._channels[topic], data, log_time=stamp_ns, publish_time=stamp_ns)
                 if not self._begun:
                     self._file.flush()

@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 import shutil
 import uuid
+from base64 import b64decode
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from conveyor_sim.bag.folder import alone
 from conveyor_sim.bag.input_log import FILE_NAME, FORMAT, START_NAME, copier, environment_of
-from conveyor_sim.bag.lock import alone
 from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.errors import BagError, SimulationError
@@ -55,6 +56,7 @@ class _Run:
     """Content of a file of inputs."""
 
     scene: Scene
+    sources: dict[str, bytes]
     from_checkpoint: bool
     environment: list[str]
     inputs: dict[int, list[Input]]
@@ -93,7 +95,7 @@ def rerun(
             simulation = Simulation(run.scene)
         if run.last < simulation.tick:
             raise BagError(f"{path}: ends at tick {run.last}, expected the start, tick {simulation.tick}, or later")
-        recorder = Recorder(bag, start=copier(start if run.from_checkpoint else None))
+        recorder = Recorder(bag, start=copier(start if run.from_checkpoint else None), sources=run.sources)
         try:
             with recorder:
                 departure = _simulate(run, simulation, recorder, progress, watch)
@@ -192,6 +194,7 @@ def _read(path: Path) -> _Run:
             raise BagError(f"{path}: format {header['format']!r} of inputs, expected {FORMAT}")
         source = {key: str(header["scene"][key]) for key in ("text", "name", "overrides")}
         scene = parse_again(source["text"], source["name"], parse_overrides(source["overrides"]))
+        sources = {name: b64decode(text, validate=True) for name, text in dict(header.get("sources", {})).items()}
         from_checkpoint, environment = bool(header["start"]), [str(entry) for entry in header["environment"]]
         for line in lines[1:]:
             entry = json.loads(line)
@@ -210,7 +213,7 @@ def _read(path: Path) -> _Run:
                 failed = bool(entry.get("failed"))
     except (IndexError, KeyError, TypeError, ValueError, RecursionError) as error:
         raise BagError(f"{path}: is damaged ({printable(error)}), expected the inputs of a run") from error
-    return _Run(scene, from_checkpoint, environment, inputs, variables, hashes, last, failed)
+    return _Run(scene, sources, from_checkpoint, environment, inputs, variables, hashes, last, failed)
 
 
 def _input(source: Any, writer: Any, kind: Any, operation: Any, names: Any, values: Any, texts: Any) -> Input:

@@ -1,4 +1,4 @@
-"""Commands on a recording: recover, replay, events, report, plot."""
+"""Commands on a recording: recover, replay, sources, events, report, plot."""
 
 from __future__ import annotations
 
@@ -83,6 +83,21 @@ def _publish(bag: Path, rate: float, start: float | None, paused: bool, ros_argu
             "environment that `make` sets up"
         ) from error
     publish_bag(bag, rate, start, paused, ros_arguments)
+
+
+@click.command()
+@click.argument("bag", type=click.Path(path_type=Path))
+@click.option("--out", type=click.Path(path_type=Path), help="New or empty folder (default: BAG/sources).")
+def sources(bag: Path, out: Path | None) -> None:
+    """Write the files that the scene in BAG was read from: scene, included files, cells, tables, overrides."""
+    from conveyor_sim.bag.sources import write_sources
+
+    folder = out or (bag if bag.is_dir() else bag.parent) / "sources"
+    result = write_sources(bag, folder)
+    for name in result.written:
+        click.echo(printable(folder / name))
+    if result.refused:
+        raise ConveyorError("\n".join(result.refused))
 
 
 @click.command()

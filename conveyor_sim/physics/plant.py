@@ -96,14 +96,15 @@ class Plant:
         for name, *_ in self.bottles:
             supply[name] = supply.get(name, 0.0) + 1.0
         for _, entry in self.scene.entries():
-            supply[entry.bottle] = supply.get(entry.bottle, 0.0) + (math.inf if entry.most is None else entry.most)
+            for kind in entry.kinds:
+                supply[kind] = supply.get(kind, 0.0) + (math.inf if entry.most is None else entry.most)
         return supply
 
     @property
     def most_bottles(self) -> int | None:
         """Largest number of bottles in a run; None if an infeed has no end."""
-        most = sum(self.supply.values())
-        return int(most) if math.isfinite(most) else None
+        most = [entry.most for _, entry in self.scene.entries()]
+        return None if None in most else len(self.bottles) + sum(number for number in most if number is not None)
 
     @cached_property
     def impact_speed(self) -> float:

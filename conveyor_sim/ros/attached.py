@@ -30,8 +30,7 @@ from conveyor_sim.errors import CommandError
 from conveyor_sim.line.commands.inputs import DECLARE, CommandOutcome
 from conveyor_sim.ros.context import new_node, start_ros
 from conveyor_sim.ros.domain import in_environment, own_domain
-from conveyor_sim.ros.intake import Intake
-from conveyor_sim.ros.lockstep_service import LockstepService
+from conveyor_sim.ros.lockstep_service import Intake, LockstepService
 from conveyor_sim.ros.publishers import check_type, ros_qos
 from conveyor_sim.ros.spinner import Spinner
 from conveyor_sim.run.alarm_changes import AlarmChanges
@@ -39,6 +38,7 @@ from conveyor_sim.run.calls import CallQueue
 from conveyor_sim.run.lockstep import LOCKSTEP, Lockstep, LockstepAnswer, LockstepRequest, Refused
 from conveyor_sim.run.scan_loop import AttachedController
 from conveyor_sim.scene import Scene, parse_again, parse_overrides
+from conveyor_sim.scene.recorded import recorded_source
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.child_process import Process
 
@@ -255,4 +255,5 @@ def _line(simulation: Simulation, run_id: str) -> Line:
 def _endless(scene: Scene) -> Scene:
     """Return the scene with a duration of LAST_TICK ticks."""
     seconds = scene.tick_ns  # 10^9 ticks of tick_ns nanoseconds
-    return parse_again(scene.source_text, scene.name, {**parse_overrides(scene.overrides_text), "duration": seconds})
+    text, overrides = recorded_source(scene)
+    return parse_again(text, scene.name, {**parse_overrides(overrides), "duration": seconds})

@@ -18,9 +18,10 @@ from conveyor_sim.errors import ConveyorError, SimulationError
 from conveyor_sim.line.run_state import ENDED, RUNNING, STOPPED, RunState
 from conveyor_sim.run.force_check import PeakWatch
 from conveyor_sim.run.scan_loop import ScanLoop
+from conveyor_sim.run.session import keep_stopped
 from conveyor_sim.run.speed import Spent
-from conveyor_sim.run.stopped import keep_stopped
 from conveyor_sim.scene import Scene
+from conveyor_sim.scene.recorded import sources_of
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.printable import SENTENCE, printable
 from conveyor_sim.support.signals import HandledOnce
@@ -72,7 +73,7 @@ def run_scene(
         for sentence in getattr(controller, "left_over", ()):
             say(sentence)
     scans.scan_tick()
-    recorder = Recorder(bag) if bag is not None else None
+    recorder = Recorder(bag, sources=sources_of(scene)) if bag is not None else None
     with recorder or nullcontext(), _stop_request() as stop:
         outputs = OutputWriter(simulation, [recorder] if recorder else [], run_id=uuid.uuid4().hex)
         outputs.start()

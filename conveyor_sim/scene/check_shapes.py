@@ -222,7 +222,8 @@ def _infeeds_in_rails(scene: Scene, rails: list[RailShape]) -> Iterator[Problem]
     feeds, groups = [], []
     for path, feed in scene.givers():
         # Any bottle may come to a machine that returns bottles.
-        radius = radii.get(feed.bottle) if isinstance(feed, Entry) else max(radii.values())
+        kinds = [radii[kind] for kind in feed.kinds if kind in radii] if isinstance(feed, Entry) else radii.values()
+        radius = max(kinds, default=None)
         if radius is not None:
             feeds.append(feed)
             groups.append(_Group((*path, "position"), _births(feed, radius), radius))

@@ -136,7 +136,10 @@ def _several_bottles(scene: Scene) -> bool:
 
 
 def _unknown_types(scene: Scene) -> Iterator[Problem]:
-    used: list[tuple[Path, str]] = [((*path, "bottle"), entry.bottle) for path, entry in scene.entries()]
+    used: list[tuple[Path, str]] = []
+    for entry_path, part in scene.entries():
+        used += [((*entry_path, "bottle"), part.bottle)]
+        used += [((*entry_path, "types"), kind) for kind in part.kinds if kind != part.bottle]
     for index, entry in enumerate(scene.bottles):
         if isinstance(entry, Grid):
             used.append((("bottles", index, "grid", "type"), entry.grid.type))

@@ -1,9 +1,10 @@
 """Pairs of materials in a scene file: contacts with their laws, and friction of bottles on belts."""
 
 from collections.abc import Mapping
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 from annotated_types import Len
+from pydantic import SerializerFunctionWrapHandler, model_serializer
 
 from conveyor_sim.scene.part import Part
 from conveyor_sim.scene.types import Component, NotNegative, OrText, Pair, Positive, Restitution, Says, quantity
@@ -70,6 +71,12 @@ class Damping(Part):
         "m/s",
         default=None,
     )
+
+    @model_serializer(mode="wrap")
+    def _without_coefficient(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave out the coefficient beside a restitution, so that a scene can be read again from its fields."""
+        fields: dict[str, Any] = handler(self)
+        return fields if self.restitution is None else {k: v for k, v in fields.items() if k != "coefficient"}
 
 
 class Tangential(Part):

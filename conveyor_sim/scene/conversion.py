@@ -27,6 +27,20 @@ def any_angle() -> Iterator[None]:
         _any_angle.reset(token)
 
 
+_converted: ContextVar[list[str] | None] = ContextVar("converted", default=None)
+
+
+@contextmanager
+def noting_texts() -> Iterator[list[str]]:
+    """Collect the names of fields for whose texts numbers are computed inside this context."""
+    names: list[str] = []
+    token = _converted.set(names)
+    try:
+        yield names
+    finally:
+        _converted.reset(token)
+
+
 class _Field(NamedTuple):
     units: tuple[str, ...]
     """Unit of its numbers; several for the columns of a list of rows."""
@@ -50,6 +64,8 @@ def in_si_units(kind: type[BaseModel], data: Any) -> Any:
         number = _number(field, value, field.units[0] if len(field.units) == 1 else "")
         if number is not value:
             changes[name] = number
+    if changes and (noted := _converted.get()) is not None:
+        noted += changes
     return {**data, **changes} if changes else data
 
 

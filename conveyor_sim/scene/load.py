@@ -10,7 +10,7 @@ from typing import Any
 from conveyor_sim.errors import SceneError
 from conveyor_sim.scene.beside import Beside
 from conveyor_sim.scene.checks import problems_of
-from conveyor_sim.scene.conversion import any_angle
+from conveyor_sim.scene.conversion import any_angle, noting_texts
 from conveyor_sim.scene.layout.compose import chosen, compose
 from conveyor_sim.scene.overrides import FILES, in_quotes, parse_overrides, plain, yaml_text
 from conveyor_sim.scene.part import validated
@@ -66,7 +66,8 @@ def parse_scene(
     reading = Reading(composition, data)
     if reading.expansion.problems:
         raise refused(reading.expansion.problems, composition.sources.place_of, name, reading.expansion.more)
-    scene = validated(Scene, reading.expansion.data)
+    with noting_texts() as texts:
+        scene = validated(Scene, reading.expansion.data)
     if isinstance(scene, tuple):
         raise reading.refused(*scene)
     problems = problems_of(scene)
@@ -74,14 +75,13 @@ def parse_scene(
         raise reading.refused(problems)
     # Recordings store the text and the overrides. With the content of other files among them, they need no file.
     changes_text = yaml_text(changes)
-    files = (
-        {path: content.decode("utf-8-sig") for path, content in beside.used.items()} if composition.is_composed else {}
-    )
+    is_expanded = composition.is_composed or reading.expansion.plan is not None or bool(texts)
+    files = {path: content.decode("utf-8-sig") for path, content in beside.used.items()} if is_expanded else {}
     if scene.underlay is not None:
         scene._underlay = read_underlay(scene.underlay, beside)
         if scene.underlay_url:
             files = {**files, scene.underlay.file: scene.underlay_url}
-    is_in_files = composition.is_composed or data is composition.data
+    is_in_files = is_expanded or data is composition.data
     stored_text = changes_text if is_in_files else yaml_text({**changes, "contacts": data["contacts"]})
     if files:
         stored_text += f"{FILES}: {in_quotes(files)}\n"
@@ -89,7 +89,7 @@ def parse_scene(
         most = in_mb(LONGEST_TEXT)
         text = f"tables, other files and overrides of {in_mb(len(stored_text))} as YAML, expected at most {most}"
         raise SceneError(f"{name}: {text}")
-    scene._source = Origin(text, name, changes_text, stored_text, files=files)
+    scene._source = Origin(text, name, changes_text, stored_text, files=files, is_expanded=is_expanded)
     scene._layout = reading.expansion.plan
     return scene
 

@@ -72,7 +72,7 @@ def yaml_text(changes: Any) -> str:
     return stream.getvalue()
 
 
-def in_quotes(texts: Mapping[str, str]) -> str:
-    """Return a mapping of texts as one line of YAML, which is read fast."""
-    text = json.dumps(texts, ensure_ascii=False)
+def in_quotes(value: Any) -> str:
+    """Return plain data as one line of YAML with all texts in quotes, which is read fast."""
+    text = json.dumps(value, ensure_ascii=False)
     return _SPECIAL.sub(lambda match: f"\\u{ord(match[0]):04x}", text)

@@ -160,7 +160,9 @@ class Origin:
     streams_by_index: bool = False
     """True if random streams are keyed by places in lists, as in old recordings, and not by names."""
     files: Mapping[str, str] = field(default_factory=dict, compare=False)
-    """Texts of the files that the scene includes or uses, by path from its folder."""
+    """Texts of the files that an expanded scene was read from beside its own, by path from its folder."""
+    is_expanded: bool = field(default=False, compare=False)
+    """True if the text uses the layout language, so that recordings hold the expanded scene."""
 
 
 def _bottle_tag(data: Any) -> str:
@@ -379,8 +381,16 @@ class Scene(Part):
 
     @property
     def source_files(self) -> Mapping[str, str]:
-        """Texts of the files that a composed scene includes or uses, by path from its folder."""
+        """Texts of the files that an expanded scene was read from beside its own, by path from its folder.
+
+        An underlay is a data URL.
+        """
         return self._source.files
+
+    @property
+    def is_expanded(self) -> bool:
+        """True if the text uses the layout language: recordings then hold the expanded scene (`recorded.py`)."""
+        return self._source.is_expanded
 
     @property
     def overrides_text(self) -> str:

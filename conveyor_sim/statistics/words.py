@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 
-from conveyor_sim.statistics.intervals import CONFIDENCE, Interval
-from conveyor_sim.statistics.sample_size import runs_to_tell
+from conveyor_sim.statistics.intervals import CONFIDENCE, Interval, runs_to_tell
 
 ROUNDING = 1e-12
 """Relative half-width below which the scatter comes from rounding of numbers."""

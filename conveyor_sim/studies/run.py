@@ -21,6 +21,7 @@ from conveyor_sim.physics.model import Model
 from conveyor_sim.run.compilation import compile_kernels
 from conveyor_sim.run.scan_loop import ScanLoop
 from conveyor_sim.scene import Scene, parse_overrides
+from conveyor_sim.scene.recorded import sources_of
 from conveyor_sim.scene.words import listed
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.studies.gauges import Averaged, Gauge, half_width
@@ -113,7 +114,7 @@ def simulate(work: Work, bag: Path | None, clock: _Clock | None = None) -> RunRo
     with nullcontext() if clock is None else clock.standing():
         load_kernels(simulation)
     keep_start = None if work.start is None else simulation.save
-    recorder = None if bag is None else Recorder(bag, start=keep_start)
+    recorder = None if bag is None else Recorder(bag, start=keep_start, sources=sources_of(scene))
     try:
         outputs = OutputWriter(simulation, [recorder] if recorder else [], run_id=uuid.uuid4().hex)
         if work.start is not None:

@@ -8,8 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from conveyor_sim.statistics.comparisons import best, compare_paired
-from conveyor_sim.statistics.intervals import mean_interval
-from conveyor_sim.statistics.sample_size import runs_for
+from conveyor_sim.statistics.intervals import mean_interval, runs_for
 from conveyor_sim.statistics.words import plus_minus, rounded
 from conveyor_sim.studies.results import Results
 from conveyor_sim.studies.row import RunRow, point_text

@@ -21,18 +21,20 @@ from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.control.scan import ALARMS, ControlError, Controller, Inputs
 from conveyor_sim.errors import CommandError, SimulationError
+from conveyor_sim.line.changeover import changeover
 from conveyor_sim.line.commands.authority import MODES
 from conveyor_sim.line.commands.inputs import DISOWN, FAULT, FORCE, INJECT, MODE, SET, UNFORCE, Input, WriterKind
 from conveyor_sim.line.run_state import ENDED, RUNNING, STOPPED, RunState
 from conveyor_sim.protocols.tags.tag_provider import SCADA_SOURCES, SteppedTagProvider
 from conveyor_sim.run.scan_loop import AttachedController, LocalController, ScanLoop
 from conveyor_sim.scene import Scene
+from conveyor_sim.scene.recorded import sources_of
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.modbus_rows import Row
 from conveyor_sim.support.printable import SENTENCE, printable
 from conveyor_sim.testing import plc
 from conveyor_sim.testing.history import ScenarioHistory
-from conveyor_sim.testing.plc_server import ServedPlc
+from conveyor_sim.testing.plc import ServedPlc
 from conveyor_sim.testing.scene_of import scene_of
 
 Condition = Callable[["Present"], Any]
@@ -223,7 +225,7 @@ class Scenario(AbstractContextManager["Scenario"]):
         self.failure = ""
         """Sentence about that failure."""
         self._read: dict[str, None] = {}
-        self._recorder = None if bag is None else Recorder(bag, start=copier(start))
+        self._recorder = None if bag is None else Recorder(bag, start=copier(start), sources=sources_of(self.scene))
         self._outputs = OutputWriter(
             self.simulation, [self._recorder] if self._recorder else [], run_id=uuid.uuid4().hex
         )
@@ -404,6 +406,16 @@ class Scenario(AbstractContextManager["Scenario"]):
         Raises CommandError if it would be refused.
         """
         self._give(Input(TEST, TEST, "test", SET, (name,), (value,)))
+
+    def changeover(self, format: str) -> None:
+        """Give the commands that set speeds, rates and bottle types of another format of the scene at the next tick.
+
+        A controller that gives the same commands in its scans overwrites them. Raise SceneError for an unknown format,
+        and for one that commands can't set.
+        """
+        commands = changeover(self.scene, format)
+        if commands:
+            self._give(Input(TEST, TEST, "test", SET, tuple(commands), tuple(commands.values())))
 
     def inject(self, fault: str, value: float = 1.0) -> None:
         """Begin a fault at the next tick, or end it with value 0. Raise CommandError if it would be refused."""

@@ -21,8 +21,8 @@ from conveyor_sim.report.figures import style
 from conveyor_sim.report.figures.damage import bottles_figure, rails_figure
 from conveyor_sim.report.figures.data import Damage
 from conveyor_sim.report.figures.recording import Recording
+from conveyor_sim.report.report import render
 from conveyor_sim.report.summarize import summarize
-from conveyor_sim.report.summary_table import render
 from conveyor_sim.simulation import Simulation
 
 

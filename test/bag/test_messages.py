@@ -19,6 +19,7 @@ from conveyor_sim.columns.image import NOTHING_FORCED, Image
 from conveyor_sim.columns.ledger import balance
 from conveyor_sim.line.commands.inputs import CommandOutcome, Input
 from conveyor_sim.scene import Scene
+from conveyor_sim.scene.recorded import recorded_source
 from conveyor_sim.simulation import Simulation
 
 LEDGER = balance(
@@ -134,7 +135,7 @@ def test_line_holds_all_that_a_replay_needs(scene: Scene) -> None:
     line: Any = typestore().deserialize_cdr(data, TOPICS["line"].type)
     assert_same(deserialize(TOPICS["line"].type, data), line)
     assert (line.run_id, line.scene_name, line.seed) == ("run-1", "small_line", 7)
-    assert line.scene_text == scene.source_text
+    assert (line.scene_text, line.overrides) == recorded_source(scene)
     assert line.belts == ["straight", "turn"]
     assert line.rails == ["right", "left", "stop", "turn_inner", "turn_outer"]
     assert dict(zip(line.bottle_types, line.type_radius.tolist(), strict=True)) == {"small": 0.03, "large": 0.05}

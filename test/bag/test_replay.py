@@ -20,11 +20,12 @@ from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.bag.replay import replay
 from conveyor_sim.errors import BagError, SceneError
-from conveyor_sim.line.devices.zone import ZoneDevice
+from conveyor_sim.line.devices.region import ZoneDevice
 from conveyor_sim.line.run_state import STOPPED, RunState
 from conveyor_sim.line.tag import count
 from conveyor_sim.physics.model import build_model
 from conveyor_sim.scene import load_scene, parse_scene
+from conveyor_sim.scene.recorded import recorded_source
 
 
 def test_recording_replays_bit_for_bit(bag: Path) -> None:
@@ -257,7 +258,7 @@ def test_a_recording_replays_in_the_steps_and_the_integrator_that_it_ran_in(tmp_
 
     def forget(name: str, message: Any) -> None:
         if name == "line":
-            message.overrides = ""
+            message.scene_text, message.overrides = recorded_source(load_scene(SMALL_LINE))
 
     forgetful = edited(tmp_path / "ran", tmp_path / "forgetful", forget)
     with open_bag(forgetful) as opened:
@@ -291,7 +292,7 @@ def test_effects_that_were_not_recorded_are_said(bag: Path, tmp_path: Path) -> N
 def test_scene_that_is_refused_today_is_said(bag: Path, tmp_path: Path) -> None:
     def spoil(name: str, message: Any) -> None:
         if name == "line":
-            message.scene_text = message.scene_text.replace("radius: 0.03", "radius: -0.03")
+            message.scene_text = message.scene_text.replace('"radius": 0.03', '"radius": -0.03')
 
     with pytest.raises(SceneError, match=r"the recorded scene is refused by this version:\n.*radius"):
         replay(edited(bag, tmp_path / "spoilt", spoil))

@@ -17,9 +17,9 @@ from conveyor_sim.line.commands.authority import AUTOMATIC, MANUAL
 from conveyor_sim.line.commands.inputs import MODE, Input
 from conveyor_sim.physics.model import build_model
 from conveyor_sim.physics.model.remedies import step_limit
+from conveyor_sim.report.report import render
 from conveyor_sim.report.summarize import summarize
 from conveyor_sim.report.summary import Summary, write_summary
-from conveyor_sim.report.summary_table import render
 from conveyor_sim.scene import Scene, load_scene, parse_scene
 from conveyor_sim.simulation import Simulation
 

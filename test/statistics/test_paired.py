@@ -9,8 +9,7 @@ from facts import stating
 from lindley import waits
 
 from conveyor_sim.statistics.comparisons import paired_difference, paired_probability, pairing_gain
-from conveyor_sim.statistics.intervals import mean_interval
-from conveyor_sim.statistics.sample_size import runs_for, runs_to_tell
+from conveyor_sim.statistics.intervals import mean_interval, runs_for, runs_to_tell
 
 
 def test_common_seeds_tell_a_faster_server_with_few_runs() -> None:

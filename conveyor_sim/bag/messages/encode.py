@@ -15,6 +15,7 @@ from conveyor_sim.columns.bottles import BottleColumns
 from conveyor_sim.columns.image import NOTHING_FORCED, Image
 from conveyor_sim.line.commands.inputs import CommandOutcome, Input, recorded_input
 from conveyor_sim.line.run_state import RunState
+from conveyor_sim.scene.recorded import recorded_source
 
 if TYPE_CHECKING:
     from conveyor_sim.simulation import Simulation
@@ -135,11 +136,12 @@ def bool_message(value: bool, header: Header) -> bytes:
 def line_message(sim: Simulation, run_id: str, header: Header) -> bytes:
     """Return a conveyor_msgs/Line: the meaning of indices, and all data needed to run the same line again."""
     scene, model, image = sim.scene, sim.model, sim.process_image
+    text, overrides = recorded_source(scene)
     values = {
         "run_id": run_id,
         "scene_name": scene.name,
-        "scene_text": scene.source_text,
-        "overrides": scene.overrides_text,
+        "scene_text": text,
+        "overrides": overrides,
         "seed": scene.seed,
         "tick_ns": model.tick_ns,
         "steps_per_tick": model.steps_per_tick,

@@ -7,7 +7,8 @@ from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.devices.entry import CLEAR, Quality, Scattering
 from conveyor_sim.line.devices.setup import BAD, JITTER, DeviceSetup
-from conveyor_sim.line.tag import MOST_COUNT, count, switch
+from conveyor_sim.line.devices.switched import CMD_BOTTLE, Switching, type_tags
+from conveyor_sim.line.tag import MOST_COUNT, Tag, count, number, switch
 from conveyor_sim.physics.state import State
 from conveyor_sim.scene.parts.infeed import Infeed
 
@@ -19,8 +20,16 @@ LATE = 2.0
 in-line."""
 
 
-class InfeedDevice(Device, Scattering):
-    """Infeed of a running line."""
+class InfeedDevice(Device, Scattering, Switching):
+    """Infeed of a running line.
+
+    Without commands, no instance attributes of them are set: states of such infeeds are those of older scenes.
+    """
+
+    rate = 0.0
+    """Rate, 1/s; unused without a rate."""
+    radius_before = 0.0
+    """Radius of the last bottle, m; unused without a choice of types."""
 
     def __init__(self, name: str, infeed: Infeed, setup: DeviceSetup) -> None:
         most = MOST_COUNT if infeed.count is None else infeed.count
@@ -29,10 +38,16 @@ class InfeedDevice(Device, Scattering):
             [
                 count(f"{name}/fed", "counter", "Bottles fed.", high=most, adds_to="fed").of("fed"),
                 switch(f"{name}/blocked", "status", "A bottle is due, but has no room.").of("blocked"),
+                *type_tags(name, infeed),
+                *_rate_tags(name, infeed),
             ],
         )
-        self._infeed, self._entry = infeed, setup.entry(infeed.bottle, infeed.direction, infeed.speed)
-        self._radius = self._entry.radius
+        self._infeed = infeed
+        self.switch_among(infeed, setup)
+        if infeed.rate_limit is not None and infeed.rate is not None:
+            self.rate = infeed.rate
+        if infeed.types:
+            self.radius_before = self._radius
         self.random = setup.random(name, JITTER)
         self.quality = Quality(infeed, setup.random(name, BAD))
         self.fed = 0
@@ -47,6 +62,21 @@ class InfeedDevice(Device, Scattering):
         self.offset = 0.0  # a part of the state of every infeed, with scatter or without
         self._draw_delay()
         self.scatter(infeed, lambda: self.random)
+
+    @property
+    def _radius(self) -> float:
+        return self._entry.radius
+
+    def command(self, name: str, value: float, now: ScanContext) -> None:
+        """Apply the type of new bottles or their rate (1/s)."""
+        if name.endswith(CMD_BOTTLE):
+            self.bottle = int(value)
+        else:
+            self.rate = value
+
+    def restored(self, tick: int) -> None:
+        """Check the restored type."""
+        self.check_type()
 
     def feed(self, now: ScanContext) -> None:
         """Feed the bottles that are due."""
@@ -65,7 +95,8 @@ class InfeedDevice(Device, Scattering):
     def _feed_packed(self, now: ScanContext) -> bool:
         """Feed from an in-line that moves with the last bottle fed. The next bottle enters one pitch behind it."""
         state, time = now.state, now.time
-        pitch = 2.0 * self._radius + (self._infeed.gap or 0.0)
+        before = self.radius_before if self._infeed.types else self._radius
+        pitch = before + self._radius + (self._infeed.gap or 0.0)
         advance = self._infeed.speed * now.length
         ahead = 0.0
         if self.fed:
@@ -126,7 +157,12 @@ class InfeedDevice(Device, Scattering):
         return time - self.due > LATE * (pitch / self._infeed.speed + self.extra)
 
     def _feed_rate(self, now: ScanContext) -> bool:
-        rate, time = self._infeed.rate or 0.0, now.time
+        limited = self._infeed.rate_limit is not None
+        rate, time = self.rate if limited else self._infeed.rate or 0.0, now.time
+        if rate == 0.0:
+            # A line does not catch up.
+            self.due = max(self.due, time - self.extra)
+            return False
         if time < self.due + self.extra - ROUNDING:
             return False
         if not self._enter(now, 0.0):
@@ -144,6 +180,8 @@ class InfeedDevice(Device, Scattering):
         self.last = self._entry.enter(now.state, x, y, self.deflection)
         self.quality.judge(self.last, now)
         self.fed += 1
+        if self._infeed.types:
+            self.radius_before = self._radius
         self._draw_delay()
         self.draw_scatter()
         return True
@@ -157,3 +195,11 @@ class InfeedDevice(Device, Scattering):
     def counts(self) -> tuple[int, int, int]:
         """Return fed bottles and bad ones among them."""
         return self.fed, self.quality.bad, 0
+
+
+def _rate_tags(name: str, infeed: Infeed) -> list[Tag]:
+    """Return the tag of the command for the rate; none without a limit."""
+    if infeed.rate_limit is None or infeed.rate is None:
+        return []
+    rate, most = infeed.rate, infeed.rate_limit
+    return [number(f"{name}/rate", "setpoint", "Bottles per second.", "1/s", 0.0, most, rate, nominal=rate)]

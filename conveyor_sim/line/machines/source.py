@@ -5,13 +5,14 @@ from collections.abc import Sequence
 from conveyor_sim.line.device import ScanContext
 from conveyor_sim.line.devices.entry import Quality, Scattering
 from conveyor_sim.line.devices.setup import BAD, JITTER, DeviceSetup
+from conveyor_sim.line.devices.switched import CMD_BOTTLE, Switching, type_tags
 from conveyor_sim.line.machines.machine import MachineDevice
 from conveyor_sim.line.machines.stop_reason import BLOCKED, NONE
 from conveyor_sim.line.tag import count, seconds, switch
 from conveyor_sim.scene.parts.source import Source
 
 
-class SourceDevice(MachineDevice, Scattering):
+class SourceDevice(MachineDevice, Scattering, Switching):
     """Source of a running line. Blocked: a bottle is due, and there is no room for it."""
 
     def __init__(self, name: str, source: Source, setup: DeviceSetup) -> None:
@@ -19,13 +20,26 @@ class SourceDevice(MachineDevice, Scattering):
             count(f"{name}/produced", "counter", "Bottles fed.", adds_to="fed"),
             switch(f"{name}/blocked", "status", "A bottle is due, and there is no room.", adds_to="state"),
             seconds(f"{name}/blocked_time", "counter", "Total time blocked."),
+            *type_tags(name, source),
         ]
+        self.switch_among(source, setup)
         super().__init__(name, source, setup, signals)
-        self._entry = setup.entry(source.bottle, source.direction, source.speed)
         self.quality = Quality(source, setup.random(name, BAD))
         self.scatter(source, lambda: setup.random(name, JITTER))
         self.fed = 0
         self.blocked_ticks = 0
+
+    def command(self, name: str, value: float, now: ScanContext) -> None:
+        """Apply the type of new bottles, or a command of all machines."""
+        if name.endswith(CMD_BOTTLE):
+            self.bottle = int(value)
+        else:
+            super().command(name, value, now)
+
+    def restored(self, tick: int) -> None:
+        """Derive what the state implies, and check the restored type."""
+        super().restored(tick)
+        self.check_type()
 
     def feed(self, now: ScanContext) -> None:
         """Feed the bottle that is due, if there is room."""

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from conveyor_sim.columns.damage import DamageEvent
 from conveyor_sim.engine.arrays.types import F8
+from conveyor_sim.physics.accounts.damage import PassedLimits
 from conveyor_sim.physics.state import State
 from conveyor_sim.scene import Scene
-from conveyor_sim.scene.types import Unchecked
 
 SLOW = 0.1
 """Speed of a bottle over that of its belt below which it counts as waiting."""
@@ -24,37 +24,30 @@ def clogging_of(state: State, scene: Scene) -> "Clogging | None":
     return Clogging(state, scene.limits.clogging_time, exits)
 
 
-class Clogging:
+class Clogging(PassedLimits):
     """Outfeeds of a scene, checked after every tick. Checkpoints hold the public attributes."""
 
     passages: dict[str, tuple[int, int, int]]
     """By outfeed: bottles removed, last tick with a passage or without waiting bottles, 1 if reported since."""
-    events: list[tuple[int, str, int, Unchecked, Unchecked, Unchecked, Unchecked, str]]
-    """Events that were not taken yet."""
 
     def __init__(self, state: State, limit: float, exits: Mapping[str, F8]) -> None:
         """Start the watch. limit: s without a passage. exits: corners (n, 2) m of each outfeed, by name."""
+        super().__init__()
         self._state = state
         self._limit = limit
         self._exits = exits
         self.passages = dict.fromkeys(exits, (0, 0, 0))
-        self.events = []
 
     def end(self, tick: int, removed: Mapping[str, int]) -> list[DamageEvent]:
         """Return the events of outfeeds that clogged in a tick, at its end. removed: bottles so far, by device."""
         before = len(self.events)
         for name, corners in self._exits.items():
             self._look_at(tick, name, corners, removed[f"outfeeds/{name}"])
-        return [DamageEvent(*event) for event in self.events[before:]]
+        return self._since(before)
 
     def clogged(self) -> dict[str, bool]:
         """Return True for each outfeed that is clogged, by name."""
         return {name: bool(reported) for name, (_, _, reported) in self.passages.items()}
-
-    def take_events(self) -> list[DamageEvent]:
-        """Return the events of clogged outfeeds since the last call, in order."""
-        events, self.events = self.events, []
-        return [DamageEvent(*event) for event in events]
 
     def _look_at(self, tick: int, name: str, corners: F8, removed: int) -> None:
         bottles, passage = self._state.world.bottles, self.passages[name]

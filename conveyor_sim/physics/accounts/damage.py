@@ -32,22 +32,39 @@ PLACES = {
 """Group and column of the engine's arrays, by limit."""
 
 
-class DamageAccount:
+class PassedLimits:
+    """Events of limits that were passed. Checkpoints hold the public attributes."""
+
+    events: list[tuple[int, str, int, Unchecked, Unchecked, Unchecked, Unchecked, str]]
+    """Events that were not taken yet."""
+
+    def __init__(self) -> None:
+        self.events = []
+
+    def take_events(self) -> list[DamageEvent]:
+        """Return the events since the last call, in order."""
+        events, self.events = self.events, []
+        return [DamageEvent(*event) for event in events]
+
+    def _since(self, count: int) -> list[DamageEvent]:
+        """Return the events that were not taken yet, without the first `count`."""
+        return [DamageEvent(*event) for event in self.events[count:]]
+
+
+class DamageAccount(PassedLimits):
     """Loads on the bottles of a State. Checkpoints hold the public attributes."""
 
     beyond: dict[str, list[int]]
     """Ids of the bottles beyond each limit at the end of the last tick, by limit."""
-    events: list[tuple[int, str, int, Unchecked, Unchecked, Unchecked, Unchecked, str]]
-    """Events that were not taken yet."""
 
     def __init__(self, state: State, limits: Limits) -> None:
+        super().__init__()
         self._state = state
         self._limits: dict[str, float] = {
             name: limit for name in Limits.model_fields if (limit := getattr(limits, name)) is not None
         }
         self._places = rail_places(state.model)
         self.beyond = {name: [] for name in WORDS}
-        self.events = []
 
     def begin(self, was_output: bool) -> None:
         """Begin a tick. was_output: True if loads were output at its beginning, so that their maxima restart."""
@@ -65,12 +82,7 @@ class DamageAccount:
         for kind, limit in self._limits.items():
             if damage is not None and (column := _column(damage, kind)) is not None:
                 self._compare(tick, kind, column, limit)
-        return [DamageEvent(*event) for event in self.events[before:]]
-
-    def take_events(self) -> list[DamageEvent]:
-        """Return the events since the last call, in order."""
-        events, self.events = self.events, []
-        return [DamageEvent(*event) for event in events]
+        return self._since(before)
 
     def columns(self, slots: np.ndarray) -> DamageColumns:
         """Return the loads on the bottles in some slots."""

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Collection
+from functools import partial
 
 from conveyor_sim.engine.contact.laws.linear import contact_time
 from conveyor_sim.physics.effects.contacts import contacts_in_use
@@ -76,18 +77,10 @@ def _curve_friction(meeting: Meeting) -> float:
     return 0.0 if meeting.has_spring else meeting.value(meeting.law.friction)
 
 
-def _chosen(field: str, value: str, plant: Plant, on: Collection[str]) -> Cause | None:
+def _chosen(plant: Plant, on: Collection[str], *, field: str, value: str) -> Cause | None:
     if getattr(plant.scene, field) == value and ("contact_friction" in on or "base_friction" in on):
         return Cause((field,), value)
     return None
-
-
-def _atan(plant: Plant, on: Collection[str]) -> Cause | None:
-    return _chosen("friction_curve", "atan", plant, on)
-
-
-def _implicit(plant: Plant, on: Collection[str]) -> Cause | None:
-    return _chosen("friction_solver", "implicit", plant, on)
 
 
 def _spring(plant: Plant, on: Collection[str]) -> Cause | None:
@@ -145,7 +138,7 @@ ATAN_FRICTION = Effect(
     name="atan_friction",
     law="p(s) = 2/pi atan(pi s / v_lim), in contacts and under bottles that stand on points",
     source="named in the paper",
-    called_for=_atan,
+    called_for=partial(_chosen, field="friction_curve", value="atan"),
     absent="friction_curve is polynomial, or nothing has friction",
     needs="nothing beside v_lim",
     can_force_on=True,
@@ -158,7 +151,7 @@ IMPLICIT_FRICTION = Effect(
     "and 1 times mu N dt / m_t instead of v_lim, and a loaded contact creeps faster. Not available with "
     "dormand_prince, which divides its steps, and linearly_implicit, which solves for friction itself",
     source="added",
-    called_for=_implicit,
+    called_for=partial(_chosen, field="friction_solver", value="implicit"),
     absent="friction_solver is explicit, or nothing has friction",
     needs="closed contacts and 1/m + R^2/J of each bottle",
     bound="none. It removes the bounds of contact_friction and, for bases that are points, of base_friction. With "

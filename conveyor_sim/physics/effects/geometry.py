@@ -1,6 +1,7 @@
 """Effects of geometry: rails at rest, moving rails, and bottles of several sizes."""
 
 from collections.abc import Collection
+from functools import partial
 
 from conveyor_sim.physics.effects.declaration import Cause, Effect
 from conveyor_sim.physics.plant import Plant
@@ -8,7 +9,7 @@ from conveyor_sim.scene.geometry import ArcPiece
 from conveyor_sim.scene.moving import movers_of
 
 
-def _rail(plant: Plant, arc: bool) -> Cause | None:
+def _rail(plant: Plant, on: Collection[str], *, arc: bool) -> Cause | None:
     for rail in plant.rails_at_rest:
         if any(isinstance(piece, ArcPiece) == arc for piece in rail.pieces):
             if rail.name in plant.scene.rails:
@@ -16,14 +17,6 @@ def _rail(plant: Plant, arc: bool) -> Cause | None:
             belt, side = rail.name.rsplit("_", 1)
             return Cause(("belts", belt, "rails", side))
     return None
-
-
-def _segments(plant: Plant, on: Collection[str]) -> Cause | None:
-    return _rail(plant, arc=False)
-
-
-def _arcs(plant: Plant, on: Collection[str]) -> Cause | None:
-    return _rail(plant, arc=True)
 
 
 def _moving(plant: Plant, on: Collection[str]) -> Cause | None:
@@ -44,7 +37,7 @@ SEGMENT_RAILS = Effect(
     "three or more touch at once, their push may be off sideways by 5 % of the deepest one, by 25 % between pieces "
     "that face each other)",
     source="(22)-(23)",
-    called_for=_segments,
+    called_for=partial(_rail, arc=False),
     absent="no straight rail",
     needs="pieces of rails, a grid over them, pieces near each bottle; a contact for each pair of materials",
 )
@@ -53,7 +46,7 @@ ARC_RAILS = Effect(
     law="contact with the nearest point of an arc; one like a C, both tips of which can touch a bottle at once, is two "
     "halves",
     source="(21)-(23)",
-    called_for=_arcs,
+    called_for=partial(_rail, arc=True),
     absent="no arc rail",
     needs="pieces of rails, a grid over them, pieces near each bottle; a contact for each pair of materials",
 )

@@ -199,8 +199,6 @@ def _onset(scene: Scene, speed: float) -> list[dict[str, Any]] | None:
         if choice is not None and not choice.at_speed and contact.damping.restitution:
             data["damping"] = {"law": "onset", "restitution": contact.damping.restitution, "speed": speed}
             changed = True
-        elif contact.damping.restitution is not None:
-            del data["damping"]["coefficient"]  # a scene gives one of the two
         contacts.append(data)
     return contacts if changed else None
 

@@ -27,6 +27,7 @@ from conveyor_sim.physics.state.snapshot import wrong
 from conveyor_sim.physics.state.world_arrays import Arrays
 from conveyor_sim.scene import Scene, parse_again, parse_overrides
 from conveyor_sim.scene.difference import scene_difference
+from conveyor_sim.scene.recorded import recorded_source
 from conveyor_sim.support.files import MB, FileError, in_mb, read_file, write_file
 from conveyor_sim.support.printable import printable
 
@@ -94,7 +95,8 @@ def write_checkpoint(
     memory, controller: data that JSON can hold. folder: the path must lie inside. Raise CheckpointError on failure, and
     if the path names a file that is not a checkpoint (of any format, damaged ones included).
     """
-    source = {"text": scene.source_text, "name": scene.source_name, "overrides": scene.overrides_text}
+    text, overrides = recorded_source(scene)
+    source = {"text": text, "name": scene.source_name, "overrides": overrides}
     header = {"format": FORMAT, "versions": versions(), "scene": source, "memory": memory, "controller": controller}
     size = sum(array.nbytes for array in arrays.values())
     if size > MOST - MB:

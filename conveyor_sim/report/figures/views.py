@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from conveyor_sim.report.figures import style
 from conveyor_sim.report.figures.bottles import ForceScale, draw_bottles, draw_forces, draw_orientation, speed_scale
 from conveyor_sim.report.figures.data import PlantFrame, StaticGeometry, box_around
-from conveyor_sim.report.figures.labels import belt_labels, mark_labels, place, rail_labels, sensor_labels
+from conveyor_sim.report.figures.labels import Label, belt_labels, mark_labels, place, rail_labels, sensor_labels
 from conveyor_sim.report.figures.plant import draw_plant
 
 Box = tuple[float, float, float, float]
@@ -61,38 +61,33 @@ def plant_figure(plant: StaticGeometry, frame: PlantFrame, title: str, peak: flo
 
     `peak` (N) is the largest force of the run, see ForceScale.
     """
-    box = whole_region(plant, [frame])
-    width, height = box[2] - box[0], box[3] - box[1]
-    inches = WIDTH - 0.8
-    figure = style.new_figure(WIDTH, float(np.clip(inches * height / width, 3.0, 11.0)) + 1.6)
-    _heading(figure, title)
-    norm = speed_scale(plant, [frame])
-    forces = force_scale([frame], inches * _POINTS / width, peak)
-    ax = figure.subplots()
-    draw_view(ax, plant, frame, norm, forces, box, inches)
-    _lighten([ax], [frame])
-    ax.set_title(instant(frame), fontweight="normal")
-    colour_bar(figure, [ax], [frame], norm, "horizontal")
-    if forces is not None:
-        forces.legend(figure)
-    labels = mark_labels(plant) + belt_labels(plant, frame.belt_speeds) + sensor_labels(plant)
-    place(ax, labels, plant, np.stack([frame.x, frame.y], axis=1))
-    return figure
+    return _whole_plant(plant, frame, title, [], peak)
 
 
 def scene_figure(plant: StaticGeometry, frame: PlantFrame, title: str) -> Figure:
     """Draw the plant of a scene with the names of rails and the initial bottles."""
+    return _whole_plant(plant, frame, title, rail_labels(plant), None)
+
+
+def _whole_plant(plant: StaticGeometry, frame: PlantFrame, title: str, more: list[Label], peak: float | None) -> Figure:
+    """Draw a complete plant with the names of its parts. more: other labels. peak: N; None: without time and forces."""
     box = whole_region(plant, [frame])
     width, height = box[2] - box[0], box[3] - box[1]
     inches = WIDTH - 0.8
-    figure = style.new_figure(WIDTH, float(np.clip(inches * height / width, 3.0, 11.0)) + 1.4)
+    room = 1.4 if peak is None else 1.6
+    figure = style.new_figure(WIDTH, float(np.clip(inches * height / width, 3.0, 11.0)) + room)
     _heading(figure, title)
     norm = speed_scale(plant, [frame])
+    forces = None if peak is None else force_scale([frame], inches * _POINTS / width, peak)
     ax = figure.subplots()
-    draw_view(ax, plant, frame, norm, None, box, inches)
+    draw_view(ax, plant, frame, norm, forces, box, inches)
     _lighten([ax], [frame])
+    if peak is not None:
+        ax.set_title(instant(frame), fontweight="normal")
     colour_bar(figure, [ax], [frame], norm, "horizontal")
-    labels = mark_labels(plant) + belt_labels(plant, frame.belt_speeds) + sensor_labels(plant) + rail_labels(plant)
+    if forces is not None:
+        forces.legend(figure)
+    labels = mark_labels(plant) + belt_labels(plant, frame.belt_speeds) + sensor_labels(plant) + more
     place(ax, labels, plant, np.stack([frame.x, frame.y], axis=1))
     return figure
 

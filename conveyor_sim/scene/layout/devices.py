@@ -146,7 +146,12 @@ class Placement:
         """Return a device with coordinates for its places, and note their sources and problems."""
         if not is_placed(device):
             return device
-        own = [kind for kind in kinds if kind.kind in (None, device.get("kind")) and (kind.within or "along") in device]
+        own = [
+            kind
+            for kind in kinds
+            if kind.kind in (None, device.get("kind"))
+            and (kind.within in device if kind.within else "along" in device or "at" in device)
+        ]
         places: set[str] = set()
         coordinates: dict[str, tuple[Any, Path]] = {}
         for kind in own:
@@ -214,9 +219,13 @@ class Placement:
             self.problems.append(problem)
 
 
+_OF_PLACES = frozenset(("along", "at", "out"))
+"""Fields that only devices along conveyors have. `at` alone lacks the name of the conveyor."""
+
+
 def is_placed(device: Any) -> bool:
     """Return True if a device, as written, has a place along a conveyor."""
-    return isinstance(device, Mapping) and ("along" in device or "out" in device)
+    return isinstance(device, Mapping) and not device.keys().isdisjoint(_OF_PLACES)
 
 
 def has_places(scene: Mapping[str, Any]) -> bool:

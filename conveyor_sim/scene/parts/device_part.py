@@ -88,6 +88,11 @@ class Entry(Giver):
         bottle: str
 
     @property
+    def kinds(self) -> tuple[str, ...]:
+        """Types of its bottles."""
+        return (self.bottle,)
+
+    @property
     def most(self) -> int | None:
         """Largest number of bottles; None without limit."""
         return None

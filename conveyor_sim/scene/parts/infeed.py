@@ -6,12 +6,13 @@ from typing import ClassVar
 from conveyor_sim.scene.parts.bad import BadBottles
 from conveyor_sim.scene.parts.device_part import Entry, Others
 from conveyor_sim.scene.parts.scatter import Scattered
+from conveyor_sim.scene.parts.switched import SwitchedTypes
 from conveyor_sim.scene.problems import Path, Problem
 from conveyor_sim.scene.types import Angle, Count, Name, NotNegative, Point, Positive, quantity
 from conveyor_sim.scene.words import shown
 
 
-class Infeed(Scattered, BadBottles, Entry):
+class Infeed(SwitchedTypes, Scattered, BadBottles, Entry):
     """A place where bottles enter, one behind the other."""
 
     KIND: ClassVar[str] = "infeed"
@@ -27,6 +28,11 @@ class Infeed(Scattered, BadBottles, Entry):
         "Clear distance to the bottle before it, in a tightly packed in-line. Or give `rate`.", "m", default=None
     )
     rate: Positive | None = quantity("Bottles a second. Or give `gap`.", "1/s", default=None)
+    rate_limit: Positive | None = quantity(
+        "Greatest rate that the command `rate` may ask for in a run. Left out: there is no such command.",
+        "1/s",
+        default=None,
+    )
     start: NotNegative = quantity("When the first bottle enters.", "s", default=0.0)
     timing_jitter: NotNegative = quantity(
         "Each bottle is early or late by up to this (with `gap`: late, up to this), drawn evenly from the seed.",
@@ -45,9 +51,14 @@ class Infeed(Scattered, BadBottles, Entry):
             given = "neither" if self.gap is None else "both"
             yield Problem(path, f"{given} of gap and rate given, expected one of them")
         yield from self.bad_problems(path)
-        if self.rate is not None and self.timing_jitter > 0.5 / self.rate:
+        yield from self.type_problems(path)
+        if self.rate_limit is not None and (self.rate is None or self.rate_limit < self.rate):
+            expected = "none without rate" if self.rate is None else f"at least {self.rate:g} (1/s), the rate"
+            yield Problem((*path, "rate_limit"), f"{shown(self.rate_limit)} given, expected {expected}")
+        most = self.rate if self.rate_limit is None else self.rate_limit
+        if self.rate is not None and most is not None and self.timing_jitter > 0.5 / most:
             yield Problem(
                 (*path, "timing_jitter"),
                 f"{shown(self.timing_jitter)} given, expected at most half the time between two bottles, "
-                f"{0.5 / self.rate:g} (s), so that they stay in order",
+                f"{0.5 / most:g} (s), so that they stay in order",
             )

@@ -7,11 +7,12 @@ from conveyor_sim.scene.parts.bad import BadBottles
 from conveyor_sim.scene.parts.device_part import Entry, Others
 from conveyor_sim.scene.parts.machine import PackmlPart
 from conveyor_sim.scene.parts.scatter import Scattered
+from conveyor_sim.scene.parts.switched import SwitchedTypes
 from conveyor_sim.scene.problems import Path, Problem
 from conveyor_sim.scene.types import Angle, Name, NotNegative, Point, quantity
 
 
-class Source(PackmlPart, Scattered, BadBottles, Entry):
+class Source(PackmlPart, SwitchedTypes, Scattered, BadBottles, Entry):
     """A machine upstream, such as a filler. It gives bottles at a rate; without room it is blocked."""
 
     KIND: ClassVar[str] = "source"
@@ -28,3 +29,4 @@ class Source(PackmlPart, Scattered, BadBottles, Entry):
         """Yield problems of a rate beyond its limit, and of bad bottles given in two ways."""
         yield from super().problems(path, others)
         yield from self.bad_problems(path)
+        yield from self.type_problems(path)

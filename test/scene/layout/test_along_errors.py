@@ -40,6 +40,7 @@ RAIL: Data = {"material": "steel", "along": "lane"}
     ("kind", "fields", "number", "facts"),
     [
         ("photo_eyes", {**EYE, "along": "lain"}, 0, ["it.along", '"lain"', "lane"]),
+        ("photo_eyes", {"at": 0.4}, -1, ["it.along", "missing", "a name"]),
         ("photo_eyes", {**EYE, "along": ["lane"]}, 0, ["it.along", '["lane"]', "a name"]),
         ("photo_eyes", {**EYE, "at": 3.9}, 1, ["it.at", "3.9", "3.7854 m", "lane"]),
         ("photo_eyes", {**EYE, "at": -3.9}, 1, ["it.at", "-3.9", "3.7854 m", "lane"]),

@@ -18,8 +18,8 @@ from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recover import recover
 from conveyor_sim.bag.replay import replay
 from conveyor_sim.errors import SimulationError
+from conveyor_sim.report.report import render
 from conveyor_sim.report.summarize import summarize
-from conveyor_sim.report.summary_table import render
 from conveyor_sim.run.runner import run_scene
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
