@@ -18,7 +18,7 @@ from std_srvs.srv import Trigger
 
 from bench.packed import SPEED
 from conveyor_sim.bag.messages.topics import CMD_SPEED, TOPICS
-from conveyor_sim.line.process_image import speed_command
+from conveyor_sim.line.tag import speed_command
 from conveyor_sim.ros.child import Child
 from conveyor_sim.ros.publishers import ros_qos
 from conveyor_sim.ros.spinner import Spinner

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from bench.measure import Contestant
 from bench.packed import SPEED, Box
-from conveyor_sim.line.process_image import speed_command
+from conveyor_sim.line.tag import speed_command
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
 

@@ -29,7 +29,7 @@ from conveyor_sim.line.commands.inputs import (
     WriterKind,
 )
 from conveyor_sim.line.line import Line
-from conveyor_sim.line.process_image import ProcessImage
+from conveyor_sim.line.tag import ProcessImage
 from conveyor_sim.physics.accounts.accounts import Accounts
 from conveyor_sim.physics.model import build_model
 from conveyor_sim.physics.state.checkpoint import Checkpoint, damaged, read_checkpoint, write_checkpoint

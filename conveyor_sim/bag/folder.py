@@ -1,13 +1,27 @@
-"""The folder of a recording, which is checked before the simulation is compiled and run."""
+"""The folder of a recording, which is checked before the simulation is compiled and run; locks on its files."""
 
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterable
-from contextlib import suppress
+from collections.abc import Iterable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from conveyor_sim.errors import BagError
+from conveyor_sim.support.file_lock import locked
+
+
+@contextmanager
+def alone(path: Path) -> Iterator[None]:
+    """Hold the lock of a file, as its writer does. Raise BagError if another process is recording or repairing it."""
+    with ExitStack() as stack:
+        try:
+            stack.enter_context(locked(path))
+        except BlockingIOError as error:
+            raise BagError(
+                f"{path}: is being recorded or repaired by another process, expected a recording that has ended"
+            ) from error
+        yield
 
 
 def require_recordable(path: Path) -> None:

@@ -17,9 +17,8 @@ from rosbags.typesys import Stores, TypesysError, get_types_from_idl, get_types_
 from rosbags.typesys.store import Typestore
 
 from conveyor_sim.bag.mcap.chunk import MESSAGE, messages_of, read_content
-from conveyor_sim.bag.mcap.foreign import IDL
 from conveyor_sim.bag.mcap.records import Data
-from conveyor_sim.bag.mcap.salvage import Salvage
+from conveyor_sim.bag.mcap.salvage import IDL, Salvage
 from conveyor_sim.bag.mcap.walk import ValidChunk
 from conveyor_sim.bag.mcap.writer import QOS_KEY
 from conveyor_sim.bag.message_reader import Raw, RecordedTopic

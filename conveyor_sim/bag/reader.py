@@ -104,13 +104,9 @@ class Bag(AbstractContextManager["Bag"]):
             counts[self._relative(recorded.topic)] += recorded.count
         return dict(counts)
 
-    @property
+    @cached_property
     def types(self) -> dict[str, str]:
         """Message type by topic, names as in OUTPUTS."""
-        return self._types
-
-    @cached_property
-    def _types(self) -> dict[str, str]:
         return {self._relative(recorded.topic): recorded.type for recorded in self._source.topics}
 
     def time(self, tick: int) -> float:

@@ -12,8 +12,7 @@ from pathlib import Path, PurePath
 from mcap.records import Channel
 from mcap.records import Schema as SchemaRecord
 
-from conveyor_sim.bag.lock import alone
-from conveyor_sim.bag.mcap.foreign import is_ros
+from conveyor_sim.bag.folder import alone
 from conveyor_sim.bag.mcap.index import Index, is_complete, read_index
 from conveyor_sim.bag.mcap.line_copy import NAME as LINE_COPY
 from conveyor_sim.bag.mcap.metadata import (
@@ -29,7 +28,7 @@ from conveyor_sim.bag.mcap.metadata import (
     write_metadata,
 )
 from conveyor_sim.bag.mcap.records import mapped
-from conveyor_sim.bag.mcap.salvage import Salvage
+from conveyor_sim.bag.mcap.salvage import Salvage, is_ros
 from conveyor_sim.bag.mcap.storage import other_storage, packed_part
 from conveyor_sim.bag.mcap.walk import NothingLeft
 from conveyor_sim.bag.mcap.writer import McapFileWriter, Schema, topic_info

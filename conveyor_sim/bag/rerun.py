@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from conveyor_sim.bag.folder import alone
 from conveyor_sim.bag.input_log import FILE_NAME, FORMAT, START_NAME, copier, environment_of
-from conveyor_sim.bag.lock import alone
 from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.errors import BagError, SimulationError

@@ -143,11 +143,10 @@ def serve(what: str | None, node: str | None, bind: str, stamps: Stamps, **given
     Ctrl-C ends it.
     """
     with collected_later():
-        from conveyor_sim.protocols.hosting.limit_options import limit_settings
         from conveyor_sim.protocols.hosting.server_child import ServerChild
         from conveyor_sim.protocols.hosting.server_kinds import SERVER_KINDS
         from conveyor_sim.protocols.hosting.serving import Serving
-        from conveyor_sim.protocols.hosting.settings import ServerSettings
+        from conveyor_sim.protocols.hosting.settings import ServerSettings, limit_settings
 
     console = Console(stderr=True, markup=False, highlight=False, soft_wrap=True)
     chosen: list[tuple[ServerKind, Any]] = [

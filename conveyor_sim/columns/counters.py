@@ -31,7 +31,7 @@ class CounterColumns:
     running: NDArray[np.float64]
     """Time in the category "running", s; the following fields likewise.
 
-    `line/machines/time_account.py` defines them.
+    `line/machines/efficiency.py` defines them.
     """
     starved: NDArray[np.float64]
     blocked: NDArray[np.float64]

@@ -3,12 +3,29 @@
 from __future__ import annotations
 
 from collections import ChainMap
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from conveyor_sim.control.alarm import Alarm
-from conveyor_sim.control.line_tags import LineTags, bind
+
+
+@dataclass(frozen=True)
+class LineTags:
+    """Signals and commands of a line by name, with their kinds: "bool", "count", "number" or "enumeration"."""
+
+    signals: Mapping[str, str]
+    commands: Mapping[str, str]
+    limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    """Accepted minimum and maximum by command; empty: not known."""
+
+
+def bind(controller: object, tags: LineTags) -> None:
+    """Pass the line's tags to a controller that has a method `bind`, before its first scan. Raise its exceptions."""
+    method = getattr(controller, "bind", None)
+    if callable(method):
+        method(tags)
+
 
 ALARMS = "alarms/"
 """Prefix of a key that is an alarm (0 or 1), not a command, in the answer of a scan."""
@@ -66,7 +83,7 @@ class Controller(Protocol):
     Optional attributes:
 
     - `declared_alarms`: a sequence of Alarm. Alarms without a declaration have defaults.
-    - `bind`: a method that receives the line's tags (`line_tags.py`) before the first scan.
+    - `bind`: a method that receives the line's tags (`LineTags`) before the first scan.
     - `variables`: numbers by name, available to conditions of tests.
     - `record`: patterns of the variables to record (`recorded.py`).
     - `left_over`: sentences about tags without use, available after `bind`.
@@ -124,12 +141,8 @@ class Constant:
 
 
 @dataclass(frozen=True)
-class _Together:
+class _Several:
     controllers: tuple[Controller, ...]
-
-    @property
-    def declared_alarms(self) -> tuple[Alarm, ...]:
-        return tuple(alarm for controller in self.controllers for alarm in declared_alarms(controller))
 
     def bind(self, tags: LineTags) -> None:
         """Pass the line's tags on."""
@@ -139,12 +152,19 @@ class _Together:
     @property
     def variables(self) -> Mapping[str, float]:
         """Variables of all controllers."""
-        return _variables(self.controllers)
+        shown: Any = [getattr(controller, "variables", {}) for controller in self.controllers]
+        return ChainMap(*shown)  # read-only view
 
     @property
     def record(self) -> tuple[str, ...]:
         """Patterns of all controllers."""
-        return _record(self.controllers)
+        return tuple(pattern for controller in self.controllers for pattern in getattr(controller, "record", ()))
+
+
+class _Together(_Several):
+    @property
+    def declared_alarms(self) -> tuple[Alarm, ...]:
+        return tuple(alarm for controller in self.controllers for alarm in declared_alarms(controller))
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
         merged: dict[str, float] = {}
@@ -159,10 +179,7 @@ class _Together:
         return merged
 
 
-@dataclass(frozen=True)
-class _Priority:
-    controllers: tuple[Controller, ...]
-
+class _Priority(_Several):
     @property
     def declared_alarms(self) -> tuple[Alarm, ...]:
         declared: dict[str, Alarm] = {}
@@ -171,36 +188,12 @@ class _Priority:
                 declared.setdefault(alarm.id, alarm)
         return tuple(declared.values())
 
-    def bind(self, tags: LineTags) -> None:
-        """Pass the line's tags on."""
-        for controller in self.controllers:
-            bind(controller, tags)
-
-    @property
-    def variables(self) -> Mapping[str, float]:
-        """Variables of all controllers."""
-        return _variables(self.controllers)
-
-    @property
-    def record(self) -> tuple[str, ...]:
-        """Patterns of all controllers."""
-        return _record(self.controllers)
-
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
         merged: dict[str, float] = {}
         for answer in [controller.scan(inputs) for controller in self.controllers]:
             for name, value in answer.items():
                 merged.setdefault(name, value)
         return merged
-
-
-def _variables(controllers: Iterable[Controller]) -> Mapping[str, float]:
-    shown: Any = [getattr(controller, "variables", {}) for controller in controllers]
-    return ChainMap(*shown)  # read-only view
-
-
-def _record(controllers: Iterable[Controller]) -> tuple[str, ...]:
-    return tuple(pattern for controller in controllers for pattern in getattr(controller, "record", ()))
 
 
 def together(*controllers: Controller) -> Controller:

@@ -14,8 +14,7 @@ from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.engine.compiler.numba_internals.machine_code import entry
 from conveyor_sim.engine.support.footing import find_carriers
 from conveyor_sim.line.alarms.declaration import Declared
-from conveyor_sim.line.process_image import of_roles
-from conveyor_sim.line.tag import COMMANDS, SIGNALS, Tag
+from conveyor_sim.line.tag import COMMANDS, SIGNALS, Tag, of_roles
 from conveyor_sim.physics.state import State
 from conveyor_sim.scene.parts.station import BAD
 

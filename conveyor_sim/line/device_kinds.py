@@ -5,21 +5,19 @@ from typing import Any
 
 from conveyor_sim.line.device import Device
 from conveyor_sim.line.devices.belt import belt_device
-from conveyor_sim.line.devices.counter import CounterDevice
+from conveyor_sim.line.devices.crossing import CounterDevice, InspectionDevice
+from conveyor_sim.line.devices.drive import NamedDriveDevice
 from conveyor_sim.line.devices.indicator import IndicatorDevice
 from conveyor_sim.line.devices.infeed import InfeedDevice
-from conveyor_sim.line.devices.inspection import InspectionDevice
 from conveyor_sim.line.devices.mover import Mover
-from conveyor_sim.line.devices.named_drive import NamedDriveDevice
-from conveyor_sim.line.devices.outfeed import OutfeedDevice
 from conveyor_sim.line.devices.photo_eye import PhotoEyeDevice
+from conveyor_sim.line.devices.region import OutfeedDevice, ZoneDevice
 from conveyor_sim.line.devices.reject import RejectDevice
 from conveyor_sim.line.devices.setup import DeviceSetup
 from conveyor_sim.line.devices.spill import SpillDevice
-from conveyor_sim.line.devices.zone import ZoneDevice
-from conveyor_sim.line.machines.sink import SinkDevice
 from conveyor_sim.line.machines.source import SourceDevice
 from conveyor_sim.line.machines.station import StationDevice
+from conveyor_sim.line.machines.taking import SinkDevice
 from conveyor_sim.physics.model import Model
 from conveyor_sim.scene.schema import Scene
 

@@ -17,10 +17,9 @@ from conveyor_sim.line.commands.authority import MAY, PEOPLE, unauthorized
 from conveyor_sim.line.commands.forcing import Forcing
 from conveyor_sim.line.commands.inputs import FAULT, INJECT, SET, WATCHDOG, CommandOutcome, Input, normalized
 from conveyor_sim.line.commands.modes import Modes
-from conveyor_sim.line.commands.moved import moved_belts
 from conveyor_sim.line.commands.operation import Operation
 from conveyor_sim.line.commands.read_back import ReadBack
-from conveyor_sim.line.commands.refusal import refusal, shown
+from conveyor_sim.line.commands.refusal import moved_belts, refusal, shown
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.device_kinds import build_devices
 from conveyor_sim.line.devices.belt_surfaces import BeltSurfaces
@@ -28,9 +27,8 @@ from conveyor_sim.line.devices.photo_eye import PhotoEyeDevice
 from conveyor_sim.line.devices.setpoint import SetpointDevice
 from conveyor_sim.line.event_log import EventLog
 from conveyor_sim.line.machines.counters import RESET_COUNTERS, ProductionCounters
-from conveyor_sim.line.process_image import ProcessImage
 from conveyor_sim.line.run_state import RUN_TAGS
-from conveyor_sim.line.tag import Adds
+from conveyor_sim.line.tag import Adds, ProcessImage
 from conveyor_sim.physics.model import build_model
 from conveyor_sim.physics.state import State
 from conveyor_sim.physics.state.snapshot import entries, restore, snapshot, typed

@@ -1,4 +1,4 @@
-"""`Tag`: description of one value of a line that is read, written, or injected by a test.
+"""`Tag`: description of one value of a line that is read, written, or injected by a test. `ProcessImage`: all of them.
 
 Units have their codes of UNECE Recommendation 20, by which OPC UA and other systems identify them.
 """
@@ -6,7 +6,7 @@ Units have their codes of UNECE Recommendation 20, by which OPC UA and other sys
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple
 
@@ -147,3 +147,47 @@ def choice(
     """Return a tag with one of several states."""
     low, high = min(texts), max(texts)
     return Tag(name, "enumeration", role, description, "1", low, high, float(initial), texts=texts, adds_to=adds_to)
+
+
+@dataclass(frozen=True)
+class ProcessImage:
+    """Tags of a line, and tables of them by role. Values are sent in the order of these tables."""
+
+    tags: tuple[Tag, ...]
+    signals: tuple[Tag, ...] = field(init=False)
+    commands: tuple[Tag, ...] = field(init=False)
+    faults: tuple[Tag, ...] = field(init=False)
+    """Faults. Tests inject them, controllers don't see them."""
+    signal_names: tuple[str, ...] = field(init=False)
+    command_names: tuple[str, ...] = field(init=False)
+    fault_names: tuple[str, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        for table, roles in (("signal", SIGNALS), ("command", COMMANDS), ("fault", ("fault",))):
+            chosen = of_roles(self.tags, roles)
+            object.__setattr__(self, f"{table}s", chosen)
+            object.__setattr__(self, f"{table}_names", tuple(tag.name for tag in chosen))
+
+    @property
+    def command_limits(self) -> dict[str, tuple[float, float]]:
+        """Minimum and maximum of each command, by name."""
+        return {tag.name: (tag.low, tag.high) for tag in self.commands}
+
+
+def of_roles(tags: Sequence[Tag], roles: Sequence[Role]) -> tuple[Tag, ...]:
+    """Return the tags that have one of some roles, in their order."""
+    return tuple(tag for tag in tags if tag.role in roles)
+
+
+def speed_command(belt: str) -> str:
+    """Return the name of a belt's speed setpoint, which is also its topic."""
+    return f"belts/{belt}/cmd_speed"
+
+
+def speed_topics(belts: Sequence[str], commands: Sequence[str]) -> list[str]:
+    """Return the topics of speed setpoints, of all belts and of named drives, from names of belts and commands.
+
+    Belts that a named drive moves have a topic, too, because a refusal with a reason is better than no answer.
+    """
+    drives = [name for name in commands if name.startswith("drives/") and name.endswith("/cmd_speed")]
+    return [*map(speed_command, belts), *drives]

@@ -18,7 +18,7 @@ class Period(NamedTuple):
     end: float
     """s"""
     category: str
-    """Time category of `line/machines/time_account.py`."""
+    """Time category of `line/machines/efficiency.py`."""
     reason: str
     """Why it was down, idle or stopped by plan; "" else."""
 

@@ -12,8 +12,7 @@ from rich.console import Console, Group, RenderableType
 from rich.table import Table
 
 from conveyor_sim.columns.counters import CounterColumns
-from conveyor_sim.line.machines.efficiency import DEFINITIONS
-from conveyor_sim.line.machines.time_account import CATEGORIES
+from conveyor_sim.line.machines.efficiency import CATEGORIES, DEFINITIONS
 from conveyor_sim.report.alarm_figures import WINDOW, AlarmFigures
 from conveyor_sim.report.periods import longest_stops, stop_reasons
 from conveyor_sim.report.production import Production, read_production

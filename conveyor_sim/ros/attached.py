@@ -30,8 +30,7 @@ from conveyor_sim.errors import CommandError
 from conveyor_sim.line.commands.inputs import DECLARE, CommandOutcome
 from conveyor_sim.ros.context import new_node, start_ros
 from conveyor_sim.ros.domain import in_environment, own_domain
-from conveyor_sim.ros.intake import Intake
-from conveyor_sim.ros.lockstep_service import LockstepService
+from conveyor_sim.ros.lockstep_service import Intake, LockstepService
 from conveyor_sim.ros.publishers import check_type, ros_qos
 from conveyor_sim.ros.spinner import Spinner
 from conveyor_sim.run.alarm_changes import AlarmChanges

@@ -16,7 +16,7 @@ from std_msgs.msg import Float64
 from conveyor_sim.bag.messages.qos import Qos
 from conveyor_sim.bag.messages.topics import CMD_SPEED, TOPICS
 from conveyor_sim.line.commands.inputs import SET, Input
-from conveyor_sim.line.process_image import speed_topics
+from conveyor_sim.line.tag import speed_topics
 from conveyor_sim.ros.direct import Aside, take_message
 from conveyor_sim.ros.publishers import ros_qos
 from conveyor_sim.run.inbox import MESSAGE_BYTES, TOO_LARGE
@@ -87,7 +87,7 @@ def _speed(name: str, message: Any) -> list[Input]:
 
 
 class CommandTopic:
-    """One subscription, used by the thread of intake.py.
+    """One subscription, used by the thread of `Intake`.
 
     Messages are taken as bytes, and their size is checked before they become Python objects.
     """

@@ -16,13 +16,12 @@ from typing import Any
 from conveyor_sim.support.interrupt import while_importing
 
 with while_importing():
-    from conveyor_sim.control.line_tags import LineTags, bind
-    from conveyor_sim.control.scan import ControlError, Controller
+    from conveyor_sim.control.scan import ControlError, Controller, LineTags, bind
     from conveyor_sim.control.st.load import load
     from conveyor_sim.errors import ConveyorError
     from conveyor_sim.ros.context import new_node, running_ros
     from conveyor_sim.ros.controller import ControllerRun, Stopped
-    from conveyor_sim.ros.declared import DeclaredParameter, declare_table
+    from conveyor_sim.ros.parameters import DeclaredParameter, declare_table
     from conveyor_sim.run.controller_parameters import controller_parameters
     from conveyor_sim.support.printable import SENTENCE, printable, printable_lines
     from conveyor_sim.support.stop_request import StopRequest

@@ -10,8 +10,7 @@ from rclpy.clock_type import ClockType
 from rclpy.node import Node
 
 from conveyor_sim.bag.messages.topics import TOPICS
-from conveyor_sim.ros.clock import to_time
-from conveyor_sim.ros.graph_watch import GraphWatch
+from conveyor_sim.ros.clock import GraphWatch, to_time
 from conveyor_sim.ros.observer import TICK, WALL
 from conveyor_sim.ros.publishers import RosSink, ros_qos
 from conveyor_sim.run.run_state import SimulationState
@@ -37,10 +36,7 @@ class Diagnostics:
         self._last_wall = time.monotonic()
         self._last_tick = 0
         self._last_run = ""
-        self._last_overruns = 0
-        self._last_refused = 0
-        self._last_lost = 0
-        self._last_guard_events = 0
+        self._last_faults: dict[str, int] = {}
         # A steady clock, because with use_sim_time the clock of the node stands still while paused.
         node.create_timer(PERIOD, self.publish, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
@@ -50,13 +46,18 @@ class Diagnostics:
         session, pacer = stepper.run.session, stepper.pacer
         simulation = session.simulation
         tick, counts = simulation.tick, simulation.counts
-        overruns = pacer.overruns - self._last_overruns
         counts_in, reception = stepper.run.inbox.counts, stepper.run.reception
         refusals = reception.refused + counts_in.turned_away
-        refused, lost = refusals - self._last_refused, counts_in.lost - self._last_lost
-        guard_events = stepper.run.guard_events - self._last_guard_events
+        faults = {
+            "overruns": pacer.overruns,
+            "refused commands": refusals,
+            "lost commands": counts_in.lost,
+            "warnings of the guard": stepper.run.guard_events,
+        }
+        new = {what: count - self._last_faults.get(what, 0) for what, count in faults.items()}
+        self._last_faults = faults
         status = DiagnosticStatus(name=self._name, hardware_id=simulation.model.name)
-        status.level, status.message = _verdict(stepper, overruns, refused, lost, guard_events)
+        status.level, status.message = _verdict(stepper, new)
         not_alone = self._graph.look()
         if not_alone and status.level != DiagnosticStatus.ERROR:
             status.level = DiagnosticStatus.WARN
@@ -96,8 +97,6 @@ class Diagnostics:
         message = DiagnosticArray(status=[status])
         message.header.stamp = to_time(simulation.stamp_ns)
         self._publisher.publish(message)
-        self._last_overruns, self._last_refused, self._last_lost = pacer.overruns, refusals, counts_in.lost
-        self._last_guard_events = stepper.run.guard_events
 
     def _measured(self, run: str, tick: int, tick_s: float) -> float:
         """Return the simulated seconds per wall second since the last message; 0 in the first one of a run."""
@@ -108,12 +107,9 @@ class Diagnostics:
         return factor
 
 
-def _verdict(stepper: Stepper, overruns: int, refused: int, lost: int, guard_events: int) -> tuple[bytes, str]:
+def _verdict(stepper: Stepper, faults: dict[str, int]) -> tuple[bytes, str]:
     if stepper.run.failure:
         return DiagnosticStatus.ERROR, f"stopped: {stepper.run.failure}"
-    warnings = [f"{overruns} overruns"] * bool(overruns) + [f"{refused} refused commands"] * bool(refused)
-    warnings += [f"{lost} lost commands"] * bool(lost)
-    warnings += [f"{guard_events} warnings of the guard"] * bool(guard_events)
-    if warnings:
+    if warnings := [f"{count} {what}" for what, count in faults.items() if count]:
         return DiagnosticStatus.WARN, f"{' and '.join(warnings)} since the last message"
     return DiagnosticStatus.OK, SimulationState(stepper.run.state).name

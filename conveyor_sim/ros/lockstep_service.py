@@ -1,10 +1,10 @@
-"""Service `lockstep`: translates conveyor_msgs/srv/Lockstep for run/lockstep.py."""
+"""Service `lockstep`: translates conveyor_msgs/srv/Lockstep for run/lockstep.py. `Intake` takes its requests."""
 
 from __future__ import annotations
 
 import array
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from typing import Any, Protocol, TypeVar
 
@@ -12,14 +12,16 @@ import numpy as np
 import numpy.typing as npt
 from conveyor_msgs.msg import CommandOutcome as OutcomeMessage
 from conveyor_msgs.srv import Lockstep
+from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.service import Service
+from rclpy.subscription import Subscription
 
 from conveyor_sim.bag.messages.qos import ANSWERS
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.commands.inputs import CommandOutcome
 from conveyor_sim.ros.clock import to_time
-from conveyor_sim.ros.direct import Aside, take_request
+from conveyor_sim.ros.direct import Aside, WaitSet, take_request
 from conveyor_sim.ros.publishers import ros_qos
 from conveyor_sim.run.lockstep import LockstepAnswer, LockstepRequest, Refused
 from conveyor_sim.simulation import Simulation
@@ -52,7 +54,7 @@ class Stepped(Protocol):
 
 
 class LockstepService:
-    """Serves the scans of one controller. The thread of intake.py takes requests; the stepping thread answers them."""
+    """Serves the scans of one controller. The thread of `Intake` takes requests; the stepping thread answers them."""
 
     def __init__(self, node: Node, stepper: Stepped, frame_id: str, *, died: Callable[[Exception], None]) -> None:
         """died: called by the stepping thread if an answer can't be sent."""
@@ -179,3 +181,60 @@ def _outcome(outcome: CommandOutcome, tick_ns: int, frame_id: str) -> OutcomeMes
 def _doubles(values: npt.NDArray[np.float64]) -> array.array[float]:
     """Return values in the form that rclpy converts fastest."""
     return array.array("d", values.tobytes())
+
+
+class TakenTopic(Protocol):
+    """A subscription in the group `Aside`."""
+
+    @property
+    def subscription(self) -> Subscription:
+        """Subscription that the thread waits for."""
+
+    def take_all(self) -> None:
+        """Hand over the messages that have come."""
+
+
+class Intake:
+    """Thread that takes commands and lockstep requests for the line, in the order they were sent, until close().
+
+    DDS keeps the order of messages within one topic only. On one machine, messages sent by a process before a request
+    have arrived before it. The thread therefore hands over all commands before a request that it has taken.
+    """
+
+    def __init__(
+        self,
+        context: Context,
+        lockstep: LockstepService,
+        topics: Sequence[TakenTopic] = (),
+        *,
+        died: Callable[[Exception], None],
+    ) -> None:
+        """died: called by the thread with an exception that ended it."""
+        self._lockstep = lockstep
+        self._topics = topics
+        self._died = died
+        self._closing = False
+        self._waiting = WaitSet(
+            context, subscriptions=[topic.subscription for topic in topics], services=[lockstep.service]
+        )
+        self._thread = threading.Thread(target=self._run, name="intake", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """End the thread."""
+        self._closing = True
+        self._waiting.wake()
+        self._thread.join()
+        self._waiting.close()
+
+    def _run(self) -> None:
+        try:
+            while not self._closing:
+                self._waiting.wait()
+                request = self._lockstep.take()
+                for topic in self._topics:
+                    topic.take_all()
+                if request is not None:
+                    self._lockstep.serve(*request)
+        except Exception as error:
+            self._died(error)

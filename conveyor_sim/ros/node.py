@@ -24,16 +24,13 @@ from conveyor_sim.line.commands.authority import PEOPLE
 from conveyor_sim.line.commands.inputs import FAULT, INJECT, OPERATE, Input
 from conveyor_sim.report.explain.choices import setting_line
 from conveyor_sim.ros import parameters
-from conveyor_sim.ros.checkpoint_services import CheckpointServices
-from conveyor_sim.ros.clock import ClockPublisher
+from conveyor_sim.ros.clock import ClockPublisher, GraphWatch
 from conveyor_sim.ros.commands import subscribe_commands
 from conveyor_sim.ros.context import new_node, one_sentence
 from conveyor_sim.ros.diagnostics import Diagnostics
-from conveyor_sim.ros.graph_watch import GraphWatch
-from conveyor_sim.ros.intake import Intake
-from conveyor_sim.ros.lockstep_service import LockstepService
+from conveyor_sim.ros.lockstep_service import Intake, LockstepService
 from conveyor_sim.ros.publishers import RosSink
-from conveyor_sim.ros.services import Services, settled
+from conveyor_sim.ros.services import CheckpointServices, Services, settled
 from conveyor_sim.ros.spinner import Spinner
 from conveyor_sim.run.active_run import ActiveRun
 from conveyor_sim.run.compilation import Cancelled, Compilation

@@ -72,19 +72,8 @@ class LockstepRequest:
         inputs = inputs_of(LOCKSTEP, self.run_id, self.alarm_ids, self.alarms, self.names, self.values)
         return [command for command in inputs if not is_empty(command)]
 
-    def _key(self) -> tuple[object, ...]:
-        bits = struct.pack(f"<{len(self.values)}d", *self.values)
-        return (
-            self.run_id,
-            self.target_tick,
-            self.names,
-            bits,
-            self.release,
-            self.sim_run_id,
-            self.alarm_ids,
-            self.alarms,
-            self.released,
-        )
+    def _key(self) -> dict[str, object]:
+        return {**vars(self), "values": struct.pack(f"<{len(self.values)}d", *self.values)}
 
 
 @dataclass(frozen=True)

@@ -18,8 +18,8 @@ from conveyor_sim.errors import ConveyorError, SimulationError
 from conveyor_sim.line.run_state import ENDED, RUNNING, STOPPED, RunState
 from conveyor_sim.run.force_check import PeakWatch
 from conveyor_sim.run.scan_loop import ScanLoop
+from conveyor_sim.run.session import keep_stopped
 from conveyor_sim.run.speed import Spent
-from conveyor_sim.run.stopped import keep_stopped
 from conveyor_sim.scene import Scene
 from conveyor_sim.scene.recorded import sources_of
 from conveyor_sim.simulation import Simulation

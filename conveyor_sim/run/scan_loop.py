@@ -10,10 +10,9 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from conveyor_sim.bag.outputs import OutputWriter
-from conveyor_sim.control.line_tags import LineTags, bind
 from conveyor_sim.control.memory import restore, snapshot
 from conveyor_sim.control.recorded import RecordedVariables
-from conveyor_sim.control.scan import ALARMS, ControlError, Controller, Inputs, declared_alarms
+from conveyor_sim.control.scan import ALARMS, ControlError, Controller, Inputs, LineTags, bind, declared_alarms
 from conveyor_sim.errors import CommandError, ConveyorError
 from conveyor_sim.line.commands.inputs import DECLARE, CommandOutcome, Input
 from conveyor_sim.physics.state.checkpoint import read_checkpoint

@@ -8,14 +8,28 @@ from pathlib import Path
 
 from conveyor_sim.bag.outputs import MessageSink, OutputWriter
 from conveyor_sim.bag.recorder import Recorder
-from conveyor_sim.errors import SimulationError
+from conveyor_sim.errors import CheckpointError, SimulationError
 from conveyor_sim.line.commands.inputs import CommandOutcome, Input
 from conveyor_sim.line.commands.refusal import shown
 from conveyor_sim.run.force_check import PeakWatch, achieved
-from conveyor_sim.run.stopped import keep_stopped
 from conveyor_sim.scene.recorded import sources_of
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.printable import SENTENCE, printable
+
+FILE_NAME = "stopped.npz"
+"""A checkpoint (`Simulation.load`), in the folder of the recording."""
+
+
+def keep_stopped(simulation: Simulation, folder: Path | None, error: SimulationError) -> SimulationError:
+    """Write the state before the failed tick into a folder, if one is passed. Return the error with the path."""
+    if folder is None:
+        return error
+    path = folder / FILE_NAME
+    try:
+        simulation.save(path)
+    except CheckpointError as failed:
+        return SimulationError(f"{error}; the state before that tick was not saved: {failed}", error.kind)
+    return SimulationError(f"{error}; the state before that tick is in {path}", error.kind)
 
 
 class RunSession:

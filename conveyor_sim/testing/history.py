@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from conveyor_sim.control.scan import ALARMS
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.commands.inputs import FORCE, INJECT, MODE, SET, UNFORCE, CommandOutcome
-from conveyor_sim.line.process_image import ProcessImage
-from conveyor_sim.line.tag import Kind
+from conveyor_sim.line.tag import Kind, ProcessImage
 
 F8 = NDArray[np.float64]
 

@@ -49,8 +49,8 @@ class Lines:
         history: float | None = None,
     ) -> Scenario:
         """Return a Scenario. Parameters and exceptions are those of `Scenario`."""
+        from conveyor_sim.testing.evidence import make_folder
         from conveyor_sim.testing.scenario import Scenario
-        from conveyor_sim.testing.unfinished import make_folder
 
         if self._folder is None:
             self._folder = make_folder(self._place)
@@ -70,7 +70,7 @@ class Lines:
 
     def close(self) -> None:
         """End the scenarios and forget them and their inputs."""
-        from conveyor_sim.testing.unfinished import remove_folder
+        from conveyor_sim.testing.evidence import remove_folder
 
         made, self.made = self.made, []
         folder, self._folder = self._folder, None
@@ -239,7 +239,7 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: p
     root = _root(config)
     if not root.is_dir():
         return
-    from conveyor_sim.testing.unfinished import left_over
+    from conveyor_sim.testing.evidence import left_over
 
     if folders := left_over(root):
         terminalreporter.section("inputs left by killed tests")

@@ -34,7 +34,7 @@ from conveyor_sim.support.modbus_rows import Row
 from conveyor_sim.support.printable import SENTENCE, printable
 from conveyor_sim.testing import plc
 from conveyor_sim.testing.history import ScenarioHistory
-from conveyor_sim.testing.plc_server import ServedPlc
+from conveyor_sim.testing.plc import ServedPlc
 from conveyor_sim.testing.scene_of import scene_of
 
 Condition = Callable[["Present"], Any]

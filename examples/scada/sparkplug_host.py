@@ -13,7 +13,7 @@ from typing import Any
 from paho.mqtt.client import Client
 from paho.mqtt.enums import CallbackAPIVersion
 
-from conveyor_sim.protocols.mqtt.payload import BOOLEAN, INT32, INT64, Payload, add_metric, decoded, whole
+from conveyor_sim.protocols.mqtt.line_metrics import BOOLEAN, INT32, INT64, Payload, add_metric, decoded, whole
 
 parser = argparse.ArgumentParser(description="Shows the values of a line as they change, and gives commands.")
 parser.add_argument("line", metavar="GROUP/NODE", help="as conveyor-sim serve --mqtt names them")

@@ -20,7 +20,7 @@ from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.bag.replay import replay
 from conveyor_sim.errors import BagError, SceneError
-from conveyor_sim.line.devices.zone import ZoneDevice
+from conveyor_sim.line.devices.region import ZoneDevice
 from conveyor_sim.line.run_state import STOPPED, RunState
 from conveyor_sim.line.tag import count
 from conveyor_sim.physics.model import build_model

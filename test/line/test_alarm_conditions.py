@@ -8,7 +8,7 @@ import pytest
 from facts import missing
 from line.alarms.board import SIGNALS, Board
 
-from conveyor_sim.line.alarm_conditions import MeasuredConditions
+from conveyor_sim.line.alarm_system import MeasuredConditions
 from conveyor_sim.line.device import Device
 from conveyor_sim.line.tag import count, number
 

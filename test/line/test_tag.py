@@ -8,8 +8,7 @@ from scenes import SHIPPED, base, belt, bottle, shipped_name, simulation
 
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.device_kinds import DEVICES, build_devices
-from conveyor_sim.line.process_image import ProcessImage
-from conveyor_sim.line.tag import MOST_COUNT, UNITS, Tag, choice, count, number, seconds, switch
+from conveyor_sim.line.tag import MOST_COUNT, UNITS, ProcessImage, Tag, choice, count, number, seconds, switch
 from conveyor_sim.physics.model import build_model
 from conveyor_sim.scene import load_scene
 

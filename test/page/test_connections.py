@@ -25,11 +25,11 @@ from aiohttp import ClientSession, WSCloseCode, WSMsgType, WSServerHandshakeErro
 from conveyor_sim.protocols.hosting.server_thread import ServerThread
 from conveyor_sim.protocols.hosting.serving import Serving
 from conveyor_sim.protocols.hosting.settings import ServerSettings
+from conveyor_sim.protocols.server.certificates import server_context
 from conveyor_sim.protocols.server.interface import ServerError
 from conveyor_sim.protocols.server.quotas import QUOTA, share_of_guests
 from conveyor_sim.protocols.web import feed, server
 from conveyor_sim.protocols.web.server import LONGEST_REQUEST, MOST_CONNECTIONS, MOST_REQUESTS, WebServer
-from conveyor_sim.protocols.web.tls import server_context
 from conveyor_sim.protocols.web.viewer import MOST_WAITING, UNSEEN
 
 T = TypeVar("T")

@@ -18,7 +18,7 @@ from conveyor_sim.cli import main
 from conveyor_sim.errors import BagError
 from conveyor_sim.line.commands.inputs import FORCE, Input
 from conveyor_sim.line.machines.counters import RESET_COUNTERS
-from conveyor_sim.line.machines.time_account import CATEGORIES
+from conveyor_sim.line.machines.efficiency import CATEGORIES
 from conveyor_sim.report.periods import longest_stops, stop_reasons
 from conveyor_sim.report.production import Production, read_production
 from conveyor_sim.scene import Scene, load_scene

@@ -16,8 +16,7 @@ from std_msgs.msg import Float64
 
 from conveyor_sim.ros.commands import subscribe_commands
 from conveyor_sim.ros.direct import WaitSet
-from conveyor_sim.ros.intake import Intake
-from conveyor_sim.ros.lockstep_service import LockstepService
+from conveyor_sim.ros.lockstep_service import Intake, LockstepService
 from conveyor_sim.run.stepper import Stepper
 
 FEEDER = "belts/feeder/cmd_speed"

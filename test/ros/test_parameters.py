@@ -6,8 +6,7 @@ from pathlib import Path
 import pytest
 from rclpy.parameter import Parameter, parameter_dict_from_yaml_file
 
-from conveyor_sim.ros.declared import DeclaredParameter
-from conveyor_sim.ros.parameters import RATES, TABLE
+from conveyor_sim.ros.parameters import RATES, TABLE, DeclaredParameter
 from conveyor_sim.scene import Scene
 
 ENTRIES = {entry.name: entry for entry in TABLE}

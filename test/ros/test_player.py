@@ -18,8 +18,7 @@ from conveyor_sim.bag.reader import Bag, open_bag
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.errors import BagError
 from conveyor_sim.run.lockstep import Refused
-from conveyor_sim.run.playback import Playback, PlayedMessage
-from conveyor_sim.run.player import Player
+from conveyor_sim.run.playback import Playback, PlayedMessage, Player
 
 
 @pytest.fixture(scope="module")

@@ -27,7 +27,7 @@ from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.bag.messages.typestore import definition
 from conveyor_sim.bag.reader import Bag, open_bag
 from conveyor_sim.ros.publishers import message_class, ros_qos
-from conveyor_sim.ros.replay_node import ReplayNode
+from conveyor_sim.ros.replay_job import ReplayNode
 from conveyor_sim.run.playback import Playback, PlayedMessage
 
 

@@ -22,8 +22,8 @@ from conveyor_sim.errors import CheckpointError
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.testing import Scenario
+from conveyor_sim.testing.evidence import left_over
 from conveyor_sim.testing.plugin import Lines
-from conveyor_sim.testing.unfinished import left_over
 
 FIRST, REACHED = 300, 925
 """Ticks: of the checkpoint, and at which the test hangs."""

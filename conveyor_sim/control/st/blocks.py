@@ -5,6 +5,7 @@ Each is a class with a slot for every variable, and `run(now)`, one call.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 from conveyor_sim.control.st.types import BOOL, DINT, INT, LINT, TIME, UDINT, ULINT, BlockType, Member, Type
@@ -226,16 +227,6 @@ CLASSES: dict[str, Any] = {f"_{one.__name__}": one for one in (TON, TOF, TP, R_T
 """Classes by their names in the code."""
 
 
-class _Typed:
-    """Constructor of a counter for one type of CV."""
-
-    def __init__(self, counter: Any, low: int, high: int) -> None:
-        self._counter, self._low, self._high = counter, low, high
-
-    def __call__(self) -> Any:
-        return self._counter(self._low, self._high)
-
-
 for _suffix, _type in (("", INT), ("_DINT", DINT), ("_LINT", LINT), ("_UDINT", UDINT), ("_ULINT", ULINT)):
     for _counter, _in, _out in (
         (CTU, {"CU": BOOL, "R": BOOL, "PV": _type}, {"Q": BOOL, "CV": _type}),
@@ -248,4 +239,4 @@ for _suffix, _type in (("", INT), ("_DINT", DINT), ("_LINT", LINT), ("_UDINT", U
     ):
         _name = f"{_counter.__name__}{_suffix}"
         STANDARD[_name] = _block(_name, f"_{_name}", _in, _out)
-        CLASSES[f"_{_name}"] = _Typed(_counter, _type.low, _type.high)
+        CLASSES[f"_{_name}"] = partial(_counter, _type.low, _type.high)

@@ -8,9 +8,8 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from conveyor_sim.control.line_tags import LineTags
 from conveyor_sim.control.recorded import PREFIX, patterns
-from conveyor_sim.control.scan import ControlError, Inputs
+from conveyor_sim.control.scan import ControlError, Inputs, LineTags
 from conveyor_sim.control.st.compile import compile_file
 from conveyor_sim.control.st.errors import StructuredTextError
 from conveyor_sim.control.st.mapping import Addresses, TagMapping, mapped, read_addresses

@@ -17,9 +17,8 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from conveyor_sim.control.line_tags import LineTags
 from conveyor_sim.control.recorded import PREFIX, patterns
-from conveyor_sim.control.scan import ALARMS, ControlError, Inputs
+from conveyor_sim.control.scan import ALARMS, ControlError, Inputs, LineTags
 from conveyor_sim.support.child_process import start_python
 from conveyor_sim.support.rounded_limit import at_limit
 

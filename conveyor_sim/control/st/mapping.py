@@ -7,8 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from conveyor_sim.control.line_tags import LineTags
-from conveyor_sim.control.scan import ALARMS
+from conveyor_sim.control.scan import ALARMS, LineTags
 from conveyor_sim.control.st.compile import Compiled
 from conveyor_sim.control.st.errors import Position, StructuredTextError
 from conveyor_sim.control.st.located import address_of, overlapping

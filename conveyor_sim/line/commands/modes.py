@@ -20,9 +20,8 @@ from conveyor_sim.line.commands.authority import (
     who,
 )
 from conveyor_sim.line.commands.inputs import DISOWN, MODE, OWN, SET, WRITER_KINDS, Input
-from conveyor_sim.line.commands.moved import moved_belts
 from conveyor_sim.line.commands.operation import Operation
-from conveyor_sim.line.commands.refusal import refusal
+from conveyor_sim.line.commands.refusal import moved_belts, refusal
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.tag import Tag, choice
 from conveyor_sim.support.printable import SENTENCE, printable

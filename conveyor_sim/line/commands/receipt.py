@@ -20,8 +20,7 @@ from conveyor_sim.line.commands.authority import (
     unauthorized,
 )
 from conveyor_sim.line.commands.inputs import DISOWN, FORCE, INJECT, MODE, OWN, SET, UNFORCE, Input
-from conveyor_sim.line.commands.moved import moved_belts
-from conveyor_sim.line.commands.refusal import ALARMS, refusal
+from conveyor_sim.line.commands.refusal import ALARMS, moved_belts, refusal
 from conveyor_sim.line.tag import COMMANDS, SIGNALS, Tag
 from conveyor_sim.support.printable import printable
 

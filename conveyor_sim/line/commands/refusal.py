@@ -1,11 +1,27 @@
 """Reasons for refusing commands and faults: unknown name, wrong value, outside the limits."""
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 
 from conveyor_sim.line.tag import Tag
 from conveyor_sim.scene.parts.alarm import PREFIX
 from conveyor_sim.support.printable import printable
+
+_TEXT = "Speed of the surface, {ratio:g} times {drive}/speed."
+_PATTERN = re.compile(r"Speed of the surface, \S+ times (drives/\w+)/speed\.")
+
+
+def moved_text(drive: str, ratio: float) -> str:
+    """Return the description of the speed of a belt that a drive ("drives/m1") moves."""
+    return _TEXT.format(drive=drive, ratio=ratio)
+
+
+def moved_belts(tags: Sequence[Tag]) -> dict[str, str]:
+    """Return the drive of each belt that a named drive moves: {"belts/one": "drives/m1"}."""
+    matches = ((tag.device, _PATTERN.fullmatch(tag.description)) for tag in tags if tag.device_class == "belt")
+    return {belt: match[1] for belt, match in matches if match is not None}
+
 
 ALARMS = PREFIX
 """Prefix of the name of a controller's alarm in an input, with value 0 or 1. It is not a command."""

@@ -2,10 +2,9 @@
 
 from collections.abc import Sequence
 
-from conveyor_sim.line.commands.moved import moved_text
+from conveyor_sim.line.commands.refusal import moved_text
 from conveyor_sim.line.device import Device, ScanContext
-from conveyor_sim.line.devices.drive import DriveDevice
-from conveyor_sim.line.devices.named_drive import NamedDriveDevice
+from conveyor_sim.line.devices.drive import DriveDevice, NamedDriveDevice
 from conveyor_sim.line.devices.region import most_inside
 from conveyor_sim.line.devices.setpoint import SetpointDevice, SpeedDevice
 from conveyor_sim.line.devices.setup import DeviceSetup

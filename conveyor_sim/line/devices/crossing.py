@@ -1,12 +1,17 @@
-"""Passages of bottles' axes over a line within a tick, with the time of each."""
+"""Lines that bottle axes cross within a tick: passages with their times, counters and inspections."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from conveyor_sim.engine.arrays.types import F8, I8
 from conveyor_sim.engine.sensors.crossings import find_crossings
-from conveyor_sim.line.device import ScanContext
+from conveyor_sim.line.device import Device, ScanContext
+from conveyor_sim.line.devices.setup import DeviceSetup
+from conveyor_sim.line.tag import count, seconds, switch
+from conveyor_sim.scene.parts.counter import Counter
+from conveyor_sim.scene.parts.inspection import Inspection
 
 
 class Passage(NamedTuple):
@@ -55,3 +60,84 @@ class CrossingLine:
             Passage(now.time - (1.0 - float(share[n])) * now.length, int(ids[slots[n]]), bool(forward[n]))
             for n in range(count)
         )
+
+
+class CounterDevice(Device):
+    """Counter of bottles whose axes pass over a line, by direction."""
+
+    def __init__(self, name: str, counter: Counter, setup: DeviceSetup) -> None:
+        super().__init__(
+            name,
+            [
+                count(f"{name}/forward", "counter", "Bottles that passed from left to right, seen along its line."),
+                count(f"{name}/backward", "counter", "Bottles that passed in the opposite direction."),
+            ],
+        )
+        self._line = CrossingLine(counter.from_, counter.to)
+        self.forward = self.backward = 0
+
+    def begin(self, now: ScanContext) -> None:
+        """Store the bottle positions."""
+        self._line.begin(now)
+
+    def end(self, now: ScanContext) -> None:
+        """Count the passages of this tick. A bottle that returns within the tick is not counted."""
+        for passage in self._line.end(now):
+            if passage.forward:
+                self.forward += 1
+            else:
+                self.backward += 1
+
+    def values(self, now: ScanContext) -> Sequence[float]:
+        """Return the values in the order of the signals."""
+        return self.forward, self.backward
+
+
+class InspectionDevice(Device):
+    """Machine that detects bad bottles among those that pass a line."""
+
+    def __init__(self, name: str, inspection: Inspection, setup: DeviceSetup) -> None:
+        super().__init__(
+            name,
+            [
+                switch(f"{name}/running", "status", "Inspects bottles, and is not stopped.", 1.0, "state"),
+                count(f"{name}/count", "counter", "Bottles that passed from left to right, seen along its line."),
+                count(f"{name}/bad", "counter", "Bad bottles among them."),
+                seconds(f"{name}/time", "actual", "Time of the last passage, between ticks."),
+                seconds(f"{name}/bad_time", "actual", "Time of the last bad bottle's passage, between ticks."),
+                switch(f"{name}/stop", "fault", "Sees no bottles."),
+            ],
+        )
+        self._line = CrossingLine(inspection.from_, inspection.to)
+        self.stop = False
+        self.count = self.bad = 0
+        self.time = self.bad_time = 0.0
+        """Times when the last bottle passed, and the last bad one, s."""
+
+    def command(self, name: str, value: float, now: ScanContext) -> None:
+        """Apply the fault `stop`."""
+        self.stop = value != 0.0
+
+    def begin(self, now: ScanContext) -> None:
+        """Store the bottle positions."""
+        self._line.begin(now)
+
+    def end(self, now: ScanContext) -> None:
+        """Inspect the bottles that passed."""
+        for passage in self._line.end(now):
+            if passage.forward and not self.stop:
+                self.count, self.time = self.count + 1, passage.time
+                if passage.id in now.bad:
+                    self.bad, self.bad_time = self.bad + 1, passage.time
+
+    def states(self, now: ScanContext) -> list[float]:
+        """Return running."""
+        return [not self.stop]
+
+    def counts(self) -> tuple[int, int, int]:
+        """Return bottles that passed, and bad ones among them."""
+        return self.count, self.bad, 0
+
+    def values(self, now: ScanContext) -> Sequence[float]:
+        """Return running, passed bottles, bad ones among them, and the times of the last ones (s)."""
+        return not self.stop, self.count, self.bad, self.time, self.bad_time

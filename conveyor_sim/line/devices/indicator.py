@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 from conveyor_sim.line.alarms.declaration import Declared, error
 from conveyor_sim.line.device import Device, ScanContext
-from conveyor_sim.line.devices.counter import CounterDevice
+from conveyor_sim.line.devices.crossing import CounterDevice
+from conveyor_sim.line.devices.region import ZoneDevice
 from conveyor_sim.line.devices.setpoint import SpeedDevice
 from conveyor_sim.line.devices.setup import DeviceSetup
-from conveyor_sim.line.devices.zone import ZoneDevice
 from conveyor_sim.line.tag import number, switch
 from conveyor_sim.scene.parts.indicator import Indicator
 

@@ -11,9 +11,8 @@ import numpy as np
 from conveyor_sim.columns.counters import LINE, CounterColumns
 from conveyor_sim.line.commands.inputs import Input
 from conveyor_sim.line.device import Device, ScanContext
-from conveyor_sim.line.machines.efficiency import efficiency
+from conveyor_sim.line.machines.efficiency import CATEGORIES, Category, TimeAccount, efficiency
 from conveyor_sim.line.machines.machine import MachineDevice
-from conveyor_sim.line.machines.time_account import CATEGORIES, Category, TimeAccount
 from conveyor_sim.line.tag import Adds
 from conveyor_sim.support.printable import printable
 

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 from conveyor_sim.line.alarms.declaration import Declared, error
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.devices.setup import DeviceSetup
+from conveyor_sim.line.machines.efficiency import CATEGORIES, Category
 from conveyor_sim.line.machines.failures import Draws, FailureClock, PlannedTimes
 from conveyor_sim.line.machines.packml import (
     CNTRL_CMD,
@@ -33,7 +34,6 @@ from conveyor_sim.line.machines.stop_reason import (
     is_failure,
     reason_texts,
 )
-from conveyor_sim.line.machines.time_account import CATEGORIES, Category
 from conveyor_sim.line.tag import Tag, choice, count, number, switch
 from conveyor_sim.scene.failures import Times
 from conveyor_sim.scene.parts.machine import PackmlPart

@@ -2,8 +2,8 @@
 
 from collections.abc import Mapping
 
+from conveyor_sim.line.machines.efficiency import Category
 from conveyor_sim.line.machines.packml import Command, PackMLState
-from conveyor_sim.line.machines.time_account import Category
 from conveyor_sim.scene.parts.machine import MOST_STOPS, PackmlPart
 
 NONE, RUN, STARVED, BLOCKED, FAULT = 0, 1, 20, 21, 30

@@ -2,7 +2,7 @@
 
 Every `period` the signals are written to it, and its commands are read and given to the line. The lag between both is
 measured and reported, because it is part of the test. A test that needs the same bits each time runs in lockstep
-(testing/plc_server.py).
+(testing/plc.py).
 """
 
 from __future__ import annotations

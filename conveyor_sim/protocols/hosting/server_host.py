@@ -35,7 +35,7 @@ from conveyor_sim.protocols.hosting.server_messages import (
 from conveyor_sim.protocols.hosting.settings import ServerSettings
 from conveyor_sim.protocols.server.interface import Health, ServerError, Status
 from conveyor_sim.protocols.server.users import Logins
-from conveyor_sim.protocols.tags.holding import Holding
+from conveyor_sim.protocols.tags.control_mode import Holding
 from conveyor_sim.protocols.tags.line_mirror import DrawableProvider
 from conveyor_sim.protocols.tags.tag_provider import WEB
 from conveyor_sim.support.child_process import how_it_ended

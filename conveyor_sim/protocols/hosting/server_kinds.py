@@ -8,8 +8,7 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 from conveyor_sim.line.commands.inputs import WriterKind
-from conveyor_sim.protocols.hosting.settings import ServerSettings
-from conveyor_sim.protocols.hosting.shared_state import SharedState
+from conveyor_sim.protocols.hosting.settings import ServerSettings, SharedState
 from conveyor_sim.protocols.server.interface import HERE, ProtocolServer, ServerError, require_free
 from conveyor_sim.protocols.tags.tag_provider import MODBUS, MQTT, OPCUA, WEB, TagProvider
 
@@ -136,9 +135,9 @@ def _mqtt_exposes(settings: ServerSettings) -> str:
 
 
 def _web(source: TagProvider, port: int, settings: ServerSettings, shared: SharedState) -> ProtocolServer:
+    from conveyor_sim.protocols.server.certificates import server_context
     from conveyor_sim.protocols.tags.line_mirror import LineMirror
     from conveyor_sim.protocols.web.server import WebServer
-    from conveyor_sim.protocols.web.tls import server_context
 
     if not isinstance(source, LineMirror):
         raise ServerError("web: the line of a test has no page; expected a scene, a recording or a node")

@@ -1,8 +1,9 @@
-"""Messages between a `ServerHost` and the process of its protocol server."""
+"""Messages between a `ServerHost` and the process of its protocol server, and the heartbeat of the process."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import asyncio
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
@@ -111,3 +112,12 @@ class StatusRequest(NamedTuple):
 
 class EndRequest(NamedTuple):
     """Sent to the process: a request to close all connections and end."""
+
+
+async def beat(take: Callable[[float], object]) -> None:
+    """Call `take` every BEAT seconds with the delay of that call (s of wall time), until this task is cancelled."""
+    loop = asyncio.get_running_loop()
+    while True:
+        due = loop.time() + BEAT
+        await asyncio.sleep(BEAT)
+        take(loop.time() - due)

@@ -16,7 +16,6 @@ from importlib import import_module
 from multiprocessing.connection import Connection
 
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.protocols.hosting.loop_lag import beat
 from conveyor_sim.protocols.hosting.remote_provider import (
     SILENCE,
     ParentCalls,
@@ -32,8 +31,9 @@ from conveyor_sim.protocols.hosting.server_messages import (
     ServerFailed,
     ServerStarted,
     ServerTask,
+    beat,
 )
-from conveyor_sim.protocols.hosting.shared_state import SharedState
+from conveyor_sim.protocols.hosting.settings import SharedState
 from conveyor_sim.protocols.server.interface import ProtocolServer
 from conveyor_sim.protocols.tags.line_mirror import decoded
 from conveyor_sim.support.child_process import die_with_parent, pipes_of_child

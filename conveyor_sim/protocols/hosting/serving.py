@@ -8,16 +8,15 @@ from contextlib import AbstractContextManager
 from types import MappingProxyType
 from typing import Any
 
-from conveyor_sim.protocols.hosting.loop_lag import beat
 from conveyor_sim.protocols.hosting.server_child import ServerChild
 from conveyor_sim.protocols.hosting.server_host import ServerHost
 from conveyor_sim.protocols.hosting.server_kinds import ServerKind
+from conveyor_sim.protocols.hosting.server_messages import beat
 from conveyor_sim.protocols.hosting.server_thread import ServerThread
-from conveyor_sim.protocols.hosting.settings import ServerSettings
-from conveyor_sim.protocols.hosting.shared_state import SharedState
+from conveyor_sim.protocols.hosting.settings import ServerSettings, SharedState
 from conveyor_sim.protocols.server.interface import HERE, Health, ProtocolServer, Status
 from conveyor_sim.protocols.server.users import Logins, read_users
-from conveyor_sim.protocols.tags.holding import Holding
+from conveyor_sim.protocols.tags.control_mode import Holding
 from conveyor_sim.protocols.tags.line_mirror import LineMirror
 from conveyor_sim.protocols.tags.tag_provider import TagProvider
 

@@ -34,9 +34,8 @@ from conveyor_sim.line.tag import COMMANDS
 from conveyor_sim.protocols.modbus.address_map import SET_MODE
 from conveyor_sim.protocols.server.interface import HERE, ServerError, Status, require_free
 from conveyor_sim.protocols.server.quotas import GUEST, QUOTA, ConnectionSlot, ConnectionSlots, Quota
-from conveyor_sim.protocols.tags.control_mode import objection, refused_for_good
+from conveyor_sim.protocols.tags.control_mode import Holding, HoldingService, objection, refused_for_good
 from conveyor_sim.protocols.tags.handshake import MAY_GO_ON, TARGET, TICK
-from conveyor_sim.protocols.tags.holding import Holding, HoldingService
 from conveyor_sim.protocols.tags.tag_provider import MODBUS, TagProvider
 from conveyor_sim.support.modbus_rows import Row, Table, decode, encode
 

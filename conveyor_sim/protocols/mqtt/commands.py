@@ -13,10 +13,15 @@ from typing import Any
 from conveyor_sim.line.commands.inputs import MODE, SET, Input, WriterKind
 from conveyor_sim.line.commands.receipt import Receipt
 from conveyor_sim.line.tag import COMMANDS, Tag
-from conveyor_sim.protocols.mqtt.line_metrics import number_of
-from conveyor_sim.protocols.mqtt.payload import decoded
-from conveyor_sim.protocols.tags.control_mode import TAKES_NO_INPUT, is_mode, objection, refused_for_good
-from conveyor_sim.protocols.tags.holding import Holding, HoldingService
+from conveyor_sim.protocols.mqtt.line_metrics import decoded, number_of
+from conveyor_sim.protocols.tags.control_mode import (
+    TAKES_NO_INPUT,
+    Holding,
+    HoldingService,
+    is_mode,
+    objection,
+    refused_for_good,
+)
 from conveyor_sim.protocols.tags.tag_provider import MQTT, TagProvider
 from conveyor_sim.support.printable import SENTENCE, printable
 

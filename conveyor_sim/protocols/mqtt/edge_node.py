@@ -36,9 +36,8 @@ from conveyor_sim.protocols.mqtt.link import (
 )
 from conveyor_sim.protocols.mqtt.session import BETWEEN, SparkplugSession, SparkplugTopics, death
 from conveyor_sim.protocols.server.interface import ServerError, Stamps, Status
-from conveyor_sim.protocols.tags.holding import HoldingService
-from conveyor_sim.protocols.tags.tag_provider import LineSnapshot, TagProvider
-from conveyor_sim.protocols.tags.tick_clock import TickClock
+from conveyor_sim.protocols.tags.control_mode import HoldingService
+from conveyor_sim.protocols.tags.tag_provider import LineSnapshot, TagProvider, TickClock
 from conveyor_sim.support.checked_json import parsed
 from conveyor_sim.support.file_lock import locked
 from conveyor_sim.support.files import FileError, read_file, write_file

@@ -8,9 +8,19 @@ from typing import Any
 
 from conveyor_sim.line.run_state import RUN, STATES
 from conveyor_sim.protocols.mqtt.commands import REBIRTH, HostCommands
-from conveyor_sim.protocols.mqtt.line_metrics import LineMetrics, is_there, milliseconds
+from conveyor_sim.protocols.mqtt.line_metrics import (
+    BOOLEAN,
+    INT32,
+    INT64,
+    STRING,
+    LineMetrics,
+    Payload,
+    add_metric,
+    add_property,
+    is_there,
+    milliseconds,
+)
 from conveyor_sim.protocols.mqtt.link import BrokerConnection
-from conveyor_sim.protocols.mqtt.payload import BOOLEAN, INT32, INT64, STRING, Payload, add_metric, add_property
 from conveyor_sim.protocols.tags.tag_provider import LineSnapshot
 
 NAMESPACE = "spBv1.0"

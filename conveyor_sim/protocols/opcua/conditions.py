@@ -13,12 +13,11 @@ from asyncua.common.events import get_event_obj_from_type_node
 
 from conveyor_sim.columns.alarms import AlarmColumns
 from conveyor_sim.line.alarms.alarm import NEVER, WAITING, AlarmState
-from conveyor_sim.protocols.opcua.emitter import Emitter
+from conveyor_sim.protocols.opcua.line_events import Emitter
 from conveyor_sim.protocols.opcua.methods import ALARM_METHODS, ALARM_STATES, add_alarm_methods
 from conveyor_sim.protocols.opcua.nodes import LINE, Nodes, node_id, nothing
 from conveyor_sim.protocols.opcua.values import status_of
-from conveyor_sim.protocols.tags.tag_provider import LineSnapshot
-from conveyor_sim.protocols.tags.tick_clock import TickClock
+from conveyor_sim.protocols.tags.tag_provider import LineSnapshot, TickClock
 
 MOST_OBJECTS = 4000
 """Largest number of alarm objects over time. Alarms beyond it have events, but no object."""

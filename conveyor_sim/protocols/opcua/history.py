@@ -20,8 +20,7 @@ from conveyor_sim.protocols.opcua.tree import is_shown
 from conveyor_sim.protocols.opcua.values import as_variant
 from conveyor_sim.protocols.server.interface import ServerError
 from conveyor_sim.protocols.tags.tag_history import TagHistory
-from conveyor_sim.protocols.tags.tag_provider import TagProvider
-from conveyor_sim.protocols.tags.tick_clock import TickClock
+from conveyor_sim.protocols.tags.tag_provider import TagProvider, TickClock
 from conveyor_sim.support.printable import printable
 
 MOST_VALUES = 10_000

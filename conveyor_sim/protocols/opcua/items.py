@@ -11,8 +11,7 @@ from asyncua import ua
 from asyncua.server.monitored_item_service import WhereClauseEvaluator
 
 from conveyor_sim.protocols.opcua.asyncua_internals import OpenItems
-from conveyor_sim.protocols.opcua.filter_codes import filter_code
-from conveyor_sim.protocols.opcua.filters import filter_units
+from conveyor_sim.protocols.opcua.filter_codes import filter_code, filter_units
 from conveyor_sim.protocols.opcua.limits import OpcUaLimits
 
 CHANGE_UNITS, FIELD_UNITS = 4, 2

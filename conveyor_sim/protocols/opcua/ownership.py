@@ -8,6 +8,8 @@ the attempt is counted and logged.
 
 from __future__ import annotations
 
+import logging
+import time
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, TypeVar
 from weakref import WeakKeyDictionary
@@ -19,7 +21,31 @@ from asyncua.server.internal_session import InternalSession
 from conveyor_sim.protocols.opcua.asyncua_internals import OpenSubscription, forget_publish
 from conveyor_sim.protocols.opcua.client_certificates import application_uris, public_key
 from conveyor_sim.protocols.opcua.items import Items
-from conveyor_sim.protocols.opcua.refusals import Refusals
+
+EVERY = 10.0
+"""Shortest interval between two log lines, s of wall time."""
+
+
+class Refusals:
+    """Count of refused requests. The log gets one line at once, then at most one line per `EVERY` seconds."""
+
+    def __init__(self) -> None:
+        """Start with a count of 0."""
+        self.count = 0
+        """Refused requests so far."""
+        self._logged, self._at = 0, -EVERY
+
+    def report(self, sentence: str) -> None:
+        """Count one refusal, and log it unless the previous line is too recent."""
+        self.count += 1
+        now = time.monotonic()
+        if now - self._at < EVERY:
+            return
+        others = self.count - self._logged - 1
+        more = f" ({others} more refused since the last line)" if others else ""
+        logging.getLogger(__name__).warning("opcua: %s%s", sentence, more)
+        self._logged, self._at = self.count, now
+
 
 T = TypeVar("T")
 Codes = ua.StatusCodes

@@ -23,8 +23,7 @@ from conveyor_sim.protocols.opcua.packml_admin import A_MINUTE, Admin
 from conveyor_sim.protocols.opcua.packml_admin import NAME as ADMIN
 from conveyor_sim.protocols.opcua.requests import Codes, Requests
 from conveyor_sim.protocols.opcua.values import status_of
-from conveyor_sim.protocols.tags.tag_provider import LineSnapshot, TagProvider
-from conveyor_sim.protocols.tags.tick_clock import TickClock
+from conveyor_sim.protocols.tags.tag_provider import LineSnapshot, TagProvider, TickClock
 from conveyor_sim.support.rounded_limit import at_limit, single
 
 NODESET = Path(__file__).parent / "nodesets" / "Opc.Ua.PackML.NodeSet2.xml"
@@ -244,14 +243,12 @@ class PackMl:
 
     def _current(self, number: int) -> dict[str, tuple[str | None, int]]:
         """Return the present state of each state machine; without a text: it is not active."""
-        none: tuple[str | None, int] = (None, 0)
-        if number in _STATES[_BASE]:
-            return {_BASE: _STATES[_BASE][PackMLState(number)], _MACHINE: none, _EXECUTE: none}
-        if number in _STATES[_MACHINE]:
-            return {_BASE: _CLEARED, _MACHINE: _STATES[_MACHINE][PackMLState(number)], _EXECUTE: none}
-        if number in _STATES[_EXECUTE]:
-            return {_BASE: _CLEARED, _MACHINE: _RUNNING, _EXECUTE: _STATES[_EXECUTE][PackMLState(number)]}
-        return dict.fromkeys((_BASE, _MACHINE, _EXECUTE), none)
+        states: dict[str, tuple[str | None, int]] = dict.fromkeys(_STATES, (None, 0))
+        outer = {_BASE: {}, _MACHINE: {_BASE: _CLEARED}, _EXECUTE: {_BASE: _CLEARED, _MACHINE: _RUNNING}}
+        for state_machine, known in _STATES.items():
+            if number in known:
+                states |= {**outer[state_machine], state_machine: known[PackMLState(number)]}
+        return states
 
 
 def _a_second(speed: float, rate: Tag, is_single: bool) -> float:

@@ -17,8 +17,7 @@ from conveyor_sim.line.tag import Tag
 from conveyor_sim.protocols.opcua.asyncua_internals import copy_node
 from conveyor_sim.protocols.opcua.nodes import NEVER, node_id
 from conveyor_sim.protocols.opcua.values import unit_of
-from conveyor_sim.protocols.tags.tag_provider import LineSnapshot
-from conveyor_sim.protocols.tags.tick_clock import TickClock
+from conveyor_sim.protocols.tags.tag_provider import LineSnapshot, TickClock
 
 NAME = "Admin"
 

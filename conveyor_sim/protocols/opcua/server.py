@@ -15,10 +15,9 @@ from asyncua.crypto.permission_rules import SimpleRoleRuleset, UserRole
 from asyncua.server.internal_server import InternalServer
 
 from conveyor_sim.protocols.opcua.conditions import AlarmStates
-from conveyor_sim.protocols.opcua.emitter import Emitter
 from conveyor_sim.protocols.opcua.history import OpcUaHistory, require_tags
 from conveyor_sim.protocols.opcua.limits import LIMITS, PUBLISHED, UNSUPPORTED, OpcUaLimits
-from conveyor_sim.protocols.opcua.line_events import LineEvents
+from conveyor_sim.protocols.opcua.line_events import Emitter, LineEvents
 from conveyor_sim.protocols.opcua.methods import Methods, add_methods
 from conveyor_sim.protocols.opcua.nodes import INDEX, NAMESPACE, Nodes
 from conveyor_sim.protocols.opcua.packml import PackMl
@@ -33,8 +32,7 @@ from conveyor_sim.protocols.server.certificates import default_folder, identity
 from conveyor_sim.protocols.server.interface import HERE, ServerError, Stamps, Status, require_free
 from conveyor_sim.protocols.server.quotas import QUOTA, ConnectionSlots, Quota
 from conveyor_sim.protocols.server.users import Logins, LoginService, User
-from conveyor_sim.protocols.tags.tag_provider import OPCUA, TagProvider
-from conveyor_sim.protocols.tags.tick_clock import TickClock
+from conveyor_sim.protocols.tags.tag_provider import OPCUA, TagProvider, TickClock
 
 _CAPABILITIES = "Server_ServerCapabilities_"
 

@@ -27,9 +27,8 @@ from conveyor_sim.line.commands.inputs import SET
 from conveyor_sim.protocols.opcua.bounds import Bounds
 from conveyor_sim.protocols.opcua.limits import OpcUaLimits
 from conveyor_sim.protocols.opcua.nodes import WRITE, name_of
-from conveyor_sim.protocols.opcua.ownership import REFRESH, OwnedSession, Owners
+from conveyor_sim.protocols.opcua.ownership import REFRESH, OwnedSession, Owners, Refusals
 from conveyor_sim.protocols.opcua.passwords import Passwords
-from conveyor_sim.protocols.opcua.refusals import Refusals
 from conveyor_sim.protocols.opcua.requests import Codes, Requests
 from conveyor_sim.protocols.opcua.subscriptions import Subscriptions
 from conveyor_sim.protocols.opcua.transport import Connection, channel
@@ -112,9 +111,7 @@ class SafeServer(InternalServer):
         """Refuse: this is no discovery server. The library would accept it from clients without a session."""
         raise ServiceError(Codes.BadServiceUnsupported)
 
-    def register_server2(self, *_: Any) -> None:
-        """Refuse, as `register_server` does."""
-        raise ServiceError(Codes.BadServiceUnsupported)
+    register_server2 = register_server
 
     def decrypt_user_token(self, isession: Any, token: ua.UserNameIdentityToken) -> tuple[str, str]:
         """Return name and password, which the token or the channel must encrypt. A replayed token is refused.
@@ -289,25 +286,11 @@ class OpcUaSession(InternalSession):
                 result.StatusCode = ua.StatusCode(Codes.BadHistoryOperationUnsupported)
         return results
 
-    async def history_update(self, params: ua.HistoryUpdateParameters) -> list[ua.HistoryUpdateResult]:
-        """Refuse."""
+    async def history_update(self, params: Any) -> Any:
+        """Refuse, as all services that change the history or the address space."""
         raise ServiceError(Codes.BadUserAccessDenied)
 
-    async def add_nodes(self, params: list[ua.AddNodesItem]) -> list[ua.AddNodesResult]:
-        """Refuse."""
-        raise ServiceError(Codes.BadUserAccessDenied)
-
-    async def delete_nodes(self, params: ua.DeleteNodesParameters) -> list[ua.StatusCode]:
-        """Refuse."""
-        raise ServiceError(Codes.BadUserAccessDenied)
-
-    async def add_references(self, params: list[ua.AddReferencesItem]) -> list[ua.StatusCode]:
-        """Refuse."""
-        raise ServiceError(Codes.BadUserAccessDenied)
-
-    async def delete_references(self, params: list[ua.DeleteReferencesItem]) -> list[ua.StatusCode]:
-        """Refuse."""
-        raise ServiceError(Codes.BadUserAccessDenied)
+    add_nodes = delete_nodes = add_references = delete_references = history_update
 
 
 class ClientSession(WellFormedSession, OwnedSession, OpcUaSession):

@@ -19,8 +19,7 @@ from asyncua.common.utils import ServiceError
 from conveyor_sim.protocols.opcua.asyncua_internals import OpenSubscription, OpenSubscriptions, sessions_of
 from conveyor_sim.protocols.opcua.items import Items, size_of
 from conveyor_sim.protocols.opcua.limits import OpcUaLimits
-from conveyor_sim.protocols.server.budget import Budget
-from conveyor_sim.protocols.server.quotas import share_of_guests
+from conveyor_sim.protocols.server.quotas import Budget, share_of_guests
 
 Codes = ua.StatusCodes
 

@@ -17,8 +17,7 @@ from conveyor_sim.protocols.opcua.asyncua_internals import OpenPort, OpenProtoco
 from conveyor_sim.protocols.opcua.client_certificates import without_issuers
 from conveyor_sim.protocols.opcua.limits import OpcUaLimits
 from conveyor_sim.protocols.opcua.processor import CHUNK, ConnectionLimits, Processor
-from conveyor_sim.protocols.server.budget import Budget
-from conveyor_sim.protocols.server.quotas import GREETED, OPENED, ConnectionSlot, ConnectionSlots
+from conveyor_sim.protocols.server.quotas import GREETED, OPENED, Budget, ConnectionSlot, ConnectionSlots
 
 ACTIVATION = 30.0
 """Longest time that a connection may be without an active session, s."""

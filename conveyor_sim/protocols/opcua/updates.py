@@ -17,8 +17,7 @@ from conveyor_sim.protocols.opcua.nodes import Nodes
 from conveyor_sim.protocols.opcua.tree import VALUE_AS_TEXT, WRITTEN_AT, WRITTEN_BY, has_text, is_shown
 from conveyor_sim.protocols.opcua.values import as_variant, status_of
 from conveyor_sim.protocols.tags.handshake import TARGET, TICK
-from conveyor_sim.protocols.tags.tag_provider import LineSnapshot, TagProvider
-from conveyor_sim.protocols.tags.tick_clock import TickClock
+from conveyor_sim.protocols.tags.tag_provider import LineSnapshot, TagProvider, TickClock
 
 MOST_BEHIND = 200
 """Largest number of ticks that wait to be written; a further one replaces the newest."""

@@ -14,8 +14,7 @@ from conveyor_sim.line.machines.weihenstephan import DATA_POINTS, data_points, n
 from conveyor_sim.line.tag import Tag
 from conveyor_sim.protocols.opcua.nodes import Nodes, node_id
 from conveyor_sim.protocols.opcua.values import status_of
-from conveyor_sim.protocols.tags.tag_provider import LineSnapshot, TagProvider
-from conveyor_sim.protocols.tags.tick_clock import TickClock
+from conveyor_sim.protocols.tags.tag_provider import LineSnapshot, TagProvider, TickClock
 
 NAME = "Weihenstephan"
 """Name of the object below a machine."""

@@ -9,7 +9,7 @@ from urllib.parse import urlparse
 
 from asyncua import ua
 from asyncua.common.utils import ServiceError
-from asyncua.server.internal_session import InternalSession, SessionState
+from asyncua.server.internal_session import InternalSession
 
 from conveyor_sim.protocols.opcua.filter_codes import filter_code
 from conveyor_sim.protocols.opcua.ownership import REFRESH
@@ -31,7 +31,10 @@ def require_url(url: str | None) -> None:
 
 
 class WellFormedSession(InternalSession):
-    """Session whose services refuse requests that the library would fail on."""
+    """Session whose services refuse requests that the library would fail on.
+
+    `Processor` has refused requests without operations before, as it reads their number.
+    """
 
     async def create_session(self, params: ua.CreateSessionParameters, *others: Any, **named: Any) -> Any:
         """Create the session. A timeout that is no finite number is treated as 0."""
@@ -40,21 +43,14 @@ class WellFormedSession(InternalSession):
         return await super().create_session(params, *others, **named)
 
     async def read(self, params: ua.ReadParameters) -> list[ua.DataValue]:
-        """Raise ServiceError for a request without nodes, or with an invalid age or invalid timestamps."""
-        _require_some(params.NodesToRead)
+        """Raise ServiceError for a request with an invalid age or invalid timestamps."""
         if not params.MaxAge >= 0.0:
             raise ServiceError(Codes.BadMaxAgeInvalid)
         _require_timestamps(params.TimestampsToReturn)
         return await super().read(params)
 
-    async def write(self, params: ua.WriteParameters) -> list[ua.StatusCode]:
-        """Raise ServiceError for a request without values."""
-        _require_some(params.NodesToWrite)
-        return await super().write(params)
-
     async def history_read(self, params: ua.HistoryReadParameters) -> list[ua.HistoryReadResult]:
         """Return BadContinuationPointInvalid for continuation points that this server did not issue."""
-        _require_some(params.NodesToRead)
         _require_timestamps(params.TimestampsToReturn)
         return await _each(
             params.NodesToRead,
@@ -65,7 +61,6 @@ class WellFormedSession(InternalSession):
 
     async def browse(self, params: ua.BrowseParameters) -> list[ua.BrowseResult]:
         """Return a status code for each node that can't be browsed as requested."""
-        _require_some(params.NodesToBrowse)
         if not params.View.ViewId.is_null():
             raise ServiceError(Codes.BadViewIdUnknown)
         return await _each(
@@ -78,24 +73,16 @@ class WellFormedSession(InternalSession):
     async def translate_browsepaths_to_nodeids(self, params: list[ua.BrowsePath]) -> list[ua.BrowsePathResult]:
         """Return a status code for each path without elements or with empty names."""
         return await _each(
-            _require_some(params),
+            params,
             _path_code,
             super().translate_browsepaths_to_nodeids,
             lambda code: ua.BrowsePathResult(ua.StatusCode(code)),
         )
 
-    async def register_nodes(self, nodes: list[ua.NodeId]) -> list[ua.NodeId]:
-        """Raise ServiceError for a request without nodes."""
-        return await super().register_nodes(_require_some(nodes))
-
-    async def unregister_nodes(self, nodes: list[ua.NodeId]) -> None:
-        """Raise ServiceError for a request without nodes."""
-        await super().unregister_nodes(_require_some(nodes))
-
     async def call(self, params: list[ua.CallMethodRequest]) -> list[ua.CallMethodResult]:
         """Return a status code for each ConditionRefresh whose arguments are not one id (ConditionRefresh2: two)."""
         return await _each(
-            _require_some(params),
+            params,
             lambda request: _refresh_code(request) if request.MethodId in REFRESH else Codes.Good,
             super().call,
             lambda code: ua.CallMethodResult(ua.StatusCode(code), [], [], []),
@@ -105,7 +92,6 @@ class WellFormedSession(InternalSession):
         self, params: ua.CreateMonitoredItemsParameters
     ) -> list[ua.MonitoredItemCreateResult]:
         """Return a status code for each item with an invalid filter."""
-        _require_some(params.ItemsToCreate)
         _require_timestamps(params.TimestampsToReturn)
         return await _each(
             params.ItemsToCreate,
@@ -117,36 +103,9 @@ class WellFormedSession(InternalSession):
     async def modify_monitored_items(
         self, params: ua.ModifyMonitoredItemsParameters
     ) -> list[ua.MonitoredItemModifyResult]:
-        """Raise ServiceError for a request without items, or with invalid timestamps."""
-        _require_some(params.ItemsToModify)
+        """Raise ServiceError for a request with invalid timestamps."""
         _require_timestamps(params.TimestampsToReturn)
         return await super().modify_monitored_items(params)
-
-    async def set_monitoring_mode(self, params: ua.SetMonitoringModeParameters) -> list[ua.StatusCode]:
-        """Raise ServiceError for a request without items."""
-        _require_some(params.MonitoredItemIds)
-        return await super().set_monitoring_mode(params)
-
-    async def delete_monitored_items(self, params: ua.DeleteMonitoredItemsParameters) -> list[ua.StatusCode]:
-        """Raise ServiceError for a request without items."""
-        _require_some(params.MonitoredItemIds)
-        return await super().delete_monitored_items(params)
-
-    async def set_publishing_mode(self, params: ua.SetPublishingModeParameters) -> list[ua.StatusCode]:
-        """Raise ServiceError for a request without subscriptions."""
-        _require_some(params.SubscriptionIds)
-        return await super().set_publishing_mode(params)
-
-    async def delete_subscriptions(self, ids: list[int]) -> list[ua.StatusCode]:
-        """Raise ServiceError for a request without subscriptions; a session that closes may have none."""
-        return await super().delete_subscriptions(ids if self.state is SessionState.Closed else _require_some(ids))
-
-    async def transfer_subscriptions(
-        self, params: ua.TransferSubscriptionsParameters, callback: Callable[..., Any]
-    ) -> list[ua.TransferResult]:
-        """Raise ServiceError for a request without subscriptions."""
-        _require_some(params.SubscriptionIds)
-        return await super().transfer_subscriptions(params, callback)
 
     def _browse_code(self, node: ua.BrowseDescription) -> int:
         if node.BrowseDirection == ua.BrowseDirection.Invalid:
@@ -175,12 +134,6 @@ def _with(params: Any, **fields: Any) -> Any:
     for name, value in fields.items():
         setattr(params, name, value)
     return params
-
-
-def _require_some(requests: list[Request] | None) -> list[Request]:
-    if not requests:
-        raise ServiceError(Codes.BadNothingToDo)
-    return requests
 
 
 def _require_timestamps(wanted: ua.TimestampsToReturn) -> None:

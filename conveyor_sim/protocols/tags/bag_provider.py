@@ -17,8 +17,7 @@ from conveyor_sim.protocols.tags.line_mirror import DRAWING_TOPICS, STATE_TOPICS
 from conveyor_sim.protocols.tags.tag_history import TagHistory
 from conveyor_sim.protocols.tags.tag_provider import Control
 from conveyor_sim.run.calls import CallQueue
-from conveyor_sim.run.playback import Playback, PlayedMessage
-from conveyor_sim.run.player import Player
+from conveyor_sim.run.playback import Playback, PlayedMessage, Player
 from conveyor_sim.support.printable import SENTENCE, printable
 
 SHORTEST = 0.005

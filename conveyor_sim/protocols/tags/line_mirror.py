@@ -370,53 +370,26 @@ def line_info(message: Any) -> LineInfo:
         raise LineMirrorError(
             f"{message.scene_name}: recorded without tags, by an older version; expected a newer recording"
         )
-    columns = (
-        message.tag_names,
-        message.tag_kinds,
-        message.tag_roles,
-        message.tag_descriptions,
-        message.tag_units,
-        message.tag_min.tolist(),
-        message.tag_max.tolist(),
-        message.tag_initial.tolist(),
-        message.tag_nominal.tolist(),
-        message.tag_texts,
-        message.tag_devices,
-        message.tag_classes,
-    )
-    tags = tuple(_tag(*row) for row in zip(*columns, strict=True))
+    columns: dict[str, Iterable[Any]] = {
+        "name": message.tag_names,
+        "kind": message.tag_kinds,
+        "role": message.tag_roles,
+        "description": message.tag_descriptions,
+        "unit": message.tag_units,
+        "low": message.tag_min.tolist(),
+        "high": message.tag_max.tolist(),
+        "initial": message.tag_initial.tolist(),
+        "nominal": (nominal or None for nominal in message.tag_nominal.tolist()),
+        "texts": map(_texts, message.tag_texts),
+        "device": message.tag_devices,
+        "device_class": message.tag_classes,
+    }
+    tags = tuple(Tag(**dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True))
     return LineInfo(message.scene_name, message.where, message.tick_ns * 1e-9, message.start_time, tags)
 
 
-def _tag(
-    name: str,
-    kind: Any,
-    role: Any,
-    description: str,
-    unit: str,
-    low: float,
-    high: float,
-    initial: float,
-    nominal: float,
-    texts: str,
-    device: str,
-    device_class: str,
-) -> Tag:
-    named = {int(number): text for number, text in _TEXT.findall(texts)}
-    return Tag(
-        name,
-        kind,
-        role,
-        description,
-        unit,
-        low,
-        high,
-        initial,
-        nominal or None,
-        named,
-        device=device,
-        device_class=device_class,
-    )
+def _texts(listed: str) -> dict[int, str]:
+    return {int(number): text for number, text in _TEXT.findall(listed)}
 
 
 _TEXT = re.compile(r"(-?\d+) (.*?)(?=, -?\d+ |$)")

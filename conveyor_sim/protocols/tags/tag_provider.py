@@ -6,6 +6,7 @@ import threading
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from datetime import datetime, timedelta, timezone
 from typing import TYPE_CHECKING, Literal, Protocol
 
 from conveyor_sim.columns.alarms import AlarmColumns
@@ -14,6 +15,7 @@ from conveyor_sim.columns.read_back import ReadBackColumns
 from conveyor_sim.line.commands.inputs import Input
 from conveyor_sim.line.run_state import RUNNING, RunState
 from conveyor_sim.line.tag import Tag
+from conveyor_sim.protocols.server.interface import Stamps
 
 if TYPE_CHECKING:
     from conveyor_sim.protocols.tags.tag_history import TagHistory
@@ -63,6 +65,31 @@ class LineInfo:
     """Wall-clock time of simulated time 0, ISO 8601."""
     tags: Sequence[Tag]
     """All tags, in the order of the process image."""
+
+
+class TickClock:
+    """Dates and times of ticks."""
+
+    def __init__(self, info: LineInfo, stamps: Stamps) -> None:
+        """Read the start time. stamps: kind of time for the time stamps of values."""
+        self._start = datetime.fromisoformat(info.start_time.replace("Z", "+00:00")).astimezone(timezone.utc)
+        self._tick = info.tick
+        self.is_simulated = stamps == "simulated"
+
+    def simulated(self, tick: float) -> datetime:
+        """Return the date of a tick in simulated time, which starts at the scene's `start_time`."""
+        try:
+            return self._start + timedelta(seconds=tick * self._tick)
+        except OverflowError:
+            return datetime.max.replace(tzinfo=timezone.utc)
+
+    def stamp(self, tick: float, heard: datetime) -> datetime:
+        """Return the time stamp of a value of a tick. heard: wall time at which the server received it."""
+        return self.simulated(tick) if self.is_simulated else heard
+
+    def tick_at(self, date: datetime) -> float:
+        """Return the tick of a date in simulated time, with a fraction; below 0 before the start."""
+        return (date - self._start).total_seconds() / self._tick
 
 
 @dataclass(frozen=True)

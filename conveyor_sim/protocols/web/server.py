@@ -15,9 +15,8 @@ from aiohttp import WSCloseCode, WSMsgType, web
 
 from conveyor_sim.page.bundle import HEADERS, PAGE, page_files
 from conveyor_sim.page.own_host import is_own, is_same_origin
-from conveyor_sim.protocols.server.budget import Budget
 from conveyor_sim.protocols.server.interface import HERE, ServerError, Status, require_free
-from conveyor_sim.protocols.server.quotas import GUEST, QUOTA, ConnectionSlot, ConnectionSlots, Quota
+from conveyor_sim.protocols.server.quotas import GUEST, QUOTA, Budget, ConnectionSlot, ConnectionSlots, Quota
 from conveyor_sim.protocols.server.users import Logins, LoginService, User
 from conveyor_sim.protocols.tags.line_mirror import DrawableProvider
 from conveyor_sim.protocols.tags.tag_provider import WEB

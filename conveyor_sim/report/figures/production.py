@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from conveyor_sim.columns.counters import CounterColumns
-from conveyor_sim.line.machines.time_account import CATEGORIES
+from conveyor_sim.line.machines.efficiency import CATEGORIES
 from conveyor_sim.report.figures import style
 from conveyor_sim.report.figures.data import Floats
 from conveyor_sim.report.periods import Period, StopReason, shares

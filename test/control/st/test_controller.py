@@ -9,8 +9,7 @@ from pathlib import Path
 import pytest
 from facts import missing, stating
 
-from conveyor_sim.control.line_tags import LineTags
-from conveyor_sim.control.scan import Inputs, together
+from conveyor_sim.control.scan import Inputs, LineTags, together
 from conveyor_sim.control.st.controller import StructuredText
 from conveyor_sim.control.st.errors import StructuredTextError
 from conveyor_sim.protocols.modbus.address_map import modbus_map

@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 from facts import stating
 
-from conveyor_sim.control.line_tags import LineTags
-from conveyor_sim.control.scan import Inputs
+from conveyor_sim.control.scan import Inputs, LineTags
 from conveyor_sim.control.st.controller import StructuredText
 from conveyor_sim.control.st.errors import StructuredTextError
 from conveyor_sim.protocols.modbus.address_map import modbus_map

@@ -27,9 +27,9 @@ from conveyor_sim.columns.read_back import ReadBackColumns
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.line.commands.authority import MAY, PEOPLE
 from conveyor_sim.line.commands.inputs import WRITER_KINDS, CommandOutcome, Input
+from conveyor_sim.line.machines.efficiency import CATEGORIES
 from conveyor_sim.line.machines.packml import COMMAND_TEXTS, MODE_STATES, Command, PackMLState
 from conveyor_sim.line.machines.stop_reason import BY_HAND, COMMANDED, WORKING
-from conveyor_sim.line.machines.time_account import CATEGORIES
 from conveyor_sim.scene import Scene, parse_scene
 from conveyor_sim.scene.yaml_lines import Document
 from conveyor_sim.simulation import Simulation

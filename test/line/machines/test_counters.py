@@ -13,7 +13,7 @@ from scenes import base, belt, contact, segment, simulation
 from conveyor_sim.columns.counters import CounterColumns
 from conveyor_sim.line.commands.inputs import Input
 from conveyor_sim.line.machines.counters import RESET_COUNTERS
-from conveyor_sim.line.machines.time_account import CATEGORIES
+from conveyor_sim.line.machines.efficiency import CATEGORIES
 from conveyor_sim.simulation import Simulation
 
 END = [[1.75, -0.2], [2.0, -0.2], [2.0, 0.2], [1.75, 0.2]]

@@ -6,8 +6,7 @@ import math
 
 import pytest
 
-from conveyor_sim.line.machines.efficiency import DEFINITIONS, Efficiency, busy, efficiency
-from conveyor_sim.line.machines.time_account import CATEGORIES
+from conveyor_sim.line.machines.efficiency import CATEGORIES, DEFINITIONS, Efficiency, busy, efficiency
 
 SHIFT = {"running": 300.0, "starved": 60.0, "blocked": 20.0, "down": 100.0, "planned": 100.0, "idle": 20.0}
 """s, of 600."""

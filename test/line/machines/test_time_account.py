@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from conveyor_sim.line.machines.time_account import CATEGORIES, TimeAccount
+from conveyor_sim.line.machines.efficiency import CATEGORIES, TimeAccount
 from conveyor_sim.physics.state.snapshot import restore, snapshot
 
 

@@ -30,7 +30,7 @@ from paho.mqtt.enums import CallbackAPIVersion
 
 from conveyor_sim.protocols.mqtt.broker import Broker
 from conveyor_sim.protocols.mqtt.edge_node import EdgeNode
-from conveyor_sim.protocols.mqtt.payload import BOOLEAN, DOUBLE, Payload, add_metric, decoded, whole
+from conveyor_sim.protocols.mqtt.line_metrics import BOOLEAN, DOUBLE, Payload, add_metric, decoded, whole
 
 MOSQUITTO = shutil.which("mosquitto") or shutil.which("mosquitto", path="/usr/sbin:/usr/local/sbin")
 if MOSQUITTO is None:

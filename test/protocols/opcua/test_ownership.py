@@ -16,7 +16,7 @@ from asyncua.server.internal_session import InternalSession
 from asyncua.ua.ua_binary import struct_from_binary
 from protocols.waiting import alone
 
-from conveyor_sim.protocols.opcua import refusals
+from conveyor_sim.protocols.opcua import ownership
 from conveyor_sim.protocols.opcua.dispatch import REQUESTS, SESSIONLESS
 from conveyor_sim.protocols.opcua.ownership import OwnedSession
 from conveyor_sim.protocols.opcua.session import OpcUaSession
@@ -472,11 +472,11 @@ def test_a_message_is_sent_again_until_it_is_acknowledged(line: Line) -> None:
 
 
 def test_attempts_are_logged_once_in_a_while(caplog: pytest.LogCaptureFixture) -> None:
-    kept = refusals.Refusals()
+    kept = ownership.Refusals()
     with caplog.at_level(logging.WARNING):
         for _ in range(100):
             kept.report("DeleteSubscriptions by an anonymous client at 10.0.0.7 refused")
-        kept._at -= refusals.EVERY
+        kept._at -= ownership.EVERY
         kept.report("Publish by jo at 10.0.0.8 refused")
     first, second = (record.getMessage() for record in caplog.records)
     assert "10.0.0.7" in first and "10.0.0.8" in second and "99 more" in second

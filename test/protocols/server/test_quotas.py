@@ -7,15 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from conveyor_sim.protocols.hosting.limit_options import limit_names, limit_settings
-from conveyor_sim.protocols.hosting.settings import ServerSettings
+from conveyor_sim.protocols.hosting.settings import ServerSettings, limit_names, limit_settings
 from conveyor_sim.protocols.opcua.limits import OpcUaLimits
-from conveyor_sim.protocols.server.budget import Budget
 from conveyor_sim.protocols.server.interface import ServerError
 from conveyor_sim.protocols.server.quotas import (
     GREETED,
     GUEST,
     OPENED,
+    Budget,
     ConnectionSlot,
     ConnectionSlots,
     Quota,

@@ -10,7 +10,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from conveyor_sim.columns.counters import CounterColumns
-from conveyor_sim.line.machines.time_account import CATEGORIES
+from conveyor_sim.line.machines.efficiency import CATEGORIES
 from conveyor_sim.report.figures import style
 from conveyor_sim.report.figures.production import (
     COLOURS,
