@@ -96,7 +96,7 @@ def test_studies_vary_the_layout(command: Command, field: str) -> None:
 def test_studies_name_the_path_of_an_expanded_part(command: Command) -> None:
     with pytest.raises(StudyError) as caught:
         scene_of(study("belts.lane.speed"), {"p": 0.1}, 1)
-    assert missing(str(caught.value), ["belts.lane.speed", "conveyors.lane"]) == []
+    assert missing(str(caught.value), ["belts.lane.speed", "conveyors.lane.speed"]) == []
     with pytest.raises(SceneError) as refused:
         load_scene("plant.yaml", {"rails": {"lane_left": {"material": "steel"}}})
     assert missing(str(refused.value), ["rails.lane_left", "conveyors.lane"]) == []

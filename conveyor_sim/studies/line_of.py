@@ -109,7 +109,9 @@ def _with_field(data: dict[str, Any], changes: dict[str, Any], path: str, value:
 
 def _require_named(data: dict[str, Any], steps: list[Any], path: str) -> None:
     """Refuse a path to what the scene does not have by that name: a belt of one field would be missing all others."""
-    for _, text in expanded_parts(data, {str(steps[0]): {str(steps[1]): {}}} if len(steps) > 1 else {}):
+    for _, text in expanded_parts(
+        data, {str(steps[0]): {str(steps[1]): {str(step): 0 for step in steps[2:3]}}} if len(steps) > 1 else {}
+    ):
         raise StudyError(f"{path}: {text}")
     entries = data.get(steps[0])
     if len(steps) < 3 or not isinstance(entries, dict) or not all(isinstance(one, dict) for one in entries.values()):

@@ -24,7 +24,9 @@ def expanded_parts(data: Any, changes: Mapping[str, Any]) -> Iterator[tuple[Path
             elif field in _OF_CONVEYORS and isinstance(part, dict) and "kind" not in part:
                 for owners in ("conveyors", "guides"):
                     if (owner := _owner(name, data.get(owners))) is not None:
-                        yield (field, name), f"a part of {owners}.{owner} given, expected a field of {owners}.{owner}"
+                        path = f"{owners}.{owner}"
+                        same = ", ".join(f"{path}.{key}" for key in part) if name == owner else ""
+                        yield (field, name), f"a part of {path} given, expected {same or f'a field of {path}'}"
                         break
 
 
