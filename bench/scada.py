@@ -1,4 +1,4 @@
-"""SCADA faces under load: 500 tags, 50 of which change at 10 Hz, to five clients of each protocol.
+"""SCADA servers under load: 500 tags, 50 of which change at 10 Hz, to five clients of each protocol.
 
 The clients of a protocol are a process of their own (bench/scada_clients.py). Changes are whole numbers that go up by
 one, so each client knows how many it has missed. What servers cost the ticks is measured on a scene, with clients and

@@ -120,7 +120,7 @@ class LimitConditions:
     def __init__(self, alarms: Alarms) -> None:
         """Find the limit alarms.
 
-        alarms: all, limits included.
+        alarms: all alarms, limit alarms included.
         """
         self._alarms = [alarm for alarm in alarms if alarm.own and alarm.id.startswith(LIMITS)]
         self._all = alarms
@@ -128,7 +128,7 @@ class LimitConditions:
     def changes(self, passed: Sequence[DamageEvent], clogged: Mapping[str, bool]) -> dict[str, bool]:
         """Return the conditions that have begun or ended, by id.
 
-        passed: limits passed in the tick that ends. clogged: by outfeed.
+        passed: limits passed in the tick that ends. clogged: True if clogged, by name of the outfeed.
         """
         if not (self._alarms or clogged):
             return {}
@@ -145,7 +145,8 @@ class AlarmSystem:
     def __init__(self, scene: Scene, devices: Sequence[Device], modes: Signals, note: Note) -> None:
         """Declare the alarms of the line and the scene.
 
-        devices: all others. modes: control modes of these. Raise SceneError for invalid alarms of the scene.
+        devices: all devices of the line except that of the alarms. modes: control modes of these devices.
+        Raise SceneError for invalid alarms of the scene.
         """
         sources = (*devices, modes)
         signals = [tag.name for source in sources for tag in source.signals]
@@ -200,7 +201,7 @@ class AlarmSystem:
     ) -> None:
         """End a tick.
 
-        passed: limits passed in it. clogged: by outfeed. forced: values of forced signals.
+        passed: limits passed in it. clogged: True if clogged, by name of the outfeed. forced: values of forced signals.
         """
         if measured := self._measured.changes(now, forced):
             now.conditions |= measured
@@ -271,7 +272,7 @@ class AlarmsDevice(Device):
     def __init__(self, alarms: Alarms) -> None:
         """Build the signals.
 
-        alarms: those of line and scene only.
+        alarms: alarms of line and scene, before controllers declare any.
         """
         most = len(alarms) + MOST_ALARMS
         standing = "alarms that stand, of controllers too."

@@ -90,7 +90,10 @@ class ScanContext:
         self._counts = None
 
     def carriers(self) -> NDArray[np.int32]:
-        """Return the belt index of each slot, (slots,), until the next scan; -1 if free, on the floor or on a plate."""
+        """Return the belt index of each slot, (slots,); -1 if free, on the floor or on a plate.
+
+        The array is valid until the next scan.
+        """
         self._count()
         plant = self.state.model.plant
         return self._carriers if plant.one_surface_per_belt else plant.belt_of_surface[self._carriers]

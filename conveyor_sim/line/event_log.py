@@ -68,7 +68,7 @@ class EventLog:
     def note_fed(self, device: Device, first: int, now: ScanContext) -> None:
         """Add events of bottles that a device has fed.
 
-        first: id of the next bottle before it.
+        first: ID of the first bottle that was fed.
         """
         self._note_bottles("bottle_fed", device, range(first, now.state.next_id), now)
 

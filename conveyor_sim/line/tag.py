@@ -42,8 +42,8 @@ Kind = Literal["bool", "count", "number", "enumeration"]
 
 Role = Literal["actual", "setpoint", "status", "command", "counter", "alarm", "fault", "run"]
 """actual: measured; setpoint: number from a controller; status: state of a device; command: switch or push-button
-for a controller; counter: number of occurrences or total time; alarm: of the line; fault: injected by a test; run:
-about the simulation."""
+that a controller writes; counter: number of occurrences or total time; alarm: of the line; fault: injected by a test;
+run: about the simulation."""
 
 Adds = Literal["", "fed", "removed", "rejected", "state"]
 """Sum that a signal adds to: bottles put onto the line, taken off it, or rejected. "state": each change of the

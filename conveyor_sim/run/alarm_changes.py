@@ -8,7 +8,7 @@ from conveyor_sim.control.scan import ALARMS, ON, commands_of, number
 
 
 class AlarmChanges:
-    """Alarms of a controller that the line must be given: all of the first scan, then those that change."""
+    """Alarms of a controller to be sent to the line: all alarms of the first scan, then only changes."""
 
     def __init__(self) -> None:
         """Start without alarms."""

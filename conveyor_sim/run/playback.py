@@ -1,4 +1,4 @@
-"""`Playback`: the messages of a recording by tick, and the state at a tick that is sought. `Player`: its replay."""
+"""`Playback`: the messages of a recording by tick, and the state at the target of a seek. `Player`: its replay."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from conveyor_sim.run.pacing import Pacer
 from conveyor_sim.support.printable import printable
 
 OWN = frozenset({"/clock", "/rosout", "/parameter_events"})
-"""Topics that the node that plays back publishes itself."""
+"""Topics that the playback node publishes itself."""
 
 RUN_STATE = "run_state"
-"""Topic that reports a playback as such. Its recorded messages are left out."""
+"""Topic that marks the run as a playback. Recorded messages of this topic are not played."""
 
 WALL_CLOCK = 10**18
 """Later log times are dates (from 2001 on), not simulated times, ns."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from conveyor_sim.physics.model.remedies import StepLimit
 
 LISTED = 2
-"""Number of topics that are listed, those of most bytes."""
+"""Number of topics listed, largest first."""
 
 NO_BOUND = "nothing in the scene bounds the time step"
 NO_REMEDY = "no single change of the scene that is known to help takes fewer steps"

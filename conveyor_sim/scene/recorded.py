@@ -41,7 +41,7 @@ def sources_of(scene: Scene) -> dict[str, bytes]:
 
 
 def expanded_text(scene: Scene) -> str:
-    """Return a scene as YAML from its fields. Each part and each item of a list takes one line."""
+    """Return a scene as YAML from its fields. Each part and each item of a list takes a separate line."""
     # The check of this rate depends on whether it is given.
     implied = {"outputs": {"counters"}} if "counters" not in scene.outputs.model_fields_set else None
     data = scene.model_dump(by_alias=True, exclude_none=True, exclude=implied)

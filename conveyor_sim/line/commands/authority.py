@@ -94,7 +94,10 @@ def covers(pattern: str, device: str, where: str) -> bool:
 
 
 def pattern_problem(patterns: Sequence[str], devices: Collection[str], where: str) -> str:
-    """Return why devices can't be released by these patterns, "" if they can. devices: that take commands."""
+    """Return why devices can't be released by these patterns, "" if they can.
+
+    devices: names of the devices that take commands.
+    """
     if len(patterns) > MOST_PATTERNS:
         return f"{len(patterns)} patterns given, expected {MOST_PATTERNS} at most"
     for pattern in patterns:

@@ -27,7 +27,7 @@ class Forcing:
     def __init__(self, signals: Sequence[Tag], note: Callable[..., None]) -> None:
         """Start without forced signals.
 
-        signals: of the line. note: as EventLog.note.
+        signals: all signals of the line. note: as EventLog.note.
         """
         self._table = {tag.name: tag.without_limits() for tag in signals}
         self._place = {tag.name: place for place, tag in enumerate(signals)}

@@ -1,6 +1,7 @@
 """`Input`: the record of every external action on a line, and its result.
 
-An input is applied at the start of one tick, or refused as a whole with a reason. Inputs of one tick are taken in order
+An input is applied at the start of one tick, or refused as a whole with a reason. One exception: from an input of a
+controller, commands without control authority are refused separately. Inputs of one tick are taken in order
 of arrival, and names within an input in their order. Each input is checked against the state of the line after the
 preceding inputs. Watchdogs act after all inputs, devices after the watchdogs.
 """

@@ -52,8 +52,8 @@ class Modes:
     ) -> None:
         """Start with all devices in Automatic and no owner.
 
-        devices: all of the line. where: the line's place in the plant. waiting: returns inputs that will be applied
-        first. note: as EventLog.note.
+        devices: all devices of the line. where: the line's place in the plant. waiting: returns inputs that will be
+        applied first. note: as EventLog.note.
         """
         commanded = [device for device in devices if device.commands]
         self._devices = {device.name: device for device in commanded}

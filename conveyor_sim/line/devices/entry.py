@@ -54,19 +54,19 @@ def has_room(state: State, x: float, y: float, radius: float) -> bool:
 
 
 class Scattering:
-    """Scatter of the next bottle of a device.
+    """Random offset of the position and direction of the next bottle of a device.
 
-    Without scatter nothing is drawn, and no instance attributes are set: states of such devices are those of scenes
-    older than scatter.
+    Without scatter, no random numbers are drawn and no public attributes are set. Checkpoints of such devices then
+    equal those from versions without scatter.
     """
 
     offset = 0.0
-    """Distance of the next bottle to the left of the middle of its places, m."""
+    """Lateral offset of the next bottle from the feed position, positive to the left, m."""
     deflection = 0.0
     """Turn of the velocity of the next bottle to the left, rad."""
 
     def scatter(self, part: Scattered, random: Callable[[], np.random.Generator]) -> None:
-        """Store amplitudes and middle of the places, and draw the first bottle.
+        """Store amplitudes and the feed position, and draw the scatter of the first bottle.
 
         random: builds the random stream. It is called only with scatter.
         """

@@ -16,8 +16,8 @@ ROUNDING = 1e-9
 """Tolerance against rounding, s: sums of 1 / rate must not miss the tick they fall on."""
 
 LATE = 2.0
-"""Multiple of the time a bottle takes to enter from a moving in-line. After that time without a bottle, the infeed
-is blocked."""
+"""An infeed is blocked if no bottle entered for this multiple of the time that a bottle takes to enter from a moving
+in-line."""
 
 
 class InfeedDevice(Device, Scattering, Switching):
@@ -93,7 +93,7 @@ class InfeedDevice(Device, Scattering, Switching):
         return self._infeed.count is not None and self.fed >= self._infeed.count
 
     def _feed_packed(self, now: ScanContext) -> bool:
-        """Feed from an in-line that moves with its last bottle. The next bottle enters one pitch behind it."""
+        """Feed from an in-line that moves with the last bottle fed. The next bottle enters one pitch behind it."""
         state, time = now.state, now.time
         before = self.radius_before if self._infeed.types else self._radius
         pitch = before + self._radius + (self._infeed.gap or 0.0)
@@ -104,7 +104,7 @@ class InfeedDevice(Device, Scattering, Switching):
             if ahead < 0.0:
                 self.blocked = self._late(time, pitch)
                 return False
-            # Beyond one tick's travel the last bottle no longer pulls the in-line.
+            # The in-line advances by at most one tick's travel, even if the last bottle is further ahead.
             ahead = self._distance_to_rails(state, min(ahead, advance))
         if not self._enter(now, ahead):
             self.blocked = self._late(time, pitch)
@@ -113,7 +113,10 @@ class InfeedDevice(Device, Scattering, Switching):
         return True
 
     def _progress(self, state: State, time: float) -> float:
-        """Return the distance of the last bottle along the in-line, m. A removed bottle continues at its speed."""
+        """Return the distance of the last bottle from the feed position, m.
+
+        The position of a removed bottle is extrapolated at the speed of the infeed.
+        """
         bottles = state.world.bottles
         slot = int((bottles.id == self.last).argmax())
         if bottles.id[slot] != self.last:

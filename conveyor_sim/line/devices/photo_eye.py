@@ -23,7 +23,7 @@ class Beams(Device):
     def __init__(self, ends: Sequence[tuple[XY, XY]]) -> None:
         """Store the beams.
 
-        ends: of each beam, m.
+        ends: both ends of each beam, m.
         """
         super().__init__("beams")
         start, end = np.array(ends, dtype=np.float64).swapaxes(0, 1)

@@ -1,4 +1,4 @@
-"""`DeviceSetup`: what constructors of devices get beside their part of the scene, and random streams.
+"""`DeviceSetup`: arguments of device constructors besides their part of the scene, and random streams.
 
 Every purpose of every device has its own stream of random numbers, so two variants of a line draw equal numbers.
 """
@@ -21,8 +21,8 @@ JITTER, BAD, CHATTER = "jitter", "bad", "chatter"
 """Purposes of random streams: times, places and directions of new bottles, bad bottles, chatter of photo-eyes."""
 
 BRANCHES = {(JITTER, "infeeds"): (), (BAD, "infeeds"): (1,), (BAD, "machines"): (2,), (CHATTER, "photo_eyes"): (3,)}
-"""Spawn keys of streams in recordings older than named streams, by purpose and field of the scene. They precede the
-index in the field."""
+"""Prefixes of the spawn keys in recordings from before streams were named, by purpose and field of the scene. The index
+in the field follows."""
 
 D = TypeVar("D", bound=Device)
 

@@ -12,7 +12,7 @@ from conveyor_sim.physics.timestep.prediction import Term
 from conveyor_sim.scene.driven import belt_speeds
 
 MEETING = 0.2
-"""Typical over fastest speed at which bottles meet, measured on the scenes of docs/accuracy.md."""
+"""Ratio of the typical to the fastest speed at which bottles meet, measured on the scenes of docs/accuracy.md."""
 
 
 def _friction(plant: Plant, on: Collection[str]) -> Cause | None:
@@ -35,7 +35,7 @@ def _friction_bounds(terms: Terms) -> list[Bound]:
         bounds.append(
             Bound("base friction", *drag_bound(terms, base_friction_bound(mu, g, limit), reason), stability=True)
         )
-    # On a turning belt a resting bottle is off by one part in these steps, with explicit and implicit friction.
+    # On a turning belt, a resting bottle has a relative error of 1 / steps, with explicit and with implicit friction.
     turning = terms.method.slip_steps(terms.tolerance) if "curved_belts" in terms.on else 0.0
     if (steps := max(0.0 if implicit else _slip_steps(terms), turning)) > 0.0:
         reason = f"{steps:.3g} steps in v_lim / (mu g) at mu = {mu:g}"
@@ -44,12 +44,12 @@ def _friction_bounds(terms: Terms) -> list[Bound]:
 
 
 def _slip_steps(terms: Terms) -> float:
-    """Return the steps in v_lim / (mu g) at which a first-order method is off by one part in `least_steps`."""
+    """Return the steps per v_lim / (mu g) at which a first-order method has a relative error of 1 / `least_steps`."""
     return terms.method.slip_steps(1.0 / terms.steps) if terms.method.second_order else terms.steps
 
 
 def _lag(quantity: str, part: Callable[[float], float], terms: Terms, dt: float) -> list[Term]:
-    """Return the error of a bottle that friction holds on its circle: part(steps) at `steps` in v_lim / (mu g).
+    """Return the error of a bottle that friction holds on its circle. part: returns it by the steps per v_lim / (mu g).
 
     Semi-implicit Euler combines a belt velocity at the present position with a bottle velocity that is half a step
     older. Leapfrog takes the belt velocity at the mid-step position (test/physics/test_turntable.py).
@@ -95,7 +95,7 @@ def _turning(plant: Plant) -> float:
 
 
 def _braked(meeting: Meeting, terms: Terms) -> list[Share]:
-    """Return the error of first-order methods: half a step of braking, mu g dt / 2 of the impact speed."""
+    """Return the error of first-order methods: braking in half a step, mu g dt / 2, relative to the impact speed."""
     if terms.laws.base_friction is None or terms.method.second_order:
         return []
     braking = float(terms.laws.base_friction.max()) * terms.scene.gravity
@@ -108,7 +108,7 @@ def _implicit_point(terms: Terms) -> bool:
 
 
 def _ring(plant: Plant, on: Collection[str]) -> Cause | None:
-    # A ring calls for rotation, which is decided later. Where rotation is forced off, the ring turns nothing.
+    # A ring enables rotation, which is decided later. Where rotation is forced off, the ring turns nothing.
     if "base_friction" in on and plant.scene.effects.get("rotation") != "off":
         for name, kind in plant.scene.bottle_types.items():
             if kind.base_radius is not None:

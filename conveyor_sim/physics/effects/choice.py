@@ -60,7 +60,7 @@ EFFECTS: tuple[Effect, ...] = (
     TIPPING,
     RIDING,
 )
-"""All effects in the order of decision. An effect that is on may call for later ones."""
+"""All effects in the order of decision. An effect that is on may enable later ones."""
 
 
 def choose_effects(plant: Plant) -> tuple[EffectChoice, ...]:

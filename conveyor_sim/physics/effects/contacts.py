@@ -78,9 +78,9 @@ def _stable(name: str, stiffness: Callable[[Meeting, Terms], tuple[float, str]])
 
 
 def _mover_bounds(meeting: Meeting, stiffness: float, terms: Terms) -> list[tuple[float, str]]:
-    """Return bounds (s) and reasons: the largest number of bottles with room, against each rail of the material.
+    """Return a bound (s) and its reason for each rail of the material with a limited drive, held up by bottles.
 
-    meeting: bottle type and rail material. stiffness: N/m.
+    The rail is held up by all bottles that fit along it. meeting: bottle type and rail material. stiffness: N/m.
     """
     materials = terms.plant.rail_materials
     bounds = []

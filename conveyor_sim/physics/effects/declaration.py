@@ -44,15 +44,15 @@ class Effect:
     bound: str = ""
     """Its bounds in words."""
     shares: Callable[[Meeting, Terms], list[Share]] | None = None
-    """Returns its parts of the error in the peak force of an impact; None without such."""
+    """Returns its contributions to the error in the peak force of an impact; None: it has none."""
     share: str = ""
     """These errors in words, without the integrator's coefficient."""
     resting: Callable[[Terms, float], list[Term]] | None = None
-    """Returns its errors in resting load at a time step in s; None without such."""
+    """Returns its errors in resting load at a time step in s; None: it has none."""
     rest: str = ""
     """These errors in words."""
     side: Callable[[Terms, float], list[Term]] | None = None
-    """Returns its errors in quantities other than contact force, at a time step in s; None without such."""
+    """Returns its errors in quantities other than contact force, at a time step in s; None: it has none."""
     beside: str = ""
     """These errors in words."""
     can_force_on: bool = False
@@ -69,5 +69,5 @@ class EffectChoice:
     on: bool
     why: str
     path: Path | None
-    """The field that decides; None where nothing in the scene calls for the effect."""
+    """The field that decides; None if nothing in the scene enables the effect."""
     forced: bool = False

@@ -48,7 +48,7 @@ def _contact_friction_bounds(terms: Terms) -> list[Bound]:
 
 
 def _kick(terms: Terms, dt: float) -> list[Term]:
-    """Return the slip after the last step of an impact, over the impact speed, where dt is too long for friction.
+    """Return the slip after the last step of an impact, relative to the impact speed, if dt is too long for friction.
 
     Friction stops the slip earlier if mu (w dt)^2 is small compared with v_lim / v.
     """

@@ -6,7 +6,7 @@ sides. The factors below are measured: an equivalent load, divided by mu m g and
 along the pile. At the equivalent load, two bottles alone need the same time step as the whole pile, by the largest
 eigenvalue of the friction of all its contacts at rest. Hoppers of 400 to 1 000 bottles with walls at 20 to 90 degrees:
 1.9 to 3.2; files between rails 1.05 to 1.2 diameters apart: 1.0 to 1.2; zigzags in lanes of 1.35 to 2.5 diameters: 1.7
-to 3.3, and up to 2.6 over the number of bottles (test/physics/effects/test_load.py). Impacts are not included.
+to 3.3, and up to 2.6 if divided by the number of bottles (test/physics/effects/test_load.py). Impacts are not included.
 """
 
 import math
@@ -28,7 +28,7 @@ WEDGED = 3.0
 """Load of a few bottles between rails, over mu m g and their number."""
 
 ENDLESS_QUEUE = 100
-"""Bottles assumed to press on each other without belts, where an infeed has no end."""
+"""Number of bottles assumed to press on each other if there are no belts and an infeed is endless."""
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ CAN = 0.73
 """Base radius over radius of a beverage can, which stacks on the countersink of another's end (docs/base.md)."""
 
 LEAST, MOST = 0.65, 1.8
-"""Scuffing of rails by bottles on rings of CAN over that on points, the extremes of docs/studies/base_radius.csv."""
+"""Extreme ratios of rail scuffing by bottles on rings of CAN to that on points (docs/studies/base_radius.csv)."""
 
 
 def notes(plant: Plant, on: Collection[str]) -> list[str]:

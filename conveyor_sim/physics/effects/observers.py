@@ -7,7 +7,7 @@ from conveyor_sim.physics.plant import Plant
 
 
 def _output(name: str, *limits: str) -> Callable[[Plant, Collection[str]], Cause | None]:
-    """Return the check for an effect that is called for by one of some limits, or by an output."""
+    """Return the check for an effect that an output or any of `limits` enables."""
 
     def called_for(plant: Plant, on: Collection[str]) -> Cause | None:
         for field in limits:

@@ -131,7 +131,7 @@ def tightest(name: str, candidates: Sequence[tuple[float, str]], stability: bool
 
 
 def drag_bound(terms: Terms, dt: float, reason: str) -> tuple[float, str]:
-    """Return a bound (s) on a drag for the scene's integrator, from that of semi-implicit Euler."""
+    """Convert the bound (s) by a drag from semi-implicit Euler to the scene's integrator."""
     limit = terms.method.drag_limit
     return limit * dt, reason if limit == 1.0 else f"{limit:g} times {reason}"
 

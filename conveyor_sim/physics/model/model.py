@@ -35,7 +35,7 @@ from conveyor_sim.scene.places import Places
 from conveyor_sim.scene.schema import BottleType, Scene
 
 SKIN = 0.2
-"""Skin of the neighbour lists over the smallest radius, a compromise between rare rebuilds and short lists."""
+"""Ratio of the neighbour lists' skin to the smallest radius, a compromise between rare rebuilds and short lists."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,8 @@ def moving_arrays(
 ) -> MovingRails:
     """Return the arrays of rails at rest in their initial positions. Each rail is a separate surface.
 
-    materials: of all rails, by number. rail, surface: numbers of the first rail and its surface. slots: bottle slots.
+    materials: materials of all rails, in the order of their numbers. rail, surface: numbers of the first moving rail
+    and of its surface. slots: bottle slots.
     ledger: True if the energy ledger is on.
     """
     count = len(shapes)

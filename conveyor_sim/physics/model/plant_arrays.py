@@ -155,7 +155,7 @@ def rail_arrays(rails: Sequence[RailShape], materials: Sequence[str]) -> tuple[S
 
 
 def belt_arrays(shapes: Sequence[BeltShape], slots: int, candidates: int) -> Belts | None:
-    """Return the areas of surfaces, with room for the one under each of `slots` bottles; None without surfaces."""
+    """Return the geometry of surfaces, and arrays for the surface under each of `slots` bottles; None: no surfaces."""
     if not shapes:
         return None
     along = np.array([unit_vector(shape.angle) for shape in shapes])

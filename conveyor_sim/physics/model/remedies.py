@@ -20,7 +20,7 @@ from conveyor_sim.scene.overrides import parse_overrides
 from conveyor_sim.scene.schema import Scene
 
 WORTH = 0.8
-"""Largest ratio, with over without, of steps and cost per tick at which a remedy is reported."""
+"""A remedy is reported if steps and cost per tick fall to this share or less."""
 
 NAMED = 2
 """Largest number of reported remedies, the cheapest first."""
@@ -45,7 +45,7 @@ BOTTLE_STEP = 3e-8
 """s per bottle and step on one core of the 2020s, rounded."""
 
 BESIDE = 10
-"""Cost of the rest of a step, in bottles."""
+"""Cost of a step that does not depend on the number of bottles, in units of the cost of one bottle."""
 
 COARSER = {"fine": "standard", "standard": "draft"}
 

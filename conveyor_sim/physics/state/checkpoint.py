@@ -38,7 +38,9 @@ FREE = frozenset({"description", "duration", "start_time", "where"})
 """Fields of a scene that may differ from those of the checkpoint."""
 
 MOST = 512 * MB
-"""Largest file, bytes. A bottle takes 0.5 to 5 kB by effects and integrator; the file is read into memory twice."""
+"""Largest file, bytes. A bottle takes 0.5 to 5 kB, depending on effects and integrator.
+The file is read into memory twice.
+"""
 
 _HEADER = "header"
 _MAGIC = b"PK\x03\x04"

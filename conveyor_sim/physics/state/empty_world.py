@@ -254,7 +254,7 @@ def _pair_tangent(entries: int) -> PairTangent:
 
 
 def empty_slots(slots: int, entries: int) -> Slots:
-    """Return empty rows of the bottles, with `entries` entries beyond them."""
+    """Return empty rows of all bottles, and room for `entries` entries that do not fit in the rows."""
     return Slots(
         entry=np.zeros(slots * WIDTH, np.uint32),
         filled=np.zeros(slots, np.uint32),

@@ -33,7 +33,7 @@ class ServerKind:
     make: Callable[[TagProvider, Any, ServerSettings, SharedState], ProtocolServer]
     """Function that makes a protocol server for the value of its option, not started. Raises ConveyorError."""
     exposes: Callable[[ServerSettings], str]
-    """Function that returns a phrase for the greeting on what clients can do."""
+    """Function that describes the rights of clients, as a phrase for the greeting."""
     by_default: bool = True
     """True if it is served when no protocol is chosen."""
     extra: str = "scada"

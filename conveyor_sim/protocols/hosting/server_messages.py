@@ -76,7 +76,7 @@ class ParentCall(NamedTuple):
     what: ParentService
     arguments: tuple[Any, ...]
     deadline: float
-    """`time.monotonic()`, which all processes share, after which the request must not be carried out."""
+    """Time after which the request must not be carried out, by `time.monotonic()`, whose clock all processes share."""
 
 
 class ParentAnswer(NamedTuple):

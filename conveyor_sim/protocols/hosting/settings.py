@@ -48,7 +48,7 @@ class ServerSettings:
     mqtt_primary_host: str = ""
     """ID of the primary host application, without which nothing is sent; empty: none."""
     users: Path | None = None
-    """File of the users who may do more than read by OPC UA and on the page; None: there are no users."""
+    """File of the users of OPC UA and of the page; None: there are no users, and clients can only read."""
     anonymous: bool = True
     """True if clients without a user may read there."""
     opcua_certificates: Path | None = None

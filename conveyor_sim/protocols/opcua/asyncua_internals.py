@@ -34,7 +34,7 @@ class OpenProtocol(OPCUAProtocol):
     """Connection that answers by its own rules. The library has no bound on work, and no answer to malformed input."""
 
     async def watch_activation(self) -> None:
-        """Close the connection while it has no active session. The library checks only once."""
+        """Close the connection if it has no active session. The library checks only once."""
         raise NotImplementedError
 
     async def answer_message(self, header: Any, buf: Any) -> bool:
@@ -104,12 +104,12 @@ class OpenItems(MonitoredItemService):
 
     @property
     def ids_by_handle(self) -> dict[int, int]:
-        """IDs of items of values, by the handle of their callback."""
+        """IDs of monitored items for data changes, by the handle of their callback."""
         return self._monitored_datachange
 
     @property
     def ids_by_node(self) -> dict[ua.NodeId, list[int]]:
-        """IDs of items of events, by node."""
+        """IDs of monitored items for events, by node."""
         return self._monitored_events
 
     def is_changed(self, values: Any, trigger: ua.DataChangeTrigger) -> bool:
@@ -239,7 +239,7 @@ def sessions_of(server: InternalServer) -> list[Any]:
 
 
 def forget_publish(request_callback: Any, subscription: int) -> None:
-    """Drop a subscription from those that wait for the Publish request of a processor.
+    """Remove a subscription from the queue that waits for Publish requests of a connection.
 
     Otherwise the next Publish request of that session would fetch values of a transferred subscription.
     """

@@ -141,7 +141,7 @@ class Views:
         subtypes: bool,
         cache: dict[tuple[ua.NodeId, bool], frozenset[ua.NodeId] | None],
     ) -> frozenset[ua.NodeId] | None:
-        """Return the reference types that a request accepts; None: all. cache: of one request."""
+        """Return the reference types that a request accepts; None: all. cache: results so far of this request."""
         if kind.is_null():
             return None
         key = kind, bool(subtypes)
@@ -172,7 +172,7 @@ _BASE_SIZE = 8
 """Assumed size of a value that is no text, list or structure, bytes."""
 
 _STRUCTURE_SIZE = 1000
-"""Bytes that a structure counts for: about that many bytes of text are encoded in the same time."""
+"""Assumed size of a structure, bytes. Encoding a structure takes as long as encoding a text of about this size."""
 
 _HISTORY_UNITS = 2
 """Work units of a value of the history."""
@@ -241,7 +241,7 @@ class Bounds:
         self._require_cost(params.ItemsToModify, freed)
 
     def charge_message(self, message: ua.NotificationMessage) -> None:
-        """Count the values and events of a message that is sent again as work."""
+        """Add the work for a message that is sent again, by its values and events."""
         self._units += CHANGE_UNITS * sum(map(size_of, message.NotificationData or []))
 
     def require_history(self, params: ua.HistoryReadParameters) -> None:
@@ -279,7 +279,7 @@ class Bounds:
             left -= wanted.QueueSize
 
     def _items(self, wanted: Any) -> int:
-        """Return the number of monitored items of the subscriptions that a function accepts."""
+        """Return the number of monitored items of all subscriptions for which `wanted` returns True."""
         subscriptions = self._service.subscriptions.values()
         return sum(len(each.monitored_item_srv) for each in subscriptions if wanted(each))
 

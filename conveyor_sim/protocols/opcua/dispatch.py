@@ -28,7 +28,7 @@ _ENUMERATIONS = {
     ua.TimestampsToReturn: Codes.BadTimestampsToReturnInvalid,
     ua.DataChangeTrigger: Codes.BadMonitoredItemFilterInvalid,
 }
-"""Status codes of values outside an enumeration; for others it is BadDecodingError."""
+"""Status code by enumeration, for a value outside it. For enumerations that are not listed it is BadDecodingError."""
 
 
 def _encoding(request: type) -> ua.NodeId:

@@ -162,7 +162,7 @@ def size_of(notification: Any) -> int:
 
 
 def _name(clause: ua.SimpleAttributeOperand) -> str:
-    """Return the name of a field as the library's events have it: "ActiveState/Id", "NodeId"; "": no field."""
+    """Return the name of a field in the library's events, such as "ActiveState/Id" or "NodeId"; "" for no field."""
     if clause.BrowsePath:
         return "/".join(part.Name or "" for part in clause.BrowsePath)
     try:

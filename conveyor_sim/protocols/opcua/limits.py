@@ -79,16 +79,16 @@ class OpcUaLimits:
     string_bytes_before_login: int = 16_384
     """Bytes of one string from a client whose session is not activated; a certificate chain has to fit."""
     answer_bytes: int = 4_000_000
-    """Bytes of values in one Read answer, 1000 for each structure, and bytes of answers that a client may leave
-    unread.
+    """Bytes of values in one Read answer, with 1000 per structure. Also the bytes of unread answers after which a
+    connection is closed.
     """
     request_units_per_second: int = 50_000
-    """Work units per second for requests of one session, with twice that at once; requests beyond wait."""
+    """Work units per second for requests of one session. Bursts may use twice as many; further requests wait."""
     guest_units_per_second: int = 100_000
-    """Work units per second for requests of all sessions without a user; requests beyond wait."""
+    """Work units per second for requests of all sessions without a user; further requests wait."""
     subscription_units_per_second: int = 100_000
-    """Work units per second for subscriptions of one session, with twice that at once. The costliest subscription of
-    a session that exceeds them ends.
+    """Work units per second for subscriptions of one session. Bursts may use twice as many. If a session exceeds this,
+    its costliest subscription ends.
     """
 
 

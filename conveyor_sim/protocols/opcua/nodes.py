@@ -51,7 +51,7 @@ class Nodes:
     """Address space of a server, to which nodes are added."""
 
     def __init__(self, server: InternalServer, history: Noted) -> None:
-        """Add nodes to a server that has the nodes of the standard. history: stores values of variables."""
+        """Prepare an address space that has the nodes of the standard. history: stores values of variables."""
         self._server, self._history = server, history
 
     def __contains__(self, name: str) -> bool:

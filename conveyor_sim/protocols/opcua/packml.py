@@ -252,7 +252,10 @@ class PackMl:
 
 
 def _a_second(speed: float, rate: Tag, is_single: bool) -> float:
-    """Return a speed (packages per minute) as a rate (1/s). A limit rounded to the sender's type becomes the limit."""
+    """Return a speed (packages per minute) as a rate (1/s).
+
+    A limit that the sender's type has rounded is accepted as the limit.
+    """
 
     def there_and_back(limit: float) -> float:
         a_minute = limit * A_MINUTE

@@ -182,7 +182,7 @@ REQUEST_UNITS, CHANNEL_UNITS, LOGIN_UNITS = 10, 500, 5000
 """Work units of any message, of opening a channel (RSA), and of a password (scrypt)."""
 
 ANSWER_BYTES = 25
-"""Bytes of an answer that cost a work unit: it takes about as long to encode them."""
+"""Bytes of an answer per work unit. Encoding them takes about as long as other work of one unit."""
 
 _ACTIVATE = ua.NodeId(ua.ObjectIds.ActivateSessionRequest_Encoding_DefaultBinary)
 

@@ -78,7 +78,7 @@ class OpcUaServer:
         quota: Quota = QUOTA,
         logins: LoginService | None = None,
     ) -> None:
-        """Prepare the server. users: users by name, who may do more than read. anonymous: True if clients without a
+        """Prepare the server. users: users by name; their roles grant rights. anonymous: True if clients without a
         user may read.
         stamps: kind of SourceTimestamp. certificates: folder of certificate and key; None: `default_folder()`.
         history: patterns of the tags whose latest values are stored. port: 0 for any free one.

@@ -166,7 +166,7 @@ class OpcUaSession(InternalSession):
     def activate_session(
         self, params: ua.ActivateSessionParameters, peer_certificate: bytes | None
     ) -> ua.ActivateSessionResult:
-        """Activate the session. A client that fails to prove its identity has no session afterwards.
+        """Activate the session. If that fails on a new connection, detach the connection from the session.
 
         On another connection the user must be the same (OPC 10000-4, 5.6.3.1), because a token may be overheard.
         """

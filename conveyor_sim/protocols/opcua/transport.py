@@ -43,7 +43,7 @@ class Connection(OpenProtocol):
     place: ConnectionSlot | None = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Take a place for a new connection, or close it."""
+        """Take a slot for a new connection, or close the connection."""
         peer = transport.get_extra_info("peername")
         self.place = self.places.take(str(peer[0]) if peer else "", self._make_room)
         if self.place is None:
@@ -62,7 +62,7 @@ class Connection(OpenProtocol):
             connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
 
     def connection_lost(self, ex: BaseException | None) -> None:
-        """Free the place of a closed connection."""
+        """Free the slot of a closed connection."""
         if self.place is not None:
             self.places.leave(self.place)
         super().connection_lost(ex)

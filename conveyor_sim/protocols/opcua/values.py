@@ -50,7 +50,7 @@ def unit_of(tag: Tag) -> ua.EUInformation:
 
 
 def status_of(snapshot: LineSnapshot) -> int:
-    """Return the status code of all values of a line. Forced signals have GoodLocalOverride where it is Good."""
+    """Return the status code of all values of a line. If it is Good, forced signals have GoodLocalOverride instead."""
     if snapshot.lost:
         return ua.StatusCodes.BadNoCommunication
     if snapshot.run.state in (ENDED, STOPPED):

@@ -30,7 +30,7 @@ class Status:
     writes: int
     """Requests passed on to the line so far: writes, and calls of methods."""
     refused: int
-    """Refused requests of this kind so far."""
+    """Refused writes and calls of methods so far."""
     latency: float
     """Longest latency since the last status, s of wall time: from a request to its answer, or from a change of the tags
     to its publication; 0 without any.

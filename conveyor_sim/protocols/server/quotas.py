@@ -3,8 +3,8 @@
 A client needs a slot before it can log in, so connections without a session are the first to be dropped. When all slots
 are taken, a connection with a failed login is dropped, otherwise one at the earliest stage. Among several,
 it is the one that was idle for longest.
-Guests have a session and no user. They hold at most three quarters of the places; the rest is for users and for
-connections without a session yet. This also holds for the places of one address. A user is never dropped for a guest.
+Guests have a session and no user. They hold at most three quarters of the slots; the rest is for users and for
+connections without a session yet. This also holds for the slots of one address. A user is never dropped for a guest.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class Budget:
 
 
 RESERVED = 0.25
-"""Share of all places, and of the places of one address, that guests never hold."""
+"""Share of all slots, and of the slots of one address, that guests never hold."""
 
 NEW, GREETED, OPENED, GUEST, USER = range(5)
 """Stages of a connection: nothing valid was received; greeted; channel open or request valid; session without a user;
@@ -55,8 +55,8 @@ class Quota:
     connections: int = 64
     """Connections at once."""
     connections_per_address: int = 48
-    """Connections from one address. The default leaves a quarter for other addresses; where all clients come from one
-    address, an operator is protected within it in the same way.
+    """Connections from one address, users not counted. The default leaves a quarter for other addresses. Within one
+    address, guests hold at most three quarters, so an operator can connect.
     """
     connections_per_user: int = 16
     """Connections of one user."""
@@ -67,12 +67,12 @@ class Quota:
 
 
 QUOTA = Quota()
-"""Default places."""
+"""Default quota."""
 
 
 @dataclass(eq=False)
 class ConnectionSlot:
-    """Place of one connection."""
+    """Slot of one connection."""
 
     address: str
     end: Callable[[], None]
@@ -90,7 +90,7 @@ class ConnectionSlot:
 
 
 def share_of_guests(places: int) -> int:
-    """Return the number of `places` that guests may hold."""
+    """Return the number of slots, out of `places`, that guests may hold."""
     return max(1, int(places * (1.0 - RESERVED)))
 
 
@@ -98,7 +98,7 @@ class ConnectionSlots:
     """All connections of one protocol server."""
 
     def __init__(self, quota: Quota, keeps_active: bool = False) -> None:
-        """Start with all places free. keeps_active: True if active guests are never dropped.
+        """Start with all slots free. keeps_active: True if active guests are never dropped.
 
         This is for a protocol without users, where a new connection can't be a user's.
         """
@@ -107,13 +107,13 @@ class ConnectionSlots:
         """Seconds without a request after which a connection is idle."""
         self._taken: set[ConnectionSlot] = set()
         self.dropped = self.refused = 0
-        """Connections that made room so far, and connections that got no place."""
+        """Connections dropped so far to make room, and connections refused for lack of a slot."""
 
     def __len__(self) -> int:
         return len(self._taken)
 
     def take(self, address: str, end: Callable[[], None]) -> ConnectionSlot | None:
-        """Return a place for a connection from an address; None: all slots are taken and none may be displaced."""
+        """Return a slot for a connection from an address; None: all slots are taken and none may be displaced."""
         own = self._of(address)
         if len(own) >= self._quota.connections_per_address and not self._drop_first(own):
             self.refused += 1
@@ -144,7 +144,7 @@ class ConnectionSlots:
         return True
 
     def admit_user(self, place: ConnectionSlot, user: str) -> bool:
-        """Let a connection go on as a user. Return False if that user holds all its places, and none is idle."""
+        """Let a connection go on as a user. Return False if that user holds all its slots, and none is idle."""
         same = [one for one in self._taken if one.user == user and one is not place]
         if len(same) >= self._quota.connections_per_user:
             idle = self._idle(same)

@@ -111,7 +111,7 @@ class Twins:
 
 TWINS = {
     "level": Twins(
-        lambda: Scenario("paper_plant"), table_level, nothing, 26, "bottles > LOW", "bottles > HIGH", level_holds
+        lambda: Scenario("paper_plant"), table_level, nothing, 36, "bottles > LOW", "bottles > HIGH", level_holds
     ),
     "cascade": Twins(lambda: Scenario("scenarios/zoned_line"), cascade, stop_packer, 20, "(NOT room OR", "(room OR"),
     "v_curve": Twins(lambda: Scenario("scenarios/buffer_lane"), v_curve, stop_filler, 15, "1.0 + MARGIN", "1.0"),
