@@ -30,10 +30,11 @@ pushers:
   p: {from: [2, 0], to: [3, 0], direction: 90 deg, stroke: 0.5, max_speed: 1, acceleration: 5, material: rail}
 diverters:
   d: {from: [4, 0], to: [4.5, 0], angle: 45 deg, max_speed: 1, acceleration: 5, material: rail}
-infeeds: {i: {bottle: bottle, position: [0.1, 0.5], direction: 0, speed: 0.5, rate: 1}}
+infeeds:
+  i: {bottle: bottle, types: [bottle], position: [0.1, 0.5], direction: 0, speed: 0.5, rate: 1, rate_limit: 2}
 outfeeds: {o: {region: [[9.5, 0], [10, 0], [10, 1]]}}
 machines:
-  source: {kind: source, bottle: bottle, position: [0.5, 0.2], direction: 0, speed: 0.5, rate: 1}
+  source: {kind: source, bottle: bottle, types: [bottle], position: [0.5, 0.2], direction: 0, speed: 0.5, rate: 1}
   sink: {kind: sink, region: [[9, 0], [9.4, 0], [9.4, 1]], rate: 1}
   station:
     {kind: station, region: [[3, 0.6], [3.2, 0.6], [3.2, 1]], position: [3.5, 0.8], direction: 0, speed: 0.5, rate: 1,
