@@ -14,7 +14,6 @@ import logging
 import os
 import secrets
 import time
-from collections import deque
 from contextlib import suppress
 from datetime import datetime, timezone
 from pathlib import Path
@@ -37,7 +36,8 @@ from conveyor_sim.protocols.mqtt.link import (
 from conveyor_sim.protocols.mqtt.session import BETWEEN, SparkplugSession, SparkplugTopics, death
 from conveyor_sim.protocols.server.interface import ServerError, Stamps, Status
 from conveyor_sim.protocols.tags.control_mode import HoldingService
-from conveyor_sim.protocols.tags.tag_provider import LineSnapshot, TagProvider, TickClock
+from conveyor_sim.protocols.tags.snapshot_queue import SnapshotQueue
+from conveyor_sim.protocols.tags.tag_provider import TagProvider, TickClock
 from conveyor_sim.support.checked_json import parsed
 from conveyor_sim.support.file_lock import locked
 from conveyor_sim.support.files import FileError, read_file, write_file
@@ -140,9 +140,6 @@ class PrimaryHost:
             self.online, self._stamp = online, stamp
 
 
-MOST_BEHIND = 200
-"""Largest number of ticks that wait to be sent; a further one replaces the newest."""
-
 WAITS = MappingProxyType({"first": 1.0, "longest": 60.0})
 """Wall time from the end of a connection to the next attempt, s: the first one, which doubles with each, and the
 longest.
@@ -182,10 +179,7 @@ class EdgeNode:
         self._version = NEWEST
         self._link: BrokerConnection | None = None
         self._state = "not connected"
-        self._waiting: deque[tuple[LineSnapshot, datetime]] = deque()
-        self._left_out = 0
-        self._longest = 0.0
-        self._is_woken = False
+        self._queue = SnapshotQueue(source)
         self._tasks: list[asyncio.Task[None]] = []
 
     @property
@@ -196,16 +190,16 @@ class EdgeNode:
     def status(self) -> Status:
         """Return the state of the connection, and counts of accepted and refused commands."""
         commands = self._commands
-        longest, self._longest = self._longest, 0.0
+        longest, left_out = self._queue.take_longest(), self._queue.left_out
         connected = int(self._link is not None and not self._link.lost)
-        return Status(connected, 0, commands.writes, commands.refused, longest, self._left_out, self._state)
+        return Status(connected, 0, commands.writes, commands.refused, longest, left_out, self._state)
 
     async def start(self) -> None:
         """Connect to the broker. Send births once the primary host is online, if there is one.
 
         Raises ServerError if the connection fails.
         """
-        self._loop, self._wake = asyncio.get_running_loop(), asyncio.Event()
+        self._queue.open()
         try:
             self._link = await self._connect()
         except BrokerConnectionError as error:
@@ -246,7 +240,7 @@ class EdgeNode:
         while True:
             await asyncio.sleep(_LOOK)
             self._commands.look()
-            self._wake.set()
+            self._queue.wake.set()
 
     async def _connect(self) -> BrokerConnection:
         """Return a connection with the next number, by the newest version of MQTT that the broker accepts.
@@ -258,7 +252,7 @@ class EdgeNode:
             number = await asyncio.to_thread(self._numbers.take)
             last_words = death(number)
             will = MqttMessage(self._names.of("NDEATH"), last_words, len(last_words), False)
-            link = BrokerConnection(self._broker, self._name, will, version, self._notice)
+            link = BrokerConnection(self._broker, self._name, will, version, self._queue.notice)
             opening = asyncio.ensure_future(asyncio.to_thread(link.open))
             try:
                 await asyncio.shield(opening)
@@ -293,14 +287,12 @@ class EdgeNode:
         host = PrimaryHost(self._broker.primary_host)
         hosts = [host.topic] if host.topic else []
         link.subscribe(self._names.node_commands, self._names.line_commands, *hosts)
-        end = self._source.listen(self._hear)
+        end = self._source.listen(self._queue.hear)
         again = dropped = 0
-        self._wake.set()
+        self._queue.wake.set()
         try:
             while not link.lost:
-                await self._wake.wait()
-                self._wake.clear()
-                self._is_woken = False
+                await self._queue.wait()
                 was_online = host.online
                 for message in link.take():
                     if message.topic == host.topic:
@@ -316,11 +308,11 @@ class EdgeNode:
                 if host.online:
                     again = await self._send(session, link, again)
                 else:
-                    self._waiting.clear()
+                    self._queue.waiting.clear()
                 self._state = self._state_of(link, host)
         finally:
             end()
-            self._waiting.clear()
+            self._queue.waiting.clear()
 
     async def _send(self, session: SparkplugSession, link: BrokerConnection, again: int) -> int:
         """Send births, data and state. again: number of requests for births. Return the number of those that still
@@ -328,22 +320,21 @@ class EdgeNode:
         """
         if session.born_at is None or again:
             if session.born_at is not None and time.monotonic() < session.born_at + BIRTHS_EVERY:
-                self._waiting.clear()  # the births will contain it
+                self._queue.waiting.clear()  # the births will contain it
                 return again
             if link.full:
                 return again
-            self._waiting.clear()
+            self._queue.waiting.clear()
             session.bear(self._source.snapshot, datetime.now(timezone.utc))
-        while self._waiting and not link.full:
-            snapshot, heard = self._waiting.popleft()
+        while self._queue.waiting and not link.full:
+            snapshot, heard = self._queue.waiting.popleft()
             session.bring(snapshot, heard)
-            self._longest = max(self._longest, (datetime.now(timezone.utc) - heard).total_seconds())
-            await asyncio.sleep(0)
+            await self._queue.done(heard)
         if not link.full:
             session.catch_up()
             session.tell(self._source.snapshot)
         if session.behind:
-            self._loop.call_later(BETWEEN, self._wake.set)
+            asyncio.get_running_loop().call_later(BETWEEN, self._queue.wake.set)
         return 0
 
     def _take(self, message: MqttMessage) -> int:
@@ -362,22 +353,6 @@ class EdgeNode:
         if not host.online:
             return f"waits for host {self._broker.primary_host}"
         return "connected, the broker lets no commands come" if link.denied else "connected"
-
-    def _hear(self) -> None:
-        """Queue the present snapshot. May be called by any thread."""
-        if len(self._waiting) >= MOST_BEHIND:
-            with suppress(IndexError):
-                self._waiting.pop()
-                self._left_out += 1
-        self._waiting.append((self._source.snapshot, datetime.now(timezone.utc)))
-        self._notice()
-
-    def _notice(self) -> None:
-        """Wake the loop. May be called by any thread."""
-        if not self._is_woken:
-            self._is_woken = True
-            with suppress(RuntimeError):  # the loop is closed
-                self._loop.call_soon_threadsafe(self._wake.set)
 
     def _ended(self, running: asyncio.Task[None]) -> None:
         """Stop the edge node after an error, because its values would be stale."""

@@ -123,8 +123,8 @@ class OpcUaServer:
         longest, server.longest[0] = server.longest[0], 0.0
         left_out = 0
         if self._updates is not None:
-            longest, self._updates.longest = max(longest, self._updates.longest), 0.0
-            left_out = self._updates.left_out
+            longest = max(longest, self._updates.queue.take_longest())
+            left_out = self._updates.queue.left_out
         service = server.iserver.subscription_service
         items = sum(len(each.monitored_item_srv) for each in service.subscriptions.values())
         refused = requests.refused + service.ended + server.iserver.owners.refusals.count

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import asyncio
-from collections import deque
 from collections.abc import Awaitable, Callable
-from contextlib import suppress
 from datetime import datetime, timezone
 
 from asyncua import ua
@@ -17,10 +14,8 @@ from conveyor_sim.protocols.opcua.nodes import Nodes
 from conveyor_sim.protocols.opcua.tree import VALUE_AS_TEXT, WRITTEN_AT, WRITTEN_BY, has_text, is_shown
 from conveyor_sim.protocols.opcua.values import as_variant, status_of
 from conveyor_sim.protocols.tags.handshake import TARGET, TICK
+from conveyor_sim.protocols.tags.snapshot_queue import SnapshotQueue
 from conveyor_sim.protocols.tags.tag_provider import LineSnapshot, TagProvider, TickClock
-
-MOST_BEHIND = 200
-"""Largest number of ticks that wait to be written; a further one replaces the newest."""
 
 Follower = Callable[[LineSnapshot, datetime, bool], Awaitable[None]]
 """Function to call after each tick, with the snapshot, its wall time, and True if time stepped back."""
@@ -35,16 +30,11 @@ class Updates:
         self._variables = [_Variable(tag) for tag in source.info.tags if is_shown(tag) and tag.role != "run"]
         self._run_tag = next((tag for tag in source.info.tags if tag.name == f"{RUN}/state"), None)
         self._commands = [tag.name for tag in source.info.tags if tag.role in COMMANDS]
-        self._waiting: deque[tuple[LineSnapshot, datetime]] = deque()
-        self._is_woken = False
-        self._wake = asyncio.Event()
-        self._loop = asyncio.get_running_loop()
+        self.queue = SnapshotQueue(source)
+        """Snapshots to be written."""
+        self.queue.open()
         self._last: LineSnapshot | None = None
         self._read_back: ReadBackColumns | None = None
-        self.longest = 0.0
-        """Longest wall time from a change of the tags to the write of their nodes, s, since this was set to 0."""
-        self.left_out = 0
-        """Ticks so far that were not written."""
         self._written: dict[str, tuple[int, str]] = {}
 
     async def bring_present(self) -> None:
@@ -53,32 +43,17 @@ class Updates:
 
     async def run(self) -> None:
         """Write all snapshots until this is cancelled."""
-        end = self._source.listen(self._hear)
-        self._hear()
+        end = self._source.listen(self.queue.hear)
+        self.queue.hear()
         try:
             while True:
-                await self._wake.wait()
-                self._wake.clear()
-                self._is_woken = False
-                while self._waiting:
-                    snapshot, heard = self._waiting.popleft()
+                await self.queue.wait()
+                while self.queue.waiting:
+                    snapshot, heard = self.queue.waiting.popleft()
                     await self._bring(snapshot, heard)
-                    self.longest = max(self.longest, (datetime.now(timezone.utc) - heard).total_seconds())
-                    await asyncio.sleep(0)  # let clients' requests run
+                    await self.queue.done(heard)
         finally:
             end()
-
-    def _hear(self) -> None:
-        """Queue the present snapshot. May be called by any thread."""
-        if len(self._waiting) >= MOST_BEHIND:
-            with suppress(IndexError):
-                self._waiting.pop()
-                self.left_out += 1
-        self._waiting.append((self._source.snapshot, datetime.now(timezone.utc)))
-        if not self._is_woken:
-            self._is_woken = True
-            with suppress(RuntimeError):  # the loop is closed
-                self._loop.call_soon_threadsafe(self._wake.set)
 
     async def _bring(self, snapshot: LineSnapshot, heard: datetime) -> None:
         last, self._last = self._last, snapshot

@@ -10,7 +10,7 @@ import pytest
 from asyncua import ua
 
 from conveyor_sim.line.run_state import ENDED, LOCKSTEP, PAUSED, REPLAYING, RUNNING, STOPPED, RunState
-from conveyor_sim.protocols.opcua.updates import MOST_BEHIND
+from conveyor_sim.protocols.tags.snapshot_queue import MOST_BEHIND
 from test.protocols.opcua.conftest import refused
 
 if TYPE_CHECKING:
