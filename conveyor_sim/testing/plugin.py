@@ -130,7 +130,7 @@ class WarmStarts:
         `warm_up` is called once per scene. Raises the exceptions of Scenario and of `warm_up`.
         """
         from conveyor_sim.control.scan import ControlError
-        from conveyor_sim.testing.scene_of import scene_of
+        from conveyor_sim.testing.scenario import scene_of
 
         loaded = scene_of(scene, overrides)
         digest = blake2b(f"{loaded.source_text}\0{loaded.overrides_text}".encode(), digest_size=6).hexdigest()

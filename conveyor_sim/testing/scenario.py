@@ -27,15 +27,34 @@ from conveyor_sim.line.commands.inputs import DISOWN, FAULT, FORCE, INJECT, MODE
 from conveyor_sim.line.run_state import ENDED, RUNNING, STOPPED, RunState
 from conveyor_sim.protocols.tags.tag_provider import SCADA_SOURCES, SteppedTagProvider
 from conveyor_sim.run.scan_loop import AttachedController, LocalController, ScanLoop
-from conveyor_sim.scene import Scene
+from conveyor_sim.scene import Scene, load_scene
+from conveyor_sim.scene.choices import choices
+from conveyor_sim.scene.overrides import merged
 from conveyor_sim.scene.recorded import sources_of
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.modbus_rows import Row
 from conveyor_sim.support.printable import SENTENCE, printable
+from conveyor_sim.support.resources import scene_path
 from conveyor_sim.testing import plc
 from conveyor_sim.testing.history import ScenarioHistory
 from conveyor_sim.testing.plc import ServedPlc
-from conveyor_sim.testing.scene_of import scene_of
+
+
+def scene_of(
+    scene: Scene | str | PathLike[str],
+    overrides: Mapping[str, Any] | None,
+    parameters: Mapping[str, Any] | None = None,
+    variant: str | None = None,
+    format: str | None = None,
+) -> Scene:
+    """Return the scene for the arguments of a Scenario. Raise the exceptions of Scenario."""
+    chosen = choices(parameters, variant, format)
+    if not isinstance(scene, Scene):
+        return load_scene(scene_path(Path(scene)), merged(dict(overrides or {}), chosen))
+    if overrides is not None or chosen:
+        raise ValueError("overrides given for a scene that is loaded, expected them where it is loaded")
+    return scene
+
 
 Condition = Callable[["Present"], Any]
 """Function of the present signals that returns true or false: `lambda s: s["belts/table/bottles"] < 40`."""
