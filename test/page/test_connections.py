@@ -29,8 +29,8 @@ from conveyor_sim.protocols.server.certificates import server_context
 from conveyor_sim.protocols.server.interface import ServerError
 from conveyor_sim.protocols.server.quotas import QUOTA, share_of_guests
 from conveyor_sim.protocols.web import feed, server
+from conveyor_sim.protocols.web.feed import MOST_WAITING, UNSEEN
 from conveyor_sim.protocols.web.server import LONGEST_REQUEST, MOST_CONNECTIONS, MOST_REQUESTS, WebServer
-from conveyor_sim.protocols.web.viewer import MOST_WAITING, UNSEEN
 
 T = TypeVar("T")
 
@@ -359,7 +359,7 @@ def test_a_flood_of_pages_leaves_a_place_for_a_user(live: Live) -> None:
 
 
 def test_what_waits_for_a_page_is_bounded() -> None:
-    from conveyor_sim.protocols.web.viewer import Viewer
+    from conveyor_sim.protocols.web.feed import Viewer
 
     async def work() -> None:
         viewer = Viewer(None)  # type: ignore[arg-type]  # nothing is sent

@@ -21,8 +21,7 @@ from conveyor_sim.protocols.server.users import Logins, LoginService, User
 from conveyor_sim.protocols.tags.line_mirror import DrawableProvider
 from conveyor_sim.protocols.tags.tag_provider import WEB
 from conveyor_sim.protocols.web.commands import ANONYMOUS, PageCommands, PageUser
-from conveyor_sim.protocols.web.feed import Feed, text_message
-from conveyor_sim.protocols.web.viewer import Viewer
+from conveyor_sim.protocols.web.feed import Feed, Viewer, text_message
 
 MOST_CONNECTIONS = 256
 """Largest number of connections at once. For one more, the oldest connection that is not a page is closed."""
