@@ -10,7 +10,7 @@ from scenes import DRIVEN_LINE
 
 from conveyor_sim.protocols.tags.line_mirror import DrawableProvider
 from conveyor_sim.protocols.tags.tag_provider import SteppedTagProvider
-from conveyor_sim.protocols.web.commands import PageCommands, PageUser
+from conveyor_sim.protocols.web.server import PageCommands, PageUser
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 
