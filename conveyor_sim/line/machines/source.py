@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 from conveyor_sim.line.device import ScanContext
 from conveyor_sim.line.devices.entry import Quality, Scattering
+from conveyor_sim.line.devices.infeed import CMD_BOTTLE, Switching, type_tags
 from conveyor_sim.line.devices.setup import BAD, JITTER, DeviceSetup
-from conveyor_sim.line.devices.switched import CMD_BOTTLE, Switching, type_tags
 from conveyor_sim.line.machines.machine import MachineDevice
 from conveyor_sim.line.machines.stop_reason import BLOCKED, NONE
 from conveyor_sim.line.tag import count, seconds, switch
