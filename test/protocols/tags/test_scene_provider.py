@@ -23,8 +23,8 @@ from conveyor_sim.line.commands.inputs import INJECT, MODE, OPERATE, OWN, SET, I
 from conveyor_sim.line.line import image_of
 from conveyor_sim.line.run_state import ENDED, LOCKSTEP, PAUSED, RUNNING, STOPPED
 from conveyor_sim.protocols.hosting.frames import MOST_FRAMES, Frames
-from conveyor_sim.protocols.hosting.remote_provider import ParentCalls, RemoteTagProvider
 from conveyor_sim.protocols.hosting.server_messages import ServerTask
+from conveyor_sim.protocols.hosting.server_process import ParentCalls, RemoteTagProvider
 from conveyor_sim.protocols.hosting.settings import ServerSettings
 from conveyor_sim.protocols.tags.line_mirror import decoded
 from conveyor_sim.protocols.tags.scene_messages import SceneTask
