@@ -194,11 +194,7 @@ class Methods:
         return alarms is not None and id in alarms.id
 
     def call(self, client: User, request: ua.CallMethodRequest) -> ua.CallMethodResult | None:
-        """Return the result of a call and count it; None for a method that is not of this class."""
-        result = self._call(client, request)
-        return None if result is None else self._requests.counted(result)
-
-    def _call(self, client: User, request: ua.CallMethodRequest) -> ua.CallMethodResult | None:
+        """Return the result of a call; None for a method that is not of this class."""
         if request.MethodId == _ACKNOWLEDGE:
             return self._acknowledge_event(client, request)
         owner, _, name = name_of(request.MethodId).rpartition("/")

@@ -177,11 +177,7 @@ class PackMl:
                     await self._nodes.write(f"{machine}/{NAME}.{name}", value, stamp, code)
 
     def call(self, client: User, request: ua.CallMethodRequest) -> ua.CallMethodResult | None:
-        """Return the result of a call of a machine's method and count it; None for any other method."""
-        result = self._call(client, request)
-        return None if result is None else self._requests.counted(result)
-
-    def _call(self, client: User, request: ua.CallMethodRequest) -> ua.CallMethodResult | None:
+        """Return the result of a call of a machine's method; None for any other method."""
         machine, _, _ = name_of(request.ObjectId).partition(f"/{NAME}")
         if machine not in self._machines:
             return None

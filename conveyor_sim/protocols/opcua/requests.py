@@ -134,11 +134,10 @@ class Requests:
         """Return True if the role of this client permits an operation."""
         return operation in MAY and _kind(client) in MAY[operation].writers
 
-    def counted(self, result: ua.CallMethodResult) -> ua.CallMethodResult:
-        """Count a call by its result, and return the result."""
+    def count(self, result: ua.CallMethodResult) -> None:
+        """Count a call by its result."""
         good = result.StatusCode.value == Codes.GoodCompletesAsynchronously
         self.writes, self.refused = self.writes + good, self.refused + (not good)
-        return result
 
     def _go_on(self, client: User, value: ua.WriteValue) -> int:
         """Set the target of a line in lockstep."""

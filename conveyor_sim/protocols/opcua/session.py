@@ -207,7 +207,9 @@ class OpcUaSession(InternalSession):
         for request in params or []:
             answers = (answer(self.user, request) for answer in self.iserver.answers)
             result = next((reply for reply in answers if reply is not None), None)
-            if result is None and request.MethodId in REFRESH:
+            if result is not None and self.iserver.requests is not None:
+                self.iserver.requests.count(result)
+            elif request.MethodId in REFRESH:
                 (result,) = await super().call([request])
             results.append(result or ua.CallMethodResult(ua.StatusCode(Codes.BadMethodInvalid), [], [], []))
         return results
