@@ -14,10 +14,9 @@ from asyncua import ua
 from asyncua.crypto.permission_rules import SimpleRoleRuleset, UserRole
 from asyncua.server.internal_server import InternalServer
 
-from conveyor_sim.protocols.opcua.conditions import AlarmStates
+from conveyor_sim.protocols.opcua.conditions import AlarmStates, Emitter, LineEvents
 from conveyor_sim.protocols.opcua.history import OpcUaHistory, require_tags
 from conveyor_sim.protocols.opcua.limits import LIMITS, PUBLISHED, UNSUPPORTED, OpcUaLimits
-from conveyor_sim.protocols.opcua.line_events import Emitter, LineEvents
 from conveyor_sim.protocols.opcua.methods import Methods, add_methods
 from conveyor_sim.protocols.opcua.nodes import INDEX, NAMESPACE, Nodes
 from conveyor_sim.protocols.opcua.packml import PackMl
