@@ -16,8 +16,7 @@ from conveyor_sim.line.devices.reject import RejectDevice
 from conveyor_sim.line.devices.setup import DeviceSetup
 from conveyor_sim.line.devices.spill import SpillDevice
 from conveyor_sim.line.machines.source import SourceDevice
-from conveyor_sim.line.machines.station import StationDevice
-from conveyor_sim.line.machines.station import SinkDevice
+from conveyor_sim.line.machines.station import SinkDevice, StationDevice
 from conveyor_sim.physics.model import Model
 from conveyor_sim.scene.schema import Scene
 

@@ -1,5 +1,6 @@
 """`ActiveRun`: current run of a stepper, its state, and the advance that a client waits for.
 
+`Reception` hands commands to the line, and counts and logs their results.
 Only the stepping thread uses it.
 """
 

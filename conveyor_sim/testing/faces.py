@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
@@ -45,7 +44,7 @@ class _Servers:
             self._thread, self._servers = None, []
 
 
-class ModbusFaces(_Servers, AbstractContextManager["ModbusFaces"]):
+class ModbusFaces(_Servers):
     """Fixture `modbus`: a function that serves a line to Modbus TCP clients on this machine."""
 
     def __call__(
@@ -64,11 +63,8 @@ class ModbusFaces(_Servers, AbstractContextManager["ModbusFaces"]):
         self._start(server)
         return server
 
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
-
-class OpcUaFaces(_Servers, AbstractContextManager["OpcUaFaces"]):
+class OpcUaFaces(_Servers):
     """Fixture `opcua`: a function that serves a line to OPC UA clients on this machine."""
 
     def __init__(self) -> None:
@@ -92,6 +88,7 @@ class OpcUaFaces(_Servers, AbstractContextManager["OpcUaFaces"]):
         self._start(server)
         return server
 
-    def __exit__(self, *_: object) -> None:
-        self.close()
+    def close(self) -> None:
+        """End all servers, and remove their certificate."""
+        super().close()
         self._folder.cleanup()

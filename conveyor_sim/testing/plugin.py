@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Generator, Iterator, Mapping
+from contextlib import closing
 from functools import partial
 from hashlib import blake2b
 from importlib.util import find_spec
@@ -185,7 +186,7 @@ def modbus() -> Iterator[ModbusFaces]:
 
     if find_spec("pymodbus") is None:
         pytest.skip(MODBUS_MISSING)
-    with ModbusFaces() as faces:
+    with closing(ModbusFaces()) as faces:
         yield faces
 
 
@@ -199,7 +200,7 @@ def opcua() -> Iterator[OpcUaFaces]:
 
     if find_spec("asyncua") is None:
         pytest.skip(OPCUA_MISSING)
-    with OpcUaFaces() as faces:
+    with closing(OpcUaFaces()) as faces:
         yield faces
 
 

@@ -1,4 +1,7 @@
-"""Stations: machines that take a bottle, work on it for one cycle, and give it back at another place."""
+"""Machines that take bottles from a region: their queue, the fill level at which they start, sinks and stations.
+
+Stations work on a bottle for one cycle, and give it back at another place.
+"""
 
 from collections.abc import Mapping, Sequence
 from types import SimpleNamespace

@@ -1,4 +1,7 @@
-"""`AlarmStates`: each alarm of a line as an object with variables, and as a condition whose changes are events."""
+"""OPC UA events. `Emitter` sends them to clients; `LineEvents` has the events of a line, except alarms.
+
+`AlarmStates` has each alarm of a line as an object with variables, and as a condition whose changes are events.
+"""
 
 from __future__ import annotations
 
