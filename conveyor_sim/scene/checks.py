@@ -4,8 +4,8 @@ import math
 from collections.abc import Iterator
 from itertools import chain, combinations_with_replacement, islice
 
+from conveyor_sim.scene.accuracy import CHOICES
 from conveyor_sim.scene.belts import CurvedBelt
-from conveyor_sim.scene.check_accuracy import accuracy_problems
 from conveyor_sim.scene.check_contacts import contact_problems
 from conveyor_sim.scene.check_shapes import shape_problems
 from conveyor_sim.scene.moving import movers_of
@@ -14,6 +14,22 @@ from conveyor_sim.scene.problems import Path, Problem
 from conveyor_sim.scene.schema import Grid, Scene
 from conveyor_sim.scene.types import is_whole_nanoseconds, nanoseconds
 from conveyor_sim.scene.words import listed, shown, some_of
+
+
+def accuracy_problems(scene: Scene) -> Iterator[Problem]:
+    """Yield problems of the choice of the time step."""
+    accuracy = scene.accuracy
+    choices = [field for field in CHOICES if getattr(accuracy, field) is not None]
+    if len(choices) > 1:
+        yield Problem(("accuracy",), f"{' and '.join(choices)} given, expected at most one of {listed(list(CHOICES))}")
+    if accuracy.error is not None and accuracy.integrator != "dormand_prince":
+        yield Problem(
+            ("accuracy", "error"),
+            f"{shown(accuracy.error)} given, expected none with integrator {accuracy.integrator}: "
+            "only dormand_prince chooses its own steps",
+        )
+    if accuracy.dt is not None and accuracy.dt > scene.tick:
+        yield Problem(("accuracy", "dt"), f"{shown(accuracy.dt)} given, expected at most the tick, {scene.tick:g} (s)")
 
 
 def limit_problems(scene: Scene) -> Iterator[Problem]:
