@@ -28,13 +28,13 @@ from conveyor_sim.scene.problems import Path
 from conveyor_sim.scene.schema import Grid, Scene, Single
 from conveyor_sim.scene.types import XY
 
-STEP = 0.05
+_STEP = 0.05
 """m"""
 
-MOST_STEPS = 4000
+_MOST_STEPS = 4000
 """Steps of all estimates of a scene, 200 m."""
 
-LANE = 1.0
+_LANE = 1.0
 """m, farthest guide that leads a bottle."""
 
 
@@ -61,9 +61,9 @@ def drift(
             break
         left = left_of(along[None])
         to_left, to_right = float(guides.distance(place[None], left)[0]), float(guides.distance(place[None], -left)[0])
-        aside = 0.5 * (to_left - to_right) if max(to_left, to_right) < LANE else 0.0
-        place = place + STEP * along + aside * left[0]
-        time += STEP / speed
+        aside = 0.5 * (to_left - to_right) if max(to_left, to_right) < _LANE else 0.0
+        place = place + _STEP * along + aside * left[0]
+        time += _STEP / speed
         times.append(time)
         places.append(place)
         for path, region in takers:
@@ -203,7 +203,7 @@ class _Tracer:
         while len(legs) < count:
             active = [index for index in range(count) if index not in legs]
             if work > MOST_WORK:
-                steps = MOST_STEPS // len(active)
+                steps = _MOST_STEPS // len(active)
                 capped = {index: self._leg(index, tracks[index], None, "cap") for index in active}
                 legs.update({index: self._estimated(leg, steps) for index, leg in capped.items()})
                 break
