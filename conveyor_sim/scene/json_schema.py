@@ -1,25 +1,67 @@
 """JSON Schema (draft 2020-12) of scene files, with which editors complete, document and check them."""
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from itertools import combinations
 from typing import Any, cast
 
 from pydantic import BaseModel
 from pydantic.json_schema import models_json_schema
 
 from conveyor_sim.scene.layout.cells import WITH_PORTS
+from conveyor_sim.scene.layout.devices import PLACEABLE, Placeable
 from conveyor_sim.scene.layout.language_schema import NAME_OR_PORT, language_fields
 from conveyor_sim.scene.layout.parts import Conveyor, SceneLayout
-from conveyor_sim.scene.layout.place_schema import PLACES, placed_devices
 from conveyor_sim.scene.parts.infeed import Infeed
 from conveyor_sim.scene.parts.source import Source
 from conveyor_sim.scene.quantities import FULL_TURN, example_of
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.scene.text_patterns import text_pattern
 
-DIALECT = "https://json-schema.org/draft/2020-12/schema"
-
 Node = dict[str, Any]
+
+PLACES = tuple(dict.fromkeys(kind.place for kind in PLACEABLE))
+"""Parts whose definitions `placed_devices` needs."""
+
+_GIVEN_BY_PLACE = ("speed",)
+"""Required fields of a device that have a default along a conveyor."""
+
+
+def placed_devices(definitions: dict[str, Node]) -> dict[str, dict[str, Node]]:
+    """Return the definitions of all devices along conveyors, by the name of the definition of the device."""
+    kinds: dict[str, list[Placeable]] = {}
+    for kind in PLACEABLE:
+        kinds.setdefault(kind.part.__name__, []).append(kind)
+    return {
+        part: {f"{part}_{_suffix(some)}": _placed(definitions, part, some) for some in _choices(own)}
+        for part, own in kinds.items()
+    }
+
+
+def _choices(kinds: list[Placeable]) -> Iterable[tuple[Placeable, ...]]:
+    """Yield the places that a device may have together."""
+    for count in range(1, len(kinds) + 1):
+        yield from combinations(kinds, count)
+
+
+def _suffix(kinds: tuple[Placeable, ...]) -> str:
+    return "_".join(kind.within or "along" for kind in kinds)
+
+
+def _placed(definitions: dict[str, Node], part: str, kinds: tuple[Placeable, ...]) -> Node:
+    device = definitions[part]
+    properties, required = dict(device["properties"]), list(device.get("required", []))
+    for kind in kinds:
+        place = definitions[kind.place.__name__]
+        own = {kind.within: place} if kind.within else place["properties"]
+        needed = [kind.within] if kind.within else place.get("required", [])
+        replaced = {*kind.instead, *own, *_GIVEN_BY_PLACE}
+        properties = {name: field for name, field in properties.items() if name not in kind.instead} | own
+        required = [*(name for name in required if name not in replaced), *needed]
+    return {**device, "properties": properties, "required": required}
+
+
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
 def scene_schema() -> Node:
