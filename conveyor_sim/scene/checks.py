@@ -4,10 +4,9 @@ import math
 from collections.abc import Iterator
 from itertools import chain, combinations_with_replacement, islice
 
+from conveyor_sim.scene.accuracy import CHOICES
 from conveyor_sim.scene.belts import CurvedBelt
-from conveyor_sim.scene.check_accuracy import accuracy_problems
 from conveyor_sim.scene.check_contacts import contact_problems
-from conveyor_sim.scene.check_limits import limit_problems
 from conveyor_sim.scene.check_shapes import shape_problems
 from conveyor_sim.scene.moving import movers_of
 from conveyor_sim.scene.problem_count import MOST_SAID
@@ -15,6 +14,43 @@ from conveyor_sim.scene.problems import Path, Problem
 from conveyor_sim.scene.schema import Grid, Scene
 from conveyor_sim.scene.types import is_whole_nanoseconds, nanoseconds
 from conveyor_sim.scene.words import listed, shown, some_of
+
+
+def accuracy_problems(scene: Scene) -> Iterator[Problem]:
+    """Yield problems of the choice of the time step."""
+    accuracy = scene.accuracy
+    choices = [field for field in CHOICES if getattr(accuracy, field) is not None]
+    if len(choices) > 1:
+        yield Problem(("accuracy",), f"{' and '.join(choices)} given, expected at most one of {listed(list(CHOICES))}")
+    if accuracy.error is not None and accuracy.integrator != "dormand_prince":
+        yield Problem(
+            ("accuracy", "error"),
+            f"{shown(accuracy.error)} given, expected none with integrator {accuracy.integrator}: "
+            "only dormand_prince chooses its own steps",
+        )
+    if accuracy.dt is not None and accuracy.dt > scene.tick:
+        yield Problem(("accuracy", "dt"), f"{shown(accuracy.dt)} given, expected at most the tick, {scene.tick:g} (s)")
+
+
+def limit_problems(scene: Scene) -> Iterator[Problem]:
+    """Yield problems of single heights of bottle types, and of limits of absent quantities."""
+    tips = False
+    for name, kind in scene.bottle_types.items():
+        given = {"contact_height": kind.contact_height, "gravity_height": kind.gravity_height}
+        missing = [field for field, value in given.items() if value is None]
+        tips = tips or not missing
+        if len(missing) == 1:
+            other = next(field for field in given if field not in missing)
+            text = f"{shown(given[other])} given without {missing[0]}, expected both or neither"
+            yield Problem(("bottle_types", name, other), text)
+    limits = scene.limits
+    if limits.tipping is not None and not tips:
+        text = f"{shown(limits.tipping)} given, expected a bottle type with contact_height and gravity_height"
+        yield Problem(("limits", "tipping"), text)
+    if limits.clogging_time is not None and not scene.outfeeds:
+        text = f"{shown(limits.clogging_time)} given, expected an outfeed that could clog"
+        yield Problem(("limits", "clogging_time"), text)
+
 
 MOVE_RAILS = ("leapfrog", "semi_implicit_euler", "velocity_verlet")
 """Integrators with moving rails. The others evaluate forces within a step, or solve for forces of rails at rest."""

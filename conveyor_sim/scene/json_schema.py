@@ -1,25 +1,127 @@
 """JSON Schema (draft 2020-12) of scene files, with which editors complete, document and check them."""
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from itertools import combinations
 from typing import Any, cast
 
 from pydantic import BaseModel
 from pydantic.json_schema import models_json_schema
 
-from conveyor_sim.scene.layout.cells import WITH_PORTS
-from conveyor_sim.scene.layout.language_schema import NAME_OR_PORT, language_fields
+from conveyor_sim.scene.layout.cells import JOIN, PLACE, WITH_PORTS
+from conveyor_sim.scene.layout.choices import NOT_IN_VARIANTS
+from conveyor_sim.scene.layout.devices import PLACEABLE, Placeable
 from conveyor_sim.scene.layout.parts import Conveyor, SceneLayout
-from conveyor_sim.scene.layout.place_schema import PLACES, placed_devices
 from conveyor_sim.scene.parts.infeed import Infeed
 from conveyor_sim.scene.parts.source import Source
 from conveyor_sim.scene.quantities import FULL_TURN, example_of
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.scene.text_patterns import text_pattern
 
-DIALECT = "https://json-schema.org/draft/2020-12/schema"
-
 Node = dict[str, Any]
+
+NAME = "^[A-Za-z][A-Za-z0-9_]*$"
+NAME_OR_PORT = r"^[A-Za-z][A-Za-z0-9_]*(\.[A-Za-z][A-Za-z0-9_]*)?$"
+
+_VALUE: Node = {"anyOf": [{"type": "number"}, {"type": "string", "pattern": text_pattern("that of the parameter")}]}
+_PATH: Node = {"type": "string", "minLength": 1}
+
+
+def language_fields(conveyor: Node, fields: Iterable[str]) -> Node:
+    """Return the schemas of the fields. conveyor: schema of a conveyor; fields: other fields of a scene."""
+    places = {name: conveyor["properties"][name] for name in (*JOIN, *PLACE)}
+    cell = _mapping(
+        {"use": _described("Cell file.", _PATH), "set": _values("Parameters of the cell."), **places}, ["use"]
+    )
+    parameter = {
+        name: _described(text, _VALUE)
+        for name, text in (("default", "Value."), ("min", "Least value."), ("max", "Greatest value."))
+    }
+    parameter["description"] = _described("Meaning.", {"type": "string"})
+    kind = {"bottle": _described("Bottle type of all entries.", _name()), "set": _values("Parameters of the scene.")}
+    varied = [*(name for name in fields if name not in NOT_IN_VARIANTS), "parameters", "cells", "format"]
+    return {
+        "include": _described("Files whose fields are joined to those of this file.", _or_list(_PATH)),
+        "parameters": _named(
+            "Quantities that texts refer to by name.", {"anyOf": [_VALUE, _mapping(parameter, ["default"])]}
+        ),
+        "cells": _named("Parts of a line from other files, by name.", cell),
+        "ports": _named("Ends of conveyors where a cell is joined.", {"type": "string", "pattern": NAME_OR_PORT}),
+        "variants": _named("Fields of the scene that differ, by name.", _mapping({name: {} for name in varied}, [])),
+        "formats": _named("Bottle type and parameters, by name.", _mapping(kind, [])),
+        "variant": _described("Variant that is simulated. Left out: none.", _name()),
+        "format": _described("Format at the start. Left out: none.", _name()),
+    }
+
+
+def _described(description: str, schema: Node) -> Node:
+    return {"description": description, **schema}
+
+
+def _name() -> Node:
+    return {"type": "string", "pattern": NAME}
+
+
+def _or_list(schema: Node) -> Node:
+    return {"anyOf": [schema, {"type": "array", "items": schema}]}
+
+
+def _mapping(properties: Node, required: list[str]) -> Node:
+    return {"type": "object", "properties": properties, "required": required, "additionalProperties": False}
+
+
+def _named(description: str, schema: Node) -> Node:
+    return _described(
+        description, {"type": "object", "patternProperties": {NAME: schema}, "additionalProperties": False}
+    )
+
+
+def _values(description: str) -> Node:
+    return _named(description, _VALUE)
+
+
+PLACES = tuple(dict.fromkeys(kind.place for kind in PLACEABLE))
+"""Parts whose definitions `placed_devices` needs."""
+
+_GIVEN_BY_PLACE = ("speed",)
+"""Required fields of a device that have a default along a conveyor."""
+
+
+def placed_devices(definitions: dict[str, Node]) -> dict[str, dict[str, Node]]:
+    """Return the definitions of all devices along conveyors, by the name of the definition of the device."""
+    kinds: dict[str, list[Placeable]] = {}
+    for kind in PLACEABLE:
+        kinds.setdefault(kind.part.__name__, []).append(kind)
+    return {
+        part: {f"{part}_{_suffix(some)}": _placed(definitions, part, some) for some in _choices(own)}
+        for part, own in kinds.items()
+    }
+
+
+def _choices(kinds: list[Placeable]) -> Iterable[tuple[Placeable, ...]]:
+    """Yield the places that a device may have together."""
+    for count in range(1, len(kinds) + 1):
+        yield from combinations(kinds, count)
+
+
+def _suffix(kinds: tuple[Placeable, ...]) -> str:
+    return "_".join(kind.within or "along" for kind in kinds)
+
+
+def _placed(definitions: dict[str, Node], part: str, kinds: tuple[Placeable, ...]) -> Node:
+    device = definitions[part]
+    properties, required = dict(device["properties"]), list(device.get("required", []))
+    for kind in kinds:
+        place = definitions[kind.place.__name__]
+        own = {kind.within: place} if kind.within else place["properties"]
+        needed = [kind.within] if kind.within else place.get("required", [])
+        replaced = {*kind.instead, *own, *_GIVEN_BY_PLACE}
+        properties = {name: field for name, field in properties.items() if name not in kind.instead} | own
+        required = [*(name for name in required if name not in replaced), *needed]
+    return {**device, "properties": properties, "required": required}
+
+
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
 def scene_schema() -> Node:

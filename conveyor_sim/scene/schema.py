@@ -17,17 +17,21 @@ from conveyor_sim.scene.drives import NamedDrive
 from conveyor_sim.scene.effect_names import EffectName, Forced
 from conveyor_sim.scene.layout.plan import LayoutPlan
 from conveyor_sim.scene.limits import Limits as DamageLimits
-from conveyor_sim.scene.machines import Machine
-from conveyor_sim.scene.part import Part
+from conveyor_sim.scene.part import Part, one_of
 from conveyor_sim.scene.parts.alarm import MeasuredAlarm
 from conveyor_sim.scene.parts.counter import Counter
 from conveyor_sim.scene.parts.device_part import DevicePart, Entry, Exit, Giver
 from conveyor_sim.scene.parts.indicator import Indicator
 from conveyor_sim.scene.parts.infeed import Infeed
+from conveyor_sim.scene.parts.inspection import Inspection
 from conveyor_sim.scene.parts.movers import Diverter, Gate, Pusher
 from conveyor_sim.scene.parts.outfeed import Outfeed
 from conveyor_sim.scene.parts.photo_eye import PhotoEye
+from conveyor_sim.scene.parts.reject import Reject
+from conveyor_sim.scene.parts.sink import Sink
+from conveyor_sim.scene.parts.source import Source
 from conveyor_sim.scene.parts.spill import Spill
+from conveyor_sim.scene.parts.station import Station
 from conveyor_sim.scene.parts.zone import Zone
 from conveyor_sim.scene.plates import Plate
 from conveyor_sim.scene.rails import Rail
@@ -50,6 +54,15 @@ from conveyor_sim.scene.types import (
     quantity,
 )
 from conveyor_sim.scene.underlay import Underlay
+
+Machine = Annotated[
+    Annotated[Source, Tag("(source)")]
+    | Annotated[Sink, Tag("(sink)")]
+    | Annotated[Station, Tag("(station)")]
+    | Annotated[Inspection, Tag("(inspection)")]
+    | Annotated[Reject, Tag("(reject)")],
+    one_of({kind: f"({kind})" for kind in ("source", "sink", "station", "inspection", "reject")}),
+]
 
 
 class BottleType(Part):

@@ -11,9 +11,8 @@ from accuracy.studies import BLOWN, CHOSEN, OWN, REFERENCE, failed, study
 from facts import missing
 from rich.console import Console
 
-from conveyor_sim.accuracy.report.block import Block, Column
 from conveyor_sim.accuracy.report.lines import three_lines
-from conveyor_sim.accuracy.report.tables import blocks, markdown, terminal
+from conveyor_sim.accuracy.report.tables import Block, Column, blocks, markdown, terminal
 from conveyor_sim.accuracy.report.words import digits, duration, percent, setting_name, spread
 from conveyor_sim.accuracy.results import AccuracyStudy
 from conveyor_sim.accuracy.setting import Setting

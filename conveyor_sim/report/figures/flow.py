@@ -63,22 +63,11 @@ def force_figure(force: PeakForceSeries) -> Figure:
     """Largest and 99th percentile of the bottles' peak contact forces in each interval of output, N."""
     figure = style.new_figure(11.0, 3.9)
     ax = figure.subplots()
-    ax.plot(
-        force.time,
-        force.largest,
-        color=style.SERIES[1],
-        linewidth=0.9,
-        label="largest of all bottles",
-        gid="largest",
-    )
-    ax.plot(
-        force.time,
-        force.percentile_99,
-        color=style.SERIES[0],
-        linewidth=1.2,
-        label="99th percentile of the bottles",
-        gid="percentile_99",
-    )
+    for gid, values, colour, width, label in (
+        ("largest", force.largest, style.SERIES[1], 0.9, "largest of all bottles"),
+        ("percentile_99", force.percentile_99, style.SERIES[0], 1.2, "99th percentile of the bottles"),
+    ):
+        ax.plot(force.time, values, color=colour, linewidth=width, label=label, gid=gid)
     ax.set_xlabel("time (s)")
     ax.set_ylabel("peak contact force (N)")
     ax.set_title("Peak contact force between two records")

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
+from conveyor_sim.page.drawings.underlay import shown_underlay
 from conveyor_sim.report.flow.belt_findings import backward_belts, opposed_belts, transfer_gaps, watchdogs
 from conveyor_sim.report.flow.clearance import clearance
 from conveyor_sim.report.flow.device_findings import devices_beside, devices_reversed
@@ -17,9 +18,15 @@ from conveyor_sim.report.flow.stretches import Bottleneck, Stretch, bottleneck, 
 from conveyor_sim.report.flow.surfaces import SurfaceMap, surfaces_of
 from conveyor_sim.report.flow.trace import trace, traced_scene
 from conveyor_sim.report.flow.trace_scene import guide_pieces
-from conveyor_sim.report.flow.underlay_finding import hidden_underlay
 from conveyor_sim.run.compilation import Compilation
 from conveyor_sim.scene.schema import Scene
+
+
+def hidden_underlay(scene: Scene) -> Iterator[Finding]:
+    """Yield a finding for an underlay that can't be shown."""
+    shown = shown_underlay(scene)
+    if isinstance(shown, str):
+        yield Finding(("underlay", "file"), shown)
 
 
 @dataclass(frozen=True)

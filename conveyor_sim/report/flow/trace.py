@@ -14,8 +14,7 @@ from conveyor_sim.line.devices.belt_surfaces import BeltSurfaces
 from conveyor_sim.physics.model import build_model
 from conveyor_sim.physics.state import State
 from conveyor_sim.physics.stepping.tick import Integration
-from conveyor_sim.report.flow.drift import MOST_STEPS, drift
-from conveyor_sim.report.flow.guides import Guides
+from conveyor_sim.report.flow.guides import Guides, left_of
 from conveyor_sim.report.flow.surfaces import NONE, Indices, SurfaceMap, running_speeds
 from conveyor_sim.report.flow.trace_scene import trace_scene
 from conveyor_sim.report.flow.track import CHUNK, Track
@@ -28,6 +27,50 @@ from conveyor_sim.scene.polygons import inside
 from conveyor_sim.scene.problems import Path
 from conveyor_sim.scene.schema import Grid, Scene, Single
 from conveyor_sim.scene.types import XY
+
+_STEP = 0.05
+"""m"""
+
+_MOST_STEPS = 4000
+"""Steps of all estimates of a scene, 200 m."""
+
+_LANE = 1.0
+"""m, farthest guide that leads a bottle."""
+
+
+def drift(
+    start: Array,
+    along: Array,
+    surfaces: SurfaceMap,
+    guides: Guides,
+    takers: Sequence[tuple[Path, Sequence[XY]]],
+    steps: int,
+) -> tuple[Array, Array, Path | None]:
+    """Return times (k,) s and places (k, 2) of a bottle that moves with the belts, and the device that takes it.
+
+    start: place, m. along: unit vector of its motion. takers: devices with their regions. It follows the middle between
+    guides, and ends after a number of steps or beside the belts, without a device (None).
+    """
+    place, time, speed = start.copy(), 0.0, 0.0
+    times, places = [], []
+    for _ in range(steps):
+        carrier = int(surfaces.under(place[None])[0])
+        if carrier != NONE and not surfaces[carrier].rests:
+            along, speed = surfaces[carrier].heading(place[None])[0], abs(surfaces[carrier].running)
+        if carrier == NONE or speed == 0.0:
+            break
+        left = left_of(along[None])
+        to_left, to_right = float(guides.distance(place[None], left)[0]), float(guides.distance(place[None], -left)[0])
+        aside = 0.5 * (to_left - to_right) if max(to_left, to_right) < _LANE else 0.0
+        place = place + _STEP * along + aside * left[0]
+        time += _STEP / speed
+        times.append(time)
+        places.append(place)
+        for path, region in takers:
+            if inside(place[None], region)[0]:
+                return np.array(times), np.array(places), path
+    return np.array(times), np.array(places).reshape(-1, 2), None
+
 
 MOST_WORK = 1e7
 """Largest work of all traces, steps of one bottle: below a second of one core of the 2020s."""
@@ -160,7 +203,7 @@ class _Tracer:
         while len(legs) < count:
             active = [index for index in range(count) if index not in legs]
             if work > MOST_WORK:
-                steps = MOST_STEPS // len(active)
+                steps = _MOST_STEPS // len(active)
                 capped = {index: self._leg(index, tracks[index], None, "cap") for index in active}
                 legs.update({index: self._estimated(leg, steps) for index, leg in capped.items()})
                 break

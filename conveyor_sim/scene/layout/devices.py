@@ -1,5 +1,6 @@
 """Devices along conveyors: their places become coordinates."""
 
+import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -19,7 +20,7 @@ from conveyor_sim.scene.layout.along import (
 )
 from conveyor_sim.scene.layout.faults import LayoutFault
 from conveyor_sim.scene.layout.plan import LayoutPlan
-from conveyor_sim.scene.layout.regions import region
+from conveyor_sim.scene.layout.routes import Bend, Route
 from conveyor_sim.scene.layout.site import Coordinate, Site
 from conveyor_sim.scene.part import Part, validated
 from conveyor_sim.scene.parts.counter import Counter
@@ -37,7 +38,57 @@ from conveyor_sim.scene.parts.zone import Zone
 from conveyor_sim.scene.problems import Path, Problem
 from conveyor_sim.scene.rails import SegmentRail
 from conveyor_sim.scene.schema import GridOfBottles, Single
+from conveyor_sim.scene.types import TOUCH, XY
 from conveyor_sim.scene.words import did_you_mean, field_names, shown, some_of
+
+_CHORD = math.radians(7.5)
+"""Largest angle of a chord. It is up to 0.2 % of the radius off the arc."""
+
+
+def region(site: Site[AlongRegion]) -> list[Coordinate]:
+    """Return the region of a device as a polygon; arcs become chords. Raise LayoutFault."""
+    begin, end, field = site.stretch()
+    place = site.place
+    right, left = site.conveyor.edges if place.width is None else (-0.5 * place.width, 0.5 * place.width)
+    part = site.conveyor.route.between(begin, end)
+    for piece in part.pieces:
+        if isinstance(piece, Bend) and not _reaches(piece, right + place.offset, left + place.offset):
+            text = f"reaches beyond the centre of a bend of radius {piece.radius:.6g} m, expected a narrower region"
+            raise LayoutFault(site.path if place.width is None else (*site.path, "width"), text)
+    corners = polygon(part, right + place.offset, left + place.offset)
+    return [Coordinate("region", [site.within_limits(corner) for corner in corners], field)]
+
+
+def polygon(route: Route, right: float, left: float) -> list[XY]:
+    """Return the corners, counter-clockwise, of the area between two offsets (m) from a route."""
+    frames = [route.frame(s) for s in _stations(route)]
+    corners = [frame.point(0.0, right) for frame in frames] + [frame.point(0.0, left) for frame in reversed(frames)]
+    return list(_apart(corners))
+
+
+def _reaches(bend: Bend, right: float, left: float) -> bool:
+    """Return True if both offsets are on the same side of the centre of a bend, or in it."""
+    inner = left if bend.turn > 0.0 else -right
+    return inner <= bend.radius + TOUCH
+
+
+def _stations(route: Route) -> Iterator[float]:
+    """Yield the stations (m) of corners along a route."""
+    yield 0.0
+    for index, piece in enumerate(route.pieces):
+        begin, end = route.stations[index : index + 2]
+        if isinstance(piece, Bend):
+            chords = math.ceil(abs(piece.turn) / _CHORD - 1e-9)
+            yield from (begin + piece.length * (number / chords) for number in range(1, chords))
+        yield end
+
+
+def _apart(corners: list[XY]) -> Iterator[XY]:
+    """Yield the corners of a polygon without those that are where the one before them is: the centre of a bend."""
+    for before, corner in zip([corners[-1], *corners], corners, strict=False):
+        if math.dist(before, corner) > TOUCH:
+            yield corner
+
 
 Coordinates = Callable[[Site[Any], Mapping[str, Any]], list[Coordinate]]
 """Returns fields in coordinates from a site and the device as written."""

@@ -1,13 +1,12 @@
 """Guides on both sides of a line through points: offset polylines with mitred corners."""
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
 from conveyor_sim.scene.layout.faults import LayoutFault
-from conveyor_sim.scene.layout.paths import SHORTEST
+from conveyor_sim.scene.layout.paths import SHORTEST, vectors
 from conveyor_sim.scene.layout.plan import Box, ConveyorPlan, Side, box_of
 from conveyor_sim.scene.problems import Path
 from conveyor_sim.scene.types import COORDINATE_LIMIT, TOUCH, XY
@@ -69,12 +68,7 @@ def guide_line(points: tuple[XY, ...], side: Side, distance: float, path: Path) 
     Raise LayoutFault if a corner is too sharp for it.
     """
     directions, stations = [], [0.0]
-    for index, (before, after) in enumerate(pairwise(points)):
-        dx, dy = after[0] - before[0], after[1] - before[1]
-        length = math.sqrt(dx * dx + dy * dy)
-        if length < SHORTEST:
-            text = f"{shown(after)} given, expected a point away from the one before it (zero length)"
-            raise LayoutFault((*path, index + 1), text)
+    for dx, dy, length in vectors(points, path):
         directions.append((dx / length, dy / length))
         stations.append(stations[-1] + length)
     left = distance if side == "left" else -distance

@@ -52,7 +52,7 @@ def route_by_points(points: tuple[XY, ...], radius: float | None, path: Path) ->
 
     Raise LayoutFault.
     """
-    legs = list(_legs(points, (*path, "points")))
+    legs = [(math.atan2(dy, dx), length) for dx, dy, length in vectors(points, (*path, "points"))]
     turns = [turned(after[0], -before[0]) for before, after in pairwise(legs)]
     cuts = [0.0]
     for index, turn in enumerate(turns):
@@ -87,12 +87,15 @@ def route_by_points(points: tuple[XY, ...], radius: float | None, path: Path) ->
     return route_of(PathFrame(*points[0], legs[0][0]), moves)
 
 
-def _legs(points: tuple[XY, ...], path: Path) -> Iterator[tuple[float, float]]:
-    """Yield direction (rad) and length (m) from each point to the next."""
+def vectors(points: tuple[XY, ...], path: Path) -> Iterator[tuple[float, float, float]]:
+    """Yield the vector and its length (m) from each point to the next. path: of the points.
+
+    Raise LayoutFault for coinciding points.
+    """
     for index, (before, after) in enumerate(pairwise(points)):
         dx, dy = after[0] - before[0], after[1] - before[1]
         length = math.sqrt(dx * dx + dy * dy)
         if length < SHORTEST:
             text = f"{shown(after)} given, expected a point away from the one before it (zero length)"
             raise LayoutFault((*path, index + 1), text)
-        yield math.atan2(dy, dx), length
+        yield dx, dy, length

@@ -14,7 +14,7 @@ import pytest
 
 from conveyor_sim.page.drawings.underlay import ShownUnderlay, shown_underlay
 from conveyor_sim.page.head import plan_head
-from conveyor_sim.report.flow.underlay_finding import hidden_underlay
+from conveyor_sim.report.flow.flow import hidden_underlay
 from conveyor_sim.scene import Scene, load_scene, parse_overrides, parse_scene
 from conveyor_sim.simulation import Simulation
 
