@@ -91,7 +91,7 @@ def drawn(rng: random.Random) -> Scene:
     """The line with what its machines can have, drawn; none of it calls for other kernels."""
     scene: dict[str, Any] = json.loads(_plain())
     scene |= {"seed": rng.randrange(1000), "outputs": {"signals": 100, "bottles": 10, "counters": 10}}
-    scene["belts"]["line"] |= rng.choice([{}, {"watchdog": 0.1}])
+    scene["conveyors"]["line"] |= rng.choice([{}, {"watchdog": 0.1}])
     for machine in scene["machines"].values():
         if machine["kind"] in ("source", "sink", "station"):
             states = rng.sample(["starting", "stopping", "holding", "aborting", "resetting", "completing"], 2)
