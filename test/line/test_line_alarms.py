@@ -46,7 +46,7 @@ def value(sim: Simulation, name: str) -> float:
 
 
 def test_a_belt_that_its_watchdog_stops_is_an_alarm_until_a_command_comes() -> None:
-    sim = line(belts={"feeder": {"watchdog": 0.5}})
+    sim = line(conveyors={"feeder": {"watchdog": 0.5}})
     assert alarm_events(sim, 60) == [(50, "raised", "belts/feeder/watchdog")]
     assert missing(sim.line.alarms["belts/feeder/watchdog"].text, "belts/feeder", "watchdog", "command") == []
     assert value(sim, "alarms/belts/feeder/watchdog") == value(sim, "alarm_counts/errors") == 1
@@ -56,7 +56,7 @@ def test_a_belt_that_its_watchdog_stops_is_an_alarm_until_a_command_comes() -> N
 
 
 def test_a_trip_stands_until_the_drive_is_reset() -> None:
-    sim = line(belts={"feeder": {"drive": {"acceleration": 1.0}}})
+    sim = line(conveyors={"feeder": {"drive": {"acceleration": 1.0}}})
     sim.inject("belts/feeder/trip", 1.0)
     assert alarm_events(sim, 3) == [(0, "raised", "belts/feeder/tripped")]
     sim.inject("belts/feeder/trip", 0.0)
@@ -74,7 +74,7 @@ def test_a_machine_that_has_failed_is_an_alarm() -> None:
 
 
 def test_what_comes_and_goes_together_says_so_once() -> None:
-    sim = line(belts={"feeder": {"drive": {"acceleration": 1.0}}})
+    sim = line(conveyors={"feeder": {"drive": {"acceleration": 1.0}}})
     for _ in range(3):
         sim.inject("belts/feeder/trip", 1.0)
         sim.inject("belts/feeder/trip", 0.0)
@@ -116,7 +116,7 @@ def test_an_alarm_with_a_limit_goes_by_what_is_read_the_line_s_own_by_what_is() 
 
     This holds for alarms of the scene and of a controller.
     """
-    sim = line(alarms={"full": {"tag": ON_TABLE, "high": 40}}, belts={"feeder": {"drive": {"acceleration": 1.0}}})
+    sim = line(alarms={"full": {"tag": ON_TABLE, "high": 40}}, conveyors={"feeder": {"drive": {"acceleration": 1.0}}})
     declare(sim, empty={"tag": ON_TABLE, "low": -1.0})
     sim.advance()
     force(sim, (ON_TABLE, 41.0), ("belts/feeder/fault", 1.0))
@@ -259,7 +259,7 @@ def busy(sim: Simulation) -> None:
 
 def test_it_goes_on_from_a_checkpoint(tmp_path: Path) -> None:
     some = {"tag": "belts/feeder/bottles", "high": 0, "on_delay": 1.2, "suppressed_by": ["belts/feeder/watchdog"]}
-    sim = line(alarms={"some": some}, belts={"feeder": {"watchdog": 2.0}})
+    sim = line(alarms={"some": some}, conveyors={"feeder": {"watchdog": 2.0}})
     busy(sim)
     sim.save(tmp_path / "there.npz")
     other = Simulation.load(tmp_path / "there.npz")
