@@ -156,7 +156,9 @@ def _is_there(parent: int, name: str, objection: Objection | None) -> bool:
     try:
         opened = os.open(name, os.O_PATH | os.O_CLOEXEC, dir_fd=parent)
     except FileNotFoundError:
-        raise FileError("is a link to a file that does not exist") from None
+        if kind == stat.S_IFLNK:
+            raise FileError("is a link to a file that does not exist") from None
+        return False  # another program removed it in between
     try:
         kind = stat.S_IFMT(os.fstat(opened).st_mode)
         if kind in _KINDS:
