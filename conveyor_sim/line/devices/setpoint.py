@@ -13,11 +13,11 @@ from conveyor_sim.scene.drives import SpeedSetpoint
 
 @dataclass
 class Watchdog:
-    """Watchdog that stops a belt or named drive if no command was accepted within its time-out (simulated time)."""
+    """Watchdog that stops a belt or named drive without an accepted speed command within its time-out (simulated)."""
 
     timeout_ticks: int
     last: int = 0
-    """Tick of the last accepted command."""
+    """Tick of the last accepted speed command."""
     tripped: bool = False
     rests: bool = False
     """True while the device is not in automatic mode."""

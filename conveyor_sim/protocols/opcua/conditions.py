@@ -92,7 +92,7 @@ SEVERITIES = {
     "signal_forced": _HANDS,
     "signal_unforced": _HANDS,
 }
-"""Severity by kind, for filters of clients. All other kinds are errors."""
+"""Severity by kind, for filters of clients. All other kinds count as errors."""
 
 
 class LineEvents:
