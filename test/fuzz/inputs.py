@@ -38,7 +38,7 @@ def speed_parts(scene: Scene) -> list[tuple[str, SpeedSetpoint]]:
 
 
 def has_drive(part: SpeedSetpoint) -> bool:
-    """Whether it runs, reverses and trips."""
+    """Return True if a belt or a named drive runs, reverses and trips."""
     return isinstance(part, NamedDrive) or getattr(part, "drive", None) is not None
 
 
