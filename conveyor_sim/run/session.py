@@ -35,8 +35,19 @@ def keep_stopped(simulation: Simulation, folder: Path | None, error: SimulationE
 class RunSession:
     """A simulation with its sinks. Only the thread that steps it may use it."""
 
-    def __init__(self, simulation: Simulation, sink: MessageSink, bag: Path | None, frame_id: str, distro: str) -> None:
+    def __init__(
+        self,
+        simulation: Simulation,
+        sink: MessageSink,
+        bag: Path | None,
+        frame_id: str,
+        distro: str,
+        *,
+        namespace: str = "",
+    ) -> None:
         """Start the run at the present tick of `simulation`. bag: folder to record to, or None.
+
+        namespace: prefix of the recorded topics.
 
         Raises BagError if the folder can't be written; nothing has been published then.
         """
@@ -51,7 +62,9 @@ class RunSession:
         self._began = simulation.time
         keep_start = simulation.save if simulation.tick > 0 else None
         sources = sources_of(simulation.scene)
-        self._recorder = Recorder(bag, distro=distro, start=keep_start, sources=sources) if bag else None
+        self._recorder = (
+            Recorder(bag, distro=distro, start=keep_start, sources=sources, namespace=namespace) if bag else None
+        )
         sinks = [sink] if self._recorder is None else [self._recorder, sink]
         self.outputs = OutputWriter(self.simulation, sinks, frame_id=frame_id, run_id=self.run_id)
         self.outputs.start()
