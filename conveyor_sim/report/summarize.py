@@ -121,7 +121,7 @@ class _Tally:
             peak_force_99=None if self._unknown else float(np.percentile(forces, 99.0)) if len(forces) else 0.0,
             setting=printable(f"{line.integrator}, dt = {line.dt * 1e6:.4g} us: {line.dt_reason}", SENTENCE),
             predicted=None if model is None else model.prediction.sentence,
-            limit=_step_limit(line),
+            limit=_step_limit(line, len(belt)),
             achieved=None if model is None else achieved(model, peak),
             pressed=None if model is None else pressed(model, self._pressing.load),
             guard=dict(Counter(kind for kind, _ in self._guard)),
@@ -185,12 +185,15 @@ def _model(line: Any) -> Model | None:
         return None
 
 
-def _step_limit(line: Any) -> StepLimit | None:
-    """Return the step limit of a recorded scene; None if this version would choose another number of steps."""
+def _step_limit(line: Any, bottles: int) -> StepLimit | None:
+    """Return the step limit of a recorded scene; None if this version would choose another number of steps.
+
+    bottles: on the line at the end.
+    """
     try:
         scene = parse_again(line.scene_text, line.scene_name, parse_overrides(line.overrides))
         choice = choose_steps(Plant.of(scene))
     except SceneError:
         return None
     same = (scene.accuracy.integrator, choice.steps) == (line.integrator, line.steps_per_tick)
-    return step_limit(scene, choice) if same else None
+    return step_limit(scene, choice, bottles) if same else None
