@@ -102,7 +102,9 @@ _WHERE = {
 @click.option("--mqtt-primary-host", default="", metavar="ID", help="Publish only while this host is online.")
 @click.option("--web", type=PORT, is_flag=False, flag_value=8080, help="Serve a page for browsers on this port.")
 @click.option("--foxglove", type=PORT, is_flag=False, flag_value=8765, help="Serve Foxglove on this port.")
-@click.option("--web-certificates", type=click.Path(path_type=Path), help="Folder of its certificate and key.")
+@click.option(
+    "--web-certificates", type=click.Path(path_type=Path), help="Folder of the certificate and key of the page."
+)
 @click.option(
     "--users",
     "--opcua-users",
@@ -222,7 +224,7 @@ def _is_bag(what: str) -> bool:
 
 
 def _require_lockstep(settings: ServerSettings) -> None:
-    _require_not_given("--lockstep", ("real_time_factor",), "none: the PLC sets the pace")
+    _require_not_given("--lockstep", ("real_time_factor",), "none: the PLC advances the time")
     _require_not_given("--lockstep", controllers.NAMES, "none: the PLC is the controller")
     if settings.modbus_role != "controller" and settings.users is None:
         raise ConveyorError(
