@@ -108,8 +108,9 @@ def pattern_problem(patterns: Sequence[str], devices: Collection[str], where: st
         return f"{len(patterns)} patterns given, expected {MOST_PATTERNS} at most"
     for pattern in patterns:
         if not any(covers(pattern, device, where) for device in devices):
-            some = ", ".join(list(devices)[:5]) or "none: there are none"
-            return f"{printable(pattern)}: fits no device that takes commands, expected such as {some}"
+            some = ", ".join(list(devices)[:5])
+            expected = f"expected such as {some}" if some else "and the line has none"
+            return f"{printable(pattern)}: fits no device that takes commands, {expected}"
     return ""
 
 

@@ -324,8 +324,8 @@ class LineMirror:
         if self._info is not None and self._strange:
             self._forget(message.run_id)
             raise LineMirrorError(
-                f"{info.name}: another line than before, or with other tags; expected {self._info.name} as it was: "
-                "restart serving"
+                f"{info.name}: the line or its tags have changed; expected {self._info.name} with the same tags; "
+                "restart the servers"
             )
         if message.run_id != self._run_id or self._info is None:
             self._forget(message.run_id)
