@@ -66,6 +66,10 @@ class Stamps:
 
 DRAWN = ("bottles", "contacts", "belts", "signals")
 """Topics that blocks contain."""
+_LOOKS = 24
+"""Moments among which the fullest one is searched, at most."""
+_LOOK_EVERY = 1.0
+"""Least simulated time between two of them, s; more of them would read the same chunks again."""
 VARIABLES = "variables"
 """Topic of a controller's variables, which are further columns of the signals."""
 
@@ -182,6 +186,23 @@ class PageRecording:
         """Number of stretches of the story."""
         return 1 + math.floor((self.last - self._began) * self._tick_ns * 1e-9 / self._detail.story)
 
+    def fullest(self) -> int:
+        """Return the tick of the displayed part with the most bottles, among ticks that are evenly spaced.
+
+        It is the first one of equals, and the first tick if no bottles were recorded.
+        """
+        if not self._bag.counts.get("bottles"):
+            return self.first
+        count = min(_LOOKS, 1 + round((self.last - self.first) * self._tick_ns * 1e-9 / _LOOK_EVERY))
+        looks = np.linspace(self.first, self.last, count).astype(np.int64).tolist()
+        # The size of a message grows with the number of its bottles, so it needs no decoding.
+        sizes = {}
+        for look, stop in zip(looks, [*looks[1:], self.last + 1], strict=True):
+            for _, tick, raw in self._stamps.messages(("bottles",), look, stop):
+                sizes[tick] = len(raw)
+                break
+        return max(sizes, key=lambda tick: sizes[tick], default=self.first)
+
     def head(self) -> dict[str, Any]:
         """Return the data of `head.head`, with the times and the numbers of blocks and stretches."""
         times = {
@@ -190,6 +211,7 @@ class PageRecording:
             "block": self._block_ticks,
             "blocks": self.blocks,
             "stories": self.stories,
+            "fullest": self.fullest(),
         }
         forced: list[int] = next((to_image(frame.data).forced.tolist() for frame in self._bag.messages("signals")), [])
         shown = head(self._bag.line, self._scene)
