@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +16,7 @@ from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.bag.reader import Bag
 from conveyor_sim.columns.bottles import BottleColumns
 from conveyor_sim.columns.variables import VariableColumns
+from conveyor_sim.errors import BagError
 from conveyor_sim.page.block import SECONDS, BlockContent, block_ticks, pack
 from conveyor_sim.page.head import head
 from conveyor_sim.page.story import TOPICS_READ, Story
@@ -189,7 +191,7 @@ class PageRecording:
     def fullest(self) -> int:
         """Return the tick of the displayed part with the most bottles, among ticks that are evenly spaced.
 
-        It is the first one of equals, and the first tick if no bottles were recorded.
+        It is the first one of equals, and the first tick if no bottles were recorded. Unreadable ticks are skipped.
         """
         if not self._bag.counts.get("bottles"):
             return self.first
@@ -198,9 +200,9 @@ class PageRecording:
         # The size of a message grows with the number of its bottles, so it needs no decoding.
         sizes = {}
         for look, stop in zip(looks, [*looks[1:], self.last + 1], strict=True):
-            for _, tick, raw in self._stamps.messages(("bottles",), look, stop):
+            with suppress(BagError):
+                _, tick, raw = next(self._stamps.messages(("bottles",), look, stop), ("", look, b""))
                 sizes[tick] = len(raw)
-                break
         return max(sizes, key=lambda tick: sizes[tick], default=self.first)
 
     def head(self) -> dict[str, Any]:
@@ -211,7 +213,6 @@ class PageRecording:
             "block": self._block_ticks,
             "blocks": self.blocks,
             "stories": self.stories,
-            "fullest": self.fullest(),
         }
         forced: list[int] = next((to_image(frame.data).forced.tolist() for frame in self._bag.messages("signals")), [])
         shown = head(self._bag.line, self._scene)

@@ -5,6 +5,7 @@ const PLACES = [[0, -1], [0, 1], [1, 0], [-1, 0], [1, -1], [-1, -1], [1, 1], [-1
 const GAP = 5, HEIGHT = 16;
 const SURE = 6; // names of this importance may cover small objects rather than stand elsewhere
 const FAN = Array.from({ length: 16 }, (_, i) => [Math.cos((i * Math.PI) / 8), Math.sin((i * Math.PI) / 8)].map((part) => +part.toFixed(3)));
+const BESIDE = 0.6; // least cosine between the place of a distant name and that across its object
 const RING = 20; // px by which each further ring of places is away
 const RINGS = [0, 0, 3, 4, 6, 6, 8]; // rings with a leader line by importance
 const snapped = (part) => (Math.abs(part) < Math.sin(Math.PI / 8) ? 0 : Math.sign(part));
@@ -60,7 +61,7 @@ export class Labels {
   // of: key of the object; x, y: px; reach: px between the point and the name; call for the most important names first.
   // towards: best of PLACES; a place across to it lies on the named object.
   add(of, text, x, y, { importance = 0, reach = 6, colour = null, bold = false, towards = null } = {}) {
-    this.wanted.push({ of, text, x, y, importance, reach, colour, bold, places: towards ? placesTowards(towards) : PLACES });
+    this.wanted.push({ of, text, x, y, importance, reach, colour, bold, towards, places: towards ? placesTowards(towards) : PLACES });
   }
 
   // covered: boxes without names, px.
@@ -101,7 +102,8 @@ export class Labels {
       const place = this._tried(label, width, camera, boxes, lines, ...last);
       if (place) return place;
     }
-    const [[ax, ay]] = label.places, fan = [...FAN].sort(([bx, by], [cx, cy]) => ax * (cx - bx) + ay * (cy - by)); // best direction first
+    const [[ax, ay]] = label.places, across = ([x, y]) => (ax * x + ay * y) / Math.hypot(ax, ay);
+    const fan = FAN.filter((place) => !label.towards || Math.abs(across(place)) > BESIDE).sort((one, other) => across(other) - across(one)); // best first
     for (let ring = 0; ring <= rings; ring++) for (const [dx, dy] of ring ? fan : label.places) {
       const place = this._tried(label, width, camera, boxes, lines, dx, dy, ring);
       if (place) return place;

@@ -66,6 +66,15 @@ async function told(source, part, take) {
   }
 }
 
+// Returns the tick with the most bottles; the first one if it can't be read.
+async function fullest(source) {
+  try {
+    return await read(source, "fullest");
+  } catch {
+    return 0;
+  }
+}
+
 async function read(source, name) {
   return JSON.parse(new TextDecoder().decode(await source.bytes(name)));
 }
@@ -152,8 +161,9 @@ async function startRecording() {
   if (failure) {
     warn(failure.text);
     view.clock.seek(Math.max(recording.start, failure.time - 5));
-  } else view.clock.seek(head.times.fullest * head.tick);
+  }
   const linked = view.link.follow();
+  if (!failure && !linked) view.clock.seek(await fullest(source) * head.tick);
   await Promise.all(view.clock.all.map((one) => one.load(one.number(view.clock.time))));
   view.snap();
   view.link.opened = linked ? null : view.clock.time;
