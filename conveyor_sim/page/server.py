@@ -46,7 +46,7 @@ class RecordingServer(AbstractContextManager["RecordingServer"]):
     def answer(self, name: str) -> bytes:
         """Return the deflated part with a name. Raise KeyError if there is none, and BagError.
 
-        Names: head, fullest, story/<n>, block/<n>, each of them after other/ for the other recording, and difference/<n>.
+        Names: head, fullest, story/<n> and block/<n>, each of them after other/ for the other recording; difference/<n>.
         """
         place = int(name.startswith("other/"))
         if place >= len(self._blocks):
