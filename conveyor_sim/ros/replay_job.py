@@ -30,7 +30,9 @@ from conveyor_sim.bag.reader import Bag, open_bag
 from conveyor_sim.errors import BagError, ConveyorError
 from conveyor_sim.ros.clock import ClockPublisher, GraphWatch
 from conveyor_sim.ros.context import new_node, start_ros
-from conveyor_sim.ros.publishers import message_class, published_hashes, ros_qos
+from conveyor_sim.ros.publishers import message_class, published_hashes
+from conveyor_sim.ros.qos_overrides import publisher_qos
+from conveyor_sim.ros.service_names import create_service
 from conveyor_sim.ros.services import settled
 from conveyor_sim.ros.spinner import Spinner
 from conveyor_sim.run.calls import CallQueue
@@ -88,9 +90,9 @@ class ReplayNode:
         # A steady clock, because with use_sim_time the clock of the node stands still while paused.
         self._node.create_timer(GRAPH_LOOK, watch.look, clock=Clock(clock_type=ClockType.STEADY_TIME))
         group = ReentrantCallbackGroup()
-        self._node.create_service(Trigger, "pause", self._pause, callback_group=group)
-        self._node.create_service(Trigger, "resume", self._resume, callback_group=group)
-        self._node.create_service(Seek, "seek", self._seek, callback_group=group)
+        create_service(self._node, Trigger, "pause", self._pause, callback_group=group)
+        create_service(self._node, Trigger, "resume", self._resume, callback_group=group)
+        create_service(self._node, Seek, "seek", self._seek, callback_group=group)
         self._thread = threading.Thread(target=self._run, name="player", daemon=True)
         self._spinner.start(self._node)
         self._thread.start()
@@ -119,7 +121,7 @@ class ReplayNode:
                 left_out, kind_name = printable(topic.name), printable(topic.type)
                 self._node.get_logger().warning(f"{left_out}: left out, {kind_name} is not installed here")
                 continue
-            publisher = self._node.create_publisher(kind, topic.name, ros_qos(topic.qos))
+            publisher = self._node.create_publisher(kind, topic.name, publisher_qos(self._node, topic.name, topic.qos))
             # Bytes are published as recorded. With another definition, they would be garbage.
             if topic.type_hash and topic.type_hash not in published_hashes(self._node, publisher.topic_name):
                 self._node.destroy_publisher(publisher)
