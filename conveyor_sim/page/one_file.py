@@ -80,6 +80,7 @@ def write_page(
             comparison = RecordingComparison(opened[0], opened[1], math.inf)
             head["compared"] = comparison.head()
             parts["difference/0"] = _deflated(text(comparison.part()))
+            parts["peaks/0"] = _deflated(text(comparison.peaks()))
             parts.update(_parts(recordings[1], "other/", {}))
         parts.update(_parts(recordings[0], "", head, None if watch is None or watch.end < 0 else watch.blocks()))
         page = one_file(parts, recordings[0].name)
@@ -95,6 +96,7 @@ def _parts(
 ) -> Iterator[tuple[str, bytes]]:
     """Yield names and content of the parts. blocks: deflated; None: those of the recording."""
     yield f"{prefix}head", _deflated(text({**recording.head(), **more}))
+    yield f"{prefix}fullest", _deflated(text(recording.fullest()))
     yield f"{prefix}story/0", _deflated(recording.story())
     for number in range(recording.blocks) if blocks is None else ():
         yield f"{prefix}block/{number}", _deflated(recording.block(number))
