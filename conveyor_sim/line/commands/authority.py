@@ -5,12 +5,14 @@ from fnmatch import fnmatchcase
 from typing import NamedTuple
 
 from conveyor_sim.line.commands.inputs import (
+    DELETE,
     DISOWN,
     FORCE,
     INJECT,
     MODE,
     OWN,
     SET,
+    SPAWN,
     UNFORCE,
     WRITER_KINDS,
     Input,
@@ -48,6 +50,11 @@ MAY: Mapping[str, Right] = {
     "reset_counters": Right(
         ("controller", *PEOPLE, "test"), "Resets counters and times of the named devices; of all if no names are given."
     ),
+    SPAWN: Right(
+        ("controller", *PEOPLE, "test"),
+        "Puts bottles of the types in names on the line; values: x, y (m), theta (rad), vx, vy (m/s), omega (rad/s).",
+    ),
+    DELETE: Right(("controller", *PEOPLE, "test"), "Removes the bottles with the IDs in values."),
 }
 """Rights by operation. An operation that is not listed is forbidden."""
 
@@ -81,6 +88,12 @@ MOST_PATTERNS = 1000
 def reserved_mode(kind: str, modes: Iterable[float]) -> float | None:
     """Return the first mode that a kind of writer may not set; None if it may set all of them."""
     return next((mode for mode in modes if mode not in MAY_SET.get(kind, ())), None)
+
+
+def advice(kind: WriterKind) -> str:
+    """Return what lets a kind of writer command a device that is in another mode."""
+    modes = [text for number, text in MODES.items() if kind in IN_CONTROL[number]]
+    return f"set its mode to {modes[-1]} first" if kind in PEOPLE else f"expected {' or '.join(modes)}"
 
 
 def reserved(device: str, kind: str, mode: float) -> str:
