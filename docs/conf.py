@@ -38,6 +38,7 @@ autodoc_typehints = "signature"
 autodoc_default_options = {"members": True, "undoc-members": True}
 default_role = "code"  # docstrings are Markdown in this
 
+PARTS = sorted(page.stem for page in ROOT.glob("docs/parts/*.md"))
 STUDIES = sorted(ROOT.glob("docs/accuracy/*/tables.md"))
 NAVIGATION = {
     "README": {
@@ -54,6 +55,7 @@ NAVIGATION = {
         "What to rely on": ["docs/accuracy", "docs/stability", "docs/reliability", "docs/performance", "docs/paper"],
         "Inside": ["docs/architecture", "docs/extending", "docs/api/index", "CONTRIBUTING", "CHANGELOG"],
     },
+    "docs/scene": {"Parts": [f"parts/{page}" for page in PARTS]},
     "docs/accuracy": {"Tables": ["accuracy/promises", *(f"accuracy/{page.parent.name}/tables" for page in STUDIES)]},
     "docs/stability": {"Tables": ["stability/cases", "stability/fuzz"]},
     "docs/api/index": {"Modules": ["simulation", "observations", "testing", "control", "recordings", "errors"]},
