@@ -42,12 +42,13 @@ PARTS = sorted(page.stem for page in ROOT.glob("docs/parts/*.md"))
 STUDIES = sorted(ROOT.glob("docs/accuracy/*/tables.md"))
 NAVIGATION = {
     "README": {
-        "First steps": [
-            *("docs/build_a_line", "docs/testing_control_logic", "docs/structured_text", "docs/ros"),
-            *("docs/scada", "docs/opcua", "docs/plc"),
+        "Tutorials": ["docs/build_a_line", "docs/tutorial_plc", "docs/tutorial_scada", "docs/tutorial_ros"],
+        "Control and protocols": [
+            *("docs/testing_control_logic", "docs/structured_text", "docs/plc"),
+            *("docs/scada", "docs/opcua", "docs/ros"),
         ],
         "A line": [
-            *("docs/scene", "docs/layout", "docs/conveyors", "docs/placement", "docs/check", "docs/line"),
+            *("docs/index", "docs/scene", "docs/layout", "docs/conveyors", "docs/placement", "docs/check", "docs/line"),
             *("docs/alarms", "docs/report", "docs/studies", "docs/view", "docs/drawings"),
             *("docs/effects", "docs/base", "docs/energy_and_damage", "docs/glossary"),
         ],
