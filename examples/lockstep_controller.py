@@ -29,7 +29,7 @@ RUN_ID = "lockstep_controller"
 def main(belt: str, scans: int) -> None:
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     node = Node("lockstep_controller")
-    client = node.create_client(Lockstep, "lockstep")
+    client = node.create_client(Lockstep, "conveyor_sim/lockstep")
     latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     _, line = wait_for_message(Line, node, "line", qos_profile=latched)
     if belt not in line.belts:

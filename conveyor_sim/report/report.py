@@ -44,11 +44,6 @@ def render(summary: Summary) -> Group:
 
 def _account(summary: Summary) -> list[tuple[str, str]]:
     wall, factor = summary.wall, summary.real_time_factor
-    # Which signals count bottles is known from the scene alone.
-    uncounted = "not known" if summary.predicted is None else "not recorded"
-    fed = uncounted if summary.fed is None else str(summary.fed)
-    removed = uncounted if summary.removed is None else str(summary.removed)
-    out = f" ({summary.rejected} rejected)" if summary.rejected else ""
     force = "not recorded"
     if summary.peak_force is not None:
         force = f"peak {summary.peak_force:.2f} N, 99th percentile of peaks {summary.peak_force_99:.2f} N"
@@ -64,7 +59,7 @@ def _account(summary: Summary) -> list[tuple[str, str]]:
         ("simulated", f"{summary.simulated:.2f} s"),
         ("wall time", "not known" if wall is None else f"{wall:.2f} s"),
         ("real-time factor", "not known" if factor is None else f"{factor:.2f}"),
-        ("bottles", f"{fed} fed, {removed} removed{out}, {summary.present} present ({summary.on_floor} on no belt)"),
+        ("bottles", f"{summary.bottles.sentence} ({summary.on_floor} on no belt)"),
         ("loop", loop),
         ("contact force", force),
         ("setting", summary.setting),

@@ -1,7 +1,7 @@
 """`AttachedNode`: a controller that is a ROS node, attached to a simulation that a test steps.
 
-To the node, it looks like `sim_node` in lockstep: the latched topic `line` and the service `lockstep`. To the test, it
-is a controller with `scan`. Scans between two requests of the node have no commands. The bits are therefore those of
+To the node, it looks like `sim_node` in lockstep: the latched topic `line` and the service `~/lockstep`. To the test,
+it is a controller with `scan`. Scans between two requests of the node have no commands. The bits are therefore those of
 the same controller as an object of the test.
 """
 
@@ -32,6 +32,7 @@ from conveyor_sim.ros.context import new_node, start_ros
 from conveyor_sim.ros.domain import in_environment, own_domain
 from conveyor_sim.ros.lockstep_service import Intake, LockstepService
 from conveyor_sim.ros.publishers import check_type, ros_qos
+from conveyor_sim.ros.service_names import SIMULATION
 from conveyor_sim.ros.spinner import Spinner
 from conveyor_sim.run.alarm_changes import AlarmChanges
 from conveyor_sim.run.calls import CallQueue
@@ -65,7 +66,7 @@ class AttachedNode(AttachedController):
         patience: float,
     ) -> None:
         """command: starts the controller, which close() ends. Empty: the controller is started elsewhere.
-        namespace: that of `line` and `lockstep`. domain: ROS_DOMAIN_ID; None: a free one, on this machine only.
+        namespace: that of the topic `line`. domain: ROS_DOMAIN_ID; None: a free one, on this machine only.
         patience: longest time for each request, s of wall time.
 
         Raises ConveyorError if there is no free domain or the message package does not fit, OSError if the command
@@ -135,7 +136,7 @@ class AttachedNode(AttachedController):
         context = Context()
         start_ros(context)
         stack.callback(rclpy.shutdown, context=context)
-        node = new_node("conveyor_sim", context=context, namespace=namespace)
+        node = new_node(SIMULATION, context=context, namespace=namespace)
         stack.callback(node.destroy_node)
         lines = node.create_publisher(Line, "line", ros_qos(TOPICS["line"].qos))
         check_type(node, lines.topic_name, LINE, default_distro())
@@ -145,7 +146,7 @@ class AttachedNode(AttachedController):
         spinner.start(node)
         stack.callback(spinner.close)
         stack.callback(Intake(context, lockstep, died=self._died).close)
-        return node.resolve_service_name("lockstep")
+        return node.resolve_service_name("~/lockstep")
 
     def _require_going_on(self, inputs: Inputs, late: bool) -> None:
         """Raise ControlError if no further request can be expected."""

@@ -36,6 +36,7 @@ from conveyor_sim.ros.clock import to_time
 from conveyor_sim.ros.direct import Aside, WaitSet, send_request, take_response
 from conveyor_sim.ros.publishers import require_same_definition, ros_qos
 from conveyor_sim.ros.sent_inputs import alarm_messages
+from conveyor_sim.ros.service_names import of_simulation
 from conveyor_sim.ros.spinner import Spinner
 from conveyor_sim.run.alarm_changes import AlarmChanges
 from conveyor_sim.scene import parse_again, parse_overrides
@@ -47,7 +48,9 @@ class LockstepClient:
     """Client for one thread."""
 
     def __init__(self, node: Node) -> None:
-        self._client = node.create_client(Lockstep, "lockstep", qos_profile=ros_qos(ANSWERS), callback_group=Aside())
+        self._client = node.create_client(
+            Lockstep, of_simulation("lockstep"), qos_profile=ros_qos(ANSWERS), callback_group=Aside()
+        )
         self._waiting = WaitSet(node.context, clients=[self._client])
 
     def close(self) -> None:

@@ -24,10 +24,14 @@ from conveyor_sim.ros.clock import to_time
 from conveyor_sim.ros.direct import Aside, WaitSet, take_request
 from conveyor_sim.ros.publishers import ros_qos
 from conveyor_sim.ros.sent_inputs import received_inputs
+from conveyor_sim.ros.service_names import Deprecation
 from conveyor_sim.run.lockstep import LockstepAnswer, LockstepRequest, Refused
 from conveyor_sim.simulation import Simulation
 
 T = TypeVar("T")
+
+Asker = tuple[Service, Any]
+"""Receiver of an answer: the service that took the request, and the header of the request."""
 
 MOST_WAITING = 100
 """Requests that may wait for an answer at once. One controller has one, repeated a few times."""
@@ -64,15 +68,23 @@ class LockstepService:
         self._died = died
         self._waiting = 0
         self._lock = threading.Lock()
-        self.service: Service = node.create_service(
-            Lockstep, "lockstep", _never, qos_profile=ros_qos(ANSWERS), callback_group=Aside()
+        self.services: tuple[Service, ...] = tuple(
+            node.create_service(Lockstep, name, _never, qos_profile=ros_qos(ANSWERS), callback_group=Aside())
+            for name in ("~/lockstep", "lockstep")
         )
+        """The service, and its old name."""
+        self._deprecation = Deprecation(node, "lockstep")
 
-    def take(self) -> tuple[Any, Any] | None:
-        """Return the next request and the header of its answer; None if there is none."""
-        return take_request(self.service)
+    def take(self) -> tuple[Any, Asker] | None:
+        """Return the next request and the receiver of its answer; None if there is none."""
+        for service in self.services:
+            if (taken := take_request(service)) is not None:
+                if service is not self.services[0]:
+                    self._deprecation.log()
+                return taken[0], (service, taken[1])
+        return None
 
-    def serve(self, request: Any, header: Any) -> None:
+    def serve(self, request: Any, asker: Asker) -> None:
         """Pass a request to the stepping thread, which answers it when its target is reached."""
         wanted = LockstepRequest(
             request.run_id,
@@ -86,25 +98,25 @@ class LockstepService:
             full = self._waiting >= MOST_WAITING
             self._waiting += not full
         if full:
-            self._send(self._now(f"{MOST_WAITING} requests wait for their answers already"), header)
+            self._send(self._now(f"{MOST_WAITING} requests wait for their answers already"), asker)
             return
 
         def advance() -> None:
             try:
                 self._stepper.advance_lockstep(wanted).add_done_callback(answer)
             except Refused as error:  # answered with the present state, which only the stepping thread may read
-                self._answer(self._filled(self._stepper.present(), str(error)), header)
+                self._answer(self._filled(self._stepper.present(), str(error)), asker)
 
         def answer(advanced: Future[LockstepAnswer]) -> None:
             error = advanced.exception()
             if error is None:
-                self._answer(self._filled(advanced.result()), header)
+                self._answer(self._filled(advanced.result()), asker)
             else:
                 refuse(error)
 
         def refuse(error: BaseException) -> None:
             if isinstance(error, ConveyorError):
-                self._answer(self._now(str(error)), header)
+                self._answer(self._now(str(error)), asker)
             else:
                 self._died(error if isinstance(error, Exception) else RuntimeError(str(error)))
 
@@ -114,14 +126,15 @@ class LockstepService:
 
         self._stepper.call(advance).add_done_callback(called)
 
-    def _answer(self, response: Any, header: Any) -> None:
+    def _answer(self, response: Any, asker: Asker) -> None:
         with self._lock:
             self._waiting -= 1
-        self._send(response, header)
+        self._send(response, asker)
 
-    def _send(self, response: Any, header: Any) -> None:
+    def _send(self, response: Any, asker: Asker) -> None:
         try:
-            self.service.send_response(response, header)
+            service, header = asker
+            service.send_response(response, header)
         except Exception as error:  # errors of rclpy have no common base, and a future would hide them
             self._died(error)
 
@@ -214,7 +227,7 @@ class Intake:
         self._died = died
         self._closing = False
         self._waiting = WaitSet(
-            context, subscriptions=[topic.subscription for topic in topics], services=[lockstep.service]
+            context, subscriptions=[topic.subscription for topic in topics], services=lockstep.services
         )
         self._thread = threading.Thread(target=self._run, name="intake", daemon=True)
         self._thread.start()

@@ -30,6 +30,7 @@ from conveyor_sim.ros.context import new_node, one_sentence
 from conveyor_sim.ros.diagnostics import Diagnostics
 from conveyor_sim.ros.lockstep_service import Intake, LockstepService
 from conveyor_sim.ros.publishers import RosSink
+from conveyor_sim.ros.service_names import SIMULATION, create_service
 from conveyor_sim.ros.services import CheckpointServices, Services, settled
 from conveyor_sim.ros.spinner import Spinner
 from conveyor_sim.run.active_run import ActiveRun
@@ -53,8 +54,8 @@ class InputServices:
         self._executor = executor
         self._stepper = stepper
         group = ReentrantCallbackGroup()
-        node.create_service(InjectFault, "inject_fault", self._inject, callback_group=group)
-        node.create_service(Operate, "operate", self._operate, callback_group=group)
+        create_service(node, InjectFault, "inject_fault", self._inject, callback_group=group)
+        create_service(node, Operate, "operate", self._operate, callback_group=group)
 
     async def _inject(self, request: Any, response: Any) -> Any:
         def between_ticks() -> str:
@@ -117,7 +118,7 @@ class SimNode:
         self._stepper: Stepper | None = None
         self._intake: Intake | None = None
         self._spinner = Spinner(context, died=self._die)
-        self._node = new_node("conveyor_sim", context=context, cli_args=list(arguments) if arguments else None)
+        self._node = new_node(SIMULATION, context=context, cli_args=list(arguments) if arguments else None)
         try:
             self._prepare()
         except BaseException:

@@ -25,6 +25,7 @@ from conveyor_sim.protocols.tags.tag_provider import MOST_WAITING, Control
 from conveyor_sim.ros.context import new_node, one_sentence, start_ros
 from conveyor_sim.ros.direct import Aside, WaitSet, take_message
 from conveyor_sim.ros.publishers import message_class, require_same_definition, ros_qos
+from conveyor_sim.ros.service_names import of_simulation
 from conveyor_sim.ros.spinner import Spinner
 from conveyor_sim.support.printable import SENTENCE, printable
 
@@ -65,13 +66,13 @@ class NodeSource(LineMirror, AbstractContextManager["NodeSource"]):
                 )
                 for name in (*STATE_TOPICS, *(DRAWING_TOPICS if drawn else ()))
             }
-            self._alive_client = self._node.create_client(srv.GetSimulationState, "get_simulation_state")
-            self._operate = self._node.create_client(srv.Operate, "operate")
+            self._alive_client = self._node.create_client(srv.GetSimulationState, of_simulation("get_simulation_state"))
+            self._operate = self._node.create_client(srv.Operate, of_simulation("operate"))
             self._services: dict[str, Any] = {
-                "pause": self._node.create_client(Trigger, "pause"),
-                "resume": self._node.create_client(Trigger, "resume"),
-                "step": self._node.create_client(srv.StepSimulation, "step_simulation"),
-                "reset": self._node.create_client(srv.ResetSimulation, "reset_simulation"),
+                "pause": self._node.create_client(Trigger, of_simulation("pause")),
+                "resume": self._node.create_client(Trigger, of_simulation("resume")),
+                "step": self._node.create_client(srv.StepSimulation, of_simulation("step_simulation")),
+                "reset": self._node.create_client(srv.ResetSimulation, of_simulation("reset_simulation")),
             }
         self._lock = threading.Lock()
         self._asked: dict[Future, Any] = {}  # requests without an answer, with their clients

@@ -31,6 +31,7 @@ from conveyor_sim.errors import BagError, ConveyorError
 from conveyor_sim.ros.clock import ClockPublisher, GraphWatch
 from conveyor_sim.ros.context import new_node, start_ros
 from conveyor_sim.ros.publishers import message_class, published_hashes, ros_qos
+from conveyor_sim.ros.service_names import create_service
 from conveyor_sim.ros.services import settled
 from conveyor_sim.ros.spinner import Spinner
 from conveyor_sim.run.calls import CallQueue
@@ -88,9 +89,9 @@ class ReplayNode:
         # A steady clock, because with use_sim_time the clock of the node stands still while paused.
         self._node.create_timer(GRAPH_LOOK, watch.look, clock=Clock(clock_type=ClockType.STEADY_TIME))
         group = ReentrantCallbackGroup()
-        self._node.create_service(Trigger, "pause", self._pause, callback_group=group)
-        self._node.create_service(Trigger, "resume", self._resume, callback_group=group)
-        self._node.create_service(Seek, "seek", self._seek, callback_group=group)
+        create_service(self._node, Trigger, "pause", self._pause, callback_group=group)
+        create_service(self._node, Trigger, "resume", self._resume, callback_group=group)
+        create_service(self._node, Seek, "seek", self._seek, callback_group=group)
         self._thread = threading.Thread(target=self._run, name="player", daemon=True)
         self._spinner.start(self._node)
         self._thread.start()

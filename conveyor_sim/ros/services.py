@@ -28,6 +28,7 @@ from std_srvs.srv import Trigger
 from conveyor_sim import __version__
 from conveyor_sim.errors import CheckpointError, ConveyorError
 from conveyor_sim.ros.clock import to_time
+from conveyor_sim.ros.service_names import create_service
 from conveyor_sim.run.calls import settle
 from conveyor_sim.run.lockstep import Refused
 from conveyor_sim.run.run_state import SimulationState
@@ -91,12 +92,12 @@ class Services:
         self._stepper = stepper
         self._create("StepSimulation", self._step)
         self._create("ResetSimulation", self._reset)
-        self._node.create_service(Trigger, "pause", self._pause, callback_group=self._group)
-        self._node.create_service(Trigger, "resume", self._resume, callback_group=self._group)
+        create_service(self._node, Trigger, "pause", self._pause, callback_group=self._group)
+        create_service(self._node, Trigger, "resume", self._resume, callback_group=self._group)
 
     def _create(self, name: str, handler: Callable[[Any, Any], Any]) -> None:
         topic = _snake_case(name)
-        self._node.create_service(getattr(own_srv, name), topic, handler, callback_group=self._group)
+        create_service(self._node, getattr(own_srv, name), topic, handler, callback_group=self._group)
         if self._real_srv is not None:
             self._node.create_service(
                 getattr(self._real_srv, name), PREFIX + topic, handler, callback_group=self._group
@@ -226,8 +227,8 @@ class CheckpointServices:
         self._log = node.get_logger()
         self._reading = False
         group = ReentrantCallbackGroup()
-        node.create_service(SaveCheckpoint, "save_checkpoint", self._save, callback_group=group)
-        node.create_service(LoadCheckpoint, "load_checkpoint", self._load, callback_group=group)
+        create_service(node, SaveCheckpoint, "save_checkpoint", self._save, callback_group=group)
+        create_service(node, LoadCheckpoint, "load_checkpoint", self._load, callback_group=group)
 
     async def _save(self, request: Any, response: Any) -> Any:
         try:

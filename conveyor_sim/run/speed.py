@@ -11,7 +11,7 @@ LISTED = 2
 """Number of topics listed, largest first."""
 
 NO_BOUND = "nothing in the scene bounds the time step"
-NO_REMEDY = "no single change of the scene that is known to help takes fewer steps"
+NO_REMEDY = "no single change of the scene, among those that usually help, leads to fewer steps"
 
 
 @dataclass(frozen=True)
@@ -35,10 +35,6 @@ class Spent:
     """Messages and the bag."""
 
 
-MANY = 100
-"""Assumed number of bottles of a scene with an endless infeed."""
-
-
 def expected(limit: StepLimit) -> list[str]:
     """Return the lines for a run that was not made yet."""
     return [f"speed: {expected_factor(limit)}; `run` measures it", *_by_steps(limit)]
@@ -46,10 +42,9 @@ def expected(limit: StepLimit) -> list[str]:
 
 def expected_factor(limit: StepLimit) -> str:
     """Return the estimated speed of a run that was not made yet, in words."""
-    bottles = MANY if limit.bottles is None else max(1, limit.bottles)
-    factor = 1.0 / limit.seconds(bottles)
+    factor = 1.0 / limit.seconds
     times = f"{factor:.2g}" if factor < 100.0 else f"{factor:.0f}"
-    on_line = "1 bottle" if bottles == 1 else f"{bottles} bottles"
+    on_line = "1 bottle" if limit.bottles == 1 else f"{limit.bottles} bottles"
     return f"about {times} x real time on one core with {on_line}, an estimate"
 
 

@@ -9,11 +9,11 @@ from facts import missing
 from scenes import NO_FLOOR, base, belt, bottle, contact, scene, segment
 
 from conveyor_sim.accuracy.candidates import candidates
-from conveyor_sim.accuracy.report.forecast import TICK, TRUSTED, forecast, foretold, predicted_error, seconds
+from conveyor_sim.accuracy.report.forecast import TRUSTED, forecast, foretold, predicted_error, seconds
 from conveyor_sim.accuracy.report.interim import PREDICTED, predicted
 from conveyor_sim.accuracy.results import Point
 from conveyor_sim.accuracy.setting import Setting
-from conveyor_sim.physics.model.remedies import BESIDE, BOTTLE_STEP
+from conveyor_sim.physics.model.remedies import BESIDE, BOTTLE_STEP, TICK_COST
 from conveyor_sim.scene import Scene
 
 
@@ -66,7 +66,7 @@ def test_each_line_says_that_nothing_has_run() -> None:
 def test_cost_goes_as_the_steps_with_a_part_that_ticks_take() -> None:
     it = line()
     one, two = (seconds(it, Setting("leapfrog", steps), 40) for steps in (100, 200))
-    assert one == pytest.approx(100 / 0.01 * (40 + BESIDE) * BOTTLE_STEP + TICK / 0.01)
+    assert one == pytest.approx(100 / 0.01 * (40 + BESIDE) * BOTTLE_STEP + TICK_COST / 0.01)
     assert two - one == pytest.approx(100 / 0.01 * (40 + BESIDE) * BOTTLE_STEP)
     assert seconds(it, Setting("rk4", 100), 40) > one
 

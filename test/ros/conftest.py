@@ -46,7 +46,7 @@ def start_node(client: LineClient, tmp_path_factory: pytest.TempPathFactory) -> 
 
     def start(**parameters: object) -> Child:
         assert all(child.exit_code is not None for child in children)
-        until(lambda: not client.node.count_services("lockstep"), "the end of the node before")
+        until(lambda: not client.node.count_services("conveyor_sim/lockstep"), "the end of the node before")
         given = {"scene": SMALL_LINE, "start_paused": True, "real_time_factor": 0.0, **parameters}
         logs = tmp_path_factory.mktemp("logs")
         child = WarmChild("sim_node", given, {**os.environ, "ROS_LOG_DIR": str(logs / "ros")}, logs)

@@ -19,6 +19,7 @@ from rclpy.signals import SignalHandlerOptions
 from conveyor_sim.bag.messages.qos import ANSWERS
 from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.ros.publishers import ros_qos
+from conveyor_sim.ros.service_names import of_simulation
 from conveyor_sim.ros.spinner import Spinner
 from conveyor_sim.support.child_process import Process
 
@@ -70,7 +71,8 @@ class LineClient:
         rclpy.shutdown(context=self._context)
 
     def client(self, kind: Any, name: str) -> Any:
-        """A client whose service is there."""
+        """A client whose service is there. A name without a slash is that of a service of the simulation."""
+        name = name if "/" in name else of_simulation(name)
         if name not in self._clients:
             self._clients[name] = self.node.create_client(kind, name, qos_profile=ros_qos(ANSWERS))
         until(self._clients[name].service_is_ready, f"the service {name}")

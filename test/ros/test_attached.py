@@ -101,7 +101,7 @@ def test_it_is_served_as_by_the_simulation_s_own_node(scenario: Scenario, domain
 def test_a_refused_command_fails(scenario: Scenario, domain: int, client: LineClient) -> None:
     def ask() -> None:
         request = srv.Lockstep.Request(run_id="test", target_tick=1, names=[FEEDER], values=[])
-        client.client(srv.Lockstep, "/cell/lockstep").call_async(request)
+        client.client(srv.Lockstep, "/cell/conveyor_sim/lockstep").call_async(request)
 
     with ThreadPoolExecutor(1) as pool:
         pool.submit(ask)
@@ -114,7 +114,8 @@ def test_a_node_that_never_asks(scenario: Scenario, tmp_path: Path) -> None:
     with pytest.raises(ControlError) as failure:
         scenario.attach_node(["sh", "-c", f"echo $$ > {file}; exec sleep 600"], namespace="/cell", patience=2.0)
     text = str(failure.value)
-    assert missing(text, ["at 0.00 s", "no request", "after 0", "within 2 s", "/cell/lockstep", "ROS domain"]) == []
+    facts = ["at 0.00 s", "no request", "after 0", "within 2 s", "/cell/conveyor_sim/lockstep", "ROS domain"]
+    assert missing(text, facts) == []
     scenario.close()
     assert not Path("/proc", file.read_text().strip()).exists()
 

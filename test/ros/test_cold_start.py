@@ -45,7 +45,7 @@ def child_of(process: int) -> int:
 @pytest.fixture
 def cold_node(domain: int, client: LineClient, tmp_path: Path) -> Iterator[Child]:
     """A node that compiles."""
-    until(lambda: not client.node.count_services("get_simulation_state"), "the end of the node before")
+    until(lambda: not client.node.count_services("conveyor_sim/get_simulation_state"), "the end of the node before")
     given = {"scene": SMALL_LINE, "record": tmp_path / "bag"}
     node = Child("sim_node", given, {**cold(tmp_path / "cache"), "ROS_LOG_DIR": str(tmp_path)}, tmp_path)
     until(lambda: "compiling the kernels for this kind of scene, about " in node.log.read_text(), "its word")
@@ -67,7 +67,7 @@ def test_it_answers_while_it_compiles(cold_node: Child, client: LineClient, tmp_
     refused = client.call(srv.SetSimulationState, "set_simulation_state", state=playing).result
     assert refused.result == Result.RESULT_INCORRECT_STATE
     assert missing(refused.error_message, ["get_simulation_state", "PAUSED or PLAYING"]) == []
-    assert not client.node.count_services("lockstep")
+    assert not client.node.count_services("conveyor_sim/lockstep")
     assert not client.node.count_publishers("/clock")
     assert not finished(tmp_path / "cache")
     quitting = SimulationState(state=SimulationState.STATE_QUITTING)

@@ -124,7 +124,7 @@ def test_a_recording_played_beside_a_simulation_is_told_by_both(
     bag = tmp_path / "bag"
     record(bag)
     node = start_node()
-    until(lambda: client.node.count_services("/lockstep"), "the node")
+    until(lambda: client.node.count_services("/conveyor_sim/lockstep"), "the node")
     arguments = ["-c", "from conveyor_sim.cli import main; main()", "replay", str(bag), "--publish", "--paused"]
     replay = WarmProcess("replay", arguments, os.environ, tmp_path)
     text = f"/clock is published by /{{}} too: {JUMPS}"

@@ -16,7 +16,7 @@ from std_msgs.msg import Float64
 
 from conveyor_sim.ros.commands import subscribe_commands
 from conveyor_sim.ros.direct import WaitSet
-from conveyor_sim.ros.lockstep_service import Intake, LockstepService
+from conveyor_sim.ros.lockstep_service import Asker, Intake, LockstepService
 from conveyor_sim.run.stepper import Stepper
 
 FEEDER = "belts/feeder/cmd_speed"
@@ -42,9 +42,9 @@ class Noting(LockstepService):
         self.received = list[int]()
         self._inbox = stepper.run.inbox
 
-    def serve(self, request: Any, header: Any) -> None:
+    def serve(self, request: Any, asker: Asker) -> None:
         self.received.append(self._inbox.counts.received)
-        super().serve(request, header)
+        super().serve(request, asker)
 
 
 def test_a_request_does_not_overtake_the_commands_sent_before_it(
@@ -61,7 +61,7 @@ def test_a_request_does_not_overtake_the_commands_sent_before_it(
         speed.publish(Float64(data=value / 2.0))
     request = srv.Lockstep.Request(run_id="test", target_tick=1)
     future = client.client(srv.Lockstep, "lockstep").call_async(request)
-    first = WaitSet(node.context, services=[lockstep.service])
+    first = WaitSet(node.context, services=lockstep.services)
     first.wait()
     first.close()
     intake = Intake(node.context, lockstep, topics, died=lockstep.errors.append)

@@ -32,7 +32,7 @@ import rclpy
 from conveyor_msgs.srv import Lockstep
 rclpy.init()
 node = rclpy.create_node("killed")
-client = node.create_client(Lockstep, "lockstep")
+client = node.create_client(Lockstep, "conveyor_sim/lockstep")
 client.wait_for_service()
 client.call_async(Lockstep.Request(**ast.literal_eval(sys.argv[1])))
 time.sleep(60)
@@ -75,7 +75,7 @@ def test_a_client_that_sleeps_while_another_scans_still_gets_its_answer(line: Li
     context = rclpy.Context()
     rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
     sleeper = Node("sleeper", context=context)
-    client = sleeper.create_client(srv.Lockstep, "lockstep", qos_profile=ros_qos(ANSWERS))
+    client = sleeper.create_client(srv.Lockstep, "conveyor_sim/lockstep", qos_profile=ros_qos(ANSWERS))
     until(client.service_is_ready, "the service lockstep")
     answer = client.call_async(srv.Lockstep.Request(run_id="sleeper"))
     for target in range(1, 201):

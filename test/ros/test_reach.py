@@ -53,7 +53,7 @@ import rclpy
 from conveyor_msgs.srv import ResetSimulation
 rclpy.init()
 node = rclpy.create_node("stranger")
-client = node.create_client(ResetSimulation, "reset_simulation")
+client = node.create_client(ResetSimulation, "conveyor_sim/reset_simulation")
 assert client.wait_for_service(60.0)
 future = client.call_async(ResetSimulation.Request())
 rclpy.spin_until_future_complete(node, future, timeout_sec=60.0)

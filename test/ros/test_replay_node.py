@@ -126,15 +126,15 @@ def test_pause_holds_and_a_seek_back_announces_itself(client: LineClient, ended:
 
         assert told_while_paused() == {1}
         assert signals.messages == []
-        assert client.call(Trigger, "resume").success
+        assert client.call(Trigger, "conveyor_replay/resume").success
         # Not that very tick: a client that is late misses messages.
         until(lambda: signals.messages and signals.messages[-1].tick >= 20, "signals from tick 20 on")
-        assert client.call(Trigger, "pause").success
+        assert client.call(Trigger, "conveyor_replay/pause").success
         (time,) = told_while_paused()
         assert signals.messages[-1].tick == time // 10_000_000 >= 20
         signals.messages.clear()
         bottles.messages.clear()
-        answer = client.call(Seek, "seek", time=0.11)
+        answer = client.call(Seek, "conveyor_replay/seek", time=0.11)
         assert (answer.success, answer.message) == (True, "at 0.11 s")
         assert signals.at_tick(11).header.stamp.nanosec == 110_000_000
         bottles.at_tick(10)
@@ -145,16 +145,16 @@ def test_pause_holds_and_a_seek_back_announces_itself(client: LineClient, ended:
 
 
 def test_a_seek_beyond_the_end_is_refused_and_one_to_the_end_ends(client: LineClient, ended: threading.Event) -> None:
-    answer = client.call(Seek, "seek", time=99.0)
+    answer = client.call(Seek, "conveyor_replay/seek", time=99.0)
     assert (answer.success, answer.message) == (
         False,
         "time: 99 given, expected a time of the recording, 0 to 0.6 (s)",
     )
-    assert client.call(Seek, "seek", time=0.6).success
+    assert client.call(Seek, "conveyor_replay/seek", time=0.6).success
     assert not ended.is_set()  # while it is paused one can seek back
-    assert client.call(Trigger, "resume").success
+    assert client.call(Trigger, "conveyor_replay/resume").success
     assert ended.wait(PATIENCE)
-    assert "has been played" in client.call(Seek, "seek", time=0.0).message
+    assert "has been played" in client.call(Seek, "conveyor_replay/seek", time=0.0).message
 
 
 def test_a_recording_of_an_earlier_format_is_published_in_the_present_definitions(client: LineClient) -> None:
@@ -203,7 +203,7 @@ def test_topics_of_types_that_are_not_installed_so_are_left_out(
         open_bag(tmp_path / "bag.mcap") as other,
         closing(ReplayNode(other, 1.0, None, True, lambda: None, context=context)),
     ):
-        client.call(Trigger, "pause")  # announced after the topics
+        client.call(Trigger, "conveyor_replay/pause")  # announced after the topics
         published = [topic for topic in definitions if client.node.count_publishers(topic)]
     rclpy.shutdown(context=context)
     assert published == ["line"]

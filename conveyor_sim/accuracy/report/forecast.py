@@ -13,18 +13,12 @@ from conveyor_sim.accuracy.candidates import candidates
 from conveyor_sim.accuracy.results import Point
 from conveyor_sim.accuracy.setting import Setting, with_setting
 from conveyor_sim.physics.model import build_model
-from conveyor_sim.physics.model.remedies import BESIDE, BOTTLE_STEP, STEP_COST
+from conveyor_sim.physics.model.remedies import MANY, STEP_COST, step_cost, tick_seconds
 from conveyor_sim.physics.plant import Plant
 from conveyor_sim.scene import Scene
 
 TRUSTED = ("leapfrog", "velocity_verlet")
 """Integrators whose predictions were held against measurements on scenes that nothing was fitted to."""
-
-MANY = 100
-"""Bottles taken for the cost of a line without an end of them."""
-
-TICK = 1e-5
-"""s of a processor that a tick takes beside its steps, in round numbers."""
 
 BETTER = 10.0
 """Accuracy gain of the setting whose cost is stated for comparison."""
@@ -94,8 +88,8 @@ def predicted_error(point: Point) -> float:
 
 def seconds(scene: Scene, setting: Setting, bottles: int) -> float:
     """Return the estimated time of one processor per simulated second, s."""
-    evaluations = setting.per_tick / scene.tick * STEP_COST[setting.integrator]
-    return evaluations * (bottles + BESIDE) * BOTTLE_STEP + TICK / scene.tick
+    work = setting.per_tick * step_cost(setting.integrator, scene.friction_solver)
+    return tick_seconds(work, bottles) / scene.tick
 
 
 def _cheapest(points: Iterable[Point], tolerance: float) -> Point | None:

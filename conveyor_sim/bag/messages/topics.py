@@ -326,8 +326,8 @@ _ROWS = (
     Topic(
         "variables",
         "conveyor_msgs/msg/Variables",
-        "a PLC program's variables that are [recorded](structured_text.md#variables-in-recordings); as a node, "
-        "by `controller_node`",
+        "a PLC program's variables that are [recorded](structured_text.md#variables-in-recordings). In ROS, "
+        "`controller_node` publishes the topic",
         "each scan of the program",
         columns=VariableColumns,
         by_controller=True,

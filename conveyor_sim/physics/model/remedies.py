@@ -1,7 +1,10 @@
 """Tightest bound on the steps of a scene, and changes of the scene that lower the number of steps.
 
 A remedy is a change of the scene file. Each candidate is tried: the steps of the changed scene are chosen, and only
-changes that lower them by enough are reported, with the resulting number.
+changes that make a tick cheaper by enough are reported, with the resulting steps and speed.
+
+The cost model of a tick: TICK_COST, and for each step BOTTLE_STEP times (bottles + BESIDE) times its relative cost.
+`explain --price` measures what this model estimates.
 """
 
 from collections.abc import Iterator, Mapping
@@ -20,7 +23,7 @@ from conveyor_sim.scene.overrides import parse_overrides
 from conveyor_sim.scene.schema import Scene
 
 WORTH = 0.8
-"""A remedy is reported if steps and cost per tick fall to this share or less."""
+"""A remedy is reported if steps and time per tick fall to this share or less."""
 
 NAMED = 2
 """Largest number of reported remedies, the cheapest first."""
@@ -38,6 +41,9 @@ STEP_COST: Mapping[str, int] = {
 }
 """Cost of a step in evaluations of all forces or equal work."""
 
+IMPLICIT_COST = 1.7
+"""Cost of a step with the implicit friction solver over that of a step without it; measured on shipped scenes."""
+
 OTHERS = ("leapfrog", "velocity_verlet")
 """Integrators that a remedy may choose."""
 
@@ -46,6 +52,12 @@ BOTTLE_STEP = 3e-8
 
 BESIDE = 10
 """Cost of a step that does not depend on the number of bottles, in units of the cost of one bottle."""
+
+TICK_COST = 5e-5
+"""s per tick besides its steps, rounded: devices, commands and the guard."""
+
+MANY = 100
+"""Assumed number of bottles of a scene with an endless infeed."""
 
 COARSER = {"fine": "standard", "standard": "draft"}
 
@@ -60,17 +72,13 @@ class Remedy:
     """Overrides of the scene."""
     steps: int
     """Steps per tick with the remedy."""
-    cost: float
-    """Cost of a step with the remedy over that without it."""
+    faster: float
+    """Estimated time of a tick without the remedy over that with it, for the scene's number of bottles."""
 
     @property
-    def price(self) -> float:
-        """Cost of a tick with the remedy, in steps of the scene without it."""
-        return self.steps * self.cost
-
-    def sentence(self, before: int) -> str:
-        """Return the remedy in words. before: steps without it."""
-        return f"{self.words}: {_steps(self.steps)}, {_times(before / self.steps)} fewer"
+    def sentence(self) -> str:
+        """The remedy in words."""
+        return f"{self.words}: {_steps(self.steps)}, about {_times(self.faster)} as fast"
 
 
 @dataclass(frozen=True)
@@ -82,10 +90,12 @@ class StepLimit:
     """True if the scene gives the steps, False if the bounds set them."""
     bounds: tuple[Bound, ...]
     """All bounds, the tightest first."""
+    step_cost: float
+    """Relative cost of a step."""
     tick: float
     """s"""
-    bottles: int | None
-    """Largest number of bottles in a run; None without limit."""
+    bottles: int
+    """Number of bottles on the line that costs are estimated for."""
     remedies: tuple[Remedy, ...]
 
     @property
@@ -118,32 +128,50 @@ class StepLimit:
         """The remedies; empty without remedies unless the steps are many."""
         if not self.remedies:
             return "" if self.steps < MANY_STEPS else "no single change of the scene that is known to help lowers it"
-        return "fewer steps: " + "; or ".join(remedy.sentence(self.steps) for remedy in self.remedies)
+        return "fewer steps: " + "; or ".join(remedy.sentence for remedy in self.remedies)
 
-    def seconds(self, bottles: int) -> float:
-        """Return the estimated computing time (s) on one core for a simulated second of `bottles` bottles."""
-        return self.steps / self.tick * (bottles + BESIDE) * BOTTLE_STEP
+    @property
+    def seconds(self) -> float:
+        """Estimated computing time (s) on one core for a simulated second of `bottles` bottles."""
+        return tick_seconds(self.steps * self.step_cost, self.bottles) / self.tick
 
     def _warning(self) -> str:
-        bottles = 100 if self.bottles is None else max(1, self.bottles)
-        seconds = self.seconds(bottles)
-        text = f"{seconds:.2g}" if seconds < 100.0 else f"{seconds:.0f}"
-        return f"slow: a simulated second of {bottles} bottles will take about {text} s of computing on one core"
+        text = f"{self.seconds:.2g}" if self.seconds < 100.0 else f"{self.seconds:.0f}"
+        return f"slow: a simulated second of {self.bottles} bottles will take about {text} s of computing on one core"
 
 
-def step_limit(scene: Scene, choice: StepChoice | None = None) -> StepLimit:
-    """Return the limit on the steps of a valid scene with remedies. choice: of this scene, if known."""
+def step_cost(integrator: str, friction_solver: str) -> float:
+    """Return the relative cost of a step."""
+    return STEP_COST[integrator] * (IMPLICIT_COST if friction_solver == "implicit" else 1.0)
+
+
+def tick_seconds(work: float, bottles: int) -> float:
+    """Return the estimated computing time (s) of a tick on one core. work: its steps times their relative cost."""
+    return TICK_COST + work * (bottles + BESIDE) * BOTTLE_STEP
+
+
+def step_limit(scene: Scene, choice: StepChoice | None = None, bottles: int | None = None) -> StepLimit:
+    """Return the limit on the steps of a valid scene with remedies.
+
+    choice: of this scene, if known. bottles: on the line, for the expected speed; by default the most in a run.
+    """
     choice = choose_steps(Plant.of(scene)) if choice is None else choice
-    tried = (_tried(scene, *candidate) for candidate in _candidates(scene, choice))
-    helpful = [remedy for remedy in tried if remedy and max(remedy.price, remedy.steps) <= WORTH * choice.steps]
-    helpful.sort(key=lambda remedy: remedy.price)
+    most = choice.terms.plant.most_bottles if bottles is None else bottles
+    bottles = MANY if most is None else max(1, most)
+    cost = step_cost(scene.accuracy.integrator, scene.friction_solver)
+    before = tick_seconds(choice.steps * cost, bottles)
+    tried = (_tried(scene, *candidate, before, bottles) for candidate in _candidates(scene, choice))
+    least = 1.0 / WORTH
+    helpful = [one for one in tried if one and one.faster >= least and one.steps <= WORTH * choice.steps]
+    helpful.sort(key=lambda remedy: -remedy.faster)
     return StepLimit(
         steps=choice.steps,
         given=choice.given is not None,
         bounds=tuple(sorted(choice.bounds, key=lambda bound: bound.dt)),
         tick=scene.tick,
-        bottles=choice.terms.plant.most_bottles,
-        remedies=tuple(remedy for remedy in helpful[:NAMED] if remedy.price <= NEAR * helpful[0].price),
+        step_cost=cost,
+        bottles=bottles,
+        remedies=tuple(remedy for remedy in helpful[:NAMED] if NEAR * remedy.faster >= helpful[0].faster),
     )
 
 
@@ -155,35 +183,33 @@ def with_remedy(scene: Scene, overrides: Mapping[str, Any]) -> Scene:
 def too_many(scene: Scene, choice: StepChoice) -> str:
     """Return why a scene of more than MOST_STEPS steps is refused, with a remedy."""
     remedies = step_limit(scene, choice).remedies
-    helps = f", as with {remedies[0].sentence(choice.steps)}" if remedies else ""
+    helps = f", as with {remedies[0].sentence}" if remedies else ""
     return f"{choice.reason}; expected at most {MOST_STEPS} steps a tick{helps}"
 
 
-def _candidates(scene: Scene, choice: StepChoice) -> Iterator[tuple[str, Mapping[str, Any], float]]:
-    """Yield candidates: words, overrides, cost of a step."""
+def _candidates(scene: Scene, choice: StepChoice) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Yield candidates: words and overrides."""
     accuracy = scene.accuracy.model_dump()
     if choice.given is not None:
         free = accuracy | {"per_tick": None, "dt": None}
-        yield f"without accuracy.{'dt' if accuracy['dt'] else 'per_tick'}", {"accuracy": free}, 1
+        yield f"without accuracy.{'dt' if accuracy['dt'] else 'per_tick'}", {"accuracy": free}
     if scene.friction_solver != "implicit":
-        yield "friction_solver: implicit", {"friction_solver": "implicit"}, 1
+        yield "friction_solver: implicit", {"friction_solver": "implicit"}
     for integrator in OTHERS:
         if accuracy["integrator"] != integrator:
-            cost = STEP_COST[integrator] / STEP_COST[accuracy["integrator"]]
-            extra = "" if cost <= 1.0 else f", at about {cost:g} times the cost of a step"
             changed = {"accuracy": accuracy | {"integrator": integrator, "error": None}}
-            yield f"accuracy: {{integrator: {integrator}}}{extra}", changed, cost
+            yield f"accuracy: {{integrator: {integrator}}}", changed
     impact_speed = choice.terms.plant.impact_speed
     onset = _onset(scene, impact_speed)
     if onset is not None:
         words = f"damping: {{law: onset, speed: {impact_speed:g}}} where a restitution is given"
-        yield words, {"contacts": onset}, 1
+        yield words, {"contacts": onset}
         if scene.accuracy.integrator in ("leapfrog", "semi_implicit_euler"):
             both = {"contacts": onset, "accuracy": accuracy | {"integrator": "velocity_verlet"}}
-            yield f"{words}, with accuracy: {{integrator: velocity_verlet}}", both, 1
+            yield f"{words}, with accuracy: {{integrator: velocity_verlet}}", both
     coarser = COARSER.get(scene.accuracy.preset or DEFAULT)
     if coarser is not None and choice.given is None and scene.accuracy.tolerance is None:
-        yield f"accuracy: {{preset: {coarser}}}, less exact", {"accuracy": accuracy | {"preset": coarser}}, 1
+        yield f"accuracy: {{preset: {coarser}}}, less exact", {"accuracy": accuracy | {"preset": coarser}}
 
 
 def _onset(scene: Scene, speed: float) -> list[dict[str, Any]] | None:
@@ -203,13 +229,16 @@ def _onset(scene: Scene, speed: float) -> list[dict[str, Any]] | None:
     return contacts if changed else None
 
 
-def _tried(scene: Scene, words: str, overrides: Mapping[str, Any], cost: float) -> Remedy | None:
-    """Return a candidate with its steps; None if it is not valid for the scene."""
+def _tried(scene: Scene, words: str, overrides: Mapping[str, Any], before: float, bottles: int) -> Remedy | None:
+    """Return a candidate with steps and speed; None if it is not valid for the scene. before: s per tick without it."""
     try:
-        steps = choose_steps(Plant.of(with_remedy(scene, overrides))).steps
+        changed = with_remedy(scene, overrides)
+        steps = choose_steps(Plant.of(changed)).steps
     except SceneError:
         return None
-    return Remedy(words, overrides, steps, cost) if steps <= MOST_STEPS else None
+    cost = step_cost(changed.accuracy.integrator, changed.friction_solver)
+    faster = before / tick_seconds(steps * cost, bottles)
+    return Remedy(words, overrides, steps, faster) if steps <= MOST_STEPS else None
 
 
 def _times(ratio: float) -> str:

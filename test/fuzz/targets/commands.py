@@ -131,7 +131,7 @@ class Station:
             log = self._node.log.read_text(errors="replace")
             if self._node.exit_code != 0 or "Traceback" in log:
                 raise Violation("bad end", f"status {self._node.exit_code}: {log[-2000:]}")
-            self._wait(lambda: not self.line.node.count_services("lockstep"), "the end of its services")
+            self._wait(lambda: not self.line.node.count_services("conveyor_sim/lockstep"), "the end of its services")
             self._node = None
         # Before the next node starts: it would count them as publishers that have not sent anything yet.
         for publisher in self._publishers.values():
