@@ -16,6 +16,7 @@ from rclpy.signals import SignalHandlerOptions
 from ros.conftest import SMALL_LINE
 from ros.line_client import LineClient, until
 from ros.warm_child import WarmProcess
+from simulation_interfaces.srv import StepSimulation
 
 from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.bag.reader import open_bag
@@ -43,7 +44,7 @@ def bag(domain: int, client: LineClient, tmp_path_factory: pytest.TempPathFactor
     arguments = [*arguments_of("sim_node", parameters), "-r", "__ns:=/cell_1"]
     node = WarmProcess("sim_node", arguments, {**os.environ, "ROS_LOG_DIR": str(folder)}, folder)
     step = "/cell_1/conveyor_sim/step_simulation"
-    client.client(srv.StepSimulation, step)
+    client.client(StepSimulation, step)
     topics = topics_of(client, "conveyor_sim")
     assert {"/cell_1/line", "/cell_1/commands", f"/cell_1/{FEEDER}", "/cell_1/photo_eyes/entry"} <= topics
     assert all(topic.startswith("/cell_1/") for topic in topics)
@@ -52,7 +53,7 @@ def bag(domain: int, client: LineClient, tmp_path_factory: pytest.TempPathFactor
     publisher.publish(Commands(names=[FEEDER], values=[0.125]))
 
     def applied() -> bool:
-        client.call(srv.StepSimulation, step, steps=1)
+        client.call(StepSimulation, step, steps=1)
         return bool(outcomes.messages)
 
     until(applied, "the command")
