@@ -31,11 +31,11 @@ class ControllerSource:
             return load(self.reference, self.parameters)
         except ControlError as error:
             raise ConveyorError(str(error)) from error
-        except Exception as error:  # of the user's Python code
+        except (Exception, SystemExit) as error:  # of the user's Python code
             raise ConveyorError(f"controller {self.reference!r}: {located(error)}") from error
 
 
-def located(error: Exception) -> str:
+def located(error: BaseException) -> str:
     """Return the type and text of an error of user code, with the last line of that code on the way to the error."""
     frames = traceback.extract_tb(error.__traceback__)
     own = [frame for frame in frames if not Path(frame.filename).is_relative_to(PACKAGE)]
