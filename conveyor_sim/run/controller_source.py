@@ -40,6 +40,10 @@ class ControllerSource:
 def located(error: BaseException) -> str:
     """Return the type and text of an error of user code, with the last line of that code on the way to the error."""
     frames = traceback.extract_tb(error.__traceback__)
-    own = [frame for frame in frames if not any(map(Path(frame.filename).is_relative_to, LIBRARIES))]
+    own = [frame for frame in frames if Path(frame.filename).is_file() and not _is_library(Path(frame.filename))]
     frame = (own or frames)[-1]
     return f"{Path(frame.filename).name}:{frame.lineno}: {type(error).__name__}: {error}"
+
+
+def _is_library(file: Path) -> bool:
+    return any(map(file.is_relative_to, LIBRARIES))
