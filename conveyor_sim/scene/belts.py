@@ -37,7 +37,7 @@ class _Belt(SpeedSetpoint):
 
     material: Name = quantity("Material, as named in `base`.")
     drive: _Drive | None = quantity(
-        "Drive: a mapping for a drive of its own, or the name of a drive in `drives`, which then has the speed, "
+        "Drive: a mapping for a separate drive, or the name of a drive in `drives`, which then has the speed, "
         "the speed_limits and the watchdog. Left out: the belt reaches the commanded speed within one tick.",
         default=None,
     )

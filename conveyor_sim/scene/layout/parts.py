@@ -82,7 +82,7 @@ class _Driven(Part):
         "Without a speed command for this long, the conveyor stops. Left out: it keeps its speed.", "s", default=None
     )
     drive: DriveOrName | None = quantity(
-        "Drive: a mapping for a drive of its own, or the name of a drive in `drives`, which then has the speed.",
+        "Drive: a mapping for a separate drive, or the name of a drive in `drives`, which then has the speed.",
         default=None,
     )
     ratio: Positive | None = quantity(
