@@ -46,7 +46,7 @@ class RecordingServer(AbstractContextManager["RecordingServer"]):
     def answer(self, name: str) -> bytes:
         """Return the deflated part with a name. Raise KeyError if there is none, and BagError.
 
-        Names: head, story/<n>, block/<n>, each of them after other/ for the other recording, difference/<n> and peaks/<n>.
+        Names: head, story/<n>, block/<n>, each of them after other/ for the other recording; difference/<n>, peaks/<n>.
         """
         place = int(name.startswith("other/"))
         if place >= len(self._blocks):
