@@ -4,6 +4,7 @@ import { SPEEDS } from "./clock.js";
 import { COLOURINGS, colourings, isDark } from "./colours.js";
 import { byId, element, say, seconds, warn } from "./dom.js";
 import { listenToKeys } from "./keys.js";
+import { Layouts } from "./layouts.js";
 import { Line } from "./live.js";
 import { LiveRecording } from "./live_recording.js";
 import { Recording } from "./recording.js";
@@ -23,7 +24,9 @@ function wire(view) {
   byId("colour").addEventListener("change", (event) => view.setColouring(event.target.value));
   byId("speed").append(...SPEEDS.map((speed) => element("option", { value: speed }, `${speed}×`)));
   byId("speed").addEventListener("change", (event) => clock.setSpeed(+event.target.value));
+  const layouts = new Layouts(view);
   const clicks = {
+    arrange: () => layouts.open(),
     play: () => clock.toggle(), back: () => clock.step(-1), ahead: () => clock.step(1), fit: () => view.wholePlant(),
     dismiss: () => say(""), closer: () => camera.zoom(1.5), farther: () => camera.zoom(1 / 1.5),
     to_start: () => { clock.seek(clock.recording.start); view.snap(); },

@@ -15,6 +15,7 @@ import { byId, element, expire, keyOf, say, seconds, warn } from "./dom.js";
 import { Events } from "./events.js";
 import { Failure } from "./failure.js";
 import { Faceplate } from "./faceplate.js";
+import { Kpi } from "./kpi.js";
 import { LiveClock } from "./live_clock.js";
 import { Plan } from "./plan.js";
 import { Scrubber } from "./scrubber.js";
@@ -55,6 +56,7 @@ export class View {
       this.plans.push(this.beside.plan);
     }
     this.banner = new Banner(this);
+    this.kpi = new Kpi(this);
     this.scrubber = new Scrubber(this);
     this.trends = new Trends(this);
     this.faceplate = new Faceplate(this);
@@ -313,6 +315,7 @@ export class View {
     this.panelsDrawn = now;
     expire();
     this.banner.draw();
+    this.kpi.draw();
     for (const alarms of this.alarms) alarms.draw();
     this.tabs.draw();
     this.trends.draw();
