@@ -35,7 +35,7 @@ PAGES: dict[str, tuple[str, ...]] = {
     "rails": ("`rails`",),
     "zones": ("`zones`", "`counters`"),
 }
-"""Pages of docs/parts/ with fields. A section is on the first page that has a part of its title."""
+"""Pages of docs/parts/ with fields. A section is on the first page with a part of its title, else in docs/scene.md."""
 
 RULES = (
     ("a name", "a name of at most 100 letters, digits and underscores, beginning with a letter"),
@@ -142,7 +142,7 @@ def tables() -> dict[str, dict[str, str]]:
         "units": "The units are " + ", ".join(f"`{name}`" for name in UNITS if name.isascii()) + ".",
         "rules": "\n".join(["| word | full rule |", "|---|---|", *(f"| {word} | {rule} |" for word, rule in RULES)]),
         "fields": _fields(whole),
-        "underlay": _fields([section for section in sections() if "`underlay`" in section[0]]),
+        "others": _fields([section for section in _sections_of(None) if section not in whole]),
     }
     return pages
 
@@ -152,7 +152,7 @@ def page_of(title: str) -> str | None:
     return next((page for page, words in PAGES.items() if any(word in title for word in words)), None)
 
 
-def _sections_of(page: str) -> list[tuple[str, type[BaseModel]]]:
+def _sections_of(page: str | None) -> list[tuple[str, type[BaseModel]]]:
     return [section for section in sections() if page_of(section[0]) == page]
 
 
