@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 )
 @click.option("--no-record", is_flag=True, help="Simulate only; nothing is written.")
 @click.option("--no-pictures", is_flag=True, help="Draw nothing; `conveyor-sim plot` does, any time later.")
+@click.option("--details", is_flag=True, help="Print setting, checks of forces, belts, topics and speed, too.")
 @click.option("--threads", type=click.IntRange(1), help="Threads to step with (default: as many as prove fastest).")
 @scene_options
 def run(
@@ -41,19 +42,19 @@ def run(
     variables: tuple[str, ...],
     no_record: bool,
     no_pictures: bool,
+    details: bool,
     threads: int | None,
     options: SceneOptions,
 ) -> None:
     """Simulate SCENE without ROS, and record it.
 
-    It runs as fast as possible, and records what the node would.
+    It runs as fast as possible, and records the topics that the ROS node would.
     """
     with collected_later():
         from conveyor_sim.bag.folder import require_recordable
         from conveyor_sim.bag.recorder import run_folder
         from conveyor_sim.physics.model import build_model
         from conveyor_sim.report.drawing import Drawing
-        from conveyor_sim.report.explain.choices import setting_line
         from conveyor_sim.report.report import report, report_unrecorded
         from conveyor_sim.run.compilation import Compilation
         from conveyor_sim.run.runner import run_scene
@@ -64,7 +65,6 @@ def run(
     controls = None if controller is None else _controller(controller, parameters)
     loaded = options.load(scene, duration)
     model = build_model(loaded)
-    click.echo(setting_line(model))
     folder = drawing = None
     if not no_record:
         folder = click.get_current_context().with_resource(run_folder(out))
@@ -78,9 +78,9 @@ def run(
     if done.interrupted:
         click.echo(f"interrupted at {done.simulated:.2f} s")
     if done.bag is None:
-        report_unrecorded(loaded, model, done)
+        report_unrecorded(loaded, model, done, details)
     else:
-        report(done.bag, done.wall, drawing, done.spent)
+        report(done.bag, done.wall, drawing, done.spent, details)
 
 
 def _controller(reference: str, parameters: str) -> Controller:
