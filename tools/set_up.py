@@ -1,8 +1,9 @@
 """Build the environment of `make run`, `make test` and others: set_up.py DISTRO [test] [bench] [docs].
 
 The result is a virtual environment with the ROS 2 wheels of that distribution, this package (editable) and
-conveyor_msgs, built from msg_defs/. `set-up.json` in the environment holds a key of each stage's inputs; a stage whose
-key is current is skipped. The file is removed while pip works, so an interrupted environment is rebuilt.
+conveyor_msgs, built from msg_defs/, beside the interface packages that the wheels lack, built from
+tools/message_build/definitions/. `set-up.json` in the environment holds a key of each stage's inputs; a stage whose key
+is current is skipped. The file is removed while pip works, so an interrupted environment is rebuilt.
 """
 
 import configparser
@@ -12,9 +13,11 @@ import json
 import os
 import re
 import shutil
+import string
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -27,6 +30,9 @@ TOOLS = {"test": "the test tools", "bench": "what is compared with", "docs": "wh
 SHARED = ("package.xml", "config", "launch", "msg_defs")  # of the checkout, where ROS looks for a package's share
 MESSAGE_BUILD = ROOT / "tools" / "message_build"
 STRIP = "strip_missing_includes.cmake"
+DEFINITIONS = MESSAGE_BUILD / "definitions"
+MISSING_PACKAGES = json.loads((MESSAGE_BUILD / "packages.json").read_text())
+"""By name: interface packages of ROS that exist as no wheel, with the version that each distribution has."""
 REFUSED = ":;\"'`$\\#%"
 """Characters that no path of the environment may contain. PATH and similar variables are split at colons, CMake's lists
 at semicolons. The others have a meaning for shells, first lines of scripts, or file URLs.
@@ -48,6 +54,8 @@ class Environment:
         self.python = self.path / "bin" / "python"
         self.state_file = self.path / "set-up.json"
         self.state = self._read_state()
+        self._packages = threading.Lock()
+        """Held while installed packages change: pip fails if one disappears while it lists them."""
 
     def _read_state(self) -> dict:
         """Return the completed stages; none if the checkout was moved, or the base Python is gone."""
@@ -85,39 +93,75 @@ class Environment:
         try:
             # Bytecode is left to the first import: most of what comes is never imported.
             options = ["--disable-pip-version-check", "install", "--prefer-binary", "--no-compile"]
-            command([self.python, "-m", "pip", *options, *what], why, log)
+            with self._packages:
+                command([self.python, "-m", "pip", *options, *what], why, log)
         except SetUpError:
             # pip itself gave up, and undid what it had begun.
             if self.state:
                 self.write_state()
             raise
 
-    def build_messages(self) -> None:
-        """Build conveyor_msgs and install it into the environment's prefix, so that no path has to be set."""
-        installed = self.path / "conveyor_msgs.txt"
-        if installed.exists():
-            for name in installed.read_text().splitlines():
-                (self.path / name).unlink(missing_ok=True)
-        log = self.path / "conveyor_msgs.log"
+    def has_interfaces(self, name: str) -> bool:
+        """Return True if an interface package is installed by other means than `build_interfaces`."""
+        return (self.path / "share" / name / "package.xml").exists() and not self._manifest(name).exists()
+
+    def build_interfaces(self, name: str) -> None:
+        """Build an interface package and install it into the environment's prefix, so that no path has to be set."""
+        log = self.path / f"{name}.log"
         log.unlink(missing_ok=True)
         # ROS's message generators can't handle spaces in paths, so all paths are links in a scratch folder.
-        with tempfile.TemporaryDirectory(prefix="conveyor_msgs_", dir=scratch_folder()) as folder:
+        with tempfile.TemporaryDirectory(prefix=f"{name}_", dir=scratch_folder()) as folder:
             scratch = Path(folder)
             (scratch / "env").symlink_to(self.path)
-            (scratch / "msg_defs").symlink_to(ROOT / "msg_defs")
             (scratch / "tools").symlink_to(MESSAGE_BUILD)
-            self._build_messages_in(scratch, log)
-            manifest = (scratch / "build" / "install_manifest.txt").read_text().splitlines()
-        installed.write_text("\n".join(name.removeprefix(f"{scratch}/env/") for name in manifest) + "\n")
+            if name in MISSING_PACKAGES:
+                self._write_source(name, scratch / "source")
+            else:
+                (scratch / "source").symlink_to(ROOT / "msg_defs")
+            self._build_in(scratch, name, log)
+            with self._packages:
+                self._install(scratch, name, log)
 
-    def _build_messages_in(self, scratch: Path, log: Path) -> None:
+    def _install(self, scratch: Path, name: str, log: Path) -> None:
+        """Install a built package in place of an earlier build of it."""
+        installed = self._manifest(name)
+        if installed.exists():
+            for file in installed.read_text().splitlines():
+                (self.path / file).unlink(missing_ok=True)
+        cmake = scratch / "env" / "bin" / "cmake"
+        command([cmake, "--install", scratch / "build"], f"installing {name}", log)
+        manifest = (scratch / "build" / "install_manifest.txt").read_text().splitlines()
+        installed.write_text("\n".join(file.removeprefix(f"{scratch}/env/") for file in manifest) + "\n")
+
+    def _manifest(self, name: str) -> Path:
+        """Path of the list of files that `build_interfaces` installed."""
+        return self.path / f"{name}.txt"
+
+    def _write_source(self, name: str, folder: Path) -> None:
+        """Write the source of a package of `MISSING_PACKAGES`, which has only definitions in the checkout."""
+        folder.mkdir()
+        for kind in (DEFINITIONS / name).iterdir():
+            (folder / kind.name).symlink_to(kind)
+        (folder / "CMakeLists.txt").symlink_to(MESSAGE_BUILD / "CMakeLists.txt")
+        package = MISSING_PACKAGES[name]
+        values = {
+            "name": name,
+            "version": package["version"][self.distro],
+            "license": package["license"],
+            "source": package["source"],
+            "depends": "\n".join(f"  <depend>{other}</depend>" for other in package["depends"]),
+        }
+        template = string.Template((MESSAGE_BUILD / "package.xml.in").read_text())
+        (folder / "package.xml").write_text(template.substitute(values))
+
+    def _build_in(self, scratch: Path, name: str, log: Path) -> None:
         env_path, build = scratch / "env", scratch / "build"
         # CMake looks for packages beside every bin/ on PATH: a sourced ROS must not be among them.
         path = [p for p in os.environ["PATH"].split(":") if not (Path(p).parent / "share" / "ament_index").is_dir()]
         parsed = build / "parsed"
         parsed.mkdir(parents=True)
         env = {**os.environ, "AMENT_PREFIX_PATH": str(env_path), "PATH": ":".join([f"{env_path}/bin", *path])}
-        env |= {"PYTHONPATH": str(scratch / "tools"), "CONVEYOR_MSGS_PARSED": str(parsed)}
+        env |= {"PYTHONPATH": str(scratch / "tools"), "PARSED_INTERFACES": str(parsed)}
         options = {
             "CMAKE_BUILD_TYPE": "Release",
             "CMAKE_PREFIX_PATH": env_path,
@@ -126,11 +170,13 @@ class Environment:
             "Python3_EXECUTABLE": env_path / "bin" / "python",
             "BUILD_TESTING": "OFF",
         }
+        if name in MISSING_PACKAGES:
+            options |= {"PACKAGE": name, "DEPENDS": ";".join(MISSING_PACKAGES[name]["depends"])}
         cmake = env_path / "bin" / "cmake"
-        defines = [f"-D{name}={value}" for name, value in options.items()]
-        what = "building conveyor_msgs"
-        command([cmake, "-G", "Ninja", "-S", scratch / "msg_defs", "-B", build, *defines], what, log, env)
-        command([cmake, "--build", build, "--target", "install"], what, log, env)
+        defines = [f"-D{option}={value}" for option, value in options.items()]
+        what = f"building {name}"
+        command([cmake, "-G", "Ninja", "-S", scratch / "source", "-B", build, *defines], what, log, env)
+        command([cmake, "--build", build], what, log, env)
 
     def register(self) -> None:
         """Lets ROS find the package by name (`ros2 pkg prefix`, `ros2 run`, `ros2 launch`): pip, editable, leaves out
@@ -226,9 +272,11 @@ def set_up(distro: str, tools: list[str]) -> None:
     described = (*(f"requirements/{name}.txt" for name in lists), "setup.py", "setup.cfg", "conveyor_sim/__init__.py")
     ros = key(*build, requirements / "run.txt")
     packages = key(ros, *(ROOT / name for name in described))
-    sources = (*MESSAGE_BUILD.glob("*.*"), *(p for p in (ROOT / "msg_defs").rglob("*") if p.is_file()))
-    messages = key(*build, *sorted(sources))
-    needed = {"ros": ros, "packages": packages, "messages": messages, "index": key(packages, Path(__file__))}
+    needed = {"ros": ros, "packages": packages, "index": key(packages, Path(__file__))}
+    interfaces = {"conveyor_msgs": ROOT / "msg_defs", **{name: DEFINITIONS / name for name in MISSING_PACKAGES}}
+    for name, folder in interfaces.items():
+        files = (*MESSAGE_BUILD.glob("*.*"), *(path for path in folder.rglob("*") if path.is_file()))
+        needed[name] = key(*build, *sorted(files))
     for tool in tools:
         needed[tool] = key(requirements / f"{tool}.txt", *(requirements / f"{name}.txt" for name in EXTRAS))
     if all(environment.state.get(stage) == wanted for stage, wanted in needed.items()):
@@ -253,11 +301,13 @@ def set_up(distro: str, tools: list[str]) -> None:
         environment.write_state(ros=ros)
     # The compiler and pip wait for different things.
     with ThreadPoolExecutor(1) as beside:
-        built = None
-        if missing("messages"):
-            say("conveyor_msgs from msg_defs/: about a minute ...")
-            environment.forget("messages")
-            built = beside.submit(environment.build_messages)
+        built = {}
+        for name, folder in interfaces.items():
+            if missing(name):
+                environment.forget(name)
+                if not environment.has_interfaces(name):
+                    say(f"{name} from {folder.relative_to(ROOT)}/: about a minute ...")
+                    built[name] = beside.submit(environment.build_interfaces, name)
         if missing("packages"):
             say("this package, and what it draws and tests with ...")
             environment.pip_install(["-e", ".[plot,accuracy,test]"], "installing this package")
@@ -270,9 +320,10 @@ def set_up(distro: str, tools: list[str]) -> None:
             say(f"{TOOLS[tool]} ...")
             environment.pip_install(["-r", requirements / f"{tool}.txt"], f"installing {TOOLS[tool]}")
             environment.write_state(**{tool: needed[tool]})
-        if built:
-            built.result()
-            environment.write_state(messages=messages)
+        for name in filter(missing, interfaces):
+            if name in built:
+                built[name].result()
+            environment.write_state(**{name: needed[name]})
     say(f"done in {time.monotonic() - start:.0f} s")
 
 

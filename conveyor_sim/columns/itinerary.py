@@ -13,10 +13,16 @@ class Itinerary:
     A bottle has returned when it comes onto a belt that it had left, with at least two other belts in between.
     """
 
-    def __init__(self, belts: int) -> None:
-        """Start without entries. belts: number of belts of the line."""
+    def __init__(self, belts: int, initial: int | None = None) -> None:
+        """Start without entries.
+
+        belts: number of belts of the line. initial: number of bottles at tick 0, which have the lowest ids; None if it
+        is unknown.
+        """
+        self._initial = initial
         self.entries: list[list[float]] = [[] for _ in range(belts)]
-        """Times by belt, s, at which a bottle came onto it from another belt or an infeed."""
+        """Times by belt, s, at which a bottle came onto it from another belt or an infeed. A station that gives a
+        bottle back to the belt from which it took it adds none."""
         self.returns: list[list[float]] = [[] for _ in range(belts)]
         """Entry times, s, of bottles that had been on the belt before, and on at least two other belts since."""
         self._since: dict[int, dict[int, set[int]]] = {}
@@ -33,14 +39,18 @@ class Itinerary:
             at = np.searchsorted(self._ids, bottles.id).clip(max=len(self._ids) - 1)
             stayed = (self._ids[at] == bottles.id) & (self._belt[at] == bottles.belt)
         for index in np.flatnonzero(~stayed & (bottles.belt >= 0)):
-            self._enter(int(bottles.id[index]), int(bottles.belt[index]), time)
+            bottle, belt = int(bottles.id[index]), int(bottles.belt[index])
+            stood = self._first is None and (time > 0.0 or self._initial is None or bottle < self._initial)
+            self._enter(bottle, belt, time, stood)
         self._ids, self._belt = bottles.id, bottles.belt
         self._first = time if self._first is None else self._first
         self._last = time
 
-    def _enter(self, bottle: int, belt: int, time: float) -> None:
+    def _enter(self, bottle: int, belt: int, time: float, stood: bool) -> None:
         since = self._since.setdefault(bottle, {})
-        if self._first is not None:  # a bottle that stands on a belt at the start did not enter it
+        if since.get(belt) == set():  # it was in a station, or on the floor, and on no other belt since
+            return
+        if not stood:  # a bottle that stands on a belt at the start did not enter it
             self.entries[belt].append(time)
             if len(since.get(belt, ())) >= 2:
                 self.returns[belt].append(time)

@@ -75,12 +75,8 @@ def _with_warnings(lines: list[str], warnings: Sequence[str]) -> list[str]:
 
 
 def _bottles(summary: Summary) -> str:
-    counts = [] if summary.fed is None else [f"{summary.fed} fed"]
-    if summary.removed is not None:
-        rejected = f" ({summary.rejected} of them rejected)" if summary.rejected else ""
-        counts.append(f"{summary.removed} removed{rejected}")
     floor = f" ({summary.on_floor} of them on no belt)" if summary.on_floor else ""
-    return ", ".join([*counts, f"{summary.present} on the line at the end{floor}"])
+    return f"{summary.bottles.sentence}{floor}"
 
 
 def _warnings(summary: Summary) -> list[str]:

@@ -9,22 +9,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.bag.messages.encode import to_image
 from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.bag.reader import Bag, open_bag
 from conveyor_sim.bag.recorded_scene import recorded_scene
-from conveyor_sim.columns.bottles import BottleColumns
 from conveyor_sim.columns.itinerary import Itinerary
 from conveyor_sim.columns.ledger import Ledger
 from conveyor_sim.errors import SceneError
 from conveyor_sim.line.commands.inputs import ARRIVAL
-from conveyor_sim.line.device_kinds import build_devices
-from conveyor_sim.line.tag import Adds
 from conveyor_sim.physics.model import Model, build_model
 from conveyor_sim.physics.model.remedies import StepLimit, step_limit
 from conveyor_sim.physics.model.step_choice import choose_steps
 from conveyor_sim.physics.plant import Plant
 from conveyor_sim.report.alarm_figures import AlarmTally
+from conveyor_sim.report.bottle_counts import BottleCounter, BottleCounts
 from conveyor_sim.report.summary import BeltFlow, Energy, LoadHistory, Loop, Summary
 from conveyor_sim.run.force_check import PressWatch, achieved, pressed
 from conveyor_sim.run.speed import TopicCount
@@ -32,7 +29,7 @@ from conveyor_sim.scene import parse_again, parse_overrides
 from conveyor_sim.support.printable import SENTENCE, printable
 
 GUARD_TEXTS = 3
-SUMMED = ("bottles", "signals", "ledger", "damage", "damage_events", "outcomes", "guard", "events", "alarm_states")
+SUMMED = ("bottles", "ledger", "damage", "damage_events", "outcomes", "guard", "events", "alarm_states")
 TAKEN = {TOPICS[name].type: TOPICS[name] for name in SUMMED}
 """Summarised topics by message type, because topics may have been renamed."""
 
@@ -48,13 +45,19 @@ class _Tally:
 
     def __init__(self, bag: Bag) -> None:
         self._bag = bag
+        self._model = _model(bag.line)
+        self._counter = BottleCounter("events" in bag.counts)
         self._topics: dict[str, list[int]] = {topic: [0, 0] for topic in bag.counts}
         self._last_tick = 0
-        self._itinerary = Itinerary(len(bag.line.belts))
+        self._itinerary = Itinerary(
+            len(bag.line.belts), None if self._model is None else len(self._model.plant.bottles)
+        )
         self._forces: list[NDArray[np.float64]] = []
         self._unknown = False
-        self._bottles: BottleColumns | None = None
-        self._signals: NDArray[np.float64] | None = None
+        self._bottles: tuple[int, NDArray[np.int32]] | None = None
+        """Tick of the last bottles, and the belts under them."""
+        self._moments = 0
+        """Number of messages of bottles."""
         self._ledger: Ledger | None = None
         self._outcomes: Counter[bool] = Counter()
         self._occasions = 0
@@ -72,14 +75,14 @@ class _Tally:
     def _take(self, topic: str, message: Any) -> None:
         self._last_tick, read = max(self._last_tick, int(message.tick)), TOPICS[topic].unpack(message)
         if topic == "bottles":
-            self._bottles = read
+            self._bottles = message.tick, read.belt
+            self._moments += 1
+            self._counter.take_bottles(read.id)
             time = self._bag.time(message.tick)
             self._itinerary.take(time, read)
             self._pressing.take(time, read.id, read.impulse)
             self._forces.append(read.peak_force[read.peak_force > 0.0])
             self._unknown = self._unknown or bool(np.isnan(read.peak_force).any())
-        elif topic == "signals":
-            self._signals = to_image(message).truth
         elif topic == "guard":
             self._guard.append((printable(message.kind), printable(message.text, SENTENCE)))
         elif topic == "damage":
@@ -89,6 +92,7 @@ class _Tally:
         elif topic == "ledger":
             self._ledger = read
         elif topic == "events":
+            self._counter.take_events(read)
             for at, kind, name in zip(read.at, read.kind, read.name, strict=True):
                 self._occasions += kind == "command_refused"
                 self._alarms.event(self._bag.time(int(at)), kind, printable(name))
@@ -100,20 +104,16 @@ class _Tally:
 
     def summary(self, wall: float | None) -> Summary:
         forces = np.concatenate(self._forces) if self._forces else np.zeros(0)
-        belt = np.zeros(0, dtype=np.int32) if self._bottles is None else self._bottles.belt
+        belt = np.zeros(0, dtype=np.int32) if self._bottles is None else self._bottles[1]
         peak = None if self._unknown else float(forces.max(initial=0.0))
-        line, model = self._bag.line, _model(self._bag.line)
-        roles = None if model is None else _roles(line, model)
+        line, model = self._bag.line, self._model
         seconds = self._bag.time(max(0, self._last_tick - int(line.tick)))
         return Summary(
             scene=printable(line.scene_name),
             bag=printable(self._bag.path, SENTENCE),
             simulated=seconds,
             wall=wall,
-            fed=self._counted(roles, "fed"),
-            removed=self._counted(roles, "removed", "rejected"),
-            rejected=self._counted(roles, "rejected"),
-            present=len(belt),
+            bottles=self._counts(),
             on_floor=int(np.count_nonzero(belt < 0)),
             belts=self._belts(belt),
             loop=self._loop(),
@@ -137,15 +137,12 @@ class _Tally:
             topics={printable(topic): TopicCount(*counts) for topic, counts in self._topics.items()},
         )
 
-    def _counted(self, roles: dict[str, Adds] | None, *wanted: Adds) -> int | None:
-        """Return the final sum of the signals with one of these roles."""
-        if roles is None:
-            return None
-        names = self._bag.line.signal_names
-        chosen = [index for index, name in enumerate(names) if roles.get(name) in wanted]
-        if not chosen:
-            return 0
-        return None if self._signals is None else int(self._signals[chosen].sum())
+    def _counts(self) -> BottleCounts:
+        """Return the counts at the last recorded bottles. With bottles of the start alone: counts at the end."""
+        tick, belt = (-1, ()) if self._bottles is None else self._bottles
+        if self._moments > 1 or tick == self._last_tick:
+            return self._counter.at(tick, len(belt))
+        return self._counter.at(self._last_tick, None)
 
     def _belts(self, belt: NDArray[np.int32]) -> dict[str, BeltFlow]:
         flows = {}
@@ -178,12 +175,6 @@ def _energy(ledger: Ledger, belts: list[str], rails: list[str]) -> Energy:
         turnover=ledger.turnover,
         rails=dict(zip(moving, ledger.rail_work.tolist(), strict=True)),
     )
-
-
-def _roles(line: Any, model: Model) -> dict[str, Adds]:
-    """Return the roles of signals in sums, by signal name, for a recorded scene."""
-    devices = build_devices(recorded_scene(line, line.scene_name), model)
-    return {signal.name: signal.adds_to for device in devices for signal in device.signals}
 
 
 def _model(line: Any) -> Model | None:

@@ -12,6 +12,7 @@ from conveyor_sim.columns.damage import DamageColumns
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.physics.model.remedies import StepLimit
 from conveyor_sim.report.alarm_figures import AlarmFigures
+from conveyor_sim.report.bottle_counts import BottleCounts
 from conveyor_sim.run.force_check import ForceCheck, Pressed
 from conveyor_sim.run.speed import TopicCount
 
@@ -134,14 +135,8 @@ class Summary:
     """s"""
     wall: float | None
     """s"""
-    fed: int | None
-    """By infeeds, sources and spills; None if this version refuses the recorded scene, or no signals were recorded."""
-    removed: int | None
-    """By outfeeds, sinks and rejects."""
-    rejected: int | None
-    """By rejects."""
-    present: int
-    """Bottles on the line at the end."""
+    bottles: BottleCounts
+    """Numbers of bottles at the end; present alone without recorded events."""
     on_floor: int
     """Number of these bottles that are on no belt."""
     belts: dict[str, BeltFlow]

@@ -95,4 +95,5 @@ def test_forced_signals_are_marked_with_what_is_true(whole: tuple[Path, Simulati
 def test_a_forced_counter_does_not_falsify_the_summary(whole: tuple[Path, Simulation]) -> None:
     summary = summarize(whole[0])
     counts = whole[1].counts
-    assert (summary.fed, summary.removed, summary.present) == (counts.fed, counts.removed, counts.present)
+    bottles = summary.bottles
+    assert (bottles.fed, bottles.removed, bottles.present) == (counts.fed, counts.removed, counts.present)

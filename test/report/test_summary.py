@@ -20,6 +20,7 @@ from conveyor_sim.line.commands.inputs import MODE, Input
 from conveyor_sim.physics.model import build_model
 from conveyor_sim.physics.model.remedies import step_limit
 from conveyor_sim.report.alarm_figures import AlarmFigures, Listed
+from conveyor_sim.report.figures.recording import Recording
 from conveyor_sim.report.labelled import MOST_LINES
 from conveyor_sim.report.outline import FILES, outline
 from conveyor_sim.report.report import render
@@ -71,11 +72,12 @@ def test_counts_are_those_of_the_simulation(tmp_path: Path) -> None:
     summary = summarize(tmp_path / "bag", wall=0.5)
     assert summary.simulated == pytest.approx(1.0)
     assert summary.real_time_factor == pytest.approx(2.0)
-    assert summary.fed == simulation.counts.fed > 0
-    assert summary.removed == simulation.counts.removed > 0
-    assert summary.present == simulation.counts.present
+    counts = simulation.counts
+    assert summary.bottles.fed == counts.fed > 0
+    assert summary.bottles.removed == counts.removed > 0
+    assert (summary.bottles.present, summary.bottles.held) == (counts.present, counts.held)
     on_belts = sum(flow.bottles for flow in summary.belts.values())
-    assert on_belts + summary.on_floor == summary.present
+    assert on_belts + summary.on_floor == summary.bottles.present
     assert (summary.commands, summary.refused) == (5, 2)
 
 
@@ -137,13 +139,12 @@ def test_a_recording_that_this_version_refuses_has_no_prediction(bag: Path, tmp_
     assert summary.predicted is None
     assert summary.achieved is None
     assert summary.peak_force is not None
-    assert (summary.fed, summary.removed, summary.rejected) == (None, None, None)
-    assert f"bottles    {summary.present} on the line at the end" in shown(summary)
+    assert summary.bottles == summarize(bag).bottles
 
 
 def test_what_sets_the_steps_is_told(bag: Path, tmp_path: Path) -> None:
     summary = summarize(bag)
-    expected = step_limit(load_scene(SMALL_LINE), bottles=summary.present)
+    expected = step_limit(load_scene(SMALL_LINE), bottles=summary.bottles.present)
     assert expected.lines != []
     assert summary.limit == expected
     assert json.loads(write_summary(summary, tmp_path).read_text())["steps"] == expected.lines
@@ -186,7 +187,7 @@ def test_rounds_of_a_loop_are_counted_where_bottles_return(tmp_path: Path) -> No
     assert summary.loop.per_minute == pytest.approx(400.0)
     assert summary.loop.per_minute_second_half == pytest.approx(400.0)
     assert summary.belts["b"].per_minute == pytest.approx(400.0)
-    assert summary.fed == 0
+    assert summary.bottles.fed == 0
 
 
 def test_to_and_fro_between_two_belts_is_no_loop(tmp_path: Path) -> None:
@@ -195,24 +196,40 @@ def test_to_and_fro_between_two_belts_is_no_loop(tmp_path: Path) -> None:
     assert summary.belts["a"].per_minute == pytest.approx(600.0)
 
 
+def test_a_bottle_that_returns_to_its_belt_has_not_come_onto_it_again(tmp_path: Path) -> None:
+    """It leaves every belt at tick 20, comes back at tick 30, and changes the belt at tick 40."""
+    belts = ring(parse_scene(THREE_BELTS), tmp_path, lambda tick: -1 if 20 <= tick < 30 else tick // 40)
+    flow = summarize(belts).belts
+    assert (flow["a"].per_minute, flow["b"].per_minute) == (0.0, pytest.approx(100.0))
+
+
 def test_bottles_of_machines_count_too(tmp_path: Path) -> None:
     """A source and a sink; sums go by what a signal counts, not by its name."""
     buffer_lane = Path(__file__).parents[2] / "config" / "scenarios" / "buffer_lane.yaml"
     simulation = record(load_scene(buffer_lane, {"duration": 5.0}), tmp_path / "bag", 500)
     summary = summarize(tmp_path / "bag")
-    assert (summary.fed, summary.removed) == (simulation.counts.fed, simulation.counts.removed)
+    assert (summary.bottles.fed, summary.bottles.removed) == (simulation.counts.fed, simulation.counts.removed)
     assert min(simulation.counts.fed, simulation.counts.removed) > 5
-    assert summary.rejected == 0
+    assert summary.bottles.rejected == 0
 
 
 def test_what_was_not_recorded_is_not_made_up(tmp_path: Path) -> None:
     record(load_scene(SMALL_LINE, {"outputs": {"signals": 0}}), tmp_path / "bag", 10)
     summary = summarize(tmp_path / "bag")
-    assert summary.fed is None
-    assert f"bottles    {summary.present} on the line at the end" in shown(summary)
+    assert summary.bottles.fed is not None
     assert summary.energy is None
     assert summary.wall is None
     assert summary.real_time_factor is None
+
+
+def test_bottles_without_events_are_those_on_the_line(tmp_path: Path) -> None:
+    simulation = Simulation(load_scene(SMALL_LINE))
+    with Recorder(tmp_path / "bag", topics=["line", "bottles"]) as recorder:
+        outputs = OutputWriter(simulation, [recorder], run_id="run")
+        outputs.start()
+    counts = summarize(tmp_path / "bag").bottles
+    assert (counts.initial, counts.fed, counts.removed, counts.rejected, counts.held) == (None,) * 5
+    assert missing(counts.sentence, f"{simulation.counts.present} on the line", "not recorded") == []
 
 
 def test_the_energy_ledger_is_told_with_the_work_of_each_belt(tmp_path: Path) -> None:
@@ -241,7 +258,7 @@ def test_summary_is_written_as_json(bag: Path, tmp_path: Path) -> None:
 def test_summary_can_be_read_on_a_terminal(bag: Path) -> None:
     summary = summarize(bag, wall=2.0)
     text = shown(summary)
-    bottles = f"{summary.fed} fed, {summary.removed} removed, {summary.present} on the line"
+    bottles = summary.bottles.sentence
     for words in (
         "small_line",
         "peak force of impacts",
@@ -276,3 +293,20 @@ def test_more_warnings_than_lines_are_counted(bag: Path) -> None:
     assert len(lines) == MOST_LINES - FILES
     assert missing(lines[-2], ["warning", "guard", "2 x soft", "first"]) == []
     assert missing(lines[-1], ["2 more warnings", "--details"]) == []
+
+
+def test_bottles_in_stations_are_held_and_counted_once(tmp_path: Path) -> None:
+    """Two stations on one belt: counts close at each recorded tick, and a station adds no entry onto its belt."""
+    scene = load_scene(Path(__file__).parents[2] / "config" / "scenarios" / "two_stations.yaml")
+    simulation = record(scene, tmp_path / "bag", 1500)
+    counts = summarize(tmp_path / "bag").bottles
+    assert counts.held == simulation.counts.held > 0
+    assert counts.fed is not None and counts.removed is not None
+    assert counts.fed == counts.removed + counts.present + counts.held
+    assert missing(counts.sentence, f"{counts.fed} fed", f"{counts.held} held in machines") == []
+    with open_bag(tmp_path / "bag") as bag:
+        flow = Recording(bag).flow
+    assert flow.fed is not None and flow.removed is not None and flow.held is not None
+    assert (flow.fed == flow.removed + flow.present + flow.held).all()
+    assert (int(flow.fed[-1]), int(flow.removed[-1])) == (counts.fed, counts.removed)
+    assert int(flow.entered[-1].max()) <= counts.fed

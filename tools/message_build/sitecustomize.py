@@ -1,4 +1,4 @@
-"""Every Python that starts while conveyor_msgs is built runs this: each IDL file is parsed once.
+"""Every Python that starts while an interface package is built runs this: each IDL file is parsed once.
 
 ROS has nine generators, and each would parse all files, which takes two thirds of its time.
 """
@@ -13,7 +13,7 @@ if "rosidl" in "".join(sys.orig_argv[1:2]):
     from rosidl_parser import parser
 
     parse = getattr(parser, "get_ast_from_idl_string", None)
-    folder = Path(os.environ["CONVEYOR_MSGS_PARSED"])
+    folder = Path(os.environ["PARSED_INTERFACES"])
 
     def parse_once(text: str) -> object:
         """Return the syntax tree of an IDL file's text, parsed once."""

@@ -41,7 +41,7 @@ class Record:
         self.scene = scene
         self.interval = scene.every("bottles") * scene.tick
         """s, between outputs of bottles."""
-        self.itinerary = Itinerary(len(scene.belts))
+        self.itinerary = Itinerary(len(scene.belts), len(simulation.model.plant.bottles))
         self.queue_forces: list[NDArray[np.float64]] = []
         """N, by output: time-mean, since the output before, of each touched bottle's summed normal forces."""
         self.peak_forces: list[NDArray[np.float64]] = []

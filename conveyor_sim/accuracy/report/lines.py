@@ -62,7 +62,7 @@ def _forces(study: AccuracyStudy, answer: Answer) -> str:
     return f"{impacts} (tolerance {_tolerance(study)}). Resting load: not measured{why}{likely}."
 
 
-def _asked(study: AccuracyStudy) -> str:
+def _tolerance(study: AccuracyStudy) -> str:
     return percent(study.tolerance)
 
 

@@ -165,14 +165,16 @@ class Velocity:
 
 @dataclass(frozen=True)
 class Flow:
-    """Flow of bottles: `time` (n,) s; `fed`, `removed`, `present` (n,) counts since the start.
+    """Flow of bottles: `time` (n,) s; `fed`, `removed`, `held`, `present` (n,) as in `BottleCounts`.
 
-    `on_belt` (n, belts) counts the bottles on each belt; `entered` (n, belts) counts entries onto it since the start.
+    The first three are None without recorded events. `on_belt` (n, belts) counts the bottles on each belt; `entered`
+    (n, belts) counts entries onto it since the start.
     """
 
     time: Floats
-    fed: NDArray[np.int64]
-    removed: NDArray[np.int64]
+    fed: NDArray[np.int64] | None
+    removed: NDArray[np.int64] | None
+    held: NDArray[np.int64] | None
     present: NDArray[np.int64]
     on_belt: NDArray[np.int64]
     entered: NDArray[np.int64]

@@ -19,7 +19,7 @@ _WINDOWS: Final = 10  # in a run: a rate is counted over this part of it
 
 
 def flow_figure(flow: Flow, belts: Sequence[str]) -> Figure:
-    """Bottles fed, on the line and removed; under it a row a belt: bottles on it, and entries per minute."""
+    """Draw the bottles fed, on the line, removed and held; below, per belt, bottles on it and entries per minute."""
     heights = (2.8, 0.9 + 0.62 * len(belts) if belts else 0.01)
     figure = style.new_figure(11.0, sum(heights))
     [[top], [rows]] = figure.subfigures(2, 1, squeeze=False, height_ratios=heights)
@@ -29,7 +29,10 @@ def flow_figure(flow: Flow, belts: Sequence[str]) -> Figure:
         ("fed", flow.fed, style.SERIES[4], 4.0),
         ("on the line", flow.present, style.SERIES[0], 1.5),
         ("removed", flow.removed, style.SERIES[1], 1.5),
+        ("held in machines", flow.held, style.SERIES[2], 1.5),
     ):
+        if counts is None or (name == "held in machines" and not counts.any()):
+            continue
         _steps(total, flow.time, counts, colour, width, gid=name, label=f"{name} ({int(counts[-1])} at the end)")
     total.set_ylabel("bottles")
     total.set_title("Bottles on the line")

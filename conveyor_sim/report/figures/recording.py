@@ -15,8 +15,10 @@ from conveyor_sim.bag.messages.encode import to_image
 from conveyor_sim.bag.reader import Bag
 from conveyor_sim.columns.bottles import BottleColumns, ContactColumns
 from conveyor_sim.columns.damage import DamageColumns, RailWearColumns
+from conveyor_sim.columns.itinerary import Itinerary
 from conveyor_sim.columns.ledger import Ledger
 from conveyor_sim.errors import BagError, ConveyorError
+from conveyor_sim.report.bottle_counts import BottleCounter, BottleCounts
 from conveyor_sim.report.figures.data import (
     Contacts,
     Damage,
@@ -243,39 +245,43 @@ class Recording:
     @cached_property
     def _summary(self) -> _Summary:
         ticks: list[int] = []
-        counts: list[tuple[int, int, int]] = []
         on_belt: list[Integers] = []
-        entered: list[Integers] = []
+        entered: list[list[int]] = []
         forces: list[tuple[float, float, int]] = []
         seen = np.empty(0, dtype=np.int64)
-        before: tuple[Integers, Integers] | None = None
+        itinerary = Itinerary(len(self.belts), self._initial)
+        present: list[int] = []
+        counter = BottleCounter("events" in self._bag.counts)
+        for events in self._bag.read("events"):
+            counter.take_events(events.data)
         for frame in self._bag.bottles():
             ids, belt = frame.data.id.astype(np.int64), frame.data.belt.astype(np.int64)
-            if before is None:
-                # What stands on a belt at the start has not come onto it, except what was fed at once.
-                standing = ids < self._initial
-                before = ids[standing], belt[standing]
             seen = np.union1d(seen, ids)
             ticks.append(frame.tick)
-            counts.append((int(np.count_nonzero(seen >= self._initial)), len(seen) - len(ids), len(ids)))
+            present.append(len(ids))
+            counter.take_bottles(frame.data.id)
             on_belt.append(np.bincount(belt[belt >= 0], minlength=len(self.belts)))
-            entered.append(entries(*before, ids, belt, len(self.belts)))
+            itinerary.take(frame.time, frame.data)
+            entered.append([len(times) for times in itinerary.entries])
             forces.append(_peak(ids, frame.data.peak_force))
-            before = ids, belt
         tick_array = np.array(ticks, dtype=np.int64)
         time = self._seconds(tick_array)
-        count_array = np.array(counts, dtype=np.int64)
         flow = Flow(
             time=time,
-            fed=count_array[:, 0],
-            removed=count_array[:, 1],
-            present=count_array[:, 2],
+            **_columns([counter.at(*now) for now in zip(ticks, present, strict=True)]),
+            present=np.array(present, dtype=np.int64),
             on_belt=np.array(on_belt, dtype=np.int64),
-            entered=np.cumsum(np.array(entered, dtype=np.int64), axis=0),
+            entered=np.array(entered, dtype=np.int64).reshape(len(ticks), len(self.belts)),
         )
         force = np.array(forces, dtype=np.float64)
         peak = PeakForceSeries(time, force[:, 0], force[:, 1], force[:, 2].astype(np.int64))
         return _Summary(tick_array, seen, flow, peak)
+
+
+def _columns(counts: Sequence[BottleCounts]) -> dict[str, Integers | None]:
+    """Return fed, removed and held (n,); None without recorded events."""
+    columns = {name: [getattr(row, name) for row in counts] for name in ("fed", "removed", "held")}
+    return {name: None if None in column else np.array(column, dtype=np.int64) for name, column in columns.items()}
 
 
 def contact_lines(bottles: BottleColumns, contacts: ContactColumns) -> Contacts:
@@ -288,15 +294,6 @@ def contact_lines(bottles: BottleColumns, contacts: ContactColumns) -> Contacts:
     between_bottles = contacts.kind == _BOTTLE_BOTTLE
     lines[between_bottles, 1] = _axes(bottles, contacts.b[between_bottles], point[between_bottles])
     return Contacts(lines, np.asarray(contacts.normal_force, dtype=np.float64))
-
-
-def entries(ids_before: Integers, belt_before: Integers, ids: Integers, belt: Integers, belts: int) -> Integers:
-    """Bottles (belts,) that are on a belt now and were not on it before; both sets of ids ascend."""
-    came = belt >= 0
-    if len(ids_before):
-        at = np.searchsorted(ids_before, ids).clip(max=len(ids_before) - 1)
-        came &= ~((ids_before[at] == ids) & (belt_before[at] == belt))
-    return np.bincount(belt[came], minlength=belts)
 
 
 def _axes(bottles: BottleColumns, ids: NDArray[np.uint64], otherwise: Floats) -> Floats:

@@ -26,7 +26,8 @@ def flow() -> Flow:
     fed = np.minimum((TIME * 4.0).astype(np.int64), 50)
     removed = np.maximum(fed - 30, 0)
     on_belt = np.stack([np.minimum(fed, 20), np.maximum(fed - 20, 0) - removed], axis=1)
-    return Flow(TIME, fed, removed, fed - removed, on_belt, np.stack([fed, np.maximum(fed - 20, 0)], axis=1))
+    entered = np.stack([fed, np.maximum(fed - 20, 0)], axis=1)
+    return Flow(TIME, fed, removed, np.zeros_like(fed), fed - removed, on_belt, entered)
 
 
 def line(figure: Figure, gid: str) -> Line2D:
@@ -78,15 +79,16 @@ def test_entries_before_the_window_has_passed_once_are_counted_in_full() -> None
     np.testing.assert_allclose(entries_per_minute(np.array([0.0, 0.5, 1.0]), entered, 2.0)[:, 0], [30.0, 30.0, 60.0])
 
 
-def test_a_line_without_belts_has_its_counts_drawn() -> None:
+def test_a_line_without_belts_and_signals_has_the_bottles_on_it_drawn() -> None:
     recorded = flow()
-    bare = Flow(TIME, recorded.fed, recorded.removed, recorded.present, np.empty((1001, 0)), np.empty((1001, 0)))
-    assert len(flow_figure(bare, []).axes) == 1
+    bare = Flow(TIME, None, None, None, recorded.present, np.empty((1001, 0)), np.empty((1001, 0)))
+    figure = flow_figure(bare, [])
+    assert [drawn.get_gid() for drawn in figure.axes[0].lines] == ["on the line"]
 
 
 def test_a_recording_of_one_instant_is_drawn() -> None:
     zero, one = np.zeros(1, dtype=np.int64), np.zeros((1, 1), dtype=np.int64)
-    figure = flow_figure(Flow(np.zeros(1), zero, zero, zero, one, one), ["feeder"])
+    figure = flow_figure(Flow(np.zeros(1), zero, zero, zero + 1, zero, one, one), ["feeder"])
     assert len(figure.axes) == 3
     assert len(force_figure(PeakForceSeries(np.zeros(1), np.zeros(1), np.zeros(1), zero - 1)).axes) == 1
 

@@ -16,7 +16,7 @@ from conveyor_sim.errors import BagError, ConveyorError
 from conveyor_sim.report.figures import style
 from conveyor_sim.report.figures.bottles import draw_bottles
 from conveyor_sim.report.figures.draw import plot_bag
-from conveyor_sim.report.figures.recording import Recording, entries
+from conveyor_sim.report.figures.recording import Recording
 from conveyor_sim.report.figures.views import table_figure
 
 
@@ -149,15 +149,6 @@ def test_peak_forces_are_taken_over_the_bottles(bag: Path, recording: Recording)
     np.testing.assert_array_equal(recording.peak_force.largest, [force.max() for force in forces])
     np.testing.assert_array_equal(recording.peak_force.percentile_99, [np.percentile(force, 99) for force in forces])
     assert recording.peak_force.largest.max() > 0.0
-
-
-def test_entries_count_changes_of_belt_and_bottles_that_are_new() -> None:
-    before, belt_before = np.array([1, 2, 3, 4]), np.array([0, 0, 1, -1])
-    now, belt_now = np.array([1, 3, 4, 5, 6]), np.array([0, 0, 1, 1, -1])
-    np.testing.assert_array_equal(entries(before, belt_before, now, belt_now, 2), [1, 2])
-    none = np.empty(0, dtype=np.int64)
-    np.testing.assert_array_equal(entries(none, none, now, belt_now, 2), [2, 2])
-    np.testing.assert_array_equal(entries(before, belt_before, none, none, 2), [0, 0])
 
 
 def test_the_plant_is_the_one_that_ran(recording: Recording) -> None:
