@@ -213,7 +213,7 @@ def test_plot_draws_into_a_folder(command: Command, tmp_path: Path) -> None:
     assert_refused(command("plot", "bag", "--time", "99"), "99")
 
 
-@pytest.mark.parametrize("name", ["replay", "plot", "recover"])
+@pytest.mark.parametrize("name", ["replay", "plot", "recover", "events", "alarms"])
 def test_bag_that_is_not_there_is_refused(command: Command, name: str) -> None:
     assert_refused(command(name, "gone"), "gone: no ")
 

@@ -1,4 +1,4 @@
-"""Commands on a recording: recover, replay, sources, events, report, plot."""
+"""Commands on a recording: recover, replay, sources, events, alarms, report, plot."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from conveyor_sim.cli.output import show
+from conveyor_sim.cli.output import line_width, show_json, show_lines
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.support.printable import SENTENCE, printable
 from conveyor_sim.support.progress import ProgressBar
@@ -106,17 +106,42 @@ def sources(bag: Path, out: Path | None) -> None:
 @click.option("--name", "names", multiple=True, help="Only of this device, alarm, ...: machines/*, ...; repeatable.")
 @click.option("--from", "start", type=float, help="Only from this simulated time in s on.")
 @click.option("--to", "stop", type=float, help="Only up to this simulated time in s.")
-@click.option("--csv", "file", type=click.Path(path_type=Path), help="Write them to this file and print none.")
-def events(bag: Path, file: Path | None, **chosen: Any) -> None:
-    """Print what happened on the line in BAG: bottles, alarms, states of machines, faults, refusals, limits passed."""
-    from conveyor_sim.report.events import chosen_events, event_table, write_csv
+@click.option("--all", "every", is_flag=True, help="Print repeated events one by one.")
+@click.option("--json", "as_json", is_flag=True, help="Print all of them as JSON.")
+@click.option("--csv", "file", type=click.Path(path_type=Path), help="Write all of them to this file and print none.")
+def events(bag: Path, file: Path | None, every: bool, as_json: bool, **chosen: Any) -> None:
+    """List the events in BAG: bottles, alarms, states of machines, faults, refusals, limits passed.
 
+    Events that are repeated, such as those of each cycle of a machine, are counted in one line between other events.
+    """
+    from conveyor_sim.report.events import chosen_events, event_listing, write_csv
+
+    if file is not None and as_json:
+        raise ConveyorError("--csv: given with --json, expected one of them")
     rows = chosen_events(bag, **chosen)
-    if file is None:
-        show(event_table(rows))
-    else:
+    if file is not None:
         write_csv(rows, file, bag)
         click.echo(f"{len(rows)} events written to {file}")
+    elif as_json:
+        show_json(row._asdict() for row in rows)
+    else:
+        show_lines(event_listing(rows, line_width(), every))
+
+
+@click.command()
+@click.argument("bag", type=click.Path(path_type=Path))
+@click.option("--kind", "kinds", multiple=True, help="Only of this class: error, warning, message; repeatable.")
+@click.option("--name", "names", multiple=True, help="Only this alarm: infeed*, ...; repeatable.")
+@click.option("--json", "as_json", is_flag=True, help="Print them as JSON.")
+def alarms(bag: Path, as_json: bool, **chosen: Any) -> None:
+    """List the alarms of BAG: how often each was raised, how long it was active, its state at the end."""
+    from conveyor_sim.report.alarms import alarm_listing, chosen_alarms
+
+    rows = chosen_alarms(bag, **chosen)
+    if as_json:
+        show_json(row._asdict() for row in rows)
+    else:
+        show_lines(alarm_listing(rows, line_width()))
 
 
 @click.command()

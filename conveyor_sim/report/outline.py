@@ -58,7 +58,7 @@ def file_lines(folder: Path, files: Sequence[Path], pictures: Sequence[Path]) ->
         names.append(f"{pictures[0].parent.relative_to(folder)}/ ({count})")
     return [
         labelled("recorded", f"{folder}: {', '.join(names)}"),
-        labelled("", f"conveyor-sim view {quote(str(folder))}"),
+        labelled("next", f"conveyor-sim view {quote(str(folder))}"),
     ]
 
 
