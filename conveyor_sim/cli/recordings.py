@@ -146,6 +146,30 @@ def alarms(bag: Path, as_json: bool, **chosen: Any) -> None:
 
 @click.command()
 @click.argument("bag", type=click.Path(path_type=Path))
+@click.option("--parquet", is_flag=True, help="Write Parquet files, with units in the metadata of the columns.")
+@click.option("--csv", "as_csv", is_flag=True, help="Write CSV files.")
+@click.option("--table", "tables", multiple=True, help="bottles, contacts, signals, events or belts; repeatable.")
+@click.option("--out", type=click.Path(path_type=Path), help="Folder for the files (default: BAG/tables).")
+def export(bag: Path, parquet: bool, as_csv: bool, tables: tuple[str, ...], out: Path | None) -> None:
+    """Write BAG as tables for other programs: bottles, contacts, signals and events.
+
+    Each table is one file with one row per bottle, contact, event or tick. Simulated time and tick come first.
+    """
+    from conveyor_sim.bag.export import export_tables
+
+    if not (parquet or as_csv):
+        raise ConveyorError("neither --parquet nor --csv given, expected one of them")
+    formats = [name for name, on in (("parquet", parquet), ("csv", as_csv)) if on]
+    folder = out or (bag if bag.is_dir() else bag.parent) / "tables"
+    with ProgressBar(f"export {bag}", 0.0, counted="messages") as bar:
+        written = export_tables(bag, folder, formats, tables, bar.update)
+    for file, rows in written.items():
+        click.echo(f"{file.name:<17}{rows} rows, {file.stat().st_size / 1e6:.3g} MB")
+    click.echo(f"written to {folder}")
+
+
+@click.command()
+@click.argument("bag", type=click.Path(path_type=Path))
 @click.option("--out", type=click.Path(path_type=Path), help="Folder for the pictures (default: BAG/report).")
 @click.option("--no-pictures", is_flag=True, help="Print only.")
 def report(bag: Path, **chosen: Any) -> None:

@@ -15,7 +15,7 @@ from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.alarms.alarm import AlarmState
 from conveyor_sim.report.alarm_figures import STANDS
 from conveyor_sim.report.events import EventRow, chosen_events
-from conveyor_sim.report.listing import Record, listing, matches
+from conveyor_sim.report.listing import ListingRow, listing, matches
 from conveyor_sim.scene.parts.alarm import AlarmClass
 from conveyor_sim.support.printable import SENTENCE, printable
 
@@ -118,7 +118,7 @@ def alarm_listing(rows: Sequence[AlarmRow], width: int | None) -> list[str]:
     if not rows:
         return ["no such alarm"]
     records = [
-        Record(
+        ListingRow(
             (
                 row.id,
                 row.alarm_class,

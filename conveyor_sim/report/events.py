@@ -16,7 +16,7 @@ from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.bag.reader import mcap_files, open_bag
 from conveyor_sim.columns.events import Kind
 from conveyor_sim.errors import BagError, ConveyorError
-from conveyor_sim.report.listing import Record, listing, matches
+from conveyor_sim.report.listing import ListingRow, listing, matches
 from conveyor_sim.support.files import FileError, write_file
 from conveyor_sim.support.printable import SENTENCE, printable
 
@@ -95,13 +95,13 @@ def event_listing(rows: Sequence[EventRow], width: int | None, every: bool = Fal
     if not rows:
         return ["no such event"]
     folds = [Fold(row) for row in rows] if every else folded(rows)
-    records = [Record((f"{fold.first.time:.3f}", fold.first.kind, fold.first.name), fold.text) for fold in folds]
+    records = [ListingRow((f"{fold.first.time:.3f}", fold.first.kind, fold.first.name), fold.text) for fold in folds]
     return listing(("time, s", "kind", "name", "text"), records, width, right=[0])
 
 
 @dataclass
 class Fold:
-    """Equal events, told in one line: the first one, and how often it happened until when."""
+    """Equal events in one line: the first one, their number, and the time of the last one."""
 
     first: EventRow
     count: int = 1
@@ -110,7 +110,7 @@ class Fold:
 
     @property
     def text(self) -> str:
-        """The text of the event; how often it happened."""
+        """Text of the event, and its number of occurrences."""
         row = self.first
         if row.kind.startswith("bottle_"):
             return f"bottle {row.bottle}" if self.count == 1 else f"{self.count} bottles until {self.last:.3f} s"
@@ -143,7 +143,7 @@ def folded(rows: Sequence[EventRow]) -> list[Fold]:
 
 
 def _sort_of(row: EventRow) -> tuple[object, ...]:
-    """Return what equal events have in common: bottles are counted, whatever their ids."""
+    """Return the properties that equal events share. Those of bottles share no ID and no count."""
     return (row.kind, row.name) if row.kind.startswith("bottle_") else (row.kind, row.name, row.value, row.text)
 
 

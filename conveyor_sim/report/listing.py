@@ -13,7 +13,7 @@ _LEAST_TEXT = 20
 _INDENT = " " * 4
 
 
-class Record(NamedTuple):
+class ListingRow(NamedTuple):
     """One record of a listing."""
 
     cells: tuple[str, ...]
@@ -23,7 +23,7 @@ class Record(NamedTuple):
 
 
 def listing(
-    headings: Sequence[str], records: Sequence[Record], width: int | None, right: Sequence[int] = ()
+    headings: Sequence[str], records: Sequence[ListingRow], width: int | None, right: Sequence[int] = ()
 ) -> list[str]:
     """Return the lines of a listing, the headings first.
 
@@ -35,7 +35,7 @@ def listing(
     taken = sum(widths) + len(_GAP) * len(widths)
     longest = max((len(record.text) for record in records), default=0)
     beside = width is None or taken + min(longest, _LEAST_TEXT) <= width
-    heads = Record(tuple(headings[:-1]), headings[-1] if beside else "")
+    heads = ListingRow(tuple(headings[:-1]), headings[-1] if beside else "")
     lines = []
     for record in (heads, *records):
         aligned = [

@@ -12,7 +12,7 @@ from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.line import image_of
 from conveyor_sim.line.machines.weihenstephan import names_of
 from conveyor_sim.line.tag import MOST_COUNT, Kind, Role, Tag
-from conveyor_sim.report.listing import Record, listing, matches
+from conveyor_sim.report.listing import ListingRow, listing, matches
 from conveyor_sim.scene import Scene
 from conveyor_sim.support.printable import printable
 
@@ -102,7 +102,7 @@ def tag_listing(tags: Sequence[Tag], width: int | None) -> list[str]:
     if not tags:
         return ["no such tag"]
     records = [
-        Record((tag.name, tag.role, _range(tag), tag.unit, f"{tag.initial:g}"), _description(tag)) for tag in tags
+        ListingRow((tag.name, tag.role, _range(tag), tag.unit, f"{tag.initial:g}"), _description(tag)) for tag in tags
     ]
     return listing(("tag", "role", "range", "unit", "initial", "description"), records, width)
 

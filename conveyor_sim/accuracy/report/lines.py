@@ -81,7 +81,7 @@ def _throughput(study: AccuracyStudy, answer: Answer) -> str:
     known = "none, because nothing leaves or returns in this scene" if flow is None else _known(flow)
     if answer.accepted:
         what = "; ".join(row.observable for row in rows if row is not flow)
-        agreed = f"; {what} within {_tolerance(study)} ({runs} long runs)" if what else f" in {runs} long runs"
+        agreed = f"; within {_tolerance(study)} in {runs} long runs: {what}" if what else f" in {runs} long runs"
         return f"Throughput: {known}{agreed}."
     others = [f"{row.observable} {_bounds(row)}" for row in rows if row.verdict != "equivalent" and row is not flow]
     return f"Throughput: {'; '.join([known, *others])}; {only} ({runs} long runs)."
