@@ -6,7 +6,7 @@ import math
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -20,12 +20,29 @@ from conveyor_sim.support.files import FileError, write_file
 
 
 @dataclass(frozen=True)
+class LastAction:
+    """The last input of a test before its condition failed."""
+
+    time: float
+    """s"""
+    text: str
+
+
+@dataclass(frozen=True)
 class FailedCondition:
     """A condition that failed."""
 
     time: float
     """s"""
     text: str
+    since: float | None = None
+    """Time at which it was first asserted, s; None: unknown."""
+    values: Mapping[str, float] = field(default_factory=dict)
+    """Values that the condition read, by signal."""
+    forced: Sequence[str] = ()
+    """Signals that were forced."""
+    action: LastAction | None = None
+    """Last input of the test; None: there was none."""
 
 
 def write_page(
@@ -57,12 +74,13 @@ def write_page(
                 recording.begin_before(end, last)
         if watch is not None and watch.end >= 0:
             recordings[0].first, recordings[0].last = watch.first, watch.end
-        head: dict[str, Any] = {"failures": [vars(failure) for failure in failures], "trends": list(trends)}
+        head: dict[str, Any] = {"failures": [asdict(failure) for failure in failures], "trends": list(trends)}
         parts: dict[str, bytes] = {}
         if other is not None:
             comparison = RecordingComparison(opened[0], opened[1], math.inf)
             head["compared"] = comparison.head()
             parts["difference/0"] = _deflated(text(comparison.part()))
+            parts["peaks/0"] = _deflated(text(comparison.peaks()))
             parts.update(_parts(recordings[1], "other/", {}))
         parts.update(_parts(recordings[0], "", head, None if watch is None or watch.end < 0 else watch.blocks()))
         page = one_file(parts, recordings[0].name)
@@ -78,6 +96,7 @@ def _parts(
 ) -> Iterator[tuple[str, bytes]]:
     """Yield names and content of the parts. blocks: deflated; None: those of the recording."""
     yield f"{prefix}head", _deflated(text({**recording.head(), **more}))
+    yield f"{prefix}fullest", _deflated(text(recording.fullest()))
     yield f"{prefix}story/0", _deflated(recording.story())
     for number in range(recording.blocks) if blocks is None else ():
         yield f"{prefix}block/{number}", _deflated(recording.block(number))

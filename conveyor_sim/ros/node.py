@@ -33,6 +33,7 @@ from conveyor_sim.ros.publishers import RosSink
 from conveyor_sim.ros.service_names import SIMULATION, create_service
 from conveyor_sim.ros.services import CheckpointServices, Services, settled
 from conveyor_sim.ros.spinner import Spinner
+from conveyor_sim.ros.static_frames import publish_frames
 from conveyor_sim.run.active_run import ActiveRun
 from conveyor_sim.run.compilation import Cancelled, Compilation
 from conveyor_sim.run.lockstep import Refused
@@ -179,10 +180,12 @@ class SimNode:
         clock = ClockPublisher(node, values.clock_rate) if values.publish_clock else None
 
         scene, threads = self._scene, values.threads or None
+        namespace = node.get_namespace().rstrip("/")
 
         def open_session(runs: int, loaded: Simulation | None) -> RunSession:
             simulation = loaded or Simulation(scene, threads)
-            return RunSession(simulation, sink, bag_folder(values.record, runs), values.frame_id, self._distro)
+            bag = bag_folder(values.record, runs)
+            return RunSession(simulation, sink, bag, values.frame_id, self._distro, namespace=namespace)
 
         def read_checkpoint(path: Path) -> Simulation:
             return Simulation.load(path, threads, scene, values.checkpoint_folder)
@@ -207,6 +210,7 @@ class SimNode:
             InputServices(node, executor, stepper)
             lockstep = LockstepService(node, stepper, values.frame_id, died=self._die)
             self._intake = Intake(node.context, lockstep, commands, died=self._die)
+            publish_frames(node, scene, values.frame_id)
             diagnostics = Diagnostics(node, stepper, sink, GraphWatch(node, clock.topic if clock else None))
 
         def on_set(changed: list[Parameter]) -> None:

@@ -324,8 +324,8 @@ _ROWS = (
     Topic(
         "variables",
         "conveyor_msgs/msg/Variables",
-        "a PLC program's variables that are [recorded](structured_text.md#variables-in-recordings); as a node, "
-        "by `controller_node`",
+        "a PLC program's variables that are [recorded](structured_text.md#variables-in-recordings). In ROS, "
+        "`controller_node` publishes the topic",
         "each scan of the program",
         columns=VariableColumns,
         by_controller=True,
@@ -356,6 +356,14 @@ _ROWS = (
         ALARMS,
         recorded=False,
         by_controller=True,
+    ),
+    Topic(
+        "/tf_static",
+        "tf2_msgs/msg/TFMessage",
+        "frames of belts and devices in `frame_id`, named as in the scene: `belts/feeder`, `photo_eyes/exit`",
+        "once, latched",
+        LATCHED,
+        recorded=False,
     ),
     Topic(
         "/clock",

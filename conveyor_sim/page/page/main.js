@@ -3,6 +3,7 @@
 import { SPEEDS } from "./clock.js";
 import { COLOURINGS, colourings, isDark } from "./colours.js";
 import { byId, element, say, seconds, warn } from "./dom.js";
+import { HEATS, LAST } from "./heat.js";
 import { listenToKeys } from "./keys.js";
 import { Line } from "./live.js";
 import { LiveRecording } from "./live_recording.js";
@@ -25,17 +26,23 @@ function wire(view) {
   byId("speed").addEventListener("change", (event) => clock.setSpeed(+event.target.value));
   const clicks = {
     play: () => clock.toggle(), back: () => clock.step(-1), ahead: () => clock.step(1), fit: () => view.wholePlant(),
-    dismiss: () => say(""), closer: () => camera.zoom(1.5), farther: () => camera.zoom(1 / 1.5),
+    approach: () => view.zoomToSelection(), dismiss: () => say(""), closer: () => camera.zoom(1.5), farther: () => camera.zoom(1 / 1.5),
     to_start: () => { clock.seek(clock.recording.start); view.snap(); },
     theme: () => { document.documentElement.dataset.theme = isDark() ? "light" : "dark"; view.touch(); },
     toggle_trends: () => {
       const hidden = byId("drawer").toggleAttribute("hidden");
       byId("toggle_trends").setAttribute("aria-expanded", !hidden);
     },
+    choices: () => byId("choices").setAttribute("aria-expanded", byId("display").toggleAttribute("data-open")),
   };
   for (const [id, action] of Object.entries(clicks)) byId(id).addEventListener("click", action);
   byId("wear").append(...Object.entries(WEARS).map(([name, { label }]) => element("option", { value: name }, label)));
   byId("wear").addEventListener("change", (event) => { view.shownWear = event.target.value; view.touch(); });
+  byId("heat").append(...Object.entries(HEATS).map(([name, { label }]) => element("option", { value: name }, label)));
+  byId("heat").addEventListener("change", (event) => view.setHeat(event.target.value));
+  const whole = view.line ? "received data" : "whole recording";
+  byId("span").append(...Object.entries({ last: `last ${LAST} s`, whole }).map(([name, label]) => element("option", { value: name }, label)));
+  byId("span").addEventListener("change", (event) => { view.shownSpan = event.target.value; view.touch(); });
   view.worn();
   for (const [id, field] of [["forces", "showForces"], ["names", "showNames"]]) {
     byId(id).addEventListener("change", (event) => { view[field] = event.target.checked; view.touch(); });
@@ -43,6 +50,7 @@ function wire(view) {
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => view.touch());
   camera.listen(byId("plan"), (px, py) => view.clicked(px, py), () => view.setFollowing(false));
   listenToKeys(view);
+  if (matchMedia("(max-width: 600px)").matches) byId("toggle_trends").click(); // the plan needs the height
   new ResizeObserver(() => view.resize()).observe(byId("stage"));
   view.setColouring("type");
 }
@@ -64,13 +72,35 @@ async function told(source, part, take) {
   }
 }
 
+// Returns the tick with the most bottles; the first one if it can't be read.
+async function fullest(source) {
+  try {
+    return await read(source, "fullest");
+  } catch {
+    return 0;
+  }
+}
+
 async function read(source, name) {
   return JSON.parse(new TextDecoder().decode(await source.bytes(name)));
 }
 
+// Reads the largest forces of both recordings.
+async function readPeaks(view, source, { stretches }) {
+  for (let part = 0; part < stretches; part++) {
+    try {
+      view.compare.addPeaks(await read(source, `peaks/${part}`), (part + 1) / stretches);
+    } catch (error) {
+      warn(`The peak forces can't be read further: ${error.message}`);
+      return;
+    }
+  }
+  document.body.dataset.peaks = "yes";
+}
+
 // Compares both recordings until the first difference of each kind, then moves to just before the first of all.
 async function compare(view, source, { stretches }) {
-  const untouched = !view.clock.playing && view.clock.time === view.clock.recording.start;
+  const untouched = !view.clock.playing && view.clock.time === view.link.opened;
   for (let part = 0; part < stretches && !view.compare.complete; part++) {
     const before = view.compare.found.length;
     try {
@@ -117,6 +147,7 @@ async function start() {
     view.resize();
     view.receive();
     document.body.dataset.told = "yes";
+    view.link.follow();
     run(view);
   }, { once: true });
 }
@@ -129,6 +160,7 @@ function run(view) {
     if (view.dirty) {
       view.dirty = false;
       view.draw(now);
+      view.link.update();
       document.body.dataset.ready = "yes";
     }
     requestAnimationFrame(loop);
@@ -149,8 +181,11 @@ async function startRecording() {
     warn(failure.text);
     view.clock.seek(Math.max(recording.start, failure.time - 5));
   }
+  const linked = view.link.follow();
+  if (!failure && !linked) view.clock.seek(await fullest(source) * head.tick);
   await Promise.all(view.clock.all.map((one) => one.load(one.number(view.clock.time))));
   view.snap();
+  view.link.opened = linked ? null : view.clock.time;
   run(view);
   // The story of a long recording is read while the page already draws.
   for (let part = 0; parts > 1 && part < parts; part++) {
@@ -162,7 +197,7 @@ async function startRecording() {
   for (let part = 0; other && part < other.recording.head.times.stories; part++) {
     if (other.recording.head.times.stories > 1) unread = await told(behind, part, (more) => view.toldMoreOf(other.story, more)) || unread;
   }
-  if (other) await compare(view, source, head.compared);
+  if (other) await Promise.all([compare(view, source, head.compared), readPeaks(view, source, head.compared)]);
 }
 
 start().catch((error) => {

@@ -1,28 +1,36 @@
 // The view: displayed state of a line, selection, and the parts that draw it.
 
 import { Alarms } from "./alarms.js";
+import { Banner } from "./banner.js";
 import { Bars } from "./bars.js";
 import { Beside } from "./beside.js";
 import { Bottle } from "./bottle.js";
 import { Camera } from "./camera.js";
 import { Clock } from "./clock.js";
-import { COLOURINGS, SCALES, colourings } from "./colours.js";
+import { COLOURINGS, SCALES, colourings, isDark } from "./colours.js";
 import { Compare } from "./compare.js";
 import { Desk } from "./desk.js";
-import { deviceOf, middle } from "./devices.js";
-import { byId, element, keyOf, say, seconds, warn } from "./dom.js";
+import { deviceOf } from "./devices.js";
+import { byId, element, expire, keyOf, say, seconds, warn } from "./dom.js";
 import { Events } from "./events.js";
+import { Failure } from "./failure.js";
 import { Faceplate } from "./faceplate.js";
+import { HEATS, Heat, heatColours } from "./heat.js";
+import { Link } from "./link.js";
 import { LiveClock } from "./live_clock.js";
+import { Minimap } from "./minimap.js";
 import { Plan } from "./plan.js";
 import { Scrubber } from "./scrubber.js";
-import { awayFrom, boundsOf, inside } from "./shapes.js";
+import { boxOf, deviceAt, outlinesOf } from "./selection.js";
+import { Series } from "./series.js";
+import { boundsOf } from "./shapes.js";
 import { Tabs } from "./tabs.js";
 import { Tiles } from "./tiles.js";
 import { Trends } from "./trends.js";
 import { Watch } from "./watch.js";
 import { NO_WEAR, WEARS, Wear } from "./wear.js";
 
+const PLANT_SCALE = 5; // px, radius of the largest bottles below which a click selects devices rather than bottles
 const MEASURED = 5000; // forces of a block from which the scale is made
 const MOST_EVENTS = 5000; // events of a running line; beyond that, events before the visible time are dropped
 const PANELS_EVERY = 120; // ms between two updates of the panels during playback
@@ -31,7 +39,7 @@ export class View {
   // other: a second recording that is shown beside the first, and its story; else null. line: of a running line, its
   // message "begin"; else null.
   constructor(recording, story, other, line = null, about = null) {
-    Object.assign(this, { recording, story, line, bottle: null, following: false, colouring: "type", shownWear: "", showForces: true, showNames: true, dirty: true });
+    Object.assign(this, { recording, story, line, bottle: null, device: null, following: false, colouring: "type", shownWear: "", shownHeat: "", shownSpan: "last", showForces: true, showNames: true, dirty: true });
     this.rival = null; // the other view
     this.letter = ""; // A, if two recordings are shown side by side
     this.fastest = 0.1;
@@ -42,7 +50,10 @@ export class View {
     this.desk = line ? new Desk(this, about) : null;
     this.watch = line ? new Watch(this) : null;
     this.camera = new Camera(boundsOf([recording, other?.recording]));
+    this.series = new Series(this);
     this.wear = new Wear(this);
+    this.heat = new Heat(this);
+    this.minimap = new Minimap(this);
     this.plan = new Plan(byId("plan"), this);
     this.plans = [this.plan];
     if (other) {
@@ -50,6 +61,7 @@ export class View {
       this.compare = new Compare(this, recording.head.compared);
       this.plans.push(this.beside.plan);
     }
+    this.banner = new Banner(this);
     this.scrubber = new Scrubber(this);
     this.trends = new Trends(this);
     this.faceplate = new Faceplate(this);
@@ -60,12 +72,15 @@ export class View {
     const production = { title: "Line", parts: [...this.bars, ...shown.map((one) => new Tiles(one))] };
     const panels = { line: production, alarms: { title: "Alarms", parts: this.alarms }, events: { title: "Events", parts: [this.events] },
       device: { title: "Device", parts: [this.faceplate] }, ...(line ? { watch: { title: "Watch", parts: [this.watch] } } : {}), bottle: { title: "Bottle", parts: [new Bottle(this)] } };
-    this.tabs = new Tabs(other ? { compare: { title: "A, B", parts: [this.compare] }, ...panels } : panels, other ? "compare" : this.bars[0].names.length ? "line" : "device");
+    const first = { ...(other ? { compare: { title: "A, B", parts: [this.compare] } } : {}),
+      ...(recording.head.failures?.length ? { failure: { title: "Failure", parts: [new Failure(this)] } } : {}) };
+    this.tabs = new Tabs({ ...first, ...panels }, Object.keys(first)[0] ?? (this.bars[0].names.length ? "line" : "device"));
     for (const part of [this.clock, this.camera]) part.addEventListener("change", () => this.touch());
     for (const one of this.clock.all) {
       one.addEventListener("loaded", () => this._loaded());
       one.addEventListener("failed", (event) => warn(event.detail));
     }
+    this.link = new Link(this);
     this.snapping = false;
   }
 
@@ -178,11 +193,10 @@ export class View {
     this.clock.pause();
     this.clock.seek(time);
     if (bottle >= 0) this.selectBottle(bottle, false);
-    const mark = this.recording.head.marks.find((other) => tag && (tag === deviceOf(other) || tag.startsWith(`${deviceOf(other)}/`)));
-    if (!mark) return;
-    this.setFollowing(false);
-    this.camera.show(...middle(mark.points));
-    this.faceplate.show(deviceOf(mark));
+    const { marks, movers, surfaces } = this.recording.head;
+    const devices = [...marks.map(deviceOf), ...movers.map(({ name }) => name), ...surfaces.map(({ name }) => `belts/${name}`)];
+    const device = devices.find((name) => tag && (tag === name || tag.startsWith(`${name}/`)));
+    if (device) this.selectDevice(device);
   }
 
   nextMark(by) {
@@ -206,11 +220,34 @@ export class View {
     if (ids.length) this.selectBottle(ids[(place < 0 ? (by > 0 ? 0 : ids.length - 1) : place + by + ids.length) % ids.length]);
   }
 
+  // Shows the faceplate of a device and its outline on the plan, moved to it if needed.
   selectDevice(name) {
+    this.device = name;
     this.faceplate.show(name);
-    const mark = this.recording.head.marks.find((other) => deviceOf(other) === name);
-    if (mark) this.camera.show(...middle(mark.points));
+    const box = boxOf(outlinesOf(this, name));
+    if (box) {
+      this.setFollowing(false);
+      this.camera.show((box[0] + box[2]) / 2, (box[1] + box[3]) / 2);
+    }
+    byId("said").textContent = `${name} selected`;
     this.touch();
+  }
+
+  // Zooms to the selected device, else to the selected bottle.
+  zoomToSelection() {
+    const box = boxOf(this.device ? outlinesOf(this, this.device) : this._bottleOutline());
+    if (!box) {
+      say("Select a device or a bottle first.");
+      return;
+    }
+    this.setFollowing(false);
+    this.camera.showBox(box);
+  }
+
+  // Returns the place of the selected bottle as a list of outlines.
+  _bottleOutline() {
+    const bottle = this.plan.frame?.bottles.find(({ id }) => id === this.bottle);
+    return bottle ? [[[bottle.x, bottle.y]]] : [];
   }
 
   setFollowing(on) {
@@ -220,6 +257,7 @@ export class View {
 
   letGo() {
     this.setFollowing(false);
+    this.device = null;
     this.selectBottle(null, false);
   }
 
@@ -233,6 +271,18 @@ export class View {
     this.touch();
   }
 
+  // name: of HEATS; "" for none.
+  setHeat(name) {
+    this.shownHeat = byId("heat").value = name;
+    byId("span").hidden = !name;
+    this.touch();
+  }
+
+  nextHeat() {
+    const names = Object.keys(HEATS);
+    this.setHeat(names[(names.indexOf(this.shownHeat) + 1) % names.length]);
+  }
+
   nextColouring() {
     const names = colourings(this);
     this.setColouring(names[(names.indexOf(this.colouring) + 1) % names.length]);
@@ -240,8 +290,8 @@ export class View {
 
   // Writes the legend of colours and lines, once their scales are known.
   _legend() {
-    const colouring = COLOURINGS[this.colouring], entries = [], { shown, most } = this.wear, lines = this.showForces && this.touching;
-    const key = [this.colouring, colouring.ends?.(this), shown, most, lines && this.strongest].join(" ");
+    const colouring = COLOURINGS[this.colouring], entries = [], { shown, most } = this.wear, lines = this.showForces && this.touching, { heat } = this;
+    const key = [heat.shown.of && heat.grid && [heat.shown.label, heat.extent, heat.most, isDark()], this.colouring, colouring.ends?.(this), shown, most, lines && this.strongest].join(" ");
     if (key === this.legendKey) return;
     this.legendKey = key;
     const ramp = (colours, low, high) => {
@@ -253,46 +303,68 @@ export class View {
     else entries.push(...keyOf(colouring.legend(this)));
     if (shown && most > NO_WEAR) entries.push(ramp(SCALES.force, "rails 0", `${+most.toPrecision(2)} ${WEARS[shown].unit}`));
     else if (shown) entries.push(element("span", { class: "entry" }, `no ${shown} on rails`));
+    if (heat.shown.of && heat.grid) {
+      entries.push(element("span", { class: "entry heat" }, ramp(heatColours(), `${heat.shown.label} 0`, `≥ ${+heat.most.toPrecision(2)} ${heat.shown.unit}`), element("small", {}, heat.extent)));
+    }
     if (lines) entries.push(element("span", { class: "entry" }, "contacts 0 ", element("span", { class: "wedge" }), ` ${+this.strongest.toPrecision(2)} N`));
     byId("legend").replaceChildren(...entries);
+    this._coverBelow();
+    this._cover();
+  }
+
+  // The legend and the buttons cover a part of the lower edge.
+  _coverBelow() {
+    this.camera.coverBelow(Math.max(byId("legend").offsetHeight, byId("zoom").offsetHeight));
+  }
+
+  // Names on the plan move aside from what covers it.
+  _cover() {
     for (const plan of this.plans) plan.cover();
-    this.touch(); // names move aside
+    this.touch();
   }
 
   clicked(px, py, plan = this.plan) {
-    const bottle = plan.bottleAt(px, py), { head } = plan.view.recording;
+    const device = deviceAt(plan.view, ...this.camera.at(px, py)), { types } = plan.view.recording.head;
+    const small = Math.max(...types.map(({ radius }) => radius)) * this.camera.scale < PLANT_SCALE;
+    const bottle = small && device ? null : plan.bottleAt(px, py);
     if (bottle !== null) {
       this.selectBottle(bottle);
       return;
     }
-    const [x, y] = this.camera.at(px, py), near = 12 / this.camera.scale;
-    const mark = head.marks.find(({ points }) => inside(points, x, y) || points.some((point, k) => awayFrom(point, points[(k + 1) % points.length], x, y) < near));
-    const surface = mark ? null : [...head.surfaces].reverse().find(({ outline }) => inside(outline, x, y));
-    const device = mark ? deviceOf(mark) : surface?.name ? `belts/${surface.name}` : null;
-    if (device) {
-      this.faceplate.show(device);
-      this.tabs.show("device");
-    }
+    if (!device) return;
+    this.selectDevice(device);
+    this.tabs.show("device");
   }
 
   resize() {
+    const { clientWidth, clientHeight } = byId("stage");
+    this.minimap.resize(clientWidth, clientHeight);
+    this._coverBelow();
     this.beside?.resize();
     this.plan.resize();
     this.touch();
   }
 
   draw(now) {
-    for (const plan of this.plans) plan.update();
+    for (const plan of this.plans) {
+      plan.update();
+      plan.view.heat.update(now);
+    }
     this._follow();
     for (const plan of this.plans) plan.draw();
     this._legend();
+    if (this.minimap.draw(this.device ? outlinesOf(this, this.device) : [])) this._cover();
     this.beside?.draw();
     this.scrubber.draw();
     const { clock, camera } = this, play = byId("play");
     byId("clock").textContent = seconds(clock.time);
     if (this.line) byId("end").textContent = seconds(this.recording.end);
-    play.textContent = clock.playing ? "❚❚" : "▶";
-    play.setAttribute("aria-label", clock.playing ? "Pause" : "Play");
+    // The run of a line is paused above the plan; below it, only the display of the past is played.
+    const [sign, text] = this.line ? (clock.playing ? ["■", "Stop the replay"] : ["▶", "Replay from here"]) : clock.playing ? ["❚❚", "Pause"] : ["▶", "Play"];
+    play.textContent = sign;
+    play.setAttribute("aria-label", text);
+    if (this.line) play.title = `${text} (space)`;
+    play.hidden = Boolean(clock.live);
     byId("speed").value = clock.speed;
     this.desk?.drawn(now);
     byId("plan").dataset.camera = [camera.x, camera.y, camera.scale, camera.width, camera.height].join(" ");
@@ -300,6 +372,8 @@ export class View {
     document.body.dataset.bottles = this.plan.frame?.bottles.length ?? "";
     if (clock.playing && now - (this.panelsDrawn ?? 0) < PANELS_EVERY) return;
     this.panelsDrawn = now;
+    expire();
+    this.banner.draw();
     for (const alarms of this.alarms) alarms.draw();
     this.tabs.draw();
     this.trends.draw();

@@ -57,6 +57,8 @@ class DrawableFrame:
     """Values of all signals as controllers read them."""
     forced: NDArray[Any]
     """Indices of the forced signals."""
+    faults: Mapping[str, float]
+    """Values of the faults that are injected, by name."""
     drawn: Mapping[str, Callable[[], Any]]
     """Decoders of the latest message by topic of DRAWING_TOPICS. A new message has a new decoder."""
 
@@ -113,6 +115,7 @@ class LineMirror:
     _alarms: AlarmColumns | None
     _owner: str
     _released: tuple[str, ...]
+    _faults: dict[str, float]
 
     def __init__(self) -> None:
         """Start empty."""
@@ -267,7 +270,7 @@ class LineMirror:
         tags |= zip(self._command_names, self._commands(), strict=False)
         now = time.time() if at is None else at
         self._frame = DrawableFrame(
-            self._line, self._tick, now, self._image.values, self._image.forced, dict(self._drawn)
+            self._line, self._tick, now, self._image.values, self._image.forced, dict(self._faults), dict(self._drawn)
         )
         self._snapshot = LineSnapshot(
             self._tick,
@@ -313,6 +316,7 @@ class LineMirror:
         self._image = self._read_back = self._alarms = None
         self._owner = ""
         self._released = ()
+        self._faults = {}
 
     def _take_line(self, message: Any) -> None:
         info = line_info(message)
@@ -320,8 +324,8 @@ class LineMirror:
         if self._info is not None and self._strange:
             self._forget(message.run_id)
             raise LineMirrorError(
-                f"{info.name}: another line than before, or with other tags; expected {self._info.name} as it was: "
-                "restart serving"
+                f"{info.name}: the line or its tags have changed; expected {self._info.name} with the same tags; "
+                "restart the servers"
             )
         if message.run_id != self._run_id or self._info is None:
             self._forget(message.run_id)
@@ -342,7 +346,11 @@ class LineMirror:
         )
         events = [Event(*row) for row in rows]
         for event in events:
-            if event.kind == "owner_changed":
+            if event.kind == "fault_injected":
+                self._faults[event.name] = event.value
+            elif event.kind == "fault_cleared":
+                self._faults.pop(event.name, None)
+            elif event.kind == "owner_changed":
                 self._owner = event.name if event.value else ""
                 text = event.text.removeprefix("released: ")
                 self._released = tuple(text.split(", ")) if self._owner and text else ()
