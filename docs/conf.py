@@ -39,6 +39,7 @@ autodoc_default_options = {"members": True, "undoc-members": True}
 default_role = "code"  # docstrings are Markdown in this
 
 PARTS = sorted(page.stem for page in ROOT.glob("docs/parts/*.md"))
+MEASURED = sorted(page.stem for page in ROOT.glob("docs/performance/*.md"))
 STUDIES = sorted(ROOT.glob("docs/accuracy/*/tables.md"))
 NAVIGATION = {
     "README": {
@@ -56,6 +57,7 @@ NAVIGATION = {
         "Inside": ["docs/architecture", "docs/extending", "docs/api/index", "CONTRIBUTING", "CHANGELOG"],
     },
     "docs/scene": {"Parts": [f"parts/{page}" for page in PARTS]},
+    "docs/performance": {"Tables": [*(f"performance/{page}" for page in MEASURED), "studies/performance_history"]},
     "docs/accuracy": {"Tables": ["accuracy/promises", *(f"accuracy/{page.parent.name}/tables" for page in STUDIES)]},
     "docs/stability": {"Tables": ["stability/cases", "stability/fuzz"]},
     "docs/api/index": {"Modules": ["simulation", "observations", "testing", "control", "recordings", "errors"]},

@@ -92,7 +92,7 @@ def test_package_xml_names_every_ros_package_that_is_imported() -> None:
             names += [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
             imported |= {name.partition(".")[0] for name in names}
     ros = {name for name in imported if name.endswith(("_msgs", "_srvs", "_interfaces")) or name.startswith("launch")}
-    assert ros | {"rclpy"} <= declared | {"simulation_interfaces"}  # served only where it is installed
+    assert ros | {"rclpy"} <= declared
 
 
 def set_up_module() -> Any:

@@ -36,6 +36,11 @@ def test_each_page_has_a_picture_and_is_linked() -> None:
             assert (ROOT / "docs" / "images" / "parts" / f"{page.stem}.webp").exists()
 
 
+def test_pages_of_folders_are_linked_from_the_page_of_the_folder() -> None:
+    for page in (ROOT / "docs" / "performance").glob("*.md"):
+        assert f"](performance/{page.name})" in (ROOT / "docs" / "performance.md").read_text()
+
+
 def test_pictures_are_small() -> None:
     files = [file for file in (ROOT / "docs" / "images").rglob("*") if file.is_file()]
     assert sum(file.stat().st_size for file in files) <= MOST_BYTES
