@@ -313,11 +313,13 @@ _ROWS = (
     ),
     Topic(
         "alarm_states",
-        "conveyor_msgs/msg/AlarmStates",
+        encode.ALARM_STATES,
         "all [alarms](alarms.md), with their declarations and states by ISA-18.2",
         "latched, each tick with a change",
         LATCHED,
         state=lambda now: now.sim.line.alarms.changes(),
+        write=encode.alarms_message,
+        read=encode.to_alarms,
         columns=AlarmColumns,
         compare=Compare(lambda line, message, index: f"alarm {message.id[index]}"),
     ),
@@ -383,7 +385,8 @@ _ROWS = (
     Topic(
         "commands",
         encode.COMMANDS,
-        "setpoints by name (`line.command_names`), applied together or refused together; alarms",
+        "setpoints by name (`line.command_names`), applied together or refused together; alarms; spawned and deleted "
+        "bottles",
         qos=EVENTS,
         recorded=False,
         subscribed=True,
