@@ -118,9 +118,13 @@ def table_columns(bag: TopicReader, topic: str) -> list[TableColumn]:
     if recorded != TOPICS[topic].type:
         raise BagError(f"{bag.path}: its topic {topic} is of type {printable(recorded)}, expected {TOPICS[topic].type}")
     if topic == "signals":
-        names = _unique([printable(name) for name in bag.line.signal_names])
-        units = ["" if unit == "1" else printable(unit) for unit in bag.line.signal_units]
-        own = tuple(TableColumn(name, np.float64, unit) for name, unit in zip(names, units, strict=True))
+        units = {tag.name: "" if tag.unit == "1" else printable(tag.unit) for tag in bag.line.tags}
+        recorded_names = bag.line.signal_names
+        names = _unique([printable(name) for name in recorded_names])
+        own = tuple(
+            TableColumn(name, np.float64, units.get(signal, ""))
+            for name, signal in zip(names, recorded_names, strict=True)
+        )
     else:
         own = {"bottles": BOTTLES, "contacts": CONTACTS, "events": EVENTS, "belts": BELTS}[topic]
     return [*TIME, *(_with_labels(column, bag.line) for column in own)]

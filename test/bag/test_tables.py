@@ -69,11 +69,12 @@ def test_frames_have_the_rows_of_all_messages(bag: Path, topic: str) -> None:
 
 def test_a_frame_of_signals_has_a_column_per_signal(bag: Path) -> None:
     with open_bag(bag) as opened:
-        frame, names, units = opened.frame("signals"), opened.line.signal_names, opened.line.signal_units
+        frame, names, tags = opened.frame("signals"), opened.line.signal_names, opened.line.tags
         images = np.array([message.data for message in opened.signals()])
     assert list(frame.columns) == ["time", "tick", *names]
     assert (frame[names].to_numpy() == images).all()
-    assert {name: frame.attrs["units"].get(name, "1") for name in names} == dict(zip(names, units, strict=True))
+    units = {tag.name: tag.unit for tag in tags}
+    assert {name: frame.attrs["units"].get(name, "1") for name in names} == {name: units[name] for name in names}
 
 
 def test_a_frame_of_events_has_their_ticks_and_absent_bottles(bag: Path) -> None:
