@@ -43,7 +43,14 @@ MEASURED = sorted(page.stem for page in ROOT.glob("docs/performance/*.md"))
 STUDIES = sorted(ROOT.glob("docs/accuracy/*/tables.md"))
 NAVIGATION = {
     "README": {
-        "Tutorials": ["docs/build_a_line", "docs/tutorial_plc", "docs/tutorial_scada", "docs/tutorial_ros"],
+        "Tutorials": [
+            "docs/build_a_line",
+            "docs/tutorial_plc",
+            "docs/tutorial_scada",
+            "docs/tutorial_ros",
+            "docs/troubleshooting",
+            "docs/gallery",
+        ],
         "Control and protocols": [
             *("docs/testing_control_logic", "docs/structured_text", "docs/plc"),
             *("docs/scada", "docs/opcua", "docs/ros"),
