@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from bisect import bisect_right
+from bisect import bisect_right, insort
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -23,9 +23,9 @@ class BottleCounts:
     initial: int | None
     """Bottles on the line, or held in machines, at the start of the recording."""
     fed: int | None
-    """Fed since then."""
+    """Fed since then, spawned bottles included."""
     removed: int | None
-    """Removed since then, rejected bottles included."""
+    """Removed since then, rejected and deleted bottles included."""
     rejected: int | None
     held: int | None
     """Held in machines, which will give them back."""
@@ -45,6 +45,16 @@ class BottleCounts:
         return ", ".join(part for part in parts if part)
 
 
+KINDS = {
+    "bottle_fed": "fed",
+    "bottle_spawned": "fed",
+    "bottle_removed": "removed",
+    "bottle_deleted": "removed",
+    "bottle_rejected": "rejected",
+}
+"""Kinds of bottle events, with the count to which they add."""
+
+
 class BottleCounter:
     """Counts bottles while a recording is read."""
 
@@ -54,8 +64,8 @@ class BottleCounter:
         has_events: True if the recording has the topic `events`, even without a message.
         """
         self._has_events = has_events
-        self._ticks: dict[str, list[int]] = {"bottle_fed": [], "bottle_removed": [], "bottle_rejected": []}
-        """Ticks of bottle events, ascending, by kind."""
+        self._ticks: dict[str, list[int]] = {"fed": [], "removed": [], "rejected": []}
+        """Ticks of bottle events, ascending, by the count to which they add."""
         self._first_fed = math.inf
         self._unfed: set[int] = set()
         """Ids below that of the first bottle fed so far."""
@@ -63,9 +73,10 @@ class BottleCounter:
     def take_events(self, events: EventColumns) -> None:
         """Add the next events of the recording."""
         for at, kind, bottle in zip(events.at.tolist(), events.kind, events.bottle.tolist(), strict=True):
-            if kind in self._ticks:
-                self._ticks[kind].append(at)
-                if kind == "bottle_fed":
+            if kind in KINDS:
+                # An input is applied at the start of a scan, and seen in the state at its end.
+                insort(self._ticks[KINDS[kind]], at + (kind in ("bottle_spawned", "bottle_deleted")))
+                if KINDS[kind] == "fed":
                     self._first_fed = min(self._first_fed, bottle)
                 elif bottle < self._first_fed:
                     self._unfed.add(bottle)
