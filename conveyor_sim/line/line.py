@@ -183,7 +183,7 @@ class Line:
         self._moved = moved_belts(self.image.tags)
         objecting = [device for device in devices if type(device).objection is not Device.objection]
         self._objecting = {command.name: device for device in objecting for command in device.commands}
-        self._counters = ProductionCounters(devices)
+        self._counters = ProductionCounters(devices, scene.counts_starts)
         self._operations = {
             SET: Operation(self._set_refusal, self._set),
             INJECT: Operation(self._inject_refusal, self._set),
@@ -343,7 +343,7 @@ class Line:
             device.take(self.now)
             if removed := self.now.state.take_removed():
                 self._log.note_removed(device, removed, self.now)
-                self._counters.note_removed(device, removed, self.now.bad)
+                self._counters.line.note_removed(device, removed, self.now.bad)
                 self.now.forget(removed)
         self.now.begin_scan()
 
