@@ -42,6 +42,7 @@ setup(
         (f"share/{NAME}", ["package.xml"]),
         (f"share/{NAME}/config", glob("config/*.yaml")),
         (f"share/{NAME}/config/scenarios", glob("config/scenarios/*.yaml")),
+        (f"share/{NAME}/examples", glob("examples/small_packaging.*")),
         (f"share/{NAME}/config/ros", glob("config/ros/*")),
         (f"share/{NAME}/config/viewers", glob("config/viewers/*")),
         (f"share/{NAME}/launch", glob("launch/*.launch.py")),

@@ -36,7 +36,7 @@ RULES: Mapping[str, str] = {
     "ros": "bag columns control errors line protocols report run scene simulation support | "
     "builtin_interfaces click conveyor_msgs diagnostic_msgs numpy rcl_interfaces rclpy rosgraph_msgs std_msgs std_srvs",
     "testing": "bag control errors line page protocols report ros run scene simulation support | numpy pytest",
-    "cli": "accuracy bag control errors page physics protocols report ros run scene studies support | click rich",
+    "cli": "accuracy bag errors page physics protocols report ros run scene studies support | click rich",
 }
 """Packages and modules from the lowest up: what each may import of this package | of third-party packages."""
 

@@ -58,7 +58,7 @@ class OutputWriter:
         return outcomes
 
     def after_failure(self) -> list[CommandOutcome]:
-        """Write the events of a tick that failed: outcomes of its commands, reports of the guard, exceeded limits."""
+        """Write the events of a tick, also of one that failed: command results, guard reports, exceeded limits."""
         events = self._sim.take_events()
         for name, topic, view in _EVENTS:
             for event in view(events) if self._sinks else ():

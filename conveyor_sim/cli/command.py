@@ -13,6 +13,7 @@ import click
 from conveyor_sim import __version__
 from conveyor_sim.cli.accuracy import accuracy
 from conveyor_sim.cli.attach import attach
+from conveyor_sim.cli.demo import demo
 from conveyor_sim.cli.drawings import draw, import_
 from conveyor_sim.cli.optimise import optimise
 from conveyor_sim.cli.recordings import events, plot, recover, replay, report, sources
@@ -64,7 +65,7 @@ def main(context: click.Context) -> None:
 
 
 for command in (
-    check, schema, tags, explain, draw, import_, run, serve, attach, user, accuracy, recover, replay, events, report,
-    plot, sources, view, sweep, optimise, study_,
+    demo, check, schema, tags, explain, draw, import_, run, serve, attach, user, accuracy, recover, replay, events,
+    report, plot, sources, view, sweep, optimise, study_,
 ):  # fmt: skip
     main.add_command(command)

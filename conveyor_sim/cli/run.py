@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
+from conveyor_sim.cli.controller_options import controller_options, controller_source
 from conveyor_sim.cli.output import say
 from conveyor_sim.cli.scene_options import SceneOptions, scene_options
-from conveyor_sim.errors import ConveyorError
 from conveyor_sim.support.garbage import collected_later
 from conveyor_sim.support.progress import ProgressBar
-
-if TYPE_CHECKING:
-    from conveyor_sim.control.scan import Controller
 
 
 @click.command()
@@ -23,11 +19,7 @@ if TYPE_CHECKING:
     "--out", "--record", "out", type=click.Path(path_type=Path), help="Folder to record to (default: runs/<UTC time>)."
 )
 @click.option("--duration", type=float, help="Simulated time in s, instead of the scene's.")
-@click.option("--controller", help="Scans at every tick: program.st, library.so, file.py:factory or module:factory.")
-@click.option("--parameters", default="", help="The controller's, by name: a mapping in YAML, or a .yaml file.")
-@click.option(
-    "--record-variables", "variables", multiple=True, help="The controller's: main/state, main/*; repeatable."
-)
+@controller_options
 @click.option("--no-record", is_flag=True, help="Simulate only; nothing is written.")
 @click.option("--no-pictures", is_flag=True, help="Draw nothing; `conveyor-sim plot` does, any time later.")
 @click.option("--threads", type=click.IntRange(1), help="Threads to step with (default: as many as prove fastest).")
@@ -58,10 +50,8 @@ def run(
         from conveyor_sim.run.compilation import Compilation
         from conveyor_sim.run.runner import run_scene
 
-    for option, given in (("--parameters", parameters), ("--record-variables", variables)):
-        if given and controller is None:
-            raise ConveyorError(f"{option}: given without --controller, expected both or neither")
-    controls = None if controller is None else _controller(controller, parameters)
+    source = controller_source(controller, parameters, variables)
+    controls = None if source is None else source.load()
     loaded = options.load(scene, duration)
     model = build_model(loaded)
     click.echo(setting_line(model))
@@ -81,14 +71,3 @@ def run(
         report_unrecorded(loaded, model, done)
     else:
         report(done.bag, done.wall, drawing, done.spent)
-
-
-def _controller(reference: str, parameters: str) -> Controller:
-    from conveyor_sim.control.scan import ControlError
-    from conveyor_sim.control.st.load import load
-    from conveyor_sim.run.controller_parameters import controller_parameters
-
-    try:
-        return load(reference, controller_parameters(parameters, "--parameters"))
-    except ControlError as error:
-        raise ConveyorError(str(error)) from error

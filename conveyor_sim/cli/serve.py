@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from rich.console import Console
 
+from conveyor_sim.cli import controller_options as controllers
 from conveyor_sim.cli.output import Number
 from conveyor_sim.cli.scene_options import NAMES, SceneOptions, scene_options
 from conveyor_sim.errors import BagError, ConveyorError
@@ -37,9 +38,12 @@ PORT = click.IntRange(0, 65535)
 
 MQTT_ROLES = ("viewer", "operator", "engineer", "controller")
 
-TAKEN_BY_SCENE = ("out", "no_record", "duration", "threads", "lockstep", "real_time_factor", "options")
-OF_SCENE = ("out", "no_record", "duration", "threads", "lockstep", *NAMES)
+_RUN = ("out", "no_record", "duration", "threads", "lockstep", *controllers.NAMES)
+TAKEN_BY_SCENE = (*_RUN, "real_time_factor", "options")
+OF_SCENE = (*_RUN, *NAMES)
 OF_BAG = ("loop",)
+OPTIONS = {"variables": "record-variables"}
+"""Names of options that differ from those of their arguments."""
 
 DRAWING = ("web", "foxglove")
 """Protocol options whose clients display bottle positions."""
@@ -98,7 +102,9 @@ _WHERE = {
 @click.option("--mqtt-primary-host", default="", metavar="ID", help="Publish only while this host is online.")
 @click.option("--web", type=PORT, is_flag=False, flag_value=8080, help="Serve a page for browsers on this port.")
 @click.option("--foxglove", type=PORT, is_flag=False, flag_value=8765, help="Serve Foxglove on this port.")
-@click.option("--web-certificates", type=click.Path(path_type=Path), help="Folder of its certificate and key.")
+@click.option(
+    "--web-certificates", type=click.Path(path_type=Path), help="Folder of the certificate and key of the page."
+)
 @click.option(
     "--users",
     "--opcua-users",
@@ -123,6 +129,7 @@ _WHERE = {
 )
 @click.option("--real-time-factor", type=Number(0.0, 1e6), default=1.0, help="0: as fast as possible.")
 @click.option("--lockstep", is_flag=True, help="SCENE only: advance only when a PLC client has finished its scan.")
+@controllers.controller_options
 @click.option("--loop", is_flag=True, help="BAG only: restart at the end.")
 @click.option("--duration", type=float, help="Of SCENE: simulated time in s, instead of the scene's.")
 @click.option(
@@ -138,9 +145,10 @@ _WHERE = {
 def serve(what: str | None, node: str | None, bind: str, stamps: Stamps, **given: Any) -> None:
     """Serve a line to SCADA systems, HMIs, PLCs, MQTT hosts, browsers and Foxglove.
 
-    SCENE is simulated in real time, and recorded with all that clients write. BAG is played back. With --node, serve
-    the line of a running ROS node. Without a protocol option, OPC UA and Modbus are served on their default ports.
-    Ctrl-C ends it.
+    SCENE is simulated in real time, and recorded with all that clients write. With --controller, a program owns its
+    line: it scans at every tick, and operators take devices by their control mode. BAG is played back. With --node,
+    serve the line of a running ROS node. Without a protocol option, OPC UA and Modbus are served on their default
+    ports. Ctrl-C ends it.
     """
     with collected_later():
         from conveyor_sim.protocols.hosting.server_child import ServerChild
@@ -181,10 +189,12 @@ def serve(what: str | None, node: str | None, bind: str, stamps: Stamps, **given
             paused = stack.enter_context(scene_source(what, console, **{name: given[name] for name in TAKEN_BY_SCENE}))
             source = paused
         with Serving(source, chosen, settings, console.print, ready) as serving:
-            in_lockstep = [IN_LOCKSTEP] if given["lockstep"] else []
-            if paused is not None and not in_lockstep:
+            notes = [IN_LOCKSTEP] if given["lockstep"] else []
+            if paused is not None and not given["lockstep"]:
                 paused.control("resume", 0.0, "")
-            watch(serving, console, [*serving.greeting, *in_lockstep])
+            if given["controller"] is not None:
+                notes.append(f"{given['controller']} commands the line; a reset loads it again")
+            watch(serving, console, [*serving.greeting, *notes])
             summary = serving.summary()
     tell_end(summary, getattr(source, "recordings", []))
 
@@ -214,7 +224,8 @@ def _is_bag(what: str) -> bool:
 
 
 def _require_lockstep(settings: ServerSettings) -> None:
-    _require_not_given("--lockstep", ("real_time_factor",), "none: the PLC says when")
+    _require_not_given("--lockstep", ("real_time_factor",), "none: the PLC advances the time")
+    _require_not_given("--lockstep", controllers.NAMES, "none: the PLC is the controller")
     if settings.modbus_role != "controller" and settings.users is None:
         raise ConveyorError(
             "--lockstep: no client may advance the line, expected --modbus-role controller, or --users with a "
@@ -226,7 +237,7 @@ def _require_not_given(what: str, names: Sequence[str], expected: str = "") -> N
     context = click.get_current_context()
     for name in names:
         if context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE:
-            option = name.replace("_", "-")
+            option = OPTIONS.get(name, name.replace("_", "-"))
             raise ConveyorError(f"--{option}: given with {what}, expected {expected or _WHERE[name]}")
 
 
@@ -241,8 +252,13 @@ def scene_source(
     threads: int | None,
     options: SceneOptions,
     lockstep: bool = False,
+    controller: str | None = None,
+    parameters: str = "",
+    variables: tuple[str, ...] = (),
 ) -> Iterator[SceneTagProvider]:
     """Yield a paused scene once its tags are known. lockstep: clients advance it.
+
+    controller, parameters, variables: options of a controller that owns the line, if there is one.
 
     A failure before its first tick leaves no recording.
     """
@@ -252,6 +268,7 @@ def scene_source(
     from conveyor_sim.protocols.tags.scene_provider import SceneTagProvider
     from conveyor_sim.support.stop_request import StopRequest
 
+    scans = controllers.controller_source(controller, parameters, variables)
     scene = options.load(what, duration)
     with ExitStack() as starting:
         stop = starting.enter_context(StopRequest())  # an interrupt would be lost, or leave a folder behind
@@ -259,7 +276,9 @@ def scene_source(
         if not no_record:
             folder = click.get_current_context().with_resource(run_folder(out))
             require_recordable(folder)
-        task = SceneTask(scene, folder, 0, real_time_factor, threads, playing=False, lockstep=lockstep)
+        task = SceneTask(
+            scene, folder, 0, real_time_factor, threads, playing=False, controller=scans, lockstep=lockstep
+        )
         source = SceneTagProvider(task, console.print)
         try:
             with source:

@@ -1,8 +1,9 @@
 """Views of the World with fewer groups, for kernels that Python calls. One compiled kernel then serves all Worlds that
 differ only in the omitted groups.
 
-Lists need no arrays that only forces need, and a list of contacts needs neither kind. Kernels and parts that kernels
-call need no view, because they are compiled for the members that they read (`compiler/reads.py`).
+A view for neighbour lists omits arrays that only forces use. A view for a list of contacts omits these and arrays of
+integrators. Kernels and parts that kernels call need no view, because they are compiled for the members that they read
+(`compiler/reads.py`).
 """
 
 from conveyor_sim.engine.arrays.world import World

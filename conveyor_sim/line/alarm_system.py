@@ -275,7 +275,7 @@ class AlarmsDevice(Device):
         alarms: alarms of line and scene, before controllers declare any.
         """
         most = len(alarms) + MOST_ALARMS
-        standing = "alarms that stand, of controllers too."
+        standing = "standing alarms, including those of controllers."
         super().__init__(
             NAME,
             [

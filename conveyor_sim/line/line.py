@@ -119,7 +119,7 @@ class EventLog:
             self.note(now.tick, kind, device.name, float(self.bottles[device.name]), bottle)
 
 
-_Outcome = tuple[int, Input, bool, str, bool, bool, bool]
+_Outcome = tuple[int, Input, bool, str, bool, bool, bool, tuple[int, ...]]
 
 _REMOVED: tuple[Adds, ...] = ("removed", "rejected")
 

@@ -6,7 +6,7 @@ import math
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -20,12 +20,29 @@ from conveyor_sim.support.files import FileError, write_file
 
 
 @dataclass(frozen=True)
+class LastAction:
+    """The last input of a test before its condition failed."""
+
+    time: float
+    """s"""
+    text: str
+
+
+@dataclass(frozen=True)
 class FailedCondition:
     """A condition that failed."""
 
     time: float
     """s"""
     text: str
+    since: float | None = None
+    """Time at which it was first asserted, s; None: unknown."""
+    values: Mapping[str, float] = field(default_factory=dict)
+    """Values that the condition read, by signal."""
+    forced: Sequence[str] = ()
+    """Signals that were forced."""
+    action: LastAction | None = None
+    """Last input of the test; None: there was none."""
 
 
 def write_page(
@@ -57,7 +74,7 @@ def write_page(
                 recording.begin_before(end, last)
         if watch is not None and watch.end >= 0:
             recordings[0].first, recordings[0].last = watch.first, watch.end
-        head: dict[str, Any] = {"failures": [vars(failure) for failure in failures], "trends": list(trends)}
+        head: dict[str, Any] = {"failures": [asdict(failure) for failure in failures], "trends": list(trends)}
         parts: dict[str, bytes] = {}
         if other is not None:
             comparison = RecordingComparison(opened[0], opened[1], math.inf)

@@ -37,6 +37,8 @@ class Watch:
         """Names of the controller's variables."""
         self.end = -1
         """The last observed tick; -1: none."""
+        self._taken = -1  # last tick whose frame was added
+        self._present: tuple[Simulation, Mapping[str, float]] | None = None
 
     @property
     def first(self) -> int:
@@ -44,7 +46,9 @@ class Watch:
         return self._start - len(self._kept) * self._block
 
     def blocks(self) -> list[bytes]:
-        """Return the blocks, deflated, the last one up to now."""
+        """Return the blocks, deflated, the last one up to now. Their last frame is that of the last observed tick."""
+        if self._present is not None and self._taken < self.end == self._present[0].tick:
+            self._add(*self._present, contacts=True)
         return [*self._kept, _deflated(self._content, self._start)]
 
     def __call__(self, simulation: Simulation, variables: Mapping[str, float]) -> None:
@@ -58,14 +62,18 @@ class Watch:
             self._start += self._block
             while (len(self._kept) - 1) * self._block * seconds >= self._last:
                 self._kept.popleft()
-        self.end = tick
+        self.end, self._present = tick, (simulation, variables)
         every = max(1, round(1.0 / FRAMES / seconds))
-        if (tick - self._start) % every:
-            return
-        bottles, contacts = simulation.bottles(), simulation.contacts()
-        self._content.bottles.append((tick, with_forces(bottles, contacts)))
-        if (tick - self._start) % max(every, round(1.0 / CONTACTS / seconds)) == 0:
-            self._content.contacts.append((tick, contacts))
+        if (tick - self._start) % every == 0:
+            self._add(simulation, variables, (tick - self._start) % max(every, round(1.0 / CONTACTS / seconds)) == 0)
+
+    def _add(self, simulation: Simulation, variables: Mapping[str, float], contacts: bool) -> None:
+        """Add a frame of the present tick, with its contacts if they are due."""
+        tick = self._taken = simulation.tick
+        present = simulation.contacts()
+        self._content.bottles.append((tick, with_forces(simulation.bottles(), present)))
+        if contacts:
+            self._content.contacts.append((tick, present))
         self._content.belts.append((tick, simulation.belts().actual))
         self.variables = self.variables or tuple(variables)
         shown = [variables.get(name, np.nan) for name in self.variables]

@@ -140,7 +140,7 @@ def cut_at_mouths(rails: Sequence[RailShape], radius: float) -> list[RailShape]:
 
 
 def _is_narrow(arc: ArcPiece, radius: float) -> bool:
-    """Return True if a bottle of this radius (m) can touch both ends from the centre's far side."""
+    """Return True if a bottle of this radius (m) can touch both ends of an arc at once, from outside its opening."""
     if is_full_turn(arc.span):
         return False
     return (arc.radius * math.sin(0.5 * arc.span) if arc.span > math.pi else arc.radius) < radius

@@ -132,7 +132,10 @@ class Reception:
     def _mention(self) -> None:
         """Log the number of repeated refusals: control has changed."""
         if self._unmentioned:
-            self._warn(f"{self._unmentioned} more commands were refused for want of control; each outcome says why")
+            self._warn(
+                f"{self._unmentioned} more commands were refused, because another writer has control; "
+                "each command result has the reason"
+            )
             self._unmentioned = 0
 
     def _log(self, line: str) -> None:

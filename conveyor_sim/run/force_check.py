@@ -40,8 +40,8 @@ class ForceCheck:
     @property
     def sentence(self) -> str:
         """Result, in words."""
-        expected = f"the {self.expected_force:.3g} N that the predicted error rests on ({self.expected_of})"
-        verdict = f"within {expected}" if self.as_expected else f"more than {expected}, which may be exceeded, too"
+        expected = f"the {self.expected_force:.3g} N assumed for the predicted error ({self.expected_of})"
+        verdict = f"within {expected}" if self.as_expected else f"more than {expected}: the error may be larger"
         return (
             f"peak force {self.peak_force:.3g} N, {verdict}; "
             f"overlap at most {percent(self.overlap)} of the smaller diameter"
@@ -67,7 +67,7 @@ class Pressed:
     @property
     def sentence(self) -> str:
         """Result, in words."""
-        bound = f"the {self.expected:.3g} N that friction in contacts is stable at ({self.expected_of})"
+        bound = f"the {self.expected:.3g} N up to which friction in contacts is stable ({self.expected_of})"
         pressed = f"pressed for {WINDOW:g} s with at most {self.load:.3g} N"
         if self.as_expected:
             return f"{pressed}, within {bound}"

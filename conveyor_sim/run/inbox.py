@@ -26,7 +26,7 @@ VALUE_BYTES = 16
 
 FULL = (
     f"the queue was full, which holds {MOST_WAITING} commands and {MOST_BYTES} bytes until the next tick; "
-    "expected fewer between two ticks, and none for long while the simulation is paused"
+    "expected fewer commands per tick, and only a few while the simulation is paused"
 )
 TOO_LARGE = f"larger than {MESSAGE_BYTES} bytes, expected at most that for one command"
 

@@ -14,9 +14,10 @@ from conveyor_sim.control.memory import restore, snapshot
 from conveyor_sim.control.recorded import RecordedVariables
 from conveyor_sim.control.scan import ALARMS, ControlError, Controller, Inputs, LineTags, bind, declared_alarms
 from conveyor_sim.errors import CommandError, ConveyorError
-from conveyor_sim.line.commands.inputs import DECLARE, CommandOutcome, Input
+from conveyor_sim.line.commands.inputs import DECLARE, OWN, CommandOutcome, Input
 from conveyor_sim.physics.state.checkpoint import read_checkpoint
 from conveyor_sim.run.alarm_changes import AlarmChanges
+from conveyor_sim.run.controller_source import located
 from conveyor_sim.simulation import Simulation
 
 CONTROLLER = "controller"
@@ -129,6 +130,11 @@ class ScanLoop:
         if self._attached is not None:
             self._attached.close()
 
+    def own(self) -> None:
+        """Take the line for the attached controller, so that others need its release; nothing without a controller."""
+        if self._attached is not None:
+            self._simulation.give(Input(self._attached.source, self._attached.writer, "controller", OWN, (), ()))
+
     def scan(self, inputs: Inputs) -> list[str]:
         """Scan once. Return the names of the alarms in the answer. Raise ControlError if there is no valid answer."""
         assert self._attached is not None
@@ -179,6 +185,8 @@ class ScanLoop:
             self.scan(Inputs(signals, simulation.time, simulation.tick, simulation.scene.tick))
         except ControlError as error:
             raise ConveyorError(f"at {simulation.time:.2f} s: {error}") from error
+        except Exception as error:  # of the user's Python code
+            raise ConveyorError(f"at {simulation.time:.2f} s: controller: {located(error)}") from error
 
     def before_tick(self, outputs: OutputWriter | None) -> None:
         """Scan, write the recorded variables to the outputs, and queue the commands. Raise as `scan_tick`."""
@@ -188,8 +196,15 @@ class ScanLoop:
         self.give()
 
     def after_tick(self, outcomes: Sequence[CommandOutcome]) -> None:
-        """Raise CommandError if a command of the controller was refused."""
+        """Raise CommandError if a command of the controller was refused.
+
+        Refusals for lack of control authority are no errors of the controller: an operator has taken the device.
+        """
         self.note(outcomes)
         source = None if self._attached is None else self._attached.source
-        if refused := [outcome.reason for outcome in outcomes if outcome.source == source and not outcome.accepted]:
+        if refused := [
+            outcome.reason
+            for outcome in outcomes
+            if outcome.source == source and not outcome.accepted and not outcome.without_control
+        ]:
             raise CommandError(f"at {self._simulation.time:.2f} s a command was refused: {'; '.join(refused)}")

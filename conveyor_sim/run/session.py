@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import time
 import uuid
+from collections.abc import Sequence
 from pathlib import Path
 
 from conveyor_sim.bag.outputs import MessageSink, OutputWriter
 from conveyor_sim.bag.recorder import Recorder
+from conveyor_sim.control.scan import Controller
 from conveyor_sim.errors import CheckpointError, SimulationError
 from conveyor_sim.line.commands.inputs import CommandOutcome, Input
 from conveyor_sim.line.commands.refusal import shown
 from conveyor_sim.run.force_check import PeakWatch, achieved
+from conveyor_sim.run.scan_loop import ScanLoop
 from conveyor_sim.scene.recorded import sources_of
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.printable import SENTENCE, printable
@@ -35,10 +38,21 @@ def keep_stopped(simulation: Simulation, folder: Path | None, error: SimulationE
 class RunSession:
     """A simulation with its sinks. Only the thread that steps it may use it."""
 
-    def __init__(self, simulation: Simulation, sink: MessageSink, bag: Path | None, frame_id: str, distro: str) -> None:
+    def __init__(
+        self,
+        simulation: Simulation,
+        sink: MessageSink,
+        bag: Path | None,
+        frame_id: str,
+        distro: str,
+        controller: Controller | None = None,
+        record: Sequence[str] = (),
+    ) -> None:
         """Start the run at the present tick of `simulation`. bag: folder to record to, or None.
 
-        Raises BagError if the folder can't be written; nothing has been published then.
+        controller: owns the line and scans at every tick, if one is passed. record: patterns of its recorded variables.
+        Raises BagError if the folder can't be written, and ConveyorError for a controller that does not fit the line;
+        nothing has been published then.
         """
         self.run_id = uuid.uuid4().hex
         self.bag = bag
@@ -48,6 +62,8 @@ class RunSession:
         """Time from the start of the first tick to the end of the last one, s of wall time."""
         self._first_tick_at: float | None = None
         self.simulation = simulation
+        self._scans = ScanLoop(simulation, controller, record)
+        self._scans.own()
         self._began = simulation.time
         keep_start = simulation.save if simulation.tick > 0 else None
         sources = sources_of(simulation.scene)
@@ -66,16 +82,20 @@ class RunSession:
     def tick(self) -> list[CommandOutcome]:
         """Advance by one tick and write all topics that are due. Return the command results.
 
-        Raises SimulationError, BagError.
+        Raises SimulationError, BagError, and ConveyorError for a controller that can't go on.
         """
         if self._first_tick_at is None:
             self._first_tick_at = time.monotonic()
+        self._scans.before_tick(self.outputs)
         try:
             self.simulation.advance(1)
         except SimulationError as error:
             self._last_outcomes = self.outputs.after_failure()
             raise keep_stopped(self.simulation, self.bag, error) from error
         outcomes = self.outputs.after_tick()
+        self._last_outcomes = outcomes
+        self._scans.after_tick(outcomes)
+        self._last_outcomes = []
         self._peaks.after_tick()
         self.wall = time.monotonic() - self._first_tick_at
         return outcomes

@@ -11,7 +11,7 @@ LISTED = 2
 """Number of topics listed, largest first."""
 
 NO_BOUND = "nothing in the scene bounds the time step"
-NO_REMEDY = "no single change of the scene that is known to help takes fewer steps"
+NO_REMEDY = "no single change of the scene, among those that usually help, leads to fewer steps"
 
 
 @dataclass(frozen=True)

@@ -38,7 +38,7 @@ class _Belt(SpeedSetpoint):
     material: Name = quantity("Material, as named in `base`.")
     drive: _Drive | None = quantity(
         "What moves it: a separate drive, or the name of one from `drives`, which then has the speed, the "
-        "speed_limits and the watchdog. Left out: it has the commanded speed from one tick to the next.",
+        "speed_limits and the watchdog. Left out: it reaches the commanded speed within one tick.",
         default=None,
     )
     ratio: Positive = quantity("Speed of the belt over that of the drive that it names.", "1", default=1.0)

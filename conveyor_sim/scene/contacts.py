@@ -107,7 +107,7 @@ class Contact(Part):
         "Stiffness of a Hertz contact, N = k x overlap^1.5.", "N/m^1.5", default=None
     )
     table: TablePoints | None = quantity(
-        "Force at each overlap, measured or computed; straight between the points and on beyond the last. "
+        "Force at each overlap, measured or computed; linear between the points, with the last slope continued. "
         "A path is taken from the scene file's folder and may not leave it, unless `--outside-tables` is given.",
         "m, N",
         default=None,

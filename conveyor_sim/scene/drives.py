@@ -53,7 +53,7 @@ class NamedDrive(SpeedSetpoint):
 
     acceleration: Positive | None = quantity(
         "Greatest change of speed in a second, speeding up or slowing down. "
-        "Left out: it has the commanded speed from one tick to the next.",
+        "Left out: it reaches the commanded speed within one tick.",
         "m/s^2",
         default=None,
     )

@@ -1,4 +1,4 @@
-"""Folders of the files that ship beside the code: scenes (config/) and message definitions (msg_defs/)."""
+"""Folders of the files that ship beside the code: scenes (config/), examples and message definitions (msg_defs/)."""
 
 from __future__ import annotations
 
@@ -29,6 +29,11 @@ def share_dir() -> Path:
 def config_dir() -> Path:
     """Return the folder of the scenes that ship with conveyor_sim."""
     return share_dir() / "config"
+
+
+def examples_dir() -> Path:
+    """Return the folder of the example lines that ship with conveyor_sim."""
+    return share_dir() / "examples"
 
 
 def msg_defs_dir() -> Path:

@@ -25,7 +25,8 @@ class StopRequest(AbstractContextManager["StopRequest"]):
     def __init__(self) -> None:
         self._reader, self._writer = socket.socketpair()
         self._writer.setblocking(False)
-        # Written to in C, whichever thread the signal meets: numpy and DDS have threads of their own.
+        # The C handler writes to this socket in the thread that gets the signal. `wait` in the main thread then
+        # returns, even if a thread of numpy or DDS got the signal.
         self._wakeup_before = signal.set_wakeup_fd(self._writer.fileno(), warn_on_full_buffer=False)
         self._signals = HandledOnce(SIGNALS, lambda _number, _frame: None)
 

@@ -18,7 +18,7 @@ from conveyor_sim.bag.input_log import input_folders
 from conveyor_sim.bag.rerun import rerun
 from conveyor_sim.control.scan import ALARMS
 from conveyor_sim.errors import BagError
-from conveyor_sim.page.one_file import FailedCondition, write_page
+from conveyor_sim.page.one_file import FailedCondition, LastAction, write_page
 from conveyor_sim.page.watch import Watch
 from conveyor_sim.report.figures import style
 from conveyor_sim.report.figures.data import PlantFrame, StaticGeometry
@@ -129,15 +129,25 @@ def keep_bag(scenario: Scenario, inputs: Path, folder: Path, watch: Watch) -> st
     return f"{folder} ({made.departure})" if made.departure else str(folder)
 
 
-def keep_page(scenario: Scenario, bag: Path, path: Path, watch: Watch) -> Path:
+def keep_page(scenario: Scenario, bag: Path, path: Path, watch: Watch, reason: str = "") -> Path:
     """Write a page from the bag of a scenario: its last seconds, and the events since its start.
 
-    Raises BagError, and ConveyorError if the file can't be written.
+    reason: message of the test if no condition failed. Raises BagError, and ConveyorError if the file can't be written.
     """
-    failure = FailedCondition(scenario.time, scenario.failure or "the test failed")
-    known = {*scenario.simulation.process_image.signal_names, *watch.variables}
-    trends = [name for name in traced(scenario) if name in known]
-    return write_page(bag, path, failures=[failure], watch=watch, trends=trends)
+    return write_page(bag, path, failures=[failure_of(scenario, reason)], watch=watch, trends=traced(scenario))
+
+
+def failure_of(scenario: Scenario, reason: str = "") -> FailedCondition:
+    """Return the failed condition of a scenario with its values, and the last input of the test before it."""
+    failed, marks = scenario.failed, scenario.history.marks
+    return FailedCondition(
+        scenario.time,
+        scenario.failure or (f"the test failed: {reason}" if reason else "the test failed"),
+        None if failed is None else failed.since,
+        scenario.values_at_failure,
+        [name for name in scenario.values_at_failure if name in scenario.simulation.line.forcing.names],
+        LastAction(marks[-1].time, _words(marks[-1])) if marks else None,
+    )
 
 
 def traced(scenario: Scenario) -> list[str]:

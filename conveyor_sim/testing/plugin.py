@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 DEFAULT_FOLDER = "line-failures"
 
+_LONGEST_MESSAGE = 300
 _LONGEST_NAME = 120
 
 
@@ -82,10 +83,10 @@ class Lines:
             if folder is not None:
                 remove_folder(folder)
 
-    def keep(self, place: Path) -> list[str]:
+    def keep(self, place: Path, reason: str = "") -> list[str]:
         """Write bags, pages and pictures to a folder. Return one line per file: its path, or why it is missing.
 
-        Inputs stay if no bag could be made from them.
+        reason: message of the test. Inputs stay if no bag could be made from them.
         """
         from conveyor_sim.errors import ConveyorError
         from conveyor_sim.page.watch import Watch
@@ -96,7 +97,7 @@ class Lines:
             part, watch = _part(place, number), Watch(SHOWN)
             for what, keep in (
                 ("bag", partial(keep_bag, scenario, inputs, part / "bag", watch)),
-                ("page", partial(keep_page, scenario, part / "bag", part / PAGE, watch)),
+                ("page", partial(keep_page, scenario, part / "bag", part / PAGE, watch, reason)),
                 ("picture", partial(draw_moment, scenario, part / PICTURE)),
             ):
                 # A plugin that limits the time of tests raises `Failed` even while the report is made.
@@ -226,10 +227,10 @@ def pytest_runtest_makereport(
     lines, warming = item.stash.get(_LINES, None), item.config.stash.get(_WARMING, None)
     place = _root(item.config) / _name(item)
     if report.failed and call.when != "teardown" and lines is not None and lines.made:
-        report.sections.append(("line at the moment of failure", "\n".join(lines.keep(place))))
+        report.sections.append(("line at the moment of failure", "\n".join(lines.keep(place, _message(call)))))
     if warming is not None and warming.made:
         if report.failed:
-            kept = warming.keep(place.with_name(f"{place.name}_warm_up"))
+            kept = warming.keep(place.with_name(f"{place.name}_warm_up"), _message(call))
             report.sections.append(("line at the moment when its warm-up failed", "\n".join(kept)))
         warming.close()
     return report
@@ -246,6 +247,11 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: p
         terminalreporter.section("inputs left by killed tests")
         for folder in folders:
             terminalreporter.write_line(f"{folder}: `conveyor-sim recover {folder}` makes the bag")
+
+
+def _message(call: pytest.CallInfo[None]) -> str:
+    """Return the first line of the exception that failed a test."""
+    return "" if call.excinfo is None else call.excinfo.exconly(tryshort=True).partition("\n")[0][:_LONGEST_MESSAGE]
 
 
 def _root(config: pytest.Config) -> Path:

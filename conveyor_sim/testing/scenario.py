@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import ast
-import inspect
 import math
 import secrets
 import uuid
@@ -13,7 +11,6 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from types import CodeType
 from typing import Any, NoReturn
 
 from conveyor_sim.bag.input_log import InputLog, copier
@@ -36,6 +33,7 @@ from conveyor_sim.support.modbus_rows import Row
 from conveyor_sim.support.printable import SENTENCE, printable
 from conveyor_sim.support.resources import scene_path
 from conveyor_sim.testing import plc
+from conveyor_sim.testing.conditions import text_of, words_of
 from conveyor_sim.testing.history import ScenarioHistory
 from conveyor_sim.testing.plc import ServedPlc
 
@@ -60,9 +58,6 @@ Condition = Callable[["Present"], Any]
 """Function of the present signals that returns true or false: `lambda s: s["belts/table/bottles"] < 40`."""
 
 
-_PLAIN = (str, int, float)
-
-
 class Present(Inputs):
     """Signals and alarms at a tick, by name. Records the names that are read."""
 
@@ -80,32 +75,6 @@ class Present(Inputs):
         return value
 
 
-def text_of(condition: Condition) -> str:
-    """Return the text of a lambda, or the name of a function."""
-    code = getattr(condition, "__code__", None)
-    if not isinstance(code, CodeType):
-        return repr(condition)
-    if code.co_name != "<lambda>":
-        return code.co_name
-    try:
-        source = "".join(inspect.findsource(condition)[0])
-        lambdas = [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Lambda)]
-    except (OSError, SyntaxError):
-        return f"the lambda in line {code.co_firstlineno} of {code.co_filename}"
-    here = [node for node in lambdas if node.lineno == code.co_firstlineno]
-    if len(here) > 1:
-        constants = {value for value in code.co_consts if isinstance(value, _PLAIN)}
-        here = [node for node in here if _constants(node) == constants]
-    texts = {" ".join((ast.get_source_segment(source, node.body) or "").split()) for node in here}
-    # Two lambdas on one line that differ in an operator only are both listed.
-    return " or ".join(sorted(texts)) or f"the lambda in line {code.co_firstlineno} of {code.co_filename}"
-
-
-def _constants(node: ast.Lambda) -> set[object]:
-    inner = (part.value for part in ast.walk(node.body) if isinstance(part, ast.Constant))
-    return {value for value in inner if isinstance(value, _PLAIN)}
-
-
 @dataclass(frozen=True)
 class Assertion:
     """A condition that is asserted from a time on."""
@@ -120,6 +89,11 @@ class Assertion:
     def text(self) -> str:
         """The assertion as the test states it."""
         return f"{self.word}({text_of(self.condition)})"
+
+    @property
+    def words(self) -> str:
+        """The assertion without Python: "always: belts/table/bottles ≤ 40"."""
+        return f"{self.word.replace('_', ' ')}: {words_of(self.condition)}"
 
 
 def values(
@@ -242,7 +216,9 @@ class Scenario(AbstractContextManager["Scenario"]):
         self.failed: Assertion | None = None
         """The assertion that failed; None if none did."""
         self.failure = ""
-        """Sentence about that failure."""
+        """Sentence about that failure, without Python."""
+        self.values_at_failure: dict[str, float] = {}
+        """Values that the failed condition has read, by name."""
         self._read: dict[str, None] = {}
         self._recorder = None if bag is None else Recorder(bag, start=copier(start), sources=sources_of(self.scene))
         self._outputs = OutputWriter(
@@ -490,7 +466,7 @@ class Scenario(AbstractContextManager["Scenario"]):
         while not self._true(assertion, present := self.signals):
             if self.simulation.tick >= last:
                 span = f"within {within:g} s, from {assertion.since:.2f} s to {self.time:.2f} s"
-                self._fail(assertion, f"{assertion.text} did not come true {span}", present)
+                self._fail(assertion, f"did not come true {span}", present)
             self._step()
         return round((self.simulation.tick - first) * self.scene.tick, 9)
 
@@ -504,18 +480,19 @@ class Scenario(AbstractContextManager["Scenario"]):
                 else ""
             )
             when = f"at {self.time:.2f} s (tick {self.simulation.tick}){after}"
-            self._fail(assertion, f"{assertion.text} was {str(unwanted).lower()} {when}", present)
+            self._fail(assertion, f"was {str(unwanted).lower()} {when}", present)
 
     def _true(self, assertion: Assertion, present: Present) -> bool:
         true = bool(assertion.condition(present))
         self._read = {**present.read, **self._read}
         return true
 
-    def _fail(self, assertion: Assertion, head: str, present: Present) -> NoReturn:
+    def _fail(self, assertion: Assertion, result: str, present: Present) -> NoReturn:
         __tracebackhide__ = True
-        self.failed, self.failure = assertion, head
+        self.failed, self.failure = assertion, f"{assertion.words} {result}"
+        self.values_at_failure = {name: present[name] for name in tuple(present.read)}
         shown = values(present.read, present, self.history.unit, self.simulation.line.forcing.names)
-        raise AssertionError(f"{head}; the signals that it reads:\n{shown}")
+        raise AssertionError(f"{assertion.text} {result}; the signals that it reads:\n{shown}")
 
     def _step(self) -> None:
         __tracebackhide__ = True

@@ -72,7 +72,7 @@ def test_a_bottle_that_steps_over_a_rail(per_tick: int, fails: bool) -> None:
     if fails:
         assert re.fullmatch(
             r"tunnelling: bottle 0 moves 200 mm in one step of 0\.01 s in the tick that began at 0 s "
-            r"at \(0\.09, 0\) m: it has 20 m/s, and more than 13 mm could pass through a contact unseen; "
+            r"at \(0\.09, 0\) m: its speed is 20 m/s, and contacts may be missed beyond 13 mm; "
             r"choose a finer accuracy",
             told,
         )

@@ -32,9 +32,9 @@ def _reset(case: Case, found: re.Match[str]) -> Case:
 
 
 ADVICE: dict[str, Callable[[Case, re.Match[str]], Case]] = {
-    r"give it a stiffness of about (\S+) N/m$": _stiffer,
+    r"give this contact a stiffness of about (\S+) N/m$": _stiffer,
     r"give it a (force_limit|torque_limit)$": _limited,
-    r"the number was written into the state; reset it$": _reset,
+    r"a value written into the state is not finite; set a finite one$": _reset,
 }
 """How each advice is followed; advice that is not here is not given to any case."""
 

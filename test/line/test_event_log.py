@@ -146,7 +146,7 @@ def test_an_alarm_is_kept_as_it_can_be_shown(name: str, shown: str) -> None:
 
 
 def test_an_alarm_has_a_name() -> None:
-    expected = "alarms/: given, expected the name of an alarm behind it"
+    expected = "alarms/: given, expected alarms/ and the name of an alarm"
     assert Simulation(REJECT).line.refusal(setting("alarms/", 1.0)) == expected
 
 

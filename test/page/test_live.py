@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from facts import missing
 from page.line import LINE
 from page.live_line import (
     SETPOINT,
@@ -130,21 +131,56 @@ def test_everything_fits_and_has_a_name_for_those_who_hear_it(page: Any, size: t
 # Who may do what
 
 
-def test_who_has_not_signed_in_is_refused_with_the_reason(page: Any, live: Live) -> None:
-    set_speed(page, "0.3")
-    told(page, "Refused: not signed in")
-    assert live.source.snapshot.values[SETPOINT] == 0.5
+def reason(page: Any, control: str) -> str:
+    """Return the reason for which a control is disabled; "" if it is enabled."""
+    settled(page)
+    text, disabled = page.locator(control).evaluate("(one) => [one.title, one.disabled]")
+    assert bool(text) == disabled
+    return str(text)
 
 
-def test_a_viewer_is_refused_with_the_reason(page: Any, live: Live) -> None:
+SET = f"[aria-label='Set {SETPOINT} now']"
+
+
+def test_controls_are_disabled_with_the_reason_before_a_sign_in(page: Any) -> None:
+    show_device(page, "belts/line")
+    assert missing(reason(page, SET), ["sign in", "operator"]) == []
+    assert missing(page.inner_text("#panel_device"), "Sign in as an operator") == []
+    for control in ("text=Pause run", "text=Reset run", f"[aria-label='Set {SETPOINT}']"):
+        assert missing(reason(page, control), ["sign in"]) == [], control
+
+
+def test_a_viewer_sees_no_control_enabled(page: Any, live: Live) -> None:
     signed_in(page, "vic")
-    set_speed(page, "0.3")
-    told(page, "Refused: vic is a viewer, who only reads")
-    page.click("text=Pause run")
-    told(page, "vic is a viewer")
-    assert live.source.snapshot.values[SETPOINT] == 0.5 and live.source.snapshot.run.text == "running"
-    page.click("#sign")
-    page.wait_for_selector("body[data-person='']")
+    page.wait_for_selector("#panel_alarms .alarm", state="attached")
+    for tab in ("device", "alarms", "watch"):
+        page.click(f"#tab_{tab}")
+        settled(page)
+        guarded = page.locator(f"#panel_{tab} [data-guarded], #desk [data-guarded]")
+        assert guarded.count() > 0 and page.locator("[data-guarded]:enabled").locator("visible=true").count() == 0, tab
+    assert missing(reason(page, "text=Reset run"), ["vic", "viewer", "operator"]) == []
+    refused = page.evaluate(FORGED, {"do": "control", "names": ["reset"], "values": []})
+    assert missing(refused, ["vic", "viewer"]) == [] and live.source.snapshot.run.text == "running"
+
+
+FORGED = """async (request) => {
+    const socket = new WebSocket(new URL("live", location.href.replace("http", "ws")));
+    await new Promise((open) => { socket.onopen = open; });
+    const replies = [], next = () => new Promise((resolve) => replies.push(resolve));
+    socket.onmessage = async ({ data }) => {
+        const bytes = new Uint8Array(await data.arrayBuffer());
+        if (bytes[0] === 0) {
+            const message = JSON.parse(new TextDecoder().decode(bytes.subarray(1)));
+            if (message.kind === "reply") replies.shift()?.(message);
+        }
+    };
+    const ask = (what) => { socket.send(JSON.stringify({ ...what, id: 1 })); return next(); };
+    await ask({ do: "sign_in", name: "vic", password: "open sesame" });
+    const { refused } = await ask(request);
+    socket.close();
+    return refused;
+}"""
+"""Sends a request that the page does not offer, as the viewer vic."""
 
 
 def test_a_wrong_password_is_none(page: Any) -> None:
@@ -154,36 +190,67 @@ def test_a_wrong_password_is_none(page: Any) -> None:
     page.click("text=Cancel")
 
 
-def test_an_operator_is_refused_in_automatic_and_for_what_is_out_of_range(page: Any, live: Live) -> None:
+def test_an_operator_is_told_to_change_the_mode_and_a_refusal_goes_when_it_no_longer_holds(page: Any) -> None:
     signed_in(page, "jo")
-    set_speed(page, "0.3")
-    told(page, "Refused: belts/line: is in Automatic")
+    show_device(page, "belts/line")
+    assert missing(reason(page, SET), "belts/line is in Automatic", ["set", "mode", "Manual", "first"]) == []
+    assert missing(reason(page, "[aria-label='Set belts/line/mode'] option[value='2']"), ["engineer"]) == []
+    put_into_mode(page, "3")
+    soon(page, lambda: reason(page, SET) == "", "it may be set")
     set_speed(page, "7")
     told(page, "Refused: belts/line/cmd_speed: 7 given, expected 0 to 1 m/s")
+    page.fill(f"[aria-label='Set {SETPOINT}']", "0.4")
+    soon(page, lambda: page.inner_text("#notice") == "", "another value is another request")
+    put_into_mode(page, "1")
+    soon(page, lambda: reason(page, SET) != "", "automatic again")
     show_device(page, "photo_eyes/exit")
-    page.click("[aria-label='Inject photo_eyes/exit/stuck_on on']")
-    told(page, "Refused: inject: given by operator web jo, expected one of the kind test")
-    put_into_mode(page, "2")
-    told(page, "Refused: belts/line: Maintenance is not for operators")  # by the line, a tick later
+    inject = reason(page, "[aria-label='Inject photo_eyes/exit/stuck_on on']")
+    assert missing(inject, ["test", "jo", "operator"]) == []
+
+
+def test_stop_is_offered_in_automatic(page: Any, live: Live) -> None:
+    signed_in(page, "jo")
+    show_device(page, "machines/packer")
+    choice, button = (f"[aria-label='Set machines/packer/cntrl_cmd{now}']" for now in ("", " now"))
+    options = page.locator(f"{choice} option")
+    enabled = [option.inner_text() for option in options.all() if option.is_enabled()]
+    assert enabled == ["Stop", "Abort"]
+    page.select_option(choice, label="Stop")
+    page.click(button)
+    soon(page, lambda: live.source.snapshot.values["machines/packer/state"] == 2.0, "it stops")
+
+
+def test_the_run_has_one_pause_control(page: Any) -> None:
+    signed_in(page, "jo")
+
+    def pausing() -> list[str]:
+        settled(page)
+        buttons = page.locator("button:visible").all()
+        named = [f"{one.inner_text()} {one.get_attribute('aria-label') or ''}" for one in buttons]
+        return [name.strip() for name in named if "pause" in name.lower() or "❚❚" in name]
+
+    assert pausing() == ["Pause run"]
+    page.click("#back")
+    page.click("#play")
+    assert pausing() == ["Pause run"] and page.get_attribute("#play", "aria-label") == "Stop the replay"
+    page.click("#follow_now")
 
 
 def test_what_one_does_another_sees_and_may_not_undo(open_page: Callable[[str], Any], live: Live) -> None:
     viewer, tester = open_page(live.url), open_page(live.url)
-    signed_in(viewer, "vic")
     show_device(viewer, "belts/line")
     field = viewer.locator("[aria-label='Set belts/line/mode']")
     assert field.input_value() == "1"
     signed_in(tester, "tess")
     put_into_mode(tester, "3")
     soon(viewer, lambda: field.input_value() == "3", "the mode, in the field, too")
-    put_into_mode(viewer, "1")
-    told(viewer, "Refused: vic is a viewer")
+    assert viewer.locator("[aria-label='Set belts/line/mode now']").is_disabled()
     assert viewer.locator("#panel_device tr", has_text="mode").first.locator("td").inner_text() == "Manual"
     put_into_mode(tester, "1")
     soon(tester, lambda: live.source.snapshot.values["belts/line/mode"] == 1.0, "automatic again")
 
 
-def test_what_a_tester_does_is_shown(page: Any, live: Live) -> None:
+def test_what_a_tester_does_is_shown(page: Any, live: Live, open_page: Callable[[str], Any]) -> None:
     signed_in(page, "tess")
     show_device(page, "photo_eyes/exit")
     page.click("[aria-label='Watch photo_eyes/exit/blocked']")
@@ -191,6 +258,9 @@ def test_what_a_tester_does_is_shown(page: Any, live: Live) -> None:
     page.click("[aria-label='Force photo_eyes/exit/blocked on']")
     row, chip = page.locator("#panel_watch li"), page.locator("[aria-label^='Remove photo_eyes/exit/blocked ']")
     soon(page, lambda: "forced" in row.inner_text() and "\non\n" in row.inner_text(), "the force")
+    for panel in ("line", "alarms", "events", "device", "bottle", "watch"):
+        page.click(f"#tab_{panel}")
+        assert missing(page.inner_text("#banner"), "forced photo_eyes/exit/blocked = on") == [], panel
     soon(page, lambda: ", forced" in chip.inner_text(), "the force, of what the trends show")
     page.click("[aria-label='End the force on photo_eyes/exit/blocked']")
     soon(page, lambda: "forced" not in row.inner_text(), "its end")
@@ -199,8 +269,11 @@ def test_what_a_tester_does_is_shown(page: Any, live: Live) -> None:
     page.click("[aria-label='Inject photo_eyes/exit/stuck_on on']")
     fault = page.locator("#panel_device tr", has_text="stuck_on").first
     soon(page, lambda: "on" in fault.locator("td").inner_text(), "the fault")
+    late = open_page(live.url)
+    soon(late, lambda: missing(late.inner_text("#banner"), "fault photo_eyes/exit/stuck_on = on") == [], "the fault")
     page.click("[aria-label='Inject photo_eyes/exit/stuck_on off']")
     soon(page, lambda: "off" in fault.locator("td").inner_text(), "its end")
+    soon(page, lambda: not page.locator("#banner").is_visible(), "nothing is forced or faulty")
 
 
 def test_alarms_are_shelved_acknowledged_and_reset(page: Any) -> None:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from facts import missing
 from page.conftest import opened_page
 from page.line import LINE, record
 from page.pixels import canvas, count_where_they_are, settled, to_pixels
@@ -192,7 +193,7 @@ def test_a_state_of_a_machine_is_one_event_with_what_is_known_of_why(page: Any) 
 def test_a_faceplate_shows_the_tags_of_the_device_that_is_clicked(page: Any) -> None:
     seek(page, 12.0)
     x, y = to_pixels(page, 1.5, 0.06)
-    page.click("#plan", position={"x": x, "y": y})
+    page.click("#plan", position={"x": x, "y": y - 8})  # beside the bottles
     settled(page)
     assert page.locator("#panel_device select").input_value() == "photo_eyes/queue"
     assert page.locator("#panel_device tr", has_text="blocked").locator("td").inner_text() in ("on", "off")
@@ -206,6 +207,17 @@ def test_a_faceplate_shows_the_tags_of_the_device_that_is_clicked(page: Any) -> 
     settled(page)
     assert page.inner_text("#panel_device .kind .badge") == "▲ 1 alarm"
     assert "capper_full" in page.inner_text("#panel_device .rows")
+
+
+def test_an_injected_fault_is_on_the_banner_in_every_panel(page: Any) -> None:
+    seek(page, 4.0)
+    assert not page.locator("#banner").is_visible()
+    seek(page, 12.0)
+    for panel in ("line", "alarms", "events", "device", "bottle"):
+        page.click(f"#tab_{panel}")
+        assert missing(page.inner_text("#banner"), "fault photo_eyes/exit/stuck_on = on") == [], panel
+    page.locator("#banner button").click()
+    assert page.input_value("#panel_device select") == "photo_eyes/exit"
 
 
 def test_an_eye_is_lit_while_it_is_blocked(page: Any) -> None:

@@ -46,7 +46,7 @@ def test_what_stands_is_listed_by_priority_then_by_age() -> None:
         priority=np.array([500, 500, 800, 900, 900], dtype=np.uint16),
         tag=[""] * 5,
         group=[""] * 5,
-        suppressed_by=["[]"] * 5,
+        suppressed_by=[()] * 5,
         latching=np.zeros(5, dtype=np.bool_),
         declared_by=[""] * 5,
         state=np.array(states, dtype=np.uint8),

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from conveyor_msgs.msg import AlarmStates, Belts, CommandOutcome, Commands, Events
+from conveyor_msgs.msg import Alarm, AlarmStates, Belts, CommandOutcome, Commands, Events
 from ros.line_client import LineClient, until
 from std_msgs.msg import Float64
 
@@ -94,12 +94,14 @@ def test_an_alarm_is_in_the_events_at_its_tick_even_beside_a_refused_command(sen
 
 
 def test_a_declaration_of_an_alarm_comes_before_the_commands_beside_it(sender: Sender) -> None:
-    declared = {"alarm_ids": ["declared"], "alarms": ['{"text": "it is there", "on_delay": 0.5}']}
-    outcome = sender.outcome_of(sender.commands, Commands(**declared))
+    declared = Alarm(id="declared", text="it is there", on_delay=0.5)
+    outcome = sender.outcome_of(sender.commands, Commands(alarms=[declared]))
     assert (outcome.accepted, outcome.operation, list(outcome.names)) == (True, "declare", ["declared"])
-    outcome = sender.outcome_of(sender.commands, Commands(alarm_ids=["declared"], alarms=['{"class": 1}']))
+    outcome = sender.outcome_of(sender.commands, Commands(alarms=[Alarm(id="declared", alarm_class="bad")]))
     assert not outcome.accepted
-    assert outcome.reason.startswith("alarm declared: class: no such field")
+    assert outcome.reason.startswith("alarm declared: alarm_class: ")
+    outcome = sender.outcome_of(sender.commands, Commands(alarms=[Alarm(id="declared", tag="x", high=math.nan)]))
+    assert not outcome.accepted and outcome.reason.startswith("alarm declared: high: ")
     with sender.line.listen(AlarmStates, "alarm_states") as states:  # a late subscriber
         message = until(lambda: states.messages and states.messages[-1], "alarm_states")
     at = list(message.id).index("declared")

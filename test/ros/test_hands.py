@@ -154,7 +154,7 @@ def test_refusals_of_a_held_belt_are_one_line_and_then_a_count(
     assert [record.message for record in caplog.records] == [
         "commands refused at tick 0: belts/feeder: is in Manual, taken by operator Jo, "
         "expected Automatic for a controller's commands",
-        "49 more commands were refused for want of control; each outcome says why",
+        "49 more commands were refused, because another writer has control; each command result has the reason",
     ]
     reception, counts = stepper.run.reception, stepper.run.inbox.counts
     assert (reception.applied, reception.refused, reception.without_control) == (100, 0, 50)

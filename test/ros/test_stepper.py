@@ -20,7 +20,7 @@ from conveyor_sim.line.commands.inputs import CommandOutcome
 from conveyor_sim.ros.child import Child
 from conveyor_sim.run.active_run import ActiveRun
 from conveyor_sim.run.calls import MOST_CALLS
-from conveyor_sim.run.lockstep import LockstepRequest, Refused
+from conveyor_sim.run.lockstep import LockstepRequest, Refused, SentInputs
 from conveyor_sim.run.session import RunSession
 from conveyor_sim.run.stepper import Stepper
 from conveyor_sim.scene import load_scene
@@ -110,7 +110,7 @@ def test_what_the_run_is_doing_is_said_whenever_that_changes() -> None:
     stepper = Stepper(run, real_time_factor=0.0, beat=lambda stamp_ns, now: None, died=lambda error: None)
 
     def ask(target: int, release: bool = False) -> None:
-        request = LockstepRequest("plc", target, (), (), release)
+        request = LockstepRequest("plc", target, SentInputs(), release)
         stepper.call(lambda: stepper.advance_lockstep(request)).result(60.0).result(60.0)
 
     def end() -> None:

@@ -1,6 +1,7 @@
 """Texts of conditions."""
 
-from conveyor_sim.testing.scenario import Present, text_of
+from conveyor_sim.testing.conditions import text_of, words_of
+from conveyor_sim.testing.scenario import Present
 
 LIMIT = 3
 
@@ -54,3 +55,18 @@ def test_reading_is_noted() -> None:
     present = Present({"a": 1.0, "b": 2.0, "c": 3.0}, 0.0, 0, 0.01)
     assert present["b"] == 2.0 and present.on("a") and present.get("d") is None
     assert list(present.read) == ["b", "a"]
+
+
+def test_a_condition_is_put_into_words_with_names_and_values_in_place_of_python() -> None:
+    name, most = "table", 40
+    pairs = [
+        (words_of(lambda s: s["belts/table/bottles"] <= 90), "belts/table/bottles ≤ 90"),
+        (words_of(lambda s: s[f"belts/{name}/bottles"] >= most), "belts/table/bottles ≥ 40"),
+        (words_of(lambda s: not s["a/blocked"] and s.on("b/full")), "not a/blocked and b/full"),
+        (words_of(lambda s: abs(s["a"] - s["b"]) < LIMIT or s.time > 1), "abs(a - b) < 3 or time > 1"),
+        (words_of(lambda s, least=2: s["a"] != least), "a ≠ 2"),
+        (words_of(lambda s: {"x == y": 1}[s["a"]] == 1), "{'x == y': 1}[a] = 1"),
+    ]
+    assert [words for words, _ in pairs] == [expected for _, expected in pairs]
+    assert words_of(nearly_full) == "nearly full"
+    assert words_of(eval(compile("lambda s: s['a'] > 1", "<typed>", "eval"))) == "the lambda in line 1 of <typed>"

@@ -5,13 +5,14 @@ import sys
 from importlib.metadata import entry_points
 
 import pytest
+from facts import missing
 from testing.conftest import ON_TABLE, STOP, TABLE
 from testing.test_documented import PLUGIN
 from testing.test_scenario import FEEDER, Hold
 
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.testing import Scenario
-from conveyor_sim.testing.evidence import came, traced
+from conveyor_sim.testing.evidence import came, failure_of, traced
 
 TESTS = f"""
 import pytest
@@ -117,6 +118,22 @@ def test_it_costs_a_run_that_does_not_use_it_nothing() -> None:
     code = f"import conveyor_sim.testing.plugin, sys; print({heavy} & set(sys.modules))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "set()\n"
+
+
+def test_the_page_of_a_failure_states_condition_values_and_the_last_action() -> None:
+    table = Scenario(TABLE)
+    table.run_for(0.5)
+    table.inject(STOP)
+    table.run_for(0.25)
+    with pytest.raises(AssertionError):
+        table.always(lambda s: s[ON_TABLE] > 90)
+    failure = failure_of(table)
+    assert missing(failure.text, f"always: {ON_TABLE} > 90", ["false", "0.75"]) == [] and "s[" not in failure.text
+    assert failure.values == {ON_TABLE: table.signals[ON_TABLE]} and failure.since == failure.time == 0.75
+    assert failure.action is not None and failure.time - failure.action.time == pytest.approx(0.25)
+    assert missing(failure.action.text, [STOP, "1"]) == []
+    plain = failure_of(Scenario(TABLE), "assert 1 == 2")
+    assert missing(plain.text, "assert 1 == 2") == [] and plain.action is None and plain.values == {}
 
 
 def test_what_is_traced() -> None:

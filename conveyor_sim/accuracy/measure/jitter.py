@@ -32,7 +32,7 @@ def jittered(scene: Scene, seed: int) -> dict[str, Any]:
     """Fields to lay over a scene for a run of a seed: the seed, and jitter of infeeds that have none of their own.
 
     Sideways by up to PLACE of the radius, less beside rails; with a rate, early or late by TIMING, too: evenly to both
-    sides, so that the mean flow stays. (In a packed in-line jitter can only delay, so there is none along it.)
+    sides, so that the mean flow stays. (In a packed queue jitter can only delay, so there is none along it.)
     """
     infeeds = {
         name: _jitter(scene, infeed)

@@ -313,19 +313,21 @@ _ROWS = (
     ),
     Topic(
         "alarm_states",
-        "conveyor_msgs/msg/AlarmStates",
+        encode.ALARM_STATES,
         "all [alarms](alarms.md), with their declarations and states by ISA-18.2",
         "latched, each tick with a change",
         LATCHED,
         state=lambda now: now.sim.line.alarms.changes(),
+        write=encode.alarms_message,
+        read=encode.to_alarms,
         columns=AlarmColumns,
         compare=Compare(lambda line, message, index: f"alarm {message.id[index]}"),
     ),
     Topic(
         "variables",
         "conveyor_msgs/msg/Variables",
-        "a PLC program's variables that are [recorded](structured_text.md#variables-in-recordings); as a node, "
-        "by `controller_node`",
+        "a PLC program's variables that are [recorded](structured_text.md#variables-in-recordings). In ROS, "
+        "`controller_node` publishes the topic",
         "each scan of the program",
         columns=VariableColumns,
         by_controller=True,
@@ -375,7 +377,8 @@ _ROWS = (
     Topic(
         "commands",
         encode.COMMANDS,
-        "setpoints by name (`line.command_names`), applied together or refused together; alarms",
+        "setpoints by name (`line.command_names`), applied together or refused together; alarms; spawned and deleted "
+        "bottles",
         qos=EVENTS,
         recorded=False,
         subscribed=True,

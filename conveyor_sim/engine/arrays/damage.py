@@ -13,7 +13,7 @@ from conveyor_sim.engine.arrays.types import F8, I8, U4
 from conveyor_sim.engine.compiler.groups import group
 
 MOST_TOUCHES = 16
-"""Contacts of one bottle that are remembered as closed. The time of closing is unknown for any more."""
+"""Largest number of closed contacts that are stored per bottle. The time of closing of further ones is unknown."""
 
 MOST_BORNE = 64
 """Contacts of one bottle that are evaluated at a time."""

@@ -66,7 +66,7 @@ class Linear(NamedTuple):
     """Scratch of the linearly implicit method (`tangent.py`, `conjugate_gradients.py`)."""
 
     x: F8
-    """Position at the start of a step, (S,). `Bottles` holds the position ahead of it at which forces are evaluated."""
+    """Position at the start of a step, (S,). `Bottles` then holds the later position at which forces are evaluated."""
     y: F8
     own: Blocks
     """Inertia, plus the resistance of a bottle's rails and base, kg, kg m, kg m^2."""

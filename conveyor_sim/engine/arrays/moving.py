@@ -90,7 +90,8 @@ class MovingRails(NamedTuple):
     sweep: F8
     """Bounding box of all positions of the rail: least x and y, greatest x and y, m, (Q, 4)."""
     course: F8
-    """Motion profile: start of each phase, s after that of the tick; position, speed, acceleration, (Q, PHASES, 4)."""
+    """Motion profile: start of each phase (s since the start of the tick), position, speed, acceleration,
+    (Q, PHASES, 4)."""
     clock: F8
     """Steps since the tick began, (1,)."""
     actuators: Actuators | None

@@ -21,7 +21,7 @@ class Riding(NamedTuple):
     rides: I1
     """1: nothing changes the bottle's velocity until the next rebuild, (S,)."""
     first: U4
-    """Starts of the runs, (S / LEAST + 2,). A block that starts with slot s stores its runs from s / LEAST on."""
+    """Starts of the runs, (S / LEAST + 2,). A block with first slot s stores its runs from index s / LEAST on."""
     end: U4
     """Ends of the runs, stored likewise."""
     runs: I8

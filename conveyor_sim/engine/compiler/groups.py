@@ -1,8 +1,9 @@
 """Groups of arrays: NamedTuples that kernels receive by address.
 
-The memory at the address is laid out in Python, once per group. Numba's own code, which unpacks about 150 arrays in
-every call, made up to half of a kernel. The place of a member depends neither on its type nor on other members, so code
-that reads a few members is compiled once for all groups in which these are alike (`narrowed`).
+The memory at the address is laid out in Python, once per group. Numba's own code unpacks about 150 arrays in every
+call, which was up to half of the size of a kernel. The offset of a member depends neither on its type nor on other
+members. So code that reads a few members is compiled once for all groups in which these have the same types
+(`narrowed`).
 """
 
 from collections.abc import Sequence

@@ -18,7 +18,10 @@ WHOLE = frozenset({(ALL,)})
 
 
 def reads(function: Any) -> list[frozenset[Path]]:
-    """Return by argument: `("bottles",)` if it tests the member for None, `("bottles", ALL)` if it takes it."""
+    """Return the members that a function reads, by argument.
+
+    `("bottles",)`: the function only tests the member for None. `("bottles", ALL)`: it uses the member.
+    """
     source = function.__globals__.get(SOURCE)
     tree = _functions(source or inspect.getsourcefile(function), source is not None)
     return _Reading(function, tree[function.__name__, function.__code__.co_firstlineno]).by_argument

@@ -8,7 +8,7 @@ The fast layout, step by step. Pairs p = 0, 1, ... are sorted by (i, j); a block
                   v v v v v v v v                                2. law: eight pairs at a time, no branches; separate
     pairs.fx | on i: 0 .. P-1 | on j: P .. 2P-1 | 0 |               pairs get 0. Written twice, once per partner:
                   ^     ^            ^                               no thread adds to another one's entry
-    slots    | 2  5  P+1  -  -  - | ...                          3. sum (slots.py): each bottle adds its own entries,
+    slots    | P+1  4  5  -  -  - | ...                          3. sum (slots.py): each bottle adds its own entries,
                                                                     six to a row; "-" is the entry that stays 0
 
 Steps 1 and 2 write by pair, step 3 by bottle: no two threads write to the same entry, and every sum has one order, that

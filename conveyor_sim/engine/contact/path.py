@@ -29,7 +29,7 @@ def note_path(path: Any, stage: Stage, dt: float, first: int, end: int) -> None:
 
 @part
 def note_stage(world: World, times: F8, squared: F8, s: int, h: float, first: int, end: int) -> None:
-    """Set the displacements of bottles first to end to row s of a tableau in a step of h (s); see `runge_kutta.py`."""
+    """Set the displacements of bottles first to end in stage s of a step of h (s); `runge_kutta.py` has the tableau."""
     path, bottles, slopes = world.path, world.bottles, world.slopes
     if path is None:
         return

@@ -11,11 +11,11 @@ below v_lim, the error is less than a hundredth of `accuracy.error` and falls as
 three times as large. With substeps of dt throughout, the order in dt is 5 where forces are smooth, 3 across v_lim, and
 at first touch that of every method: 1 with a dashpot, clamped or not, 2 without, 2.5 in velocity with Hertz.
 
-The pair's difference in velocity shows as little as 1/169 of the error that a jump of the force causes in velocity;
-that in position over the substep shows 1/79. The latter is weighted tenfold, so no jump causes more than 8 times the
-error estimate.
+The difference between the two methods of the pair underestimates the velocity error of a force jump. In velocity, the
+difference may be as small as 1/169 of this error. The difference in position, divided by the substep, is at least 1/79
+of it. The latter is weighted tenfold, so the error of a jump is at most 8 times the error estimate.
 
-Peak forces are those at the ends of substeps, missed by up to (pi/n)^2/8 at n substeps per contact. If two belts that
+Peak forces are those at the ends of substeps, low by up to (pi/n)^2/8 with n substeps per contact. If two belts that
 run against each other hold a bottle on the line between them, the force jumps all the time. Substeps are then about
 `accuracy.error` divided by the jump of the acceleration.
 

@@ -1,14 +1,15 @@
 """Classical Runge-Kutta method, with four force evaluations per step, and one more per tick.
 
 It has order 4 where forces are smooth, as in a lasting contact or in friction below v_lim, and 3 through v_lim, where
-the friction curve bends. First touch limits its order as for every method, with a third of velocity Verlet's error:
-order 1 with a dashpot, clamped or not, whose force jumps; 2 with an undamped linear spring, whose slope does; 2.5 in
-velocity with Hertz. Measured in a rebound: 1.00 with a dashpot, 0.99 clamped, 1.99 without, 2.50 with Hertz; through
-friction 4.03 below v_lim, 3.09 across it (test/physics/test_head_on.py, test_contact_laws.py, test_set_down.py).
+the friction curve bends. First touch limits its order, as in every method. The order is 1 with a dashpot, clamped or
+not, because the force jumps. It is 2 with an undamped linear spring, because the slope of the force jumps, and 2.5 in
+velocity with Hertz. The error is a third of velocity Verlet's. Measured orders in a rebound: 1.00 with a dashpot, 0.99
+clamped, 1.99 without, 2.50 with Hertz; through friction 4.03 below v_lim, 3.09 across it (test/physics/test_head_on.py,
+test_contact_laws.py, test_set_down.py).
 
 Peak forces are those at the start of each step and at the end of the tick, because the states of the other evaluations
-are not on the trajectory. An undamped peak between two steps is missed by up to (pi/n)^2/8 at n steps per contact, and
-none is exceeded. Impulses weight the evaluations as the velocity update does.
+are not on the trajectory. They are never larger than the true peak. With n steps per contact, an undamped peak between
+two steps is underestimated by up to (pi/n)^2/8. Impulses weight the evaluations as the velocity update does.
 
 Tangential springs in a stage follow the displacement of the stage. They are cut and stored once, at the end of a step:
 order 4 while a contact sticks. Within a tick the damage evaluation sees them one step late.

@@ -1,10 +1,10 @@
 """Semi-implicit Euler, the paper's integrator (eqs. 5 and 6), and leapfrog: v += dt a(r, v), then r += dt v, the new v.
 
 Velocities are those of mid-step, positions those of the end of the step. Semi-implicit Euler treats both as
-simultaneous, so a bottle that a turning belt carries seems to slip outward by half a step's acceleration: its forces at
-rest are off by mu g dt / v_lim. Leapfrog uses the belt's velocity at the bottle's mid-step position
-(`EngineSettings.lag`) and has no such error (test/physics/test_resting_load.py). On straight belts and floors the two
-agree to the bit.
+simultaneous, so a bottle that a turning belt carries seems to slip outward by half a step's acceleration. Its resting
+forces then have a relative error of mu g dt / v_lim. Leapfrog uses the belt's velocity at the bottle's mid-step
+position (`EngineSettings.lag`) and has no such error (test/physics/test_resting_load.py). On straight belts and floors
+the two agree to the bit.
 
 The order is 1 through dashpots, clamped or not, and through friction, with or without a jump at first touch. Without
 damping its errors in energy stay bounded; rebounds and peak forces then converge with order 2, rebounds with Hertz with

@@ -97,7 +97,7 @@ def _list_rails(i: int, world: World, damage: Any, worker: Worker, count: int) -
         return count
     bottles, contacts = world.bottles, worker.rail_contacts
     for c in range(find_rail_contacts(i, world, contacts)):
-        # A contact that pushes through another piece of its surface counts there.
+        # A contact with share 0 exerts no force: another piece of the same surface carries its load and counts.
         if contacts.share[c] > 0.0 and count < MOST_BORNE:
             entry = contacts.entry[c]
             spring = rail_elongation(world, i, entry)

@@ -170,7 +170,7 @@ def _move(
     else:
         speed += dt * acceleration
         position += dt * speed
-        # Booked with the speed before the step; a kick takes the mean of those before and after it.
+        # `_book` uses the speed before the step. The work of a kick needs the mean of the speeds before and after it.
         _book(ledger, actuators, q, 0.5 * dt * dt * acceleration)
     if position <= 0.0:
         position, speed = 0.0, max(speed, 0.0)

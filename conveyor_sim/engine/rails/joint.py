@@ -1,4 +1,6 @@
-"""Joints of rail pieces: the common end point pushes a bottle once, and only from beyond both pieces."""
+"""Joints of rail pieces. Their common end point pushes a bottle once, and only a bottle that lies beyond the ends of
+both pieces.
+"""
 
 from conveyor_sim.engine.arrays.rails import Ends
 from conveyor_sim.engine.compiler.compile import part

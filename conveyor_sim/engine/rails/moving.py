@@ -1,9 +1,9 @@
-"""Moving rails: their positions at every step, their contacts, and the speed there.
+"""Moving rails: their positions at every step, their contacts, and the velocity of the rail at a contact.
 
 A rail's motion profile is a closed form of time, constant accelerations one after another, so it moves within a tick,
-and a tick can be repeated in shorter steps. It leaves its profile when its drive is held up (`actuators.py`). A contact
-identifies a moving rail by an entry of MOVING or more. There are few moving rails. So every bottle near the box that a
-rail sweeps tests it, and no list depends on the rail's position.
+and a tick can be repeated in shorter steps. It leaves its profile if bottles overload its drive (`actuators.py`). A
+contact identifies a moving rail by an entry of MOVING or more. There are few moving rails. So every bottle near the box
+that a rail sweeps tests it, and no list depends on the rail's position.
 """
 
 import math
@@ -26,7 +26,10 @@ MOVING = 1 << 40
 
 @part
 def place_rails(moving: Any, worker: Worker, dt: float) -> None:
-    """Move the rails to their positions at the clock, in steps of dt (s). All see it after the next `wait_for_all`."""
+    """Move the rails to their positions at time `clock` x dt of the tick. dt: step, s.
+
+    Other workers see the new positions after the next `wait_for_all`.
+    """
     if moving is None:
         return
     if worker.rank == 0:

@@ -13,7 +13,7 @@ from conveyor_sim.engine.compiler.compile import part
 SWEEPS = 64
 
 IN_LINE = 1e-10
-"""Squared sine between normals below which two pieces count as one; rounding would be divided by it."""
+"""Squared sine between normals below which two pieces count as one. Division by less would amplify rounding errors."""
 
 
 @part

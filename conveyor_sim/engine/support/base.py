@@ -19,8 +19,9 @@ from conveyor_sim.engine.threads.workers import units
 
 @part
 def add_base_friction(world: World, spin: Any, load: ForceSums, implicit: Any, dt: float, first: int, end: int) -> None:
-    """Add the friction of belts and floor on bottles first to end, straddling rings excepted, to their load and moment.
+    """Add the friction of belts and floor to the load and moment of bottles first to end.
 
+    Rings that may straddle belts are excluded (`add_straddling_friction`).
     spin, load, implicit: groups of the World, or other arrays of the same shape; implicit None: explicit friction.
     """
     if world.footing is None:
@@ -93,8 +94,9 @@ def _turn(turn: Any, i: int) -> float:
 def add_straddling_friction(
     world: World, spin: Any, load: ForceSums, powers: Any, lag: float, first: int, end: int
 ) -> None:
-    """Add the friction on rings that may straddle belts to the load of bottles first to end; UNIT divides first.
+    """Add the friction on rings that may straddle belts to the load of bottles first to end.
 
+    `first` must be a multiple of UNIT.
     powers: (units, H + 1), W, to which the power taken from each belt is added, or None. lag: s, as in
     `relative_velocity`.
     """

@@ -1,4 +1,4 @@
-"""Friction of a base that is a ring, which sliding and spinning share (the paper's base is a point).
+"""Friction of a base that is a ring, shared by sliding and spinning. The paper's base is a point.
 
 For a disc: Farkas, Bartels, Unger and Wolf, Phys. Rev. Lett. 90, 248302 (2003).
 
@@ -39,7 +39,8 @@ def ring_means(slide: float, spin: float, slip_limit: float) -> tuple[float, flo
     squared = 0.25 * slip_limit * slip_limit
     sum_squared = (slide + spin) * (slide + spin) + squared
     difference_squared = (slide - spin) * (slide - spin) + squared
-    # D from S: two independent roots would be packed into one instruction, which then can't be packed across bottles.
+    # D is computed from S. LLVM would put two independent roots of one bottle into one vector instruction, and then
+    # could not vectorise across bottles.
     unit = 1.0 / math.sqrt(sum_squared)
     ratio = math.sqrt(difference_squared * unit * unit)
     a = first = 0.5 * (1.0 + ratio)
@@ -63,10 +64,10 @@ def _mean(a: float, b: float, rest: float, weight: float) -> tuple[float, float,
 
 @part
 def ring_share(own: float, other: float, limit: float, first: float, rest: float) -> float:
-    """Return F/(mu m g s_v) for own s_v and other s_w, M/(mu m g R_b s_w) for own s_w and other s_v; s/m; finite.
+    """Return the share of friction per slip speed, s/m; finite.
 
-    It is [1 - (s_w/first)^2/2 - rest/s_v^2]/limit, which is free of cancellation; its c_1 = s_v s_w/first is in the
-    second term.
+    With own = s_v and other = s_w it is F/(mu m g s_v). With own = s_w and other = s_v it is M/(mu m g R_b s_w). The
+    formula [1 - (s_w/first)^2/2 - rest/s_v^2]/limit is free of cancellation; c_1 = s_v s_w/first is in its second term.
     """
     # `rest` scales with the fourth power of the smaller speed: far below the other speed it is only rounding error.
     least = 1e-8 * first

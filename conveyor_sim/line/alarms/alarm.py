@@ -62,7 +62,7 @@ NEVER = -1
 
 
 class LineAlarm:
-    """One alarm. `settle` after any change of `active`, `suppressed`, `shelved` and `out_of_service`."""
+    """One alarm. Call `settle` after each change of `active`, `suppressed`, `shelved` or `out_of_service`."""
 
     def __init__(self, id: str, number: int, fields: AlarmFields, declared_by: str, own: bool, tick: float) -> None:
         """Start as a normal alarm.

@@ -47,7 +47,7 @@ _SPACES = str.maketrans("\n\r\t", "   ")
 def parse(ids: Sequence[str], texts: Sequence[str]) -> list[Declared] | str:
     """Return the declarations in an input, or why they can't be read: field, value, expectation."""
     if not ids or len(ids) != len(texts):
-        return f"{len(ids)} ids and {len(texts)} declarations of alarms given, expected equal numbers from 1 on"
+        return f"{len(ids)} ids and {len(texts)} declarations of alarms given, expected as many of each, at least one"
     if len(ids) > MOST_ALARMS:
         return f"{len(ids)} alarms declared in one input, expected {MOST_ALARMS} at most"
     declared = []

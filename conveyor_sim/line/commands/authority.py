@@ -83,6 +83,12 @@ def reserved_mode(kind: str, modes: Iterable[float]) -> float | None:
     return next((mode for mode in modes if mode not in MAY_SET.get(kind, ())), None)
 
 
+def advice(kind: WriterKind) -> str:
+    """Return what lets a kind of writer command a device that is in another mode."""
+    modes = [text for number, text in MODES.items() if kind in IN_CONTROL[number]]
+    return f"set its mode to {modes[-1]} first" if kind in PEOPLE else f"expected {' or '.join(modes)}"
+
+
 def reserved(device: str, kind: str, mode: float) -> str:
     """Return why a kind of writer may not switch a device to or from a mode."""
     return f"{device}: {MODES[int(mode)]} is not for {kind}s, expected an engineer"
@@ -102,8 +108,9 @@ def pattern_problem(patterns: Sequence[str], devices: Collection[str], where: st
         return f"{len(patterns)} patterns given, expected {MOST_PATTERNS} at most"
     for pattern in patterns:
         if not any(covers(pattern, device, where) for device in devices):
-            some = ", ".join(list(devices)[:5]) or "none: there are none"
-            return f"{printable(pattern)}: fits no device that takes commands, expected such as {some}"
+            some = ", ".join(list(devices)[:5])
+            expected = f"expected such as {some}" if some else "and the line has none"
+            return f"{printable(pattern)}: fits no device that takes commands, {expected}"
     return ""
 
 

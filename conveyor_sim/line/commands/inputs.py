@@ -44,6 +44,15 @@ UNFORCE = "unforce"
 DECLARE = "declare"
 """Operation that declares alarms of a controller: ids as names, one JSON object per alarm as texts."""
 
+SPAWN = "spawn"
+"""Operation that puts bottles on the line: their types as names, six values per bottle (`SPAWN_VALUES`)."""
+
+SPAWN_VALUES = ("x", "y", "theta", "vx", "vy", "omega")
+"""Values of one bottle in an input SPAWN, in m, rad, m/s and rad/s, as in conveyor_msgs/Spawn."""
+
+DELETE = "delete"
+"""Operation that removes bottles; their ids as values."""
+
 FAULT = "fault"
 """Source of injected faults."""
 
@@ -98,6 +107,8 @@ class CommandOutcome:
     """True if only this part of the input was refused; the rest has a separate result."""
     repeated: bool = False
     """True if an equal refusal was already reported since the last change of control authority."""
+    bottles: tuple[int, ...] = ()
+    """Ids of the bottles that an input SPAWN put on the line, in the order of its names."""
 
     @property
     def source(self) -> str:

@@ -73,7 +73,7 @@ def refusal(
 def alarm_problem(name: str, value: float) -> str:
     """Return why a controller can't set or clear an alarm, "" if it can."""
     if name == ALARMS:
-        return f"{name}: given, expected the name of an alarm behind it"
+        return f"{name}: given, expected {name} and the name of an alarm"
     return "" if value in (0.0, 1.0) else f"{printable(name)}: {value:g} given, expected 0 or 1"
 
 

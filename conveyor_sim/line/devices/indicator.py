@@ -31,7 +31,7 @@ class IndicatorDevice(Device):
         tags = [
             number(f"{name}/flow", "actual", "Passages within the last window.", "1/h", 0.0, most),
             switch(f"{name}/jam", "status", "Bottles wait, the belt runs, and none has passed for the jam time."),
-            switch(f"{name}/starved", "status", "The belt runs, and no bottle has waited for the starved time."),
+            switch(f"{name}/starved", "status", "The belt runs, and for the starved time no bottle was waiting."),
         ]
         if self._can_block:
             text = "Bottles wait, the belt is to run, and downstream can't take them."
@@ -46,12 +46,12 @@ class IndicatorDevice(Device):
         self._jam_ticks, self._starved_ticks = setup.ticks(indicator.jam_time), setup.ticks(starved_time)
         self._window, self._window_ticks = indicator.window, setup.ticks(indicator.window)
         self.passed = 0
-        """Largest number of bottles out minus those back in so far. A bottle that shakes on the line counts once."""
+        """Running maximum of (bottles out - bottles back in). A bottle that oscillates at the beam counts once."""
         self.recent = []
         self.stuck = 0
         """Ticks for which no bottle has left although one could."""
         self.empty = 0
-        """Ticks for which no bottle has waited."""
+        """Ticks since a bottle last waited."""
         self.jam = self.starved = self.blocked = False
 
     @property

@@ -1,4 +1,7 @@
-"""Infeeds: bottles enter from a tightly packed in-line (`gap`) or at a rate, always into free space."""
+"""Infeeds: bottles enter from a tightly packed queue (`gap`) or at a rate, always into free space.
+
+The queue is not simulated: it lies upstream of the infeed and moves with the last bottle that entered.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,13 +56,14 @@ ROUNDING = 1e-9
 
 LATE = 2.0
 """An infeed is blocked if no bottle entered for this multiple of the time that a bottle takes to enter from a moving
-in-line."""
+queue."""
 
 
 class InfeedDevice(Device, Scattering, Switching):
     """Infeed of a running line.
 
-    Without commands, no instance attributes of them are set: states of such infeeds are those of older scenes.
+    `rate` and `radius_before` become instance attributes, and thus part of checkpoints, only if a command uses them.
+    So checkpoints of infeeds without commands equal those of versions without these commands.
     """
 
     rate = 0.0
@@ -129,7 +133,7 @@ class InfeedDevice(Device, Scattering, Switching):
         return self._infeed.count is not None and self.fed >= self._infeed.count
 
     def _feed_packed(self, now: ScanContext) -> bool:
-        """Feed from an in-line that moves with the last bottle fed. The next bottle enters one pitch behind it."""
+        """Feed from a packed queue that moves with the last bottle fed. The next bottle enters one pitch behind it."""
         state, time = now.state, now.time
         before = self.radius_before if self._infeed.types else self._radius
         pitch = before + self._radius + (self._infeed.gap or 0.0)
@@ -140,7 +144,7 @@ class InfeedDevice(Device, Scattering, Switching):
             if ahead < 0.0:
                 self.blocked = self._late(time, pitch)
                 return False
-            # The in-line advances by at most one tick's travel, even if the last bottle is further ahead.
+            # The queue advances by at most one tick's travel, even if the last bottle is further ahead.
             ahead = self._distance_to_rails(state, min(ahead, advance))
         if not self._enter(now, ahead):
             self.blocked = self._late(time, pitch)

@@ -192,7 +192,7 @@ class PhotoEyeDevice(Device):
 
     def end(self, now: ScanContext) -> None:
         """Evaluate this tick."""
-        if self._quiet and self._beams.state(self._index) == self.beam:  # FREE and not in it, or BLOCKED and in it
+        if self._quiet and self._beams.state(self._index) == self.beam:  # FREE and False, or BLOCKED and True
             return
         spans = self._beams.spans(self._index)
         if now.tick == 0:

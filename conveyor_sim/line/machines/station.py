@@ -161,7 +161,7 @@ class StationDevice(TakingDevice, Scattering):
             count(f"{name}/false_accepts", "counter", "Tests passed by values outside their limits."),
             count(f"{name}/false_rejects", "counter", "Tests failed by values within their limits."),
             *(
-                count(f"{name}/defect_{test}", "counter", f"Bottles that failed the test of {test}.")
+                count(f"{name}/defect_{test}", "counter", f"Bottles that failed the test `{test}`.")
                 for test in station.tests
             ),
             switch(f"{name}/holds", "status", "A bottle is in the station."),

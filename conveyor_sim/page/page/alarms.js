@@ -2,6 +2,7 @@
 
 import { controlsOfAlarm } from "./controls.js";
 import { element, refill, seconds, titled } from "./dom.js";
+import { restrict } from "./rights.js";
 import { ALARM_STATES } from "./story.js";
 
 // Lists of alarms with the same key look the same.
@@ -27,13 +28,15 @@ export class Alarms {
   constructor(view) {
     this.view = view;
     this.list = element("ul", { class: "rows", "aria-label": titled("Alarms", view) });
-    this.root = element("section", {}, element("h2", {}, titled("Alarms", view)), this.list);
+    this.note = element("p", { class: "reason", hidden: true });
+    this.root = element("section", {}, element("h2", {}, titled("Alarms", view)), this.note, this.list);
     this.drawn = null;
   }
 
   draw() {
     const { story, clock } = this.view, alarms = story.alarmsAt(clock.time);
     this.drawn = fillAlarms(this.list, alarms, this.view, "All alarms are normal.", this.drawn);
+    restrict(this.list, this.note);
     this.view.badge("alarms", alarms.filter((alarm) => alarm.stands).length);
   }
 }

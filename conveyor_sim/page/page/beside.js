@@ -2,6 +2,7 @@
 
 import { byId, element, seconds } from "./dom.js";
 import { Plan } from "./plan.js";
+import { Series } from "./series.js";
 import { Wear } from "./wear.js";
 
 const PARTS = 2; // last parts of a path that are shown
@@ -17,6 +18,7 @@ export class Beside {
     this.other = Object.create(view);
     view.letter = "A";
     Object.assign(this.other, { recording, story, rival: view, letter: "B", badge: () => {}, jump: (...where) => view.jump(...where) });
+    this.other.series = new Series(this.other);
     this.other.wear = new Wear(this.other);
     this.plan = this.other.plan = new Plan(this.canvas, this.other);
     view.rival = this.other;

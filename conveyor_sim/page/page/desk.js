@@ -2,17 +2,22 @@
 
 import { byId, element, seconds, warn } from "./dom.js";
 import { wallTime } from "./live.js";
+import { Rights, guarded, restrict } from "./rights.js";
 
 const SURE = 5000; // ms within which a second click confirms
 const STANDS = ["paused", "ended", "stopped"]; // states of a run in which time stands
 const TOLD = 500; // ms between two updates of the latency
 const STALE = 2; // s without a frame of a running line after which the bar reports it
+const READABLE = 3; // s for which a refusal is shown at least, unless the user goes on
 const REMEMBERED = 20; // s in which a refusal by the line is attributed to a request of this page
 
 export class Desk {
   constructor(view, about) {
-    Object.assign(this, { view, about, status: about.status, latency: 0, told: 0, requests: new Map() });
+    Object.assign(this, { view, about, status: about.status, latency: 0, told: 0, requests: new Map(), edits: 0 });
     const { line } = view;
+    this.rights = new Rights(this, about.rights);
+    this.why = element("small", { id: "why", class: "reason", hidden: true });
+    byId("side").addEventListener("input", () => { this.edits += 1; });
     this.link = element("span", { id: "link", role: "status" });
     this.late = element("span", { id: "latency", title: "Latency: from the tick of the line to its frame on this screen" });
     this.run = element("span", { id: "run" });
@@ -20,7 +25,7 @@ export class Desk {
     const can = about.users ? about.controls : [];
     const controls = [["pause", "Pause run", []], ["resume", "Resume run", []], ["step", "Step one tick", [1]], ["reset", "Reset run", []]]
       .filter(([what]) => can.includes(what)).map(([what, label, values]) => {
-        const button = element("button", { onclick: () => (what === "reset" ? this._sure(button, label) : this.ask("control", [what], values)) }, label);
+        const button = guarded(element("button", { onclick: () => (what === "reset" ? this._sure(button, label) : this.ask("control", [what], values)) }, label), () => this.rights.refusal("control"));
         this.buttons.set(what, button);
         return button;
       });
@@ -29,7 +34,7 @@ export class Desk {
     this.sign = element("button", { id: "sign", onclick: () => this._sign() }, "Sign in");
     this.signing = line.signing;
     this.signing.done = () => this.connection();
-    byId("desk").replaceChildren(this.link, this.late, this.now, this.run, ...controls, element("span", { class: "gap" }), this.who, ...(about.users ? [this.sign] : []));
+    byId("desk").replaceChildren(this.link, this.late, this.now, this.run, ...controls, this.why, element("span", { class: "gap" }), this.who, ...(about.users ? [this.sign] : []));
     byId("desk").hidden = false;
     line.addEventListener("connection", () => { this.at = this.before = null; this.connection(); });
     line.addEventListener("locked", () => this.connection());
@@ -61,6 +66,8 @@ export class Desk {
     this.who.textContent = name ? `${name} (${role})` : state === "live" ? "read only" : "";
     this.sign.textContent = name ? "Sign out" : "Sign in";
     document.body.dataset.person = name;
+    restrict(byId("desk"), this.why);
+    this.why.hidden ||= state !== "live";
     this.view.touch();
   }
 
@@ -87,9 +94,19 @@ export class Desk {
     for (const [text, time] of this.requests) if (wallTime() > time + REMEMBERED) this.requests.delete(text);
     this.requests.set(names.join(", "), wallTime());
     const { refused } = await this.view.line.ask({ do: what, names, values });
-    warn(refused ? `Refused: ${refused}` : "");
+    if (refused) this._refused(names, refused);
+    else warn("");
     if (!refused) byId("said").textContent = `${what} ${names.join(", ")}: accepted`;
     return !refused;
+  }
+
+  // Shows a refusal until the user edits a value, or something changes on which it may depend.
+  _refused(names, text) {
+    const { line, recording } = this.view, at = wallTime(), { edits } = this;
+    const devices = names.map((name) => recording.tags.get(name)?.device ?? name);
+    const key = () => JSON.stringify([line.connected, line.person, this.status.run, this.status.owner, ...devices.flatMap((device) => ["mode", "state"].map((what) => recording.latest(`${device}/${what}`) ?? null))]);
+    const then = key();
+    warn(`Refused: ${text}`, () => edits === this.edits && (key() === then || wallTime() < at + READABLE));
   }
 
   // A reset discards the run, so it needs a second click.
@@ -103,7 +120,7 @@ export class Desk {
   // Shows requests that the line has refused one tick later.
   happened({ kind = [], name = [], text = [] }) {
     kind.forEach((one, i) => {
-      if (one === "command_refused" && this.requests.has(name[i])) warn(`Refused: ${text[i]}`);
+      if (one === "command_refused" && this.requests.has(name[i])) this._refused(name[i].split(", "), text[i]);
     });
   }
 

@@ -34,14 +34,22 @@ export const short = (name, most = 28) => (name.length > most ? `${name.slice(0,
 // Returns the title of a panel, with A or B if two recordings are shown.
 export const titled = (text, view) => (view.letter ? `${text} of ${view.letter}` : text);
 
-// Shows a notice over the plan; "": none.
-export function say(text, isWrong = false) {
+let holds = null; // function that returns false once the notice no longer holds
+
+// Shows a notice over the plan; "": none. while_: returns false once it no longer holds.
+export function say(text, isWrong = false, while_ = null) {
   byId("notice").textContent = text;
   byId("news").className = text ? (isWrong ? "wrong" : "") : "none";
+  holds = while_;
 }
 
 // Shows an error or a refusal over the plan.
-export const warn = (text) => say(text, true);
+export const warn = (text, while_ = null) => say(text, true, while_);
+
+// Removes a notice that no longer holds.
+export function expire() {
+  if (holds && !holds()) say("");
+}
 
 export const byId = (id) => document.getElementById(id);
 

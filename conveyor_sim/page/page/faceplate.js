@@ -3,6 +3,7 @@
 import { fillAlarms } from "./alarms.js";
 import { controlsOf } from "./controls.js";
 import { element, seconds, shown, titled } from "./dom.js";
+import { restrict } from "./rights.js";
 
 const ORDER = ["status", "actual", "counter", "alarm", "command", "setpoint", "fault"];
 const TITLES = { status: "Status", actual: "Values", counter: "Counters", alarm: "Alarm counts", command: "Commands", setpoint: "Setpoints", fault: "Faults" };
@@ -16,7 +17,7 @@ export class Faceplate {
       ...this.devices.map((name) => element("option", { value: name }, name)));
     this.body = element("div", { class: "plate" });
     this.root = element("section", {}, element("h2", {}, "Device"), this.choice, this.body);
-    this.rows = this.alarms = [];
+    this.rows = this.alarms = this.groups = [];
     if (this.devices.length) this.show(this.devices[0]);
   }
 
@@ -26,14 +27,16 @@ export class Faceplate {
     this.choice.value = device;
     const { recording } = this.view, tags = recording.head.tags.filter((tag) => tag.device === device);
     this.rows = [];
-    const groups = ORDER.filter((role) => tags.some((tag) => tag.role === role)).map((role) => element("div", {},
-      element("h3", {}, TITLES[role]),
-      element("table", {}, ...this._whose(), ...tags.filter((tag) => tag.role === role).flatMap((tag) => this._row(tag, device)))));
+    this.groups = ORDER.filter((role) => tags.some((tag) => tag.role === role)).map((role) => {
+      const note = element("p", { class: "reason", hidden: true });
+      return { note, root: element("div", {}, element("h3", {}, TITLES[role]), note,
+        element("table", {}, ...this._whose(), ...tags.filter((tag) => tag.role === role).flatMap((tag) => this._row(tag, device)))) };
+    });
     this.alarms = this.views.map((view) => ({ view, key: null, list: element("ul", { class: "rows", "aria-label": titled(`Alarms of ${device}`, view) }) }));
     const alarms = this.alarms.map(({ view, list }) => element("div", {}, element("h3", {}, titled("Alarms", view)), list));
     this.count = element("span", { class: "badge" });
     // The alarms are below, so that fields do not move when an alarm comes.
-    this.body.replaceChildren(element("p", { class: "kind" }, tags[0]?.class?.replaceAll("_", " ") ?? "", this.count), ...this._moves(device), ...groups, ...alarms);
+    this.body.replaceChildren(element("p", { class: "kind" }, tags[0]?.class?.replaceAll("_", " ") ?? "", this.count), ...this._moves(device), ...this.groups.map(({ root }) => root), ...alarms);
     this.draw();
   }
 
@@ -67,7 +70,7 @@ export class Faceplate {
   }
 
   draw() {
-    const { time } = this.view.clock, forced = new Map(this.views.map((view) => [view, view.story.forcedAt(time)]));
+    const { time } = this.view.clock, marked = new Map(this.views.map((view) => [view, { forced: view.story.forcedAt(time), faults: view.story.faultsAt(time) }]));
     const isOurs = ({ tag }) => this.device === "alarms" || tag === this.device || tag.startsWith(`${this.device}/`);
     let count = 0;
     for (const one of this.alarms) {
@@ -81,7 +84,7 @@ export class Faceplate {
     for (const row of this.rows) {
       const { tag, cells, note, choice } = row;
       const notes = cells.map((cell) => {
-        const [now, said] = this._now(tag, cell, forced.get(cell.view)), text = shown(now, tag), { value } = cell;
+        const [now, said] = this._now(tag, cell, marked.get(cell.view)), text = shown(now, tag), { value } = cell;
         if (choice && Number.isFinite(now) && now !== row.chosen && choice !== document.activeElement) choice.value = row.chosen = now; // set by any writer
         if (value.textContent !== text) value.textContent = text;
         const isOn = tag.kind === "bool" && now === 1, isBad = tag.role === "fault" || tag.name.endsWith("/fault");
@@ -94,26 +97,18 @@ export class Faceplate {
       const said = isOne ? notes[0] : notes.map((one, i) => (one ? `${this.views[i].letter}: ${one}` : "")).filter(Boolean).join(", ");
       if (note.textContent !== said) note.textContent = said;
     }
+    for (const { root, note } of this.groups) restrict(root, note);
+    for (const { list } of this.alarms) restrict(list);
   }
 
   // Returns the value of a tag in a recording, and a remark on it.
-  _now(tag, { view: { recording, story, clock }, signal, command }, forced) {
+  _now(tag, { view: { recording, story, clock }, signal, command }, { forced, faults }) {
     if (signal !== undefined) return [recording.at("signals", signal, clock.time), forced.has(tag.name) ? "forced" : ""];
     if (command >= 0) {
       const read = story.readBackAt(command, clock.time);
       return read ? [read.value, `by ${read.writer} since ${seconds(read.since)}`] : [tag.initial, ""];
     }
     if (!recording.tags.has(tag.name)) return [null, ""];
-    return [(tag.role === "fault" ? this._fault(story, tag.name) : undefined) ?? tag.initial, ""];
-  }
-
-  _fault(story, name) {
-    let now;
-    for (const event of story.events) {
-      if (event.time > this.view.clock.time + 1e-6) break;
-      if (event.name === name && event.kind === "fault_injected") now = event.value;
-      if (event.name === name && event.kind === "fault_cleared") now = 0;
-    }
-    return now;
+    return [tag.role === "fault" ? faults.get(tag.name) ?? 0 : tag.initial, ""];
   }
 }

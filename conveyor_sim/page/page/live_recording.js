@@ -30,6 +30,11 @@ export class LiveRecording extends Recording {
     this.count = this.number(this.end) + 1;
   }
 
+  // Returns the newest value of a signal.
+  latest(name) {
+    return this.signal(name, this.end);
+  }
+
   number(time) {
     return Math.max(0, Math.floor((time - this.origin + 1e-6) / this.length));
   }

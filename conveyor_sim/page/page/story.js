@@ -2,6 +2,7 @@
 
 import { lastUpTo } from "./block.js";
 import { CATEGORIES } from "./colours.js";
+import { failureText } from "./failure.js";
 
 const STATE_NAMES = [
   "Undefined", "Clearing", "Stopped", "Starting", "Idle", "Suspended", "Execute", "Stopping", "Aborting", "Aborted",
@@ -12,6 +13,7 @@ export const ALARM_STATES = [
   "out of service",
 ];
 const STANDS = new Set([1, 2, 4, 5]);
+export const isStanding = (state) => STANDS.has(state);
 const SHOWN = new Set([1, 2, 3, 4, 5, 6, 7, 8]);
 
 const EXECUTE = 6;
@@ -33,6 +35,7 @@ export function stateName(number, category) {
 export const stateColour = (number, category) => CATEGORIES[number === EXECUTE ? "running" : category] ?? CATEGORIES.idle;
 
 const HOLDS = /^(machine_state|signal_|fault_)/;
+const INTERVENES = /^(signal_|fault_)/;
 const OF_ONE = new Set(["alarm_changes", "readback"]); // lists whose second entry states the subject
 const timeOf = (row) => row.at ?? row[0];
 const LISTS = ["alarm_changes", "readback", "counters", "runs", "wear"];
@@ -80,6 +83,7 @@ export class Story {
   build() {
     const { data } = this, { at = [], kind, name, bottle, value, text } = data.events;
     this.events = at.map((time, i) => ({ time, kind: kind[i], name: name[i], bottle: bottle[i], value: value[i], text: text[i] }));
+    this.interventions = this.events.filter(({ kind }) => INTERVENES.test(kind));
     this.fed = new Map();
     this.rejected = new Set();
     this.machines = new Map(); // by machine, times of state changes
@@ -143,7 +147,7 @@ export class Story {
       if (event.kind === "fault_injected") marks.push({ time: event.time, kind: "fault", text: `fault ${event.name}` });
       if (event.kind === "command_refused") marks.push({ time: event.time, kind: "refused", text: `refused ${event.name}: ${event.text}` });
     }
-    for (const failure of this.head.failures ?? []) marks.push({ ...failure, kind: "failed" });
+    for (const failure of this.head.failures ?? []) marks.push({ time: failure.time, text: failureText(failure), kind: "failed" });
     return marks.sort((a, b) => a.time - b.time);
   }
 
@@ -152,7 +156,7 @@ export class Story {
     const found = [];
     for (const [number, alarm] of this.alarms) {
       const now = alarm.states[lastUpTo(alarm.times, time + 1e-6)];
-      if (now && SHOWN.has(now.state)) found.push({ number, ...alarm, ...now, stands: STANDS.has(now.state) });
+      if (now && SHOWN.has(now.state)) found.push({ number, ...alarm, ...now, stands: isStanding(now.state) });
     }
     return found.sort((a, b) => b.stands - a.stands || b.priority - a.priority || b.since - a.since);
   }
@@ -173,11 +177,25 @@ export class Story {
   // Returns the names of the signals that are forced at a time.
   forcedAt(time) {
     const forced = new Set(this.head.forced.map((index) => this.head.signals[index]));
-    for (const event of this.events) {
-      if (event.time > time + 1e-6) break;
-      if (event.kind === "signal_forced") forced.add(event.name);
-      if (event.kind === "signal_unforced") forced.delete(event.name);
+    for (const { kind, name } of this._intervened(time)) {
+      if (kind === "signal_forced") forced.add(name);
+      if (kind === "signal_unforced") forced.delete(name);
     }
     return forced;
+  }
+
+  // Returns the values of the faults that are injected at a time, by name.
+  faultsAt(time) {
+    const faults = new Map(Object.entries(this.head.faults ?? {}));
+    for (const { kind, name, value } of this._intervened(time)) {
+      if (kind === "fault_injected") faults.set(name, value);
+      if (kind === "fault_cleared") faults.delete(name);
+    }
+    return faults;
+  }
+
+  _intervened(time) {
+    const after = this.interventions.findIndex((event) => event.time > time + 1e-6);
+    return after < 0 ? this.interventions : this.interventions.slice(0, after);
   }
 }

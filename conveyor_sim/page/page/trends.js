@@ -15,7 +15,7 @@ export class Trends {
   constructor(view) {
     this.view = view;
     this.names = [];
-    this.window = 30;
+    this.window = this._firstWindow();
     this.plot = null;
     const { recording } = view;
     this.input = element("input", { list: "signals", placeholder: "Add a signal …", "aria-label": "Add a signal to the trends", onchange: () => this._typed() });
@@ -23,7 +23,7 @@ export class Trends {
     this.choice = element("select", { "aria-label": "Seconds shown", onchange: () => { this.window = +this.choice.value; view.touch(); } },
       ...WINDOWS.map((window) => element("option", { value: window, selected: window === this.window }, `${window} s`)));
     byId("trendbar").append(this.chips, this.input,
-      element("datalist", { id: "signals" }, ...recording.head.signals.map((name) => element("option", { value: name }))), this.choice);
+      element("datalist", { id: "signals" }, ...[...recording.head.signals, ...recording.head.commands].map((name) => element("option", { value: name }))), this.choice);
     if (view.rival) byId("trendbar").append(element("small", {}, "dashed: B"));
     this.box = byId("trends");
     for (const name of this._first()) this.add(name);
@@ -39,6 +39,12 @@ export class Trends {
     return found.slice(0, 4);
   }
 
+  // Returns the shortest window that shows the last action of a failed test when the page opens, s.
+  _firstWindow() {
+    const { action, time } = this.view.recording.head.failures?.at(-1) ?? {};
+    return WINDOWS.find((window) => window >= 30 && (!action || time - action.time < 0.7 * window)) ?? WINDOWS[WINDOWS.length - 1];
+  }
+
   _typed() {
     if (this.view.recording.signalIndex.has(this.input.value)) {
       this.add(this.input.value);
@@ -47,7 +53,7 @@ export class Trends {
   }
 
   add(name) {
-    if (this.names.includes(name) || !this.view.recording.signalIndex.has(name)) return;
+    if (this.names.includes(name) || !this.view.series.has(name)) return;
     this.names = [...this.names, name].slice(-MOST);
     this._chipped();
   }
@@ -72,7 +78,7 @@ export class Trends {
 
   // Returns the scale of a signal: switches in lanes, all others of one unit on one axis.
   _scale(name) {
-    const tag = this.view.recording.tags.get(name);
+    const tag = this.view.series.tag(name);
     return tag?.kind === "bool" ? "switch" : tag?.unit || "1";
   }
 
@@ -100,17 +106,23 @@ export class Trends {
     const stepped = uPlot.paths.stepped({ align: 1 });
     this.plot = new uPlot({
       width: this.box.clientWidth, height: this.box.clientHeight, legend: { show: false }, scales, axes, cursor: { y: false, drag: { x: false, y: false } },
-      series: [{}, ...this._drawn().map(({ name, i, dash }) => ({ label: name, scale: this._scale(name), stroke: COLOURED(i), width: 2, dash, points: { show: false }, spanGaps: dash !== null, paths: this.view.recording.tags.get(name)?.kind === "number" ? undefined : stepped }))],
+      series: [{}, ...this._drawn().map(({ name, i, dash }) => ({ label: name, scale: this._scale(name), stroke: COLOURED(i), width: 2, dash, points: { show: false }, spanGaps: dash !== null, paths: this._steps(name) ? stepped : undefined }))],
       hooks: { draw: [(plot) => this._lanes(plot), (plot) => this._marks(plot)] },
     }, this._data(), this.box);
     this.plot.over.addEventListener("click", (event) => this.view.jump(this.plot.posToVal(event.offsetX, "x")));
     this.theme = colours;
   }
 
+  // Returns true for a signal that changes in steps, as all commands do.
+  _steps(name) {
+    const { series, recording } = this.view;
+    return series.tag(name)?.kind !== "number" || !recording.signalIndex.has(name);
+  }
+
   // One line per signal, and a dashed one for its value in the other recording.
   _drawn() {
-    const lines = this.names.map((name, i) => ({ name, i, of: this.view.recording, dash: null })), { rival } = this.view;
-    return rival ? [...lines, ...lines.map((line) => ({ ...line, of: rival.recording, dash: [5, 4] }))] : lines;
+    const lines = this.names.map((name, i) => ({ name, i, of: this.view.series, dash: null })), { rival } = this.view;
+    return rival ? [...lines, ...lines.map((line) => ({ ...line, of: rival.series, dash: [5, 4] }))] : lines;
   }
 
   _span() {
@@ -119,8 +131,8 @@ export class Trends {
   }
 
   _data() {
-    const [from, to] = this._span(), all = this._drawn().map(({ name, of }) => this._laned(name, of.series(name, from, to)));
-    if (this.view.rival) return uPlot.join(all.map(({ times, values }) => [times, values]));
+    const [from, to] = this._span(), all = this._drawn().map(({ name, of }) => this._laned(name, of.between(name, from, to)));
+    if (this.view.rival || this.names.some((name) => !this.view.recording.signalIndex.has(name))) return uPlot.join(all.map(({ times, values }) => [times, values]));
     return [all[0]?.times ?? [], ...all.map(({ values }) => values)];
   }
 
@@ -137,7 +149,7 @@ export class Trends {
     context.textAlign = "right";
     context.textBaseline = "middle";
     for (const name of this.switches) {
-      const text = short(name.split("/").slice(-2)[0], GUTTER_LETTERS);
+      const text = short(name.startsWith("alarms/") ? name.slice(7) : name.split("/").slice(-2)[0], GUTTER_LETTERS);
       context.fillText(text, bbox.left - 6 * devicePixelRatio, plot.valToPos(LANE * this._lane(name) + 0.5, "switch", true));
     }
     context.restore();
@@ -180,8 +192,38 @@ export class Trends {
     ].filter(({ time }) => time >= from && time <= to).sort((one, other) => one.time - other.time);
     for (const { time, kind } of marks) line(time, MARKS[kind] ?? colours.muted, kind === "command" ? [3, 3] : [6, 3]);
     line(clock.time, colours.ink, []);
+    for (const failure of recording.head.failures ?? []) this._sinceAction(plot, failure);
     for (const { time, text } of marks) say(time, text.length > LONGEST ? `${text.slice(0, LONGEST)}…` : text);
     context.restore();
+  }
+
+  // Draws the time from the last action of a test to the failure.
+  _sinceAction(plot, { time, action }) {
+    if (!action || action.time >= time) return;
+    const { ctx: context, bbox } = plot, colours = palette(), ratio = devicePixelRatio, y = bbox.top + 24 * ratio, tip = 5 * ratio;
+    const inside = (at) => Math.min(bbox.left + bbox.width, Math.max(bbox.left, plot.valToPos(at, "x", true))), from = inside(action.time), to = inside(time);
+    if (to - from < 1) return;
+    context.strokeStyle = context.fillStyle = MARKS.failed;
+    context.lineWidth = 1.5 * ratio;
+    context.beginPath();
+    for (const [x, inwards] of [[from, tip], [to, -tip]]) {
+      context.moveTo(x + inwards, y - tip);
+      context.lineTo(x, y);
+      context.lineTo(x + inwards, y + tip);
+    }
+    context.moveTo(from, y);
+    context.lineTo(to, y);
+    context.stroke();
+    const text = seconds(time - action.time);
+    context.font = `600 ${11 * ratio}px system-ui, sans-serif`;
+    context.textAlign = "center";
+    context.textBaseline = "middle";
+    const half = context.measureText(text).width / 2 + 3 * ratio, middle = Math.min(bbox.left + bbox.width - half, Math.max(bbox.left + half, (from + to) / 2));
+    context.fillStyle = colours.halo;
+    context.fillRect(middle - half, y - 8 * ratio, 2 * half, 16 * ratio);
+    context.fillStyle = colours.ink;
+    context.fillText(text, middle, y);
+    context.textBaseline = "alphabetic";
   }
 
   draw() {
@@ -208,8 +250,8 @@ export class Trends {
   // Writes the present value of each signal on its chip.
   _written() {
     this.names.forEach((name, i) => {
-      const tag = this.view.recording.tags.get(name), value = this.chips.children[i].querySelector("b");
-      const text = [...new Set(this.view.plans.map(({ view }) => shown(view.signal(name), tag)))].join(" | "); // of A and B
+      const tag = this.view.series.tag(name), value = this.chips.children[i].querySelector("b");
+      const text = [...new Set(this.view.plans.map(({ view }) => shown(view.series.value(name), tag)))].join(" | "); // of A and B
       if (value.textContent !== text) value.textContent = text;
     });
   }

@@ -1,6 +1,7 @@
 // The view: displayed state of a line, selection, and the parts that draw it.
 
 import { Alarms } from "./alarms.js";
+import { Banner } from "./banner.js";
 import { Bars } from "./bars.js";
 import { Beside } from "./beside.js";
 import { Bottle } from "./bottle.js";
@@ -10,13 +11,15 @@ import { COLOURINGS, SCALES, colourings } from "./colours.js";
 import { Compare } from "./compare.js";
 import { Desk } from "./desk.js";
 import { deviceOf, middle } from "./devices.js";
-import { byId, element, keyOf, say, seconds, warn } from "./dom.js";
+import { byId, element, expire, keyOf, say, seconds, warn } from "./dom.js";
 import { Events } from "./events.js";
+import { Failure } from "./failure.js";
 import { Faceplate } from "./faceplate.js";
 import { LiveClock } from "./live_clock.js";
 import { Plan } from "./plan.js";
 import { Scrubber } from "./scrubber.js";
 import { awayFrom, boundsOf, inside } from "./shapes.js";
+import { Series } from "./series.js";
 import { Tabs } from "./tabs.js";
 import { Tiles } from "./tiles.js";
 import { Trends } from "./trends.js";
@@ -42,6 +45,7 @@ export class View {
     this.desk = line ? new Desk(this, about) : null;
     this.watch = line ? new Watch(this) : null;
     this.camera = new Camera(boundsOf([recording, other?.recording]));
+    this.series = new Series(this);
     this.wear = new Wear(this);
     this.plan = new Plan(byId("plan"), this);
     this.plans = [this.plan];
@@ -50,6 +54,7 @@ export class View {
       this.compare = new Compare(this, recording.head.compared);
       this.plans.push(this.beside.plan);
     }
+    this.banner = new Banner(this);
     this.scrubber = new Scrubber(this);
     this.trends = new Trends(this);
     this.faceplate = new Faceplate(this);
@@ -60,7 +65,9 @@ export class View {
     const production = { title: "Line", parts: [...this.bars, ...shown.map((one) => new Tiles(one))] };
     const panels = { line: production, alarms: { title: "Alarms", parts: this.alarms }, events: { title: "Events", parts: [this.events] },
       device: { title: "Device", parts: [this.faceplate] }, ...(line ? { watch: { title: "Watch", parts: [this.watch] } } : {}), bottle: { title: "Bottle", parts: [new Bottle(this)] } };
-    this.tabs = new Tabs(other ? { compare: { title: "A, B", parts: [this.compare] }, ...panels } : panels, other ? "compare" : this.bars[0].names.length ? "line" : "device");
+    const first = { ...(other ? { compare: { title: "A, B", parts: [this.compare] } } : {}),
+      ...(recording.head.failures?.length ? { failure: { title: "Failure", parts: [new Failure(this)] } } : {}) };
+    this.tabs = new Tabs({ ...first, ...panels }, Object.keys(first)[0] ?? (this.bars[0].names.length ? "line" : "device"));
     for (const part of [this.clock, this.camera]) part.addEventListener("change", () => this.touch());
     for (const one of this.clock.all) {
       one.addEventListener("loaded", () => this._loaded());
@@ -291,8 +298,12 @@ export class View {
     const { clock, camera } = this, play = byId("play");
     byId("clock").textContent = seconds(clock.time);
     if (this.line) byId("end").textContent = seconds(this.recording.end);
-    play.textContent = clock.playing ? "❚❚" : "▶";
-    play.setAttribute("aria-label", clock.playing ? "Pause" : "Play");
+    // The run of a line is paused above the plan; below it, only the display of the past is played.
+    const [sign, text] = this.line ? (clock.playing ? ["■", "Stop the replay"] : ["▶", "Replay from here"]) : clock.playing ? ["❚❚", "Pause"] : ["▶", "Play"];
+    play.textContent = sign;
+    play.setAttribute("aria-label", text);
+    if (this.line) play.title = `${text} (space)`;
+    play.hidden = Boolean(clock.live);
     byId("speed").value = clock.speed;
     this.desk?.drawn(now);
     byId("plan").dataset.camera = [camera.x, camera.y, camera.scale, camera.width, camera.height].join(" ");
@@ -300,6 +311,8 @@ export class View {
     document.body.dataset.bottles = this.plan.frame?.bottles.length ?? "";
     if (clock.playing && now - (this.panelsDrawn ?? 0) < PANELS_EVERY) return;
     this.panelsDrawn = now;
+    expire();
+    this.banner.draw();
     for (const alarms of this.alarms) alarms.draw();
     this.tabs.draw();
     this.trends.draw();

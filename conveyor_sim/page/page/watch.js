@@ -2,6 +2,7 @@
 
 import { field } from "./controls.js";
 import { element, shown } from "./dom.js";
+import { guarded, restrict } from "./rights.js";
 
 const MOST = 30;
 
@@ -12,8 +13,8 @@ export class Watch {
     this.input = element("input", { list: "signals", placeholder: "Add a signal …", "aria-label": "Add a signal to the watch table", onchange: () => this._typed() });
     this.list = element("ul", { class: "rows watched", "aria-label": "Watched signals" });
     this.none = element("p", { class: "muted" }, "Watched signals are listed here with their present values. ◎ in a faceplate adds one.");
-    this.all = element("button", { onclick: () => view.desk.ask("unforce", []) }, "End all forces");
-    this.root = element("section", {}, element("h2", {}, "Watch table"), this.input, this.none, this.list, view.desk?.commands ? this.all : "");
+    this.note = element("p", { class: "reason", hidden: true });
+    this.root = element("section", {}, element("h2", {}, "Watch table"), this.input, this.none, this.note, this.list);
   }
 
   _typed() {
@@ -26,8 +27,8 @@ export class Watch {
     if (this.rows.has(name)) return true;
     const value = element("span", { class: "value" }), said = element("small", {});
     const remove = element("button", { class: "quiet", "aria-label": `Remove ${name}`, title: "Remove", onclick: () => { this.rows.delete(name); row.remove(); this.draw(); } }, "✕");
-    const hands = view.desk?.commands ? element("div", { class: "choices" }, field(tag, "Force", (given) => view.desk.ask("force", [name], [given]), view.signal(name)),
-      element("button", { "aria-label": `End the force on ${name}`, onclick: () => view.desk.ask("unforce", [name]) }, "Unforce")) : "";
+    const hands = view.desk?.commands ? element("div", { class: "choices" }, field(tag, "Force", (given) => view.desk.ask("force", [name], [given]), () => view.desk.rights.refusal("force"), view.signal(name)),
+      guarded(element("button", { "aria-label": `End the force on ${name}`, onclick: () => view.desk.ask("unforce", [name]) }, "Unforce"), () => view.desk.rights.refusal("unforce"))) : "";
     const row = element("li", {}, element("div", { class: "watch" }, element("span", { class: "what" }, name, said), value, remove), hands);
     this.rows.set(name, { tag, value, said });
     this.list.append(row);
@@ -44,6 +45,6 @@ export class Watch {
       said.textContent = isForced ? "forced" : "";
       value.classList.toggle("forced", isForced);
     }
-    this.all.hidden = !forced.size;
+    restrict(this.list, this.note);
   }
 }

@@ -49,7 +49,9 @@ def _slip_steps(terms: Terms) -> float:
 
 
 def _lag(quantity: str, part: Callable[[float], float], terms: Terms, dt: float) -> list[Term]:
-    """Return the error of a bottle that friction holds on its circle. part: returns it by the steps per v_lim / (mu g).
+    """Return the error of a bottle that friction holds on its circle. part: error as a function of n.
+
+    n is the number of steps per v_lim / (mu g).
 
     Semi-implicit Euler combines a belt velocity at the present position with a bottle velocity that is half a step
     older. Leapfrog takes the belt velocity at the mid-step position (test/physics/test_turntable.py).
@@ -117,7 +119,7 @@ def _ring(plant: Plant, on: Collection[str]) -> Cause | None:
 
 
 def _ring_bounds(terms: Terms) -> list[Bound]:
-    """Return the bounds of a spinning ring: those of a sliding point, scaled by J / (m R_b^2)."""
+    """Return the bounds for the spin of a ring: the bounds for a sliding point times J / (m R_b^2)."""
     if terms.laws.base_friction is None:
         return []
     mu = float(terms.laws.base_friction.max())
@@ -153,33 +155,35 @@ BASE_FRICTION = Effect(
     absent="no friction under the bottles",
     needs="mu by surface and bottle type, velocity of each surface",
     bounds=_friction_bounds,
-    bound="half of v_lim / (mu g); with leapfrog and semi-implicit Euler 2 / sqrt(tolerance) steps in it, 20 at 1 %, "
-    "and with the latter 1 / tolerance where a belt turns, 100 at 1 %; with the linearly implicit method 4 steps in "
-    "it, as it is stable in any",
+    bound="half of tau = v_lim / (mu g). Leapfrog and semi-implicit Euler: also 2 / sqrt(tolerance) steps per tau, 20 "
+    "at 1 %. Semi-implicit Euler with curved belts: also 1 / tolerance steps per tau, 100 at 1 %. The linearly "
+    "implicit method is stable in steps of any length; it takes at least 4 per tau",
     shares=_braked,
-    share="with leapfrog and semi-implicit Euler mu g dt / (2 v), v a fifth of the speed of impact, as most are slower",
+    share="with leapfrog and semi-implicit Euler mu g dt / (2 v). v is a fifth of the largest impact speed, because "
+    "most impacts are slower",
     resting=_resting,
-    rest="on belts that turn, with semi-implicit Euler one part in the steps in v_lim / (mu g), with leapfrog "
-    "Omega dt / 2",
+    rest="on curved belts 1 / n with semi-implicit Euler, where n is the number of steps per v_lim / (mu g); "
+    "Omega dt / 2 with leapfrog",
     side=_creep,
-    beside="of creep on curved belts, with semi-implicit Euler one part in the steps in v_lim / (mu g), with leapfrog "
-    "and implicit friction two",
+    beside="in the creep on curved belts 1 / n with semi-implicit Euler, 2 / n with leapfrog and implicit friction; n "
+    "as above",
 )
 RING_BASE = Effect(
     name="ring_base",
-    law="the base is a ring: sliding and spinning share its friction, and it may straddle two belts; v / sqrt(v^2 + "
-    "(v_lim / 2)^2) of each part of it drags in place of p(s); explicit with every friction_solver; types "
-    "without base_radius beside it stand on points",
+    law="the base is a ring: sliding and spinning share its friction, and it may straddle two belts. For each part of "
+    "the ring, v / sqrt(v^2 + (v_lim / 2)^2) takes the place of p(s). Friction of rings is explicit with every "
+    "friction_solver. Bottle types without base_radius in the same scene stand on points",
     source="added",
     called_for=_ring,
-    absent="no bottle type with base_radius, no friction under the bottles, or rotation forced off",
+    absent="no bottle type has base_radius, there is no friction under the bottles, or rotation is forced off",
     needs="base_radius by bottle type",
     bounds=_ring_bounds,
-    bound="for the spin, those of base_friction with v_lim J / (mu g m R_b^2)",
+    bound="for the spin, those of base_friction with tau = v_lim J / (mu g m R_b^2)",
 )
 BELTS = Effect(
     name="belts",
-    law="the last listed belt or plate under the axis carries; plates follow belts",
+    law="where surfaces overlap, the last one in the list carries the bottle whose axis is on it; plates are listed "
+    "after belts",
     source="(11)-(15)",
     called_for=_belts,
     absent="no belt or plate with friction",

@@ -35,10 +35,10 @@ def _riding(plant: Plant, on: Collection[str]) -> Cause | None:
 
 
 def _prevented(plant: Plant, on: Collection[str]) -> str:
-    """Return why no bottle of a plant can ride, "" if one may."""
+    """Return why no bottle of a plant can ride; "" if bottles can."""
     if plant.scene.accuracy.integrator not in RIDES:
         return f"{plant.scene.accuracy.integrator} can't leave bottles out of a step"
-    return "springs under the bottles pull anew at every step" if "static_friction" in on else ""
+    return "static_friction changes the force under bottles at every step" if "static_friction" in on else ""
 
 
 def _infeed(plant: Plant, on: Collection[str]) -> Cause | None:
@@ -60,21 +60,23 @@ ROTATION = Effect(
 )
 RIDING = Effect(
     name="riding",
-    law="a bottle on a straight belt that is near nothing, and whose velocity a step leaves as it is to the bit, takes "
-    "its next steps without forces: x += dt v, the same bits; until lists are made anew or the tick ends",
+    law="a bottle on a straight belt without neighbours takes its next steps without forces, x += dt v, once a step "
+    "has left its velocity unchanged to the last bit. The results are the same bits. Forces are computed again when "
+    "neighbour lists are rebuilt, or in the next tick",
     source="added",
     called_for=_riding,
-    absent="no straight belt with friction, or springs under the bottles, or rk4, dormand_prince or linearly_implicit",
+    absent="no straight belt has friction, bottles stand on springs (static_friction), or the integrator is rk4, "
+    "dormand_prince or linearly_implicit",
     absent_here=_prevented,
-    needs="velocities of a step before; runs of bottles that are stepped",
+    needs="velocities of the previous step; ranges of slots whose bottles are stepped",
 )
 INFEED = Effect(
     name="infeed",
-    law="bottles enter one behind the other, by gap or rate; stations give theirs back",
+    law="bottles enter one behind the other, at a gap or a rate; stations return the bottles that they took",
     source="added",
     called_for=_infeed,
     absent="no infeed, source, spill or station",
-    needs="counters and draws of each entry; room for more bottles as they come",
+    needs="counters and random draws of each entry; storage that grows with the number of bottles",
 )
 OUTFEED = Effect(
     name="outfeed",
@@ -82,5 +84,5 @@ OUTFEED = Effect(
     source="added",
     called_for=_outfeed,
     absent="no outfeed, sink, reject or station",
-    needs="corners and counters of each",
+    needs="corners and counters of each region",
 )

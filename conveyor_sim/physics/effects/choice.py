@@ -1,4 +1,4 @@
-"""All effects in order, the choice of those that a scene needs, and their joint bounds and predictions."""
+"""All effects in order, the choice of effects for a scene, and their bounds and predictions together."""
 
 from collections.abc import Mapping, Sequence
 from functools import partial
@@ -84,7 +84,7 @@ def choose_effects(plant: Plant) -> tuple[EffectChoice, ...]:
 def impacts_of(terms: Terms) -> tuple[Impact, ...]:
     """Return one expected impact per pair of bottle types that can touch, and per bottle type and rail material.
 
-    Each has the errors that the present effects contribute.
+    Each has the errors of all effects that are on.
     """
     adding = [effect.shares for effect in EFFECTS if effect.shares is not None and effect.name in terms.on]
     speed = terms.plant.impact_speed
@@ -127,7 +127,7 @@ def _choose(effect: Effect, plant: Plant, on: set[str]) -> EffectChoice | None:
     possible = effect.can_force_off if forced == "off" else effect.can_force_on
     if not possible and (cause is not None) != (forced == "on"):
         return None
-    why = f"forced {forced} by effects.{effect.name}" + (f"; {cause} calls for it" if cause is not None else "")
+    why = f"forced {forced} by effects.{effect.name}" + (f"; {cause} enables it" if cause is not None else "")
     return EffectChoice(effect.name, forced == "on", why, ("effects", effect.name), forced=True)
 
 
@@ -143,13 +143,13 @@ def _refusals(scene: Scene, absent: Mapping[EffectName, str]) -> list[str]:
     for name in sorted(absent, key=lambda name: places.line_of(("effects", name)) or 0):
         reason = f'"on" given, expected "off": {absent[name]}'
         if scene.effects[name] == "off":
-            reason = f'"off" given, expected "on": what calls for {name} makes no sense without it'
+            reason = '"off" given, expected "on": a field of the scene needs this effect'
         lines.append(f"{places.of(('effects', name))}: effects.{name}: {reason}")
     return lines
 
 
 def _impact_bounds(expected: Sequence[Impact], tolerance: float) -> list[Bound]:
-    """Return the tightest bound of impacts between bottles, and that of impacts on rails."""
+    """Return two bounds: the tightest of impacts between bottles, and the tightest of impacts on rails."""
     tightest: dict[str, Bound] = {}
     for impact in expected:
         bound = impact.bound(tolerance)

@@ -78,9 +78,9 @@ def _stable(name: str, stiffness: Callable[[Meeting, Terms], tuple[float, str]])
 
 
 def _mover_bounds(meeting: Meeting, stiffness: float, terms: Terms) -> list[tuple[float, str]]:
-    """Return a bound (s) and its reason for each rail of the material with a limited drive, held up by bottles.
+    """Return a bound (s) and its reason for each moving rail with a limited drive and the meeting's material.
 
-    The rail is held up by all bottles that fit along it. meeting: bottle type and rail material. stiffness: N/m.
+    The bound assumes that bottles stop the rail: as many as fit along it. stiffness: N/m.
     """
     materials = terms.plant.rail_materials
     bounds = []
@@ -90,7 +90,7 @@ def _mover_bounds(meeting: Meeting, stiffness: float, terms: Terms) -> list[tupl
         most = 2 * (1 + math.floor(shape.length / (2.0 * meeting.first.radius)))
         # A force at the end of an arm accelerates it like a mass of J / L^2.
         mass = shape.mass / shape.fastest_point**2
-        reason = f"{most} bottles at {shape.name}, a body of {mass:.3g} kg when held up, at k = {stiffness:.3g} N/m"
+        reason = f"{most} bottles that stop {shape.name}, a body of {mass:.3g} kg, at k = {stiffness:.3g} N/m"
         bounds.append((mover_bound(stiffness, meeting.reduced_mass, mass, most), reason))
     return bounds
 
@@ -101,7 +101,7 @@ def _linear(meeting: Meeting, terms: Terms) -> tuple[float, str]:
 
 
 def _hertz(meeting: Meeting, terms: Terms) -> tuple[float, str]:
-    """Return the stiffness at the deepest overlap of an impact or a queue; it grows with the load."""
+    """Return the stiffness at the largest overlap in impacts and queues; it grows with the load."""
     law, k = meeting.elastic
     if law is not hertz.HERTZ:
         return 0.0, ""
@@ -119,7 +119,7 @@ def _table(meeting: Meeting, terms: Terms) -> tuple[float, str]:
 
 
 def _peak(stiffness: Callable[[Meeting, Terms], tuple[float, str]]) -> Callable[[Meeting, Terms], list[Share]]:
-    """Return the share of an elastic law in the error of a meeting: its peak falls between two steps."""
+    """Return a function for the error of an elastic law in an impact: the peak falls between two steps."""
 
     def shares(meeting: Meeting, terms: Terms) -> list[Share]:
         if stiffness(meeting, terms)[0] == 0.0:
@@ -134,8 +134,8 @@ BOTTLE_CONTACT = Effect(
     law="contact between bottles",
     source="(22)-(23)",
     called_for=_pairs,
-    absent="a single bottle",
-    needs="a list of the pairs that are near, with coefficients and forces by pair; a contact for each pair of "
+    absent="the scene has a single bottle",
+    needs="a list of near pairs, with coefficients and forces of each; in the scene, a contact for each pair of "
     "materials",
 )
 LINEAR = Effect(
@@ -146,10 +146,11 @@ LINEAR = Effect(
     absent="no contact with stiffness",
     needs="k by pair of materials",
     bounds=_stable("", _linear),
-    bound="1 / sqrt(6 k / m), half of that at which a hexagonal packing is unstable; 1 / sqrt(2 k / m), half of that "
-    "at which a bottle between two rails is; 1 / sqrt(k (2 / m + n / M)) with n bottles at a moving rail of mass M",
+    bound="1 / sqrt(6 k / m), half of the stability limit of a hexagonal packing; 1 / sqrt(2 k / m), half of the "
+    "stability limit of a bottle between two rails; 1 / sqrt(k (2 / m + n / M)) for n bottles at a moving rail of "
+    "mass M",
     shares=_peak(_linear),
-    share="(w dt)^2 / 8, with w = sqrt(k / m_r): a peak between two steps",
+    share="(w dt)^2 / 8, with w = sqrt(k / m_r), because the peak falls between two steps",
     can_force_off=False,
 )
 HERTZ = Effect(
@@ -160,12 +161,12 @@ HERTZ = Effect(
     absent="no contact with hertz_stiffness",
     needs="k by pair of materials",
     bounds=_stable("Hertz ", _hertz),
-    bound="those of linear at the tangent stiffness, at the overlap of an impact at v or of the load of belts as in "
-    "contact_friction; v is the speed of the fastest belt or infeed, or the largest difference of initial velocities, "
-    "plus the speed of the fastest moving rail; 1 m/s if everything rests",
+    bound="those of linear, with k the tangent stiffness at the larger of two overlaps: in an impact at v, and under "
+    "the load N of contact_friction. v is the speed of the fastest belt or infeed, or the largest difference of "
+    "initial velocities, plus the speed of the fastest moving rail; 1 m/s if everything rests",
     shares=_peak(_hertz),
-    share="(w dt)^2 / 8, with w = sqrt(1.5 k delta^0.5 / m_r) at the largest overlap of an impact at v: a peak between "
-    "two steps",
+    share="(w dt)^2 / 8, with w = sqrt(1.5 k delta^0.5 / m_r) at the largest overlap of an impact at v, because the "
+    "peak falls between two steps",
     can_force_off=False,
 )
 TABLE = Effect(

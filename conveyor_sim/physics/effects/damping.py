@@ -1,4 +1,4 @@
-"""Effects of damping in contacts: one for each law in `engine/contact/laws/`, made from its declaration."""
+"""Effects of damping in contacts: one per law in `engine/contact/laws/`, built from the declaration of the law."""
 
 from collections.abc import Callable, Collection
 from typing import Any
@@ -27,7 +27,7 @@ def _called_for(law: DampingLaw) -> Callable[[Plant, Collection[str]], Cause | N
 
 
 def _dashpot(law: DampingLaw, meeting: Meeting, terms: Terms) -> float:
-    """Return the force per speed (kg/s) at the deepest point of an impact; 0 if the meeting has another law."""
+    """Return the force per speed (kg/s) at the largest overlap of an impact; 0 if the meeting has another law."""
     coefficient = meeting.coefficient(law)
     if coefficient == 0.0:
         return 0.0
@@ -46,7 +46,7 @@ def _bounds(law: DampingLaw) -> Callable[[Terms], list[Bound]]:
                 said = f"m_r / (2 {law.rate}) at c = {c:g} kg/s"
                 if law.exponent > 0.0:
                     speed = terms.plant.impact_speed
-                    said = f"m_r / (2 {law.rate}), {c:.3g} kg/s at the deepest of an impact at {speed:g} m/s"
+                    said = f"m_r / (2 {law.rate}), {c:.3g} kg/s at the largest overlap of an impact at {speed:g} m/s"
                 candidates.append(drag_bound(terms, damping_bound(c, meeting.reduced_mass), said))
         return tightest(law.label, candidates, stability=True)
 
@@ -69,9 +69,12 @@ def _shares(law: DampingLaw) -> Callable[[Meeting, Terms], list[Share]]:
 
 def _share(law: DampingLaw) -> str:
     if law.exponent == 0.0:
-        return f"{law.rate} dt / m_r, or k dt / c if that is less: the jump at first touch acts up to a step late"
+        return (
+            f"{law.rate} dt / m_r, or k dt / c if that is less, because the jump of the force at first touch acts up "
+            "to a step late"
+        )
     power = "w dt" if law.exponent == 1.0 else f"(w dt)^{law.exponent:g}"
-    return f"{law.rate} dt / m_r, times {power} with a method of second order"
+    return f"{law.rate} dt / m_r; with methods of second order, {power} times that"
 
 
 def _effect(law: DampingLaw) -> Effect:

@@ -48,9 +48,9 @@ def _contact_friction_bounds(terms: Terms) -> list[Bound]:
 
 
 def _kick(terms: Terms, dt: float) -> list[Term]:
-    """Return the slip after the last step of an impact, relative to the impact speed, if dt is too long for friction.
+    """Return the slip that remains after an impact, relative to the impact speed, if dt is too long for friction.
 
-    Friction stops the slip earlier if mu (w dt)^2 is small compared with v_lim / v.
+    If mu (w dt)^2 is small compared with v_lim / v, friction stops the slip before the impact ends.
     """
     if "implicit_friction" in terms.on or terms.method.slip == 0.0:
         return []
@@ -59,14 +59,15 @@ def _kick(terms: Terms, dt: float) -> list[Term]:
     for meeting in meetings(terms):
         mu = _curve_friction(meeting)
         w = frequency(meeting, terms, speed)
-        # Steps per contact for stable explicit friction at the peak of the impact: 2 pi mu v / v_lim for hoops.
+        # Steps per contact for stable explicit friction at the peak of the impact. Two equal hoops: 2 pi mu v / v_lim.
         mobility = _rim_mobility(meeting.first) + _rim_mobility(meeting.second)
         resolved = math.pi * mu * meeting.reduced_mass * mobility * speed / terms.scene.slip_limit
         steps = math.pi / (w * dt)
         if mu > 0.0 and steps < resolved:
             kick = 0.5 * terms.method.slip * mu * (w * dt) * (w * dt)
             reason = (
-                f"{steps:.3g} steps an impact of {meeting.what} at {speed:g} m/s, of {resolved:.3g}, 2 pi mu v / v_lim"
+                f"{steps:.3g} steps per impact of {meeting.what} at {speed:g} m/s; friction needs {resolved:.3g}, "
+                "pi mu (m_r / m_t) v / v_lim"
             )
             kicks.append((kick, reason))
     return [Term("tangential speed after an impact", *max(kicks))] if kicks else []
@@ -100,7 +101,7 @@ def _rim_mobility(kind: BottleType | None) -> float:
 
 
 def _largest_stiffness(meeting: Meeting, terms: Terms) -> float:
-    """Return the stiffness of the tangential spring, N/m; Mindlin's at the deepest overlap of an impact or a queue."""
+    """Return the stiffness of the tangential spring, N/m; Mindlin's at the largest overlap in impacts and queues."""
     if (mindlin := meeting.value(meeting.law.tangential_mindlin)) > 0.0:
         pressed = overlap_at(meeting, terms, terms.load.force)
         return mindlin * math.sqrt(max(deepest(meeting, terms, terms.plant.impact_speed)[0], pressed))
@@ -128,11 +129,12 @@ CONTACT_FRICTION = Effect(
     absent="no contact with friction",
     needs="mu by pair of materials",
     bounds=_contact_friction_bounds,
-    bound="v_lim / [2 mu (1/m + R^2/J) N], with N the largest load of belts full of bottles on a contact, limited by "
-    "the largest number of bottles in the scene (physics/effects/load.py)",
+    bound="v_lim / [2 mu (1/m + R^2/J) N]. N is the load on a contact from belts full of bottles, or from all bottles "
+    "of the scene if that is less (physics/effects/load.py)",
     side=_kick,
-    beside="in the tangential speed after an impact: mu (w dt)^2 / 2 times the speed of impact, if a contact lasts for "
-    "fewer than 2 pi mu v / v_lim steps",
+    beside="in the tangential speed after an impact mu (w dt)^2 / 2 times the speed of impact, if a contact lasts for "
+    "fewer than pi mu (m_r / m_t) v / v_lim steps. 1 / m_t is the sum of 1/m + R^2/J of the bottles that touch. For "
+    "two equal hoops the number is 2 pi mu v / v_lim",
 )
 ATAN_FRICTION = Effect(
     name="atan_friction",
@@ -140,16 +142,17 @@ ATAN_FRICTION = Effect(
     source="named in the paper",
     called_for=partial(_chosen, field="friction_curve", value="atan"),
     absent="friction_curve is polynomial, or nothing has friction",
-    needs="nothing beside v_lim",
+    needs="only v_lim",
     can_force_on=True,
 )
 IMPLICIT_FRICTION = Effect(
     name="implicit_friction",
-    law="friction at the slip at the end of a step, with the mass of a bottle split among its contacts. With velocity "
-    "Verlet and rk4 it equals explicit friction, with the same accuracy, up to gamma dt = 2/3 and 1, where gamma is "
-    "2 mu N / (m_t v_lim) times the number of closed contacts. In longer steps friction reaches mu N at a slip of 1.5 "
-    "and 1 times mu N dt / m_t instead of v_lim, and a loaded contact creeps faster. Not available with "
-    "dormand_prince, which divides its steps, and linearly_implicit, which solves for friction itself",
+    law="friction at the slip at the end of a step, with the mass of a bottle split among its contacts. With "
+    "velocity_verlet up to gamma dt = 2/3, and with rk4 up to gamma dt = 1, it equals explicit friction. Here gamma is "
+    "2 mu N / (m_t v_lim) times the number of closed contacts. In longer steps friction reaches mu N at a larger slip "
+    "than v_lim, and a loaded contact creeps faster. That slip is mu N dt / m_t with rk4, and 1.5 times as large with "
+    "velocity_verlet. Not available with dormand_prince, which divides its steps, and linearly_implicit, which solves "
+    "for friction itself",
     source="added",
     called_for=partial(_chosen, field="friction_solver", value="implicit"),
     absent="friction_solver is explicit, or nothing has friction",
@@ -170,6 +173,6 @@ TANGENTIAL_SPRING = Effect(
     absent="no contact with tangential, or no friction in contacts",
     needs="elongation of each contact, kept through rebuilds; k_t, c_t and mu by pair of materials",
     bounds=_spring_bounds,
-    bound="2 / sqrt(tolerance) steps in pi sqrt(m_t / k_t), 20 at 1 %, with k_t as in the hardest impact or queue; "
-    "m_t / (2 c_t), with 1/m_t the sum of 1/m + R^2/J of those that touch",
+    bound="pi sqrt(m_t / k_t) divided by 2 / sqrt(tolerance), that is by 20 at 1 %, with k_t at the largest overlap in "
+    "impacts and queues; and m_t / (2 c_t). 1 / m_t is the sum of 1/m + R^2/J of the bottles that touch",
 )

@@ -33,34 +33,36 @@ def _radii(plant: Plant, on: Collection[str]) -> Cause | None:
 
 SEGMENT_RAILS = Effect(
     name="segment_rails",
-    law="contact with the nearest point of a segment, its ends included; pieces that meet push as one surface (where "
-    "three or more touch at once, their push may be off sideways by 5 % of the deepest one, by 25 % between pieces "
-    "that face each other)",
+    law="contact with the nearest point of a segment, its ends included; pieces that meet push as one surface. If a "
+    "bottle touches three or more pieces at once, their resultant has a sideways error of up to 5 % of the largest "
+    "single force, and of 25 % between pieces that face each other",
     source="(22)-(23)",
     called_for=partial(_rail, arc=False),
     absent="no straight rail",
-    needs="pieces of rails, a grid over them, pieces near each bottle; a contact for each pair of materials",
+    needs="pieces of rails, a grid over them, pieces near each bottle; in the scene, a contact for each pair of "
+    "materials",
 )
 ARC_RAILS = Effect(
     name="arc_rails",
-    law="contact with the nearest point of an arc; one like a C, both tips of which can touch a bottle at once, is two "
-    "halves",
+    law="contact with the nearest point of an arc. An arc like a C, both tips of which can touch a bottle at once, is "
+    "divided into two halves",
     source="(21)-(23)",
     called_for=partial(_rail, arc=True),
     absent="no arc rail",
-    needs="pieces of rails, a grid over them, pieces near each bottle; a contact for each pair of materials",
+    needs="pieces of rails, a grid over them, pieces near each bottle; in the scene, a contact for each pair of "
+    "materials",
 )
 MOVING_RAILS = Effect(
     name="moving_rails",
-    law="straight rails that slide or swing, at constant accelerations one after another, in every step; damping and "
-    "friction know the velocity of the rail at the contact; where the drive's limit does not do for that, a body, "
-    "M a = F + Q, with F within the limit and Q what bottles exert",
+    law="straight rails that slide or swing in every step, on profiles of constant accelerations. Damping and friction "
+    "use the velocity of the rail at the contact. If the force limit of the drive does not suffice for the profile, "
+    "the rail moves as a body, M a = F + Q: F is the force of the drive at its limit, Q the force of the bottles",
     source="added",
     called_for=_moving,
     absent="no gate, pusher or diverter",
-    needs="the course of each rail and where it is now; a box that it sweeps; unless no drive has a limit, the sum of "
-    "what bottles exert on each rail; a contact for each pair of materials; integrators leapfrog, "
-    "semi_implicit_euler and velocity_verlet",
+    needs="profile and position of each rail, and the box that it sweeps; if a drive has a force limit, the sum of "
+    "forces of bottles on each rail; in the scene, a contact for each pair of materials, and leapfrog, "
+    "semi_implicit_euler or velocity_verlet as integrator",
     can_force_off=False,
 )
 UNEQUAL_RADII = Effect(
@@ -68,7 +70,7 @@ UNEQUAL_RADII = Effect(
     law="overlap from the radii of both bottles",
     source="added",
     called_for=_radii,
-    absent="all bottles that touch have one radius",
+    absent="all bottles that can touch have the same radius",
     needs="R_i + R_j of each pair",
     can_force_on=True,
     can_force_off=False,

@@ -2,11 +2,15 @@
 
 A belt drags a bottle with at most mu m g. Only the bottles along its running length press on one contact; bottles
 beside each other press on different ones. In a pile the load is shared unevenly, and a bottle is loaded from several
-sides. The factors below are measured: an equivalent load, divided by mu m g and by the number of bottles in a file
-along the pile. At the equivalent load, two bottles alone need the same time step as the whole pile, by the largest
-eigenvalue of the friction of all its contacts at rest. Hoppers of 400 to 1 000 bottles with walls at 20 to 90 degrees:
-1.9 to 3.2; files between rails 1.05 to 1.2 diameters apart: 1.0 to 1.2; zigzags in lanes of 1.35 to 2.5 diameters: 1.7
-to 3.3, and up to 2.6 if divided by the number of bottles (test/physics/effects/test_load.py). Impacts are not included.
+sides. The factors below are measured. A factor is an equivalent load, divided by mu m g and by the number of bottles in
+a file along the pile. At the equivalent load, two bottles alone need the same time step as the complete pile, which
+follows from the largest eigenvalue of the friction in all its contacts at rest.
+
+Measured factors (test/physics/effects/test_load.py), without impacts:
+- hoppers of 400 to 1 000 bottles with walls at 20 to 90 degrees: 1.9 to 3.2
+- files between rails 1.05 to 1.2 diameters apart: 1.0 to 1.2
+- zigzags in lanes of 1.35 to 2.5 diameters: 1.7 to 3.3. Divided by the number of all bottles in place of those of a
+  file, up to 2.6.
 """
 
 import math
@@ -19,13 +23,13 @@ NARROW = 1.25
 """Largest width, in diameters, of a belt on which bottles stand in single file."""
 
 FILE = 1.25
-"""Load in single file, over mu m g and the number of bottles in the file."""
+"""Factor of a single file: load / (mu m g n) with n bottles in the file."""
 
 PILE = 3.5
-"""Load in a pile, over mu m g and the number of bottles in a file along the pile."""
+"""Factor of a pile: load / (mu m g n) with n bottles in a file along the pile."""
 
 WEDGED = 3.0
-"""Load of a few bottles between rails, over mu m g and their number."""
+"""Factor of a few bottles between rails: load / (mu m g n) with n bottles in all."""
 
 ENDLESS_QUEUE = 100
 """Number of bottles assumed to press on each other if there are no belts and an infeed is endless."""
@@ -43,9 +47,10 @@ class Load:
 def contact_load(plant: Plant, laws: Laws) -> Load:
     """Return the largest load that is expected from the bottles and belts of a scene.
 
-    It is the smaller of two loads: that of full belts one behind the other, and that of all bottles of a run. The force
-    of a mover's drive (`MovingShape.limit`, hundreds of newtons) is not included: it would set the steps of every scene
-    with a gate, although only a stuck bottle bears it. The end of a run reports such loads (`force_check.Pressed`).
+    It is the smaller of two loads: from all belts full of bottles one behind the other, and from all bottles of a run.
+    The force of a mover's drive (`MovingShape.limit`, hundreds of newtons) is not included. It would determine the
+    steps of every scene with a gate, although only a stuck bottle bears it. The end of a run reports such loads
+    (`force_check.Pressed`).
     """
     friction, most = laws.friction_under_bottles, plant.supply
     if friction is None or not most:

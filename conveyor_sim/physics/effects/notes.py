@@ -6,23 +6,23 @@ from conveyor_sim.physics.effects.contacts import contacts_in_use
 from conveyor_sim.physics.plant import Plant
 
 CAN = 0.73
-"""Base radius over radius of a beverage can, which stacks on the countersink of another's end (docs/base.md)."""
+"""Base radius of a beverage can divided by its radius; the base fits into the end of the can below (docs/base.md)."""
 
 LEAST, MOST = 0.65, 1.8
 """Extreme ratios of rail scuffing by bottles on rings of CAN to that on points (docs/studies/base_radius.csv)."""
 
 
 def notes(plant: Plant, on: Collection[str]) -> list[str]:
-    """Return a sentence about bottles on points that may rub along rails, in a list; an empty list without such."""
+    """Return a list with one sentence if bottles on points may rub along rails, else an empty list."""
     on_points = bottles_on_points(plant, on)
     if not on_points:
         return []
     name = on_points[0]
     others = "" if len(on_points) == 1 else f", and {len(on_points) - 1} more,"
     return [
-        f"bottle_types.{name}{others} stands on a point: its spin is free, and along rails it rolls; on rings "
-        f"scuffing was {LEAST:g} to {MOST:g} times that on shipped scenes (docs/base.md); give base_radius, of a can "
-        f"{CAN:g} of the radius: {CAN * plant.scene.bottle_types[name].radius:.3g} m"
+        f"bottle_types.{name}{others} stands on a point: nothing brakes its spin, and it rolls along rails; with rings "
+        f"as bases, scuffing was {LEAST:g} to {MOST:g} times as large in shipped scenes (docs/base.md); give "
+        f"base_radius, for a can {CAN:g} times the radius: {CAN * plant.scene.bottle_types[name].radius:.3g} m"
     ]
 
 

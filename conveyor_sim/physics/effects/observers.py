@@ -1,4 +1,4 @@
-"""Effects that only observe: they add no law, but cost time in every step or output."""
+"""Effects that only observe: they change no result, but cost time in every step or output."""
 
 from collections.abc import Callable, Collection
 
@@ -30,7 +30,7 @@ PEAKS = Effect(
     source="added",
     called_for=_output("bottles"),
     absent="outputs.bottles is 0",
-    needs="two sums a bottle, normal forces by pair",
+    needs="two sums per bottle, normal force of each pair",
     can_force_on=True,
 )
 CONTACT_ARRAYS = Effect(
@@ -44,32 +44,33 @@ CONTACT_ARRAYS = Effect(
 )
 ENERGY_LEDGER = Effect(
     name="energy_ledger",
-    law="work of every belt, F u + M Omega, against what friction and damping dissipate, what springs and motion hold, "
-    "and what bottles bring and take; what is left over is the integrator's error",
+    law="balance of energy: the work of every belt, F u + M Omega, against the energy that friction and damping "
+    "dissipate, that springs and motion store, and that bottles bring in and carry away. The residual is the error of "
+    "the integrator",
     source="added",
     called_for=_output("ledger"),
     absent="outputs.ledger is 0",
-    needs="damping and friction by pair and by bottle, sums over all bottles in every step",
+    needs="damping and friction of each pair and each bottle, sums over all bottles in every step",
     can_force_on=True,
 )
 SCUFFING = Effect(
     name="scuffing",
-    law="sliding work at a bottle's wall, sum of |T s| dt over its contacts and the steps; the same, and the impulse "
-    "of normal forces, for each bin of a rail. A contact counts in full for either side",
+    law="sliding work at a bottle's wall: sum of |T s| dt over its contacts and steps. Each bin of a rail has the same "
+    "sum, and the impulse of its normal forces. A contact counts in full on both sides",
     source="added",
     called_for=_output("damage", "scuffing_work"),
     absent="outputs.damage is 0 and there is no limits.scuffing_work",
-    needs="a sum a bottle, two a bin of rail, contacts listed anew in every step",
+    needs="one sum per bottle, two per bin of a rail; a list of contacts in every step",
     can_force_on=True,
 )
 CRUSHING = Effect(
     name="crushing",
-    law="largest sum of the normal forces on a bottle; largest squeeze by two of them that oppose each other, "
-    "min(N_a, N_b) |cos|",
+    law="largest sum of the normal forces on a bottle; largest squeeze between two normal forces that oppose each "
+    "other, min(N_a, N_b) |cos|",
     source="added",
     called_for=_output("damage", "crushing_force", "opposed_force"),
     absent="outputs.damage is 0 and there is neither limits.crushing_force nor limits.opposed_force",
-    needs="four peaks a bottle, contacts listed anew in every step",
+    needs="four peaks per bottle; a list of contacts in every step",
     can_force_on=True,
 )
 IMPACTS = Effect(
@@ -78,15 +79,16 @@ IMPACTS = Effect(
     source="added",
     called_for=_output("damage", "impact_speed", "impact_force"),
     absent="outputs.damage is 0 and there is neither limits.impact_speed nor limits.impact_force",
-    needs="what each bottle touched a step before, and how fast it was then; contacts listed anew in every step",
+    needs="contacts and velocity of each bottle in the previous step; a list of contacts in every step",
     can_force_on=True,
 )
 TIPPING = Effect(
     name="tipping",
-    law="|F_c (h_c - h_cg) - F_b h_cg| / (m g R_b), the moment smoothed over sqrt(h_cg/g): 1 for a load that would tip "
-    "the bottle if it lasts. R_b is base_radius, or radius for a bottle on a point",
+    law="|F_c (h_c - h_cg) - F_b h_cg| / (m g R_b), with the moment smoothed over sqrt(h_cg/g). At 1, a lasting load "
+    "tips the bottle. F_c is the sum of contact forces at height h_c, F_b the force under the base, and h_cg the "
+    "height of the centre of gravity. R_b is base_radius, or radius for a bottle on a point",
     source="added",
     called_for=_tipping,
     absent="outputs.damage is 0 and there is no limits.tipping, or no type has contact_height and gravity_height",
-    needs="a smoothed moment a bottle; contacts and base friction found anew in every step",
+    needs="one smoothed moment per bottle; a list of contacts, and the base friction, in every step",
 )

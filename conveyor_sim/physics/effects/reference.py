@@ -1,4 +1,4 @@
-"""Reference of all effects: `python -m conveyor_sim.physics.effects.reference > docs/effects.md` writes it."""
+"""Page about all effects: `python -m conveyor_sim.physics.effects.reference > docs/effects.md` writes it."""
 
 from conveyor_sim.engine.contact.laws import DAMPING
 from conveyor_sim.physics.effects.choice import EFFECTS
@@ -11,22 +11,23 @@ INTRODUCTION = """\
 conveyor_sim/physics/effects/
 and conveyor_sim/engine/contact/laws/. -->
 
-A scene is simulated with the effects that it calls for and no others. One that is off has no arrays, no branch in the
-compiled loops and no output. `conveyor-sim explain SCENE` lists which effects are on, by which line of the scene, and
-what bounds the time step; `conveyor-sim explain SCENE --price` measures what each costs.
+An effect is a part of the physics, such as a damping law or curved belts. Fields of the scene enable the effects that
+it needs; all others are off. An effect that is off has no arrays, no branch in the compiled loops and no output.
+`conveyor-sim explain SCENE` lists the effects that are on, the line of the scene that enables each, and the bounds on
+the time step. `conveyor-sim explain SCENE --price` measures the cost of each effect.
 
-`effects` in a scene forces an effect on or off:
+The field `effects` forces an effect on or off:
 
     effects: {rotation: off, peaks: on}
 
-An effect with parameters is called for by giving them, and can't be forced on without. Off can't be
-forced where a scene makes no sense without. What an effect calls for goes with it: without contact friction nothing may
-be left that turns a bottle.
+An effect with parameters is enabled by its parameters. It can't be forced on without them. An effect that the scene
+needs, such as its elastic law, can't be forced off. An effect that is forced off no longer enables others: without
+contact friction, for example, rotation may be off too. Each section below states what can be forced.
 
 ## Choosing effects
 
-An effect is chosen by a field of the scene; the rest of the scene stays as it is. examples/effects.yaml has laws other
-than the paper's:
+To choose an effect, set its field; the rest of the scene does not change. examples/effects.yaml uses other laws than
+the paper:
 
 ```yaml
 name: glass_on_two_belts
@@ -49,45 +50,51 @@ infeeds:
 effects: {contact_arrays: off, peaks: off}                          # without a reader
 ```
 
-- `hertz_stiffness` in place of `stiffness`: the deeper a contact, the stiffer it is. `table` takes a measured curve.
-- `restitution` in place of `coefficient`: speed after over speed before an impact; the coefficient follows from it.
-- `tangential`: contacts that stick remember how far they were pushed. Take it where bottles stand: in queues, on
-  accumulation tables, in funnels that may clog ([below](#tangential-springs)). The friction curve, without memory, lets
-  them creep.
-- `base_radius`: a bottle that straddles two belts turns, and its base brakes its spin. A type without it stands on a
-  point, the paper's base; [base.md](base.md) says what that changes, and when to give `tangential` in `base`.
-- `effects`: turns off what no reader needs; here, the outputs of contacts and of peaks.
+- `hertz_stiffness` in place of `stiffness`: the stiffness of a contact grows with its overlap. `table` takes a
+  measured curve.
+- `restitution` in place of `coefficient`: the speed after an impact divided by the speed before it. The coefficient is
+  computed from it.
+- `tangential`: a spring along the contact stores how far a sticking contact was displaced. Use it for bottles at rest:
+  in queues, on accumulation tables, in funnels that may clog ([below](#tangential-springs)). With the friction curve,
+  which has no memory, they creep.
+- `base_radius`: the base is a ring. A bottle that straddles two belts turns, and its base brakes its spin. A type
+  without `base_radius` stands on a point, as in the paper. [base.md](base.md) states the differences, and when to set
+  `tangential` in `base`.
+- `effects`: turns off outputs that no one reads, here those of contacts and of peaks.
 
 ## Tangential springs
 
-By the friction curve a queue at rest gets no help from its rails: it creeps until the stop bears n mu m g, all that the
-belt pulls with. With tangential springs the rails carry their part, and the force on the stop no longer grows with the
-queue. Round bottles need neighbours that keep them from rolling along the rails: a zigzag file rolls like gears, and
-its stop bears all; a file of ones and twos by turns does not, and of 49 bottles the stop bears 7
-(`test/physics/test_janssen.py`).
+With the friction curve, rails carry none of the load of a queue at rest. The queue creeps until the stop bears
+n mu m g, the complete drag of the belt on n bottles. With tangential springs the rails bear a part, and the force on
+the stop no longer grows with the length of the queue. This requires that bottles can't roll along the rails. A zigzag
+file rolls like a train of gears, and its stop bears the complete load. A file in which one bottle and two bottles
+alternate can't roll: with 49 bottles, the stop bears the load of 7 (`test/physics/test_janssen.py`).
 
-`stiffness` is the same at every overlap. `stiffness_ratio`, for Hertz contacts, has it grow with the overlap as
-Mindlin's theory says: `tangential: {stiffness_ratio: 0.88}` for glass. The whole contact sticks or slides, its rim does
-not slide before its middle. So the slip that an oblique impact leaves is off the curve of Maw, Barber and Fawcett by up
-to 0.45 mu v_n / stiffness_ratio for spheres, half of that for hoops, and by nothing where the contact slides
-throughout (`test/physics/test_maw_curve.py`). It is the rule that LAMMPS calls `mindlin_rescale/force`.
+`stiffness` is the same at every overlap. With `stiffness_ratio`, for Hertz contacts, the stiffness grows with the
+overlap as in Mindlin's theory: `tangential: {stiffness_ratio: 0.88}` for glass. A contact sticks or slides as one
+piece, while in the theory its rim slides first. This causes an error in the slip that remains after an oblique impact,
+against the curve of Maw, Barber and Fawcett: up to 0.45 mu v_n / stiffness_ratio for spheres, half as much for hoops,
+and 0 if the contact slides throughout (`test/physics/test_maw_curve.py`). LAMMPS calls this rule
+`mindlin_rescale/force`.
 
-Spring and dashpot together exert at most mu N. While a contact slides, the spring is cut to mu N / k_t. LAMMPS
-(`linear_history`) cuts spring and dashpot together, so that (mu N - c_t s) / k_t is left of the spring at a slip s.
-Without `damping` the two are the same; with it they slide alike, and differ in the elongation from which a contact that
-stops sliding goes on.
+Spring and dashpot together exert at most mu N. While a contact slides, the elongation is limited to mu N / k_t. LAMMPS
+(`linear_history`) limits the sum of both forces, so that the elongation at a slip s is (mu N - c_t s) / k_t. Without
+`damping` the two rules are equal. With it the sliding forces are equal; only the elongation at which sliding ends
+differs.
 
 ## Damping laws
 
-A contact has one law of damping, by `damping: {law: ...}`:
+`damping: {law: ...}` selects the damping law of a contact:
 
 LAWS OF DAMPING
 
-Bounds on dashpots and on friction at rest are those of leapfrog and semi-implicit Euler, which a drag makes unstable at
-dt = 2 / gamma. Velocity Verlet, unstable at 1 / gamma, takes half of them; rk4, at 2.785 / gamma, takes 1.39 times.
+The bounds on dt for dashpots and for friction at rest apply to leapfrog and semi-implicit Euler. With a drag of rate
+gamma, these are unstable beyond dt = 2 / gamma. Velocity Verlet is unstable beyond 1 / gamma, and its bounds are half
+as long. rk4 is unstable beyond 2.785 / gamma, and its bounds are 1.39 times as long.
 
-`conveyor-sim explain` shows what came of the choice. In the list below, numbers in brackets are equations of the paper
-(docs/paper.md).
+`conveyor-sim explain` shows the effects of a scene with its bounds and errors. In the list below, numbers in brackets
+are equations of the paper (docs/paper.md). Symbols: delta overlap, N normal force, mu friction, s slip speed, v impact
+speed, w frequency of a contact, m_r reduced mass, J moment of inertia, R radius, R_b base radius, v_lim `slip_limit`.
 """
 
 
@@ -106,7 +113,7 @@ def _section(effect: Effect) -> str:
         ("bound on dt", effect.bound or "none"),
         ("error in the peak force of an impact", effect.share),
         ("error in resting load", effect.rest),
-        ("error beside", effect.beside),
+        ("other errors", effect.beside),
         ("can be forced", _forcible(effect)),
     ]
     return "\n".join([f"## {effect.name}", "", *(f"- {name}: {text}" for name, text in rows if text), ""])

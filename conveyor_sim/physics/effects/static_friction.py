@@ -40,7 +40,7 @@ def _bounds(terms: Terms) -> list[Bound]:
 
 
 def _braked(meeting: Meeting, terms: Terms) -> list[Share]:
-    """Return the error of first-order methods: half a step of braking, as with the friction curve."""
+    """Return the error of first-order methods: braking in half a step, as with the friction curve."""
     table = terms.laws.base_spring
     if table is None or terms.method.second_order:
         return []
@@ -50,16 +50,17 @@ def _braked(meeting: Meeting, terms: Terms) -> list[Share]:
 
 STATIC_FRICTION = Effect(
     name="static_friction",
-    law="in place of the curve of base_friction a spring from the base to a point of its belt, k e + c v, its force at "
-    "most mu m g; the point goes with the belt, turns with it where it turns, and is dragged along by a base that "
-    "slides; on another belt the spring begins anew. Explicit with every friction_solver; for bottles on points",
+    law="in place of the curve of base_friction, a spring and dashpot from the base to a point of its belt, k e + c v, "
+    "with a force of at most mu m g. The point moves and turns with the belt, and a base that slides drags it along. "
+    "On another belt a new spring starts at e = 0. The spring is explicit with every friction_solver, and applies to "
+    "bottles on points only",
     source="Cundall and Strack 1979",
     called_for=_springs,
     absent="no base with tangential, or no friction under the bottles",
-    needs="a point of its belt for each bottle; k, c and mu by belt and bottle type; integrators leapfrog, "
-    "semi_implicit_euler and velocity_verlet",
+    needs="a point of its belt for each bottle; k, c and mu by belt and bottle type; in the scene, leapfrog, "
+    "semi_implicit_euler or velocity_verlet as integrator",
     bounds=_bounds,
-    bound="2 / sqrt(tolerance) steps in pi sqrt(m / k), 20 at 1 %; m / (2 c)",
+    bound="pi sqrt(m / k) divided by 2 / sqrt(tolerance), that is by 20 at 1 %; and m / (2 c)",
     shares=_braked,
     share="that of base_friction",
 )

@@ -1,4 +1,4 @@
-"""Input of bounds on the time step and of predicted errors, and functions that several effects use."""
+"""Input for bounds on the time step and for predicted errors, and functions that several effects use."""
 
 import math
 from collections.abc import Collection, Iterator, Sequence
@@ -55,7 +55,7 @@ class Terms:
 
     @property
     def steps(self) -> float:
-        """Smallest number of steps in a time scale that is resolved."""
+        """Smallest number of steps that resolves a time scale."""
         return least_steps(self.tolerance)
 
 
@@ -131,7 +131,7 @@ def tightest(name: str, candidates: Sequence[tuple[float, str]], stability: bool
 
 
 def drag_bound(terms: Terms, dt: float, reason: str) -> tuple[float, str]:
-    """Convert the bound (s) by a drag from semi-implicit Euler to the scene's integrator."""
+    """Convert a bound (s) for a drag, valid for semi-implicit Euler, to the scene's integrator."""
     limit = terms.method.drag_limit
     return limit * dt, reason if limit == 1.0 else f"{limit:g} times {reason}"
 

@@ -22,7 +22,7 @@ MEMORY: Mapping[tuple[str, ...], str] = {
     ("damage", "events"): "waits until it is taken",
     ("clogging", "events"): "waits until it is taken",
     ("integration", "events"): "waits until it is taken",
-    ("integration", "deepest"): "largest overlap so far: decides only if a report is the first",
+    ("integration", "deepest"): "largest overlap so far: only determines which report is the first",
     ("integration", "shortened_ticks"): "a count",
     ("line", "outcomes"): "wait until they are taken",
 }
@@ -32,10 +32,10 @@ MEMORY: Mapping[tuple[str, ...], str] = {
 def full_state_hash(memory: Mapping[str, Any], arrays: Arrays, limits: Limits) -> int:
     """Return 64 bits over memory and arrays as a checkpoint holds them. Equal hashes mean equal futures, almost surely.
 
-    Covered of motion: tick, ids, slots, bottles (also in machines), tangential springs (also stored ones), contact laws
-    by pair, neighbour lists, moving rails with their drives, loads that have a limit.
-    Covered of the line: devices, random streams, waiting commands, modes, forces, alarms, counters, log.
-    Left out: SCRATCH, OBSERVERS, MEMORY, FIXED (arrays that the scene sets once), and LIMITED without limits of loads.
+    The hash covers the motion: tick, ids, slots, bottles (also in machines), tangential springs (also stored ones),
+    contact laws by pair, neighbour lists, moving rails with their drives, loads that have a limit.
+    It covers the line: devices, random streams, waiting commands, modes, forces, alarms, counters, log.
+    Not covered: SCRATCH, OBSERVERS, MEMORY, FIXED (arrays that the scene sets once); without limits of loads, LIMITED.
 
     A future belongs to one scene, version and sequence of commands. The memory of a controller is not part of a
     Simulation. Equal futures may have unequal hashes, because lists are hashed with their unused room.

@@ -158,7 +158,7 @@ class State:
         )
         present = set(world.bottles.id.tolist())
         if not valid or len(self.held) < len(held) or not present.isdisjoint(self.held):
-            raise ValueError("held has bottles that can't be, or that are on the line too")
+            raise ValueError("held has bottles that don't exist, or that are also on the line")
         self._free = np.flatnonzero(self.world.bottles.id < 0).tolist()
 
     def _equip(self, slots: "slice | NDArray[np.int64]") -> None:

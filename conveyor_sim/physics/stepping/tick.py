@@ -110,7 +110,7 @@ class Integration:
             again = self._guard.end(self._model.dt / factor)
             if again is None:
                 self._memory.shortened_ticks += 1
-                text = f"{first.sentence(seconds, 1)}; the tick was done again in steps {factor} times shorter"
+                text = f"{first.sentence(seconds, 1)}; the tick was repeated in steps {factor} times shorter"
                 self._memory.report(GuardEvent(tick + 1, "shorter_steps", first.bottle, first.x, first.y, text))
                 return
             tried, wrong = factor, again

@@ -18,9 +18,9 @@ class Bound:
 
 
 def least_steps(tolerance: float) -> float:
-    """Return the smallest number of steps in a contact, and in v_lim / (mu g), for errors of second order: 20 at 1 %.
+    """Return the smallest number of steps per contact, and per v_lim / (mu g), with errors of second order: 20 at 1 %.
 
-    tolerance: relative error in contact force. A peak between two such steps is missed by a third of the tolerance.
+    tolerance: relative error in contact force. The error of a peak between two such steps is a third of it.
     """
     return 2.0 / math.sqrt(tolerance)
 
@@ -38,8 +38,8 @@ def wedge_bound(stiffness: float, mass: float) -> float:
 def mover_bound(stiffness: float, mass: float, mover: float, bottles: int) -> float:
     """Return a bound (s) for bottles (kg) between a rail at rest and a rail that is a body (kg).
 
-    It is at most half of the stability limit: the largest eigenvalue of the scaled stiffness does not exceed the sum
-    of its two rows, 2 k / m and n k / M.
+    It is at most half of the stability limit, because the largest eigenvalue of the scaled stiffness matrix does not
+    exceed 2 k / m + n k / M.
     """
     return 1.0 / math.sqrt(stiffness * (2.0 / mass + bottles / mover))
 
@@ -67,7 +67,7 @@ def contact_friction_bound(
 
 
 def steps_per_tick(tick: float, bounds: Sequence[Bound], given: int | None, choice: str) -> tuple[int, str]:
-    """Return the steps in a tick of `tick` s and the reason: as given, or the fewest that satisfy every bound.
+    """Return the steps per tick of `tick` s and the reason. given: set by the scene; None: the fewest in all bounds.
 
     choice: target of the bounds, in words.
     """
@@ -83,7 +83,7 @@ def steps_per_tick(tick: float, bounds: Sequence[Bound], given: int | None, choi
 
 
 def fewest_steps(tick: float, dt: float) -> int:
-    """Return the fewest equal steps in a tick (s) that are no longer than dt (s)."""
+    """Return the smallest number of equal steps in a tick (s) with lengths of at most dt (s)."""
     return max(1, math.ceil(tick / dt * (1.0 - 1e-12)))
 
 

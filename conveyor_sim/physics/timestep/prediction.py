@@ -1,9 +1,9 @@
-"""Expected errors of a time step in contact forces: of impacts, and at rest.
+"""Expected errors in contact forces at a time step: in the peak force of impacts, and in resting load.
 
-An impact is a peak of force. Its relative error, RMS over the phases at which first touch may fall into a step, has
-parts that effects contribute (`Share`), each a power of dt. A peak between two steps is missed by (w dt)^2 / 8, that is
-(pi / n)^2 / 8 at n steps per contact. A dashpot that begins with a jump is missed by up to c dt / m_r. The total is the
-root of the sum of squares. methods.py has the coefficients of each integrator.
+The relative error of a force peak is an RMS over the phases at which first touch may fall into a step. Effects
+contribute parts of it (`Share`), each a power of dt. Because a peak falls between two steps, the error is (w dt)^2 / 8,
+that is (pi / n)^2 / 8 at n steps per contact. Because the force of a dashpot jumps at first touch, the error is up to
+c dt / m_r. The total is the root of the sum of squares. methods.py has the coefficients of each integrator.
 
 Resting load is the mean force over 1 s of contacts that stay closed: bottles in a queue, or along the rim of a
 turntable. Its error has other causes, such as a force that lags behind a turning surface.
@@ -17,7 +17,7 @@ from conveyor_sim.physics.timestep.bounds import Bound, least_steps
 from conveyor_sim.physics.timestep.methods import Share
 
 WHOLE_SCENE = 1.0
-"""Error in peak forces of a scene with many impacts, over that of one impact."""
+"""Error in peak forces of a scene with many impacts, divided by the error of one impact."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Impact:
         return math.hypot(*(share.at(dt) for share in self.shares))
 
     def bound(self, tolerance: float) -> Bound:
-        """Return the longest time step within a relative error in contact force and with `least_steps` per contact."""
+        """Return the longest time step with a relative error of at most `tolerance` and `least_steps` per contact."""
         few, allowed = self.duration / least_steps(tolerance), tolerance / WHOLE_SCENE
         dt = few if self._of_steps(few) <= allowed else _root(lambda dt: self._of_steps(dt) - allowed, few)
         return Bound(f"impact of {self.what}", dt, f"{self.sentence(dt)} {self.at}")
@@ -111,7 +111,7 @@ def predict(
     forces = [(impact.force, f"an impact of {impact.what} {impact.at}") for impact in impacts]
     force, reason = max([pressing, *forces])
     if not impacts:
-        nothing = "nothing makes contact forces"
+        nothing = "the scene has no contact forces"
         return Prediction(None, nothing, None, nothing, tuple(terms), force, reason)
     worst = max(impacts, key=lambda impact: impact.error(dt))
     peak_reason = f"impact of {worst.what}, {worst.sentence(dt)} {worst.at}"
@@ -135,7 +135,7 @@ def percent(value: float) -> str:
 
 
 def _root(rising: Callable[[float], float], above: float) -> float:
-    """Return the root of a rising function by bisection, to the last digits. It is positive at `above`."""
+    """Return the root of a rising function by bisection, to the last bit. The function is positive at `above`."""
     below = 0.0
     while True:
         middle = 0.5 * (below + above)

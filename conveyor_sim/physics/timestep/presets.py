@@ -14,7 +14,7 @@ PRESETS: Mapping[Preset, float] = {"draft": 0.05, "standard": 0.01, "fine": 0.00
 """Largest relative error in contact force by preset. All other numbers follow from it."""
 
 DEFAULT: Preset = "standard"
-"""Preset of a scene without `accuracy`, and of the bounds where a scene gives the time step."""
+"""Preset of a scene without `accuracy`, and of the bounds for a scene that sets the time step."""
 
 RESTITUTIONS = (1.0, 0.9, 0.5)
 """Restitutions of the impacts in the table of steps."""
@@ -30,7 +30,7 @@ class Target:
 
 
 def target(accuracy: Accuracy) -> Target:
-    """Return the target of a scene; the default where it chooses none, or gives the time step."""
+    """Return the target of a scene; the default if it chooses none, or sets the time step."""
     if accuracy.tolerance is not None:
         return Target(accuracy.tolerance, f"tolerance {percent(accuracy.tolerance)} in contact force")
     preset = accuracy.preset or DEFAULT
@@ -40,15 +40,19 @@ def target(accuracy: Accuracy) -> Target:
 def table() -> str:
     """Return two Markdown tables: presets and their numbers."""
     numbers: list[tuple[str, Callable[[float], str]]] = [
-        ("relative error in contact force, at most", percent),
-        ("steps a contact, at least", lambda tolerance: f"{least_steps(tolerance):.3g}"),
+        ("largest relative error in contact force", percent),
+        ("smallest number n of steps per contact", lambda tolerance: f"{least_steps(tolerance):.3g}"),
         (
-            "by which a peak between two such steps is missed, (π/n)²/8",
+            "error of a force peak between two of n steps, (π/n)²/8",
             lambda tolerance: percent((math.pi / least_steps(tolerance)) ** 2 / 8.0),
         ),
-        ("steps in v_lim/(μ g), leapfrog and semi-implicit Euler", lambda tolerance: f"{least_steps(tolerance):.3g}"),
         (
-            "the same for semi-implicit Euler where a belt turns: creep and resting load are off by one part in them",
+            "steps per v_lim/(μ g), leapfrog and semi-implicit Euler",
+            lambda tolerance: f"{least_steps(tolerance):.3g}",
+        ),
+        (
+            "number m of steps per v_lim/(μ g), semi-implicit Euler with curved belts: the error of creep and resting "
+            "load is 1/m",
             lambda tolerance: f"{1.0 / tolerance:.0f}",
         ),
     ]
@@ -62,12 +66,12 @@ def table() -> str:
         for e in RESTITUTIONS
     ]
     return "\n".join(
-        [*_markdown("preset", presets), "", *_markdown("steps a contact, linear, `paper` damping", contacts), ""]
+        [*_markdown("preset", presets), "", *_markdown("steps per contact, linear, `paper` damping", contacts), ""]
     )
 
 
 def _impact(method: Method, restitution: float) -> Impact:
-    """Return the impact of a linear contact of unit mass, stiffness and speed, with a dashpot that jumps."""
+    """Return the impact of a linear contact with unit mass, stiffness and speed, and a linear dashpot."""
     shares = [method.between_steps(1.0)]
     if restitution < 1.0:
         c = DAMPING_BY_NAME["paper"].coefficient(restitution, 1.0, 1.0, 1.0)

@@ -43,7 +43,7 @@ class Frames:
         self.counts = True
         """False while the process does not serve yet: then `left_out` does not change."""
         self.left_out = 0
-        """Ticks that the process was never sent, because it was too far behind."""
+        """Ticks that were never sent to the process, because it was too far behind."""
         with self._wake:
             self._ends = (view.hear(self._hear), view.listen(self._listen))
             self._listen()

@@ -50,13 +50,13 @@ class ServerSettings:
     users: Path | None = None
     """File of the users of OPC UA and of the page; None: there are no users, and clients can only read."""
     anonymous: bool = True
-    """True if clients without a user may read there."""
+    """True if clients without a user may read over OPC UA and on the page."""
     opcua_certificates: Path | None = None
     """Folder of the OPC UA server's certificate and key; None: the default folder of the operating system's user."""
     opcua_history: Sequence[str] = ()
     """Patterns of the tags whose latest values OPC UA keeps as history."""
     web_certificates: Path | None = None
-    """Folder of the certificate and key of the page; None: those of the OPC UA server, where the page needs any."""
+    """Folder of the certificate and key of the page. None: if the page needs them, those of the OPC UA server."""
     opcua_limits: OpcUaLimits = LIMITS
     """Limits of one OPC UA client."""
     opcua_quota: Quota = QUOTA

@@ -217,7 +217,7 @@ class OpenSubscriptions(SubscriptionService):
 
 
 class OpenServer(Server):
-    """Server with another port. The library's `start` makes its own."""
+    """Server with another class of listening port (`OpenPort`). The library's `start` creates a `BinaryServer`."""
 
     @property
     def policies(self) -> Any:

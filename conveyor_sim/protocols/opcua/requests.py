@@ -151,7 +151,7 @@ class Requests:
         return int(Codes.BadOutOfRange if refused else Codes.GoodCompletesAsynchronously)
 
     def _set_mode(self, client: User, value: ua.WriteValue) -> int:
-        """Set the control mode of a device, for clients that can only write."""
+        """Set the control mode of a device by a write, for clients that can't call methods."""
         if not self.may(client, MODE):
             return int(Codes.BadUserAccessDenied)
         tag = self._modes[name_of(value.NodeId)]

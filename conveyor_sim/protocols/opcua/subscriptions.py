@@ -241,7 +241,7 @@ class Subscriptions(OpenSubscriptions):
 
     @uamethod  # type: ignore[untyped-decorator]
     async def condition_refresh(self, parent: Any, subscription_id: int, mid: int | None = None) -> Any:
-        """Send all conditions that are retained again (OPC 10000-9, 5.5.7); at most once per `REFRESH_PERIOD`."""
+        """Resend all retained conditions (OPC 10000-9, 5.5.7); at most once per `REFRESH_PERIOD`."""
         subscription = self.subscriptions.get(subscription_id)
         if subscription is None:
             return ua.StatusCode(Codes.BadSubscriptionIdInvalid)

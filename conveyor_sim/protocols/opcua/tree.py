@@ -42,7 +42,7 @@ def add_line(nodes: Nodes, info: LineInfo) -> None:
     for name, (kind, description) in RUN_VARIABLES.items():
         nodes.variable(f"{RUN}/{name}", name, run, ua.Variant(nothing(kind), kind), description)
     first = ua.Variant(0, ua.VariantType.Int64)
-    text = "Target tick of a line in lockstep. All writes before it act as one set with it."
+    text = "Target tick of a line in lockstep. It takes effect together with all writes since the previous target."
     nodes.variable(TARGET, TARGET.rpartition("/")[2], run, first, text, access=READ_AND_WRITE)
 
 

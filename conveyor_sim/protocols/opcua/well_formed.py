@@ -33,7 +33,7 @@ def require_url(url: str | None) -> None:
 class WellFormedSession(InternalSession):
     """Session whose services refuse requests that the library would fail on.
 
-    `Processor` has refused requests without operations before, as it reads their number.
+    Requests without operations do not arrive here: `Processor` refuses them when it reads the number of operations.
     """
 
     async def create_session(self, params: ua.CreateSessionParameters, *others: Any, **named: Any) -> Any:

@@ -77,7 +77,9 @@ def identity(folder: Path) -> Identity:
             x509.UniformResourceIdentifier
         )
     except (x509.ExtensionNotFound, ValueError) as error:
-        raise CertificateError(f"{folder / CERTIFICATE}: names no application, expected one URI of it") from error
+        raise CertificateError(
+            f"{folder / CERTIFICATE}: no application URI, expected one as subject alternative name"
+        ) from error
     return Identity(certificate, _read(folder / KEY), uri, trusted)
 
 

@@ -9,7 +9,7 @@ import time
 from collections.abc import Mapping
 from typing import Protocol
 
-from conveyor_sim.line.commands.authority import AUTOMATIC, IN_CONTROL, MODES, PEOPLE, covers
+from conveyor_sim.line.commands.authority import AUTOMATIC, IN_CONTROL, MODES, PEOPLE, advice, covers
 from conveyor_sim.line.commands.inputs import DISOWN, OWN, SET, Input, WriterKind
 from conveyor_sim.line.commands.receipt import Receipt, Refusal
 from conveyor_sim.line.machines.packml import stops
@@ -157,7 +157,7 @@ def objection(source: TagProvider, command: Tag, value: float, kind: WriterKind,
         return ""
     mode = int(snapshot.values.get(f"{device}/mode", AUTOMATIC))
     if kind not in IN_CONTROL[mode]:
-        return f"{device}: is in {MODES[mode]}"
+        return f"{device}: is in {MODES[mode]}, {advice(kind)}"
     if kind != "controller" or snapshot.owner in ("", writer):
         return ""
     if any(covers(pattern, device, source.info.where) for pattern in snapshot.released):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import threading
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -57,6 +56,8 @@ class DrawableFrame:
     """Values of all signals as controllers read them."""
     forced: NDArray[Any]
     """Indices of the forced signals."""
+    faults: Mapping[str, float]
+    """Values of the faults that are injected, by name."""
     drawn: Mapping[str, Callable[[], Any]]
     """Decoders of the latest message by topic of DRAWING_TOPICS. A new message has a new decoder."""
 
@@ -113,6 +114,7 @@ class LineMirror:
     _alarms: AlarmColumns | None
     _owner: str
     _released: tuple[str, ...]
+    _faults: dict[str, float]
 
     def __init__(self) -> None:
         """Start empty."""
@@ -267,7 +269,7 @@ class LineMirror:
         tags |= zip(self._command_names, self._commands(), strict=False)
         now = time.time() if at is None else at
         self._frame = DrawableFrame(
-            self._line, self._tick, now, self._image.values, self._image.forced, dict(self._drawn)
+            self._line, self._tick, now, self._image.values, self._image.forced, dict(self._faults), dict(self._drawn)
         )
         self._snapshot = LineSnapshot(
             self._tick,
@@ -313,6 +315,7 @@ class LineMirror:
         self._image = self._read_back = self._alarms = None
         self._owner = ""
         self._released = ()
+        self._faults = {}
 
     def _take_line(self, message: Any) -> None:
         info = line_info(message)
@@ -320,8 +323,8 @@ class LineMirror:
         if self._info is not None and self._strange:
             self._forget(message.run_id)
             raise LineMirrorError(
-                f"{info.name}: another line than before, or with other tags; expected {self._info.name} as it was: "
-                "restart serving"
+                f"{info.name}: the line or its tags have changed; expected {self._info.name} with the same tags; "
+                "restart the servers"
             )
         if message.run_id != self._run_id or self._info is None:
             self._forget(message.run_id)
@@ -342,7 +345,11 @@ class LineMirror:
         )
         events = [Event(*row) for row in rows]
         for event in events:
-            if event.kind == "owner_changed":
+            if event.kind == "fault_injected":
+                self._faults[event.name] = event.value
+            elif event.kind == "fault_cleared":
+                self._faults.pop(event.name, None)
+            elif event.kind == "owner_changed":
                 self._owner = event.name if event.value else ""
                 text = event.text.removeprefix("released: ")
                 self._released = tuple(text.split(", ")) if self._owner and text else ()
@@ -366,31 +373,25 @@ def line_info(message: Any) -> LineInfo:
 
     Raises LineMirrorError for a recording from before there were tags.
     """
-    if not len(getattr(message, "tag_names", ())):
+    if message.format == 1:
         raise LineMirrorError(
             f"{message.scene_name}: recorded without tags, by an older version; expected a newer recording"
         )
-    columns: dict[str, Iterable[Any]] = {
-        "name": message.tag_names,
-        "kind": message.tag_kinds,
-        "role": message.tag_roles,
-        "description": message.tag_descriptions,
-        "unit": message.tag_units,
-        "low": message.tag_min.tolist(),
-        "high": message.tag_max.tolist(),
-        "initial": message.tag_initial.tolist(),
-        "nominal": (nominal or None for nominal in message.tag_nominal.tolist()),
-        "texts": map(_texts, message.tag_texts),
-        "device": message.tag_devices,
-        "device_class": message.tag_classes,
-    }
-    tags = tuple(Tag(**dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True))
+    tags = tuple(
+        Tag(
+            name=tag.name,
+            kind=tag.kind,
+            role=tag.role,
+            description=tag.description,
+            unit=tag.unit,
+            low=tag.min,
+            high=tag.max,
+            initial=tag.initial,
+            nominal=tag.nominal or None,
+            texts=dict(zip(tag.state_values.tolist(), tag.state_texts, strict=True)),
+            device=tag.device,
+            device_class=tag.device_class,
+        )
+        for tag in message.tags
+    )
     return LineInfo(message.scene_name, message.where, message.tick_ns * 1e-9, message.start_time, tags)
-
-
-def _texts(listed: str) -> dict[int, str]:
-    return {int(number): text for number, text in _TEXT.findall(listed)}
-
-
-_TEXT = re.compile(r"(-?\d+) (.*?)(?=, -?\d+ |$)")
-"""An entry of `Tag.listed_texts`."""

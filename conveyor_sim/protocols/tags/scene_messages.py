@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from conveyor_sim.line.commands.inputs import Input
 from conveyor_sim.protocols.tags.tag_provider import Control
+from conveyor_sim.run.controller_source import ControllerSource
 from conveyor_sim.scene import Scene
 
 PATIENCE = 20.0
@@ -28,6 +29,8 @@ class SceneTask:
     threads: int | None
     playing: bool = True
     """True if the run starts at once, False if it starts paused."""
+    controller: ControllerSource | None = None
+    """Controller that owns the line and scans at every tick; None: clients alone command it."""
     lockstep: bool = False
     """True if the run advances only to the targets that clients set; `playing` then has no effect."""
 

@@ -216,8 +216,15 @@ class _Process:
         task, distro = self._task, default_distro()
 
         def open_session(runs: int, loaded: Simulation | None) -> RunSession:
+            source = task.controller
+            controller = None if source is None else source.load()
             simulation = loaded or Simulation(task.scene, task.threads)
-            return RunSession(simulation, self._copies, bag_folder(task.record, task.number + runs), FRAME, distro)
+            bag = bag_folder(task.record, task.number + runs)
+            record = () if source is None else source.record
+            session = RunSession(simulation, self._copies, bag, FRAME, distro, controller, record)
+            for sentence in getattr(controller, "left_over", ()):
+                self._copies.tell(UserMessage(sentence))
+            return session
 
         run = ActiveRun(
             open_session,

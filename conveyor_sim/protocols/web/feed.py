@@ -279,7 +279,7 @@ class Feed:
             "blocks": 1,
             "stories": 1,
         }
-        about = {**self._head[1], "times": times, "forced": drawable.forced.tolist()}
+        about = {**self._head[1], "times": times, "forced": drawable.forced.tolist(), "faults": drawable.faults}
         story = self._new_story()
         total, events = self._source.events(max(0, self._heard - MOST_PAST_EVENTS))
         story.look(

@@ -14,15 +14,17 @@ from typing import Any, NamedTuple
 
 from aiohttp import WSCloseCode, WSMsgType, web
 
-from conveyor_sim.line.commands.authority import MAY, unauthorized
+from conveyor_sim.line.commands.authority import AUTOMATIC, IN_CONTROL, MAY, MAY_SET, MODES, PEOPLE, unauthorized
 from conveyor_sim.line.commands.inputs import DECLARE, SET, Input, WriterKind
 from conveyor_sim.line.commands.receipt import Receipt
+from conveyor_sim.line.machines.packml import CNTRL_CMD, Command, stops
+from conveyor_sim.line.run_state import STATES
 from conveyor_sim.line.tag import COMMANDS, Tag
 from conveyor_sim.page.bundle import HEADERS, PAGE, page_files
 from conveyor_sim.page.own_host import is_own, is_same_origin
 from conveyor_sim.protocols.server.interface import HERE, ServerError, Status, require_free
 from conveyor_sim.protocols.server.quotas import GUEST, QUOTA, Budget, ConnectionSlot, ConnectionSlots, Quota
-from conveyor_sim.protocols.server.users import Logins, LoginService, Role, User
+from conveyor_sim.protocols.server.users import ROLES, Logins, LoginService, Role, User
 from conveyor_sim.protocols.tags.control_mode import MAY_CONTROL, TAKES_NO_INPUT, objection, refused_for_good
 from conveyor_sim.protocols.tags.line_mirror import DrawableProvider
 from conveyor_sim.protocols.tags.tag_provider import WEB
@@ -55,6 +57,21 @@ class PageUser(NamedTuple):
 ANONYMOUS = PageUser()
 
 
+def page_rights() -> dict[str, Any]:
+    """Return the rights of all roles, so that the page disables controls that would be refused."""
+    return {
+        "operations": {operation: MAY[operation].writers for operation in OPERATIONS},
+        "control": MAY_CONTROL,
+        "commands": {role: [mode for mode in MODES if role in IN_CONTROL[mode]] for role in ROLES},
+        "modes": MAY_SET,
+        "texts": MODES,
+        "automatic": AUTOMATIC,
+        "people": PEOPLE,
+        "stop": {"name": CNTRL_CMD, "values": [value for value in Command if stops(CNTRL_CMD, value)]},
+        "over": [STATES[state] for state in TAKES_NO_INPUT],
+    }
+
+
 class PageCommands:
     """Requests of all pages of one tag provider.
 
@@ -83,7 +100,7 @@ class PageCommands:
     def _do(self, person: PageUser, request: Mapping[str, Any]) -> str:
         if person.kind is None:
             who = f"{person.name} is a viewer, who only reads" if person.name else "not signed in"
-            return f"{who}; expected an operator, engineer, controller or test"
+            return f"{who}: sign in as an operator, engineer, controller or test user"
         what, names, values = request.get("do"), request.get("names", []), request.get("values", [])
         if not (_are(names, str) and _are(values, (int, float)) and all(abs(value) <= LARGEST for value in values)):
             return f"expected at most {MOST_NAMES} names and finite values"
@@ -193,7 +210,11 @@ class WebServer:
         self._at = host, port
         self._commands = PageCommands(source)
         self._feed = Feed(
-            source, users=self._logins.has_users, takes=source.takes_inputs, controls=sorted(self._commands.controls)
+            source,
+            users=self._logins.has_users,
+            takes=source.takes_inputs,
+            controls=sorted(self._commands.controls),
+            rights=page_rights(),
         )
         self._files = page_files()
         self._runner: web.AppRunner | None = None

@@ -25,7 +25,7 @@ class Infeed(SwitchedTypes, Scattered, BadBottles, Entry):
     )
     count: Count | None = quantity("How many bottles enter. Left out: without end.", "1", default=None)
     gap: NotNegative | None = quantity(
-        "Clear distance to the bottle before it, in a tightly packed in-line. Or give `rate`.", "m", default=None
+        "Clear distance to the bottle before it, in a tightly packed queue. Or give `rate`.", "m", default=None
     )
     rate: Positive | None = quantity("Bottles a second. Or give `gap`.", "1/s", default=None)
     rate_limit: Positive | None = quantity(

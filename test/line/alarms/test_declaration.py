@@ -70,8 +70,8 @@ def test_what_can_not_be_is_said_in_one_sentence(text: str, problem: str) -> Non
 @pytest.mark.parametrize(
     ("ids", "texts", "problem"),
     [
-        ([], [], "0 ids and 0 declarations of alarms given, expected equal numbers from 1 on"),
-        (["a"], [], "1 ids and 0 declarations of alarms given, expected equal numbers from 1 on"),
+        ([], [], "0 ids and 0 declarations of alarms given"),
+        (["a"], [], "1 ids and 0 declarations of alarms given"),
         (["a", "a"], ["{}", "{}"], "alarm a: declared twice in one input"),
         *(
             ([id], ["{}"], "expected an id of 1 to 100 printable characters, without `alarms/` before it")
@@ -81,4 +81,4 @@ def test_what_can_not_be_is_said_in_one_sentence(text: str, problem: str) -> Non
 )
 def test_so_is_what_is_no_id(ids: list[str], texts: list[str], problem: str) -> None:
     found = parse(ids, texts)
-    assert isinstance(found, str) and found.endswith(problem)
+    assert isinstance(found, str) and problem in found

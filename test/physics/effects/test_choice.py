@@ -209,7 +209,7 @@ def test_every_effect_is_decided_and_says_why_not() -> None:
     [
         ({"accuracy": {"integrator": "rk4"}}, "rk4 can't leave bottles out of a step"),
         ({"accuracy": {"integrator": "linearly_implicit"}}, "linearly_implicit can't leave bottles out of a step"),
-        ({"base": [{**base(0.4)[0], "tangential": {"stiffness": 900.0}}]}, "springs under the bottles pull anew"),
+        ({"base": [{**base(0.4)[0], "tangential": {"stiffness": 900.0}}]}, "static_friction changes the force"),
         ({"belts": {"bend": CURVED}}, "no straight belt"),
     ],
 )  # fmt: skip

@@ -34,7 +34,7 @@ def noted(**fields: Any) -> list[str]:
 def test_a_point_that_may_rub_is_told_with_the_remedy(fields: dict[str, Any]) -> None:
     (sentence,) = noted(**fields)
     assert sentence.startswith("bottle_types.bottle stands on a point: ")
-    assert sentence.endswith(f"give base_radius, of a can {CAN} of the radius: 0.0474 m")
+    assert sentence.endswith(f"give base_radius, for a can {CAN} times the radius: 0.0474 m")
     two = {"bottle": kind(), "ring": kind(base_radius=0.04), "small": kind(0.05)}
     assert noted(**fields, bottle_types=two)[0].startswith("bottle_types.bottle, and 1 more, stands on a point")
 

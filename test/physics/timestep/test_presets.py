@@ -58,7 +58,7 @@ def test_shipped_scenes() -> None:
 def test_the_table_has_the_numbers() -> None:
     lines = table().splitlines()
     assert lines[0] == "| preset | draft | standard | fine |"
-    assert "| relative error in contact force, at most | 5 % | 1 % | 0.1 % |" in lines
-    assert "| steps a contact, at least | 8.94 | 20 | 63.2 |" in lines
+    assert "| largest relative error in contact force | 5 % | 1 % | 0.1 % |" in lines
+    assert "| smallest number n of steps per contact | 8.94 | 20 | 63.2 |" in lines
     assert "| `leapfrog`, undamped | 9 | 20 | 63 |" in lines
     assert all(line.count("|") == 5 for line in lines if line)

@@ -87,7 +87,7 @@ def test_a_plc_gives_the_bits_of_its_program(
         (["--modbus", "0"], "--lockstep: no client may advance the line, expected --modbus-role controller, or"),
         (
             ["--modbus", "0", "--modbus-role", "controller", "--real-time-factor", "1"],
-            "--real-time-factor: given with --lockstep, expected none: the PLC says when",
+            "--real-time-factor: given with --lockstep, expected none: the PLC advances the time",
         ),
     ],
 )

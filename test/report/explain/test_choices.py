@@ -56,7 +56,7 @@ def test_effects_are_told_with_line_field_law_and_source() -> None:
         "N = k delta; (22)-(23)",
         "hertz off no contact with hertz_stiffness",
         "base_friction on 12 floor: friction 0.4",
-        "rotation off 15 forced off by effects.rotation; contacts[0].friction: 0.1 calls for it",
+        "rotation off 15 forced off by effects.rotation; contacts[0].friction: 0.1 enables it",
         "contact_arrays off outputs.contacts is 0",
     ):
         assert line in lines
@@ -96,7 +96,7 @@ def test_the_errors_to_expect_are_told_with_their_reasons() -> None:
     assert f"predicted error {EXPECTED} in the peak force of impacts: {impact}" in " ".join(lines)
     (resting,) = (line for line in lines if line.startswith("resting load"))
     assert missing(resting, ["not", "time step"]) == []
-    slipped = re.compile(rf"{SLIPPED} in tangential speed after an impact: 14 steps an impact")
+    slipped = re.compile(rf"{SLIPPED} in tangential speed after an impact: 14 steps per impact")
     assert any(slipped.match(line) for line in lines)
 
 

@@ -50,7 +50,7 @@ ONSET = DampingLaw(
     words="damping from zero on",
     law="N = max(0, N_elastic (1 + lambda v_n)), which sets in at zero",
     when="Hunt and Crossley's damping in proportion to the elastic force, with every elastic law. It sets in at zero. "
-    "Its restitution falls with the speed, at low speeds by as much again at twice the speed.",
+    "Its restitution e falls with the speed: at low speeds, 1 - e is proportional to the speed.",
     source="Hunt and Crossley 1975",
     unit="s/m",
     chosen_as="onset",
@@ -60,7 +60,7 @@ ONSET = DampingLaw(
     exponent=1.0,
     coefficient=lambda e, speed, stiffness, reduced_mass: onset_damping(e, speed),
     rebound=lambda elastic, stiffness, c, reduced_mass, speed: onset_restitution(c * speed),
-    # The first-order error of semi-implicit Euler acts like another elastic law, and e does not depend on that law.
+    # The first-order error of semi-implicit Euler acts like a change of the elastic law, on which e does not depend.
     order=lambda smooth: max(2.0, smooth),
     stiffness_power=lambda elastic: 0.0,
     rate="lambda N",

@@ -6,7 +6,7 @@ from conveyor_sim.engine.contact.laws.declaration import DampingLaw
 
 
 def force(c: float, elastic: float, depth: float, closing: float) -> float:
-    """Return c v in N, 0 without contact: a dashpot by itself acts on separate surfaces, too."""
+    """Return c v in N; 0 without contact, where the elastic force is 0 by itself but c v is not."""
     return (c if depth > 0.0 else 0.0) * closing
 
 

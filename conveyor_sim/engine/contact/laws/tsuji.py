@@ -37,8 +37,8 @@ TSUJI = DampingLaw(
     label="Tsuji damping",
     words="Tsuji's dashpot",
     law="N = max(0, k delta^1.5 + c delta^0.25 v_n), of the same restitution at any speed",
-    when="With `restitution` on a Hertz contact it is Tsuji's dashpot, which grows as delta^0.25: again the "
-    "restitution is the same at any speed.",
+    when="With `restitution` on a Hertz contact, the law is Tsuji's dashpot, which grows as delta^0.25. Its "
+    "restitution is also the same at any speed.",
     source="Tsuji, Tanaka and Ishida 1992",
     unit="kg/(s m^0.25)",
     chosen_as="normal",

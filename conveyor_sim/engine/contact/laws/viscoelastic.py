@@ -84,9 +84,9 @@ VISCOELASTIC = DampingLaw(
     label="viscoelastic damping",
     words="viscoelastic",
     law="N = max(0, k delta^1.5 + c delta^0.5 v_n), of a restitution that falls with the speed",
-    when="Viscoelastic spheres, on Hertz contacts only. 1 - e grows as the fifth root of the speed, as measured on "
-    "glass: by 15 % at twice the speed. Choose it where bottles meet slowly in queues and fast at infeeds, and one "
-    "restitution would be wrong for either; give `restitution` and the `speed` at which it was measured.",
+    when="Viscoelastic spheres, on Hertz contacts only. 1 - e grows as the fifth root of the speed, by 15 % at twice "
+    "the speed, as measured on glass. Choose it if bottles meet slowly in queues and fast at infeeds, so that one "
+    "restitution does not fit both. Give `restitution` and the `speed` at which it was measured.",
     source="Kuwabara and Kono 1987, Brilliantov, Spahn, Hertzsch and Poeschel 1996",
     unit="kg/(s m^0.5)",
     chosen_as="viscoelastic",

@@ -1,1 +1,1 @@
-"""The guard: checks every tick for states that no bottle can reach, and has the tick repeated or the run stopped."""
+"""The guard: detects physically impossible states after every tick. The tick is then repeated or the run stopped."""

@@ -1,7 +1,7 @@
 """Chatter: with steps that are too long, explicit friction reverses the slip at every step, within +-v_lim.
 
-Checks for finite numbers and averages do not detect it, so velocities are compared from step to step. Only chatter
-changes the sign of their second differences at every step: an impact bends a velocity to one side for some steps.
+Numbers stay finite and averages look normal, so velocities are compared from step to step. Only chatter changes the
+sign of their second differences at every step. In an impact the sign stays the same for several steps.
 """
 
 import numpy as np
@@ -13,13 +13,13 @@ EXPLICIT = frozenset({"leapfrog", "semi_implicit_euler", "velocity_verlet", "rk4
 """Integrators that can chatter. The others solve for friction, or control their errors."""
 
 EVERY = 262144
-"""Steps between two checks. A check costs as much as about a hundred steps of a hundred bottles."""
+"""Steps between two checks. A check takes as long as about 100 steps of 100 bottles."""
 
 STEPS = 8
-"""Steps of a check. No resolved contact oscillates at every step for that long."""
+"""Steps in a check. No resolved contact changes direction at every one of them."""
 
 LEAST = 0.25
-"""Smallest reported amplitude of chatter, over v_lim."""
+"""Smallest reported amplitude of chatter, in multiples of v_lim."""
 
 
 def chatter_of(velocities: F8) -> F8:

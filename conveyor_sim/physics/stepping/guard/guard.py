@@ -21,13 +21,13 @@ from conveyor_sim.physics.stepping.guard.world_snapshot import WorldSnapshot
 from conveyor_sim.scene.types import Unchecked
 
 DEEPEST = 0.75
-"""Largest allowed overlap over the (smaller) radius. At 1 an axis is on a rail; beyond, the normal reverses."""
+"""Largest allowed overlap, in radii (of the smaller bottle). Beyond 1 the axis is behind the rail, and n reverses."""
 
 GROWTH = 2.0
-"""Largest allowed growth of the energy in a tick, without the work of belts. Resolved contacts oscillate by less."""
+"""Largest allowed ratio of energies after and before a tick, without the work of belts. Good steps stay below."""
 
 SOFT = 0.2
-"""Overlap over the radius from which a contact is reported as soft. Positions have an error of the same size."""
+"""Overlap, in radii, from which a contact is reported as soft. The error of positions is as large."""
 
 CLOSELY = 128
 """Largest number of steps between checks of overlaps. A check costs about half a step."""
@@ -40,7 +40,7 @@ class GuardMemory:
     events: list[tuple[int, Literal["shorter_steps", "chatter", "soft", "stopped"], int, Unchecked, Unchecked, str]] = (
         field(default_factory=list)
     )
-    """Events that were not taken yet."""
+    """Events that are not reported to the run yet."""
     chatters: bool = False
     """True once chatter was reported."""
     shortened_ticks: int = 0
@@ -109,7 +109,7 @@ class Guard:
         depth = max(deep)
         if self.memory.put_in and depth > DEEPEST and self._was_deep():
             return None
-        # It stays true until a check finds no deep overlap.
+        # `put_in` stays True until a check finds no deep overlap.
         self.memory.put_in = self.memory.put_in and depth == 0.0
         if depth > SOFT >= self.memory.deepest or depth > DEEPEST:
             worst = deep.index(depth)
@@ -139,8 +139,9 @@ class Guard:
         """Return the event of a bottle that chatters. share: amplitude over slip_limit."""
         bottle, x, y = Words(self._model, self._state.world).place(slot)
         text = (
-            f"bottle {bottle} at ({x:.4g}, {y:.4g}) m shakes by {share:.2g} of slip_limit at every step: friction "
-            f"chatters at dt = {self._model.dt:g} s ({self._model.dt_reason}); choose a finer accuracy"
+            f"the velocity of bottle {bottle} at ({x:.4g}, {y:.4g}) m alternates by +-{share:.2g} slip_limit from "
+            f"step to step: friction chatters at dt = {self._model.dt:g} s ({self._model.dt_reason}); "
+            "choose a finer accuracy"
         )
         return GuardEvent(tick, "chatter", bottle, x, y, text)
 
@@ -160,7 +161,7 @@ class Guard:
         return (before, total) if total > GROWTH * before + self._work else None
 
     def _was_deep(self) -> bool:
-        """Return True if overlaps exceeded DEEPEST before the tick already; bottles placed so may separate."""
+        """Return True if overlaps exceeded DEEPEST already before the tick. Bottles placed like this may separate."""
         after, watch = WorldSnapshot(), self._state.world.probe
         bottle, other = watch.bottle.copy(), watch.other.copy()
         after.take(self._state.world)

@@ -31,9 +31,9 @@ class Squeeze:
 
 
 def squeeze_of(model: Model, world: World, found: RailContacts, slot: int) -> Squeeze | None:
-    """Return the moving rail that presses on a bottle, directly or through others; None without one. found: scratch.
+    """Return the moving rail that presses on a bottle, directly or through other bottles; None without one.
 
-    Of several rails, one without a force limit comes first. The neighbour lists must be valid.
+    found: scratch. Among several rails, those without force limit take precedence. The neighbour lists must be valid.
     """
     moving = world.moving
     if moving is None:

@@ -13,15 +13,16 @@ from conveyor_sim.physics.model import Model
 from conveyor_sim.physics.stepping.guard.squeeze import Squeeze
 
 CAME_FAST = 0.5
-"""Speed over the speed that a contact can stop. Above it the cause is an impact, below it a lasting force."""
+"""Ratio of speed to the largest speed that a contact can stop. Above it, an impact is the cause, else a steady force.
+"""
 
 REMEDY_DEPTH = 0.1
-"""Overlap over the radius at the proposed stiffness."""
+"""Overlap at the proposed stiffness, in radii."""
 
 
 @dataclass(frozen=True)
 class Violation:
-    """A state that no bottle can reach."""
+    """A physically impossible state of one bottle."""
 
     bottle: int
     """Id."""
@@ -29,7 +30,7 @@ class Violation:
     """m, at the beginning of the tick."""
     y: float
     what: str
-    """The violation, as a clause that begins with the bottle."""
+    """The violation, as a clause."""
     why: str
     """The cause, and after a semicolon the remedy."""
     kind: Literal["unstable", "tunnelling"]
@@ -54,8 +55,10 @@ class Words:
 
     def put_in(self, slot: int) -> Violation:
         """Return the violation of a bottle that was not finite before the first step."""
-        what = f"bottle {self._id(slot)} has no finite position or velocity before a step was taken"
-        return self._unstable(slot, what, "the number was written into the state; reset it", curable=False)
+        what = f"bottle {self._id(slot)} has no finite position or velocity before the first step"
+        return self._unstable(
+            slot, what, "a value written into the state is not finite; set a finite one", curable=False
+        )
 
     def not_finite(self, slot: int) -> Violation:
         """Return the violation of a bottle that is no longer finite."""
@@ -63,28 +66,28 @@ class Words:
         if self._model.integrator != "dormand_prince":
             return self._unstable(slot, what, self._too_long())
         why = (
-            f"dormand_prince does not keep an error of {self._model.settings.error:g} m/s within {MOST:,} substeps "
-            "of a tick; allow a larger error or choose another integrator"
+            f"dormand_prince needs more than {MOST:,} substeps per tick for an error of {self._model.settings.error:g} "
+            "m/s; allow a larger error or choose another integrator"
         )
         return self._unstable(slot, what, why, curable=False)
 
     def far(self, slot: int, speed: float, dt: float) -> Violation:
         """Return the violation of a bottle that moves too far in one step. speed: m/s."""
         what = f"bottle {self._id(slot)} moves {1e3 * speed * dt:.3g} mm in one step of {dt:g} s"
-        limit = f"more than {1e3 * self._model.settings.skin:.3g} mm could pass through a contact unseen"
-        why = f"it has {speed:.3g} m/s, and {limit}; choose a finer accuracy"
+        limit = f"contacts may be missed beyond {1e3 * self._model.settings.skin:.3g} mm"
+        why = f"its speed is {speed:.3g} m/s, and {limit}; choose a finer accuracy"
         return self._tunnelling(slot, what, self._forced() or why)
 
     def energy(self, slot: int, before: float, after: float, explained: float) -> Violation:
         """Return the violation of unexplained energy (J). slot: of the fastest bottle."""
         rise = f"from {before:.3g} to {after:.3g} J"
-        what = f"bottle {self._id(slot)} is the fastest while the energy of all rises {rise}"
+        what = f"the energy of all bottles, of which bottle {self._id(slot)} is the fastest, rises {rise}"
         workers = "belts and rails" if self._model.plant.moving else "belts"
-        why = f"{workers} explain {explained:.3g} J of it at most, so it comes of the time step: {self._too_long()}"
+        why = f"{workers} add at most {explained:.3g} J, so the time step is the cause: {self._too_long()}"
         return self._unstable(slot, what, self._forced() or why)
 
     def pair(self, slot: int, other: int, depth: float) -> Violation:
-        """Return the violation of two bottles that overlap too deep. depth: over the smaller radius."""
+        """Return the violation of two bottles that overlap too much. depth: overlap in smaller radii."""
         a, b = self._bottles, slot
         kinds = a.type[[b, other]].astype(np.int64)
         relative = float(np.hypot(a.vx[b] - a.vx[other], a.vy[b] - a.vy[other]))
@@ -97,7 +100,7 @@ class Words:
         return self._tunnelling(slot, what, why)
 
     def rail(self, slot: int, rail: int, depth: float) -> Violation:
-        """Return the violation of a bottle too deep in a rail. depth: over the radius."""
+        """Return the violation of a bottle that overlaps a rail too much. depth: overlap in radii."""
         model, bottles, kind = self._model, self._bottles, int(self._bottles.type[slot])
         shape = model.plant.rails[rail]
         entry = int(rail_entries(model, np.array([kind]), np.array([rail]))[0])
@@ -121,11 +124,11 @@ class Words:
         return float(moving.vx[q] - moving.turn[q] * dy), float(moving.vy[q] + moving.turn[q] * dx)
 
     def _forced(self, pressed: bool = False) -> str:
-        """Return a clause on a squeezing rail without force limit, else "". pressed: True for a lasting force."""
+        """Return a clause on a moving rail that presses without force limit, else "". pressed: by a steady force."""
         squeeze = self._squeeze
         if squeeze is None or squeeze.force is not None or not (squeeze.held or pressed):
             return ""
-        return f"{squeeze.what} with whatever force that takes; give it a {squeeze.field}"
+        return f"{squeeze.what} with unlimited force; give it a {squeeze.field}"
 
     def _too_soft(
         self,
@@ -145,8 +148,8 @@ class Words:
         if speed > CAME_FAST * stopped:
             needed = mass * (speed / (REMEDY_DEPTH * radius)) ** 2
             return (
-                f"it came with {speed:.3g} m/s, and the contact with {what} stops {stopped:.3g} m/s within a radius; "
-                f"give it a stiffness of about {needed:.2g} N/m"
+                f"it arrived at {speed:.3g} m/s, and the contact with {what} can stop at most {stopped:.3g} m/s within "
+                f"a radius; give this contact a stiffness of about {needed:.2g} N/m"
             )
         here = float(elastic_energy(self._model, law, entries, np.array([depth * radius]))[0])
         force, cause = 2.0 * here / (depth * radius), "it is pressed"
@@ -155,7 +158,7 @@ class Words:
         needed = force / (REMEDY_DEPTH * radius)
         return (
             f"{cause} with about {force:.3g} N, too much for the contact with {what}; "
-            f"give it a stiffness of about {needed:.2g} N/m"
+            f"give this contact a stiffness of about {needed:.2g} N/m"
         )
 
     def _too_long(self) -> str:

@@ -1,4 +1,4 @@
-"""A copy of all state that a tick changes."""
+"""Copy of all state that a tick changes."""
 
 from dataclasses import dataclass
 
@@ -18,19 +18,19 @@ class WorldSnapshot:
         self._groups: list[_Group] = []
 
     def take(self, world: World) -> None:
-        """Copy the arrays, in place of the previous copy."""
+        """Copy the arrays, and discard the previous copy."""
         if world is not self._world:
             self._world, self._groups = world, _groups(tick_arrays(world))
         for group in self._groups:
-            # One call per type: a call per array would cost as much for each of them.
+            # One call per type: one call per array would take that time for each array.
             np.concatenate(group.columns, out=group.copy)
 
     def restore(self, state: State) -> None:
-        """Put the copy back. No bottle may have been added or removed since."""
+        """Restore the state from the copy. No bottle may have been added or removed since `take`."""
         now = tick_arrays(state.world)
         for group in self._groups:
             for name, copy in zip(group.names, np.split(group.copy, group.ends), strict=True):
-                # Lists may have been lengthened since, never shortened.
+                # Lists may be longer now than when they were copied, never shorter.
                 now[name].reshape(-1)[: copy.size] = copy
         state.world.neighbourhood.stale[0] = 1
         state.make_lists()
@@ -38,7 +38,7 @@ class WorldSnapshot:
 
 @dataclass
 class _Group:
-    """Arrays of one type, and their copies one behind the other."""
+    """Arrays of one type, and one array with their copies in the same order."""
 
     names: list[str]
     columns: list[NDArray[np.generic]]

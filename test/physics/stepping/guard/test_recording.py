@@ -93,4 +93,4 @@ def test_the_command_line_ends_with_the_sentence(tmp_path: Path) -> None:
     done = CliRunner().invoke(main, ["run", str(file), "--out", str(tmp_path / "run")])
     assert done.exit_code == 1
     assert "bottle 0 sinks" in done.output
-    assert "give it a stiffness of about" in done.output
+    assert "a stiffness of about" in done.output
