@@ -6,6 +6,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 from bag.editing import edited
 from facts import stating
@@ -33,6 +34,8 @@ SECOND = OLD / "before_tag_messages.mcap"
 """Format 2, recorded with commit 7fa2643: an infeed with random bottles, alarms of the scene and of a controller,
 inputs of every operation.
 """
+CYCLES = OLD / "before_cycles.mcap"
+"""Format 2: a filler, a capper and two packers with failures, a reset, and rates above the nominal ones."""
 EYE = "photo_eyes/eye/blocked"
 
 
@@ -40,6 +43,17 @@ def test_the_second_format_replays_with_its_random_streams() -> None:
     report = replay(SECOND)
     assert report.difference is None and report.last_tick == 400
     assert report.compared["bottles"] == 9 and report.compared["outcomes"] == 10 and report.compared["signals"] == 41
+
+
+def test_machines_of_the_second_format_count_as_recorded() -> None:
+    """Counters and signals replay bit for bit, with effectiveness above 100 % and a bottle fed at the start."""
+    report = replay(CYCLES)
+    assert (report.difference, report.last_tick) == (None, 1600)
+    assert report.compared["counters"] == report.compared["signals"] == 33
+    with open_bag(CYCLES) as bag:
+        first, *_, last = [frame.data for frame in bag.read("counters")]
+    assert first.processed[0] == 1 and last.effectiveness.max() > 1.2
+    assert last.rate_limit.tolist() == last.rate.tolist() and np.isnan(last.set_effectiveness).all()
 
 
 def test_its_tags_are_those_of_its_scene() -> None:

@@ -36,12 +36,13 @@ class DeviceCounter:
     begun: float
     """Part of its cycle that was done at the reset."""
 
-    def __init__(self, device: Device) -> None:
+    def __init__(self, device: Device, counts_starts: bool) -> None:
         """Start at 0.
 
-        device: one that counts bottles.
+        device: one that counts bottles. counts_starts: `Scene.counts_starts`.
         """
         self._device = device
+        self._counts_starts = counts_starts
         self._machine = device if isinstance(device, MachineDevice) else None
         self._reasons = next((tag.texts for tag in device.tags if tag.name == f"{device.name}/stop_reason"), {})
         self.reset(0)
@@ -69,6 +70,8 @@ class DeviceCounter:
 
     def set_cycles(self, tick: int, length: float) -> float:
         """Return the cycles at the set rate in the time running since the reset. length: of a tick, s."""
+        if self._counts_starts:
+            return math.nan  # recordings before format 3 do not hold them
         return 0.0 if self._machine is None else (self._machine.time.set_work_up_to(tick) - self.set_work) * length
 
     def times(self, tick: int, length: float) -> dict[str, float]:
@@ -149,11 +152,13 @@ class ProductionCounters:
     def __init__(self, devices: Sequence[Device], counts_starts: bool) -> None:
         """Start at 0. counts_starts: `Scene.counts_starts`."""
         self._counts_starts = counts_starts
-        self._devices = {device.name: DeviceCounter(device) for device in devices if device.counts() is not None}
+        self._devices = {
+            device.name: DeviceCounter(device, counts_starts) for device in devices if device.counts() is not None
+        }
         self.line = LineCounter(devices)
         # The line may be reset without its bottleneck, so it has separate counters of the bottleneck.
         slowest = bottleneck([device for device in devices if isinstance(device, MachineDevice)])
-        self._slowest = {machine.name: DeviceCounter(machine) for machine in slowest}
+        self._slowest = {machine.name: DeviceCounter(machine, counts_starts) for machine in slowest}
 
     @property
     def memory(self) -> dict[str, DeviceCounter | LineCounter]:
@@ -208,7 +213,7 @@ class ProductionCounters:
         failures = sum(counter.counted()[3] for counter in slowest)
         work = Work(
             sum(counter.cycles() for counter in slowest),
-            sum(counter.set_cycles(tick, length) for counter in slowest),
+            sum(counter.set_cycles(tick, length) for counter in slowest) if slowest else math.nan,
             reference,
             left - defective,
             left + rejected,

@@ -86,8 +86,7 @@ class MachineDevice(Device):
         self._ramp = part.rate * tick / part.ramp_up if part.ramp_up else 0.0
         self._plans = [PlannedTimes(stop, tick) for stop in part.planned_stops.values()]
         self._counts_starts = setup.scene.counts_starts
-        self.reference_rate = part.rate if self._counts_starts else most
-        """Rate to which effectiveness refers, 1/s: the fastest permitted one."""
+        self._reference = part.rate if self._counts_starts else most
         self.time = TimeAccount(category, rate)
         self.run = True
         self.rate = rate
@@ -142,6 +141,11 @@ class MachineDevice(Device):
     def category(self) -> Category:
         """Time category since the last tick."""
         return self._category
+
+    @property
+    def reference_rate(self) -> float:
+        """Rate to which effectiveness refers, 1/s: the fastest permitted one."""
+        return self._reference
 
     def restored(self, tick: int) -> None:
         """Derive flags, category and status from the stored attributes."""

@@ -82,9 +82,12 @@ class SinkDevice(TakingDevice):
             count(f"{name}/taken_bad", "counter", "Bad bottles taken."),
             switch(f"{name}/starved", "status", "A bottle is due, and none is there.", adds_to="state"),
             seconds(f"{name}/starved_time", "counter", "Total time starved."),
-            count(f"{name}/processed", "counter", "Bottles whose cycle is complete."),
-            count(f"{name}/defective", "counter", "Bad bottles among them."),
         ]
+        if not setup.scene.counts_starts:
+            signals += [
+                count(f"{name}/processed", "counter", "Bottles whose cycle is complete."),
+                count(f"{name}/defective", "counter", "Bad bottles among them."),
+            ]
         super().__init__(name, sink, setup, signals)
         self.removed = 0
         self.removed_bad = 0
@@ -134,7 +137,8 @@ class SinkDevice(TakingDevice):
         """Return the values in the order of the signals."""
         taken = self.works, self.removed, self.removed_bad
         starved = self.cause == STARVED, self.waited_time("starved", self.starved_ticks, now)
-        return *taken, *starved, self.processed, self.defective, *self.status()
+        completed = () if self._counts_starts else (self.processed, self.defective)
+        return *taken, *starved, *completed, *self.status()
 
     def states(self, now: ScanContext) -> list[float]:
         """Return running, starved, state, category and stop reason."""
