@@ -19,10 +19,12 @@ from conveyor_sim.engine.arrays.bodies import Bottles
 from conveyor_sim.engine.observers.contact_list import closed_contacts
 from conveyor_sim.line.commands.inputs import (
     ARRIVAL,
+    DELETE,
     FAULT,
     INJECT,
     OPERATE,
     SET,
+    SPAWN,
     WATCHDOG,
     CommandOutcome,
     Input,
@@ -84,6 +86,7 @@ class Simulation:
         for kind, x, y, theta, vx, vy, omega in bottles:
             self._state.add(self.model.bottle_types.index(kind), x, y, theta, vx, vy, omega)
         self._accounts = Accounts(self._state, scene)
+        self._line.placement.feeding, self._line.placement.removing = self._accounts.feeding, self._accounts.removing
         self._feed()
         self._line.end(self.tick)
         self._state.make_lists()
@@ -203,6 +206,30 @@ class Simulation:
     def operate(self, operation: str, names: Sequence[str] = (), values: Sequence[float] = (), *, writer: str) -> None:
         """Queue an operation of an operator: `acknowledge`, `reset`, `shelve`, ... of alarms by ID."""
         self.give(Input(OPERATE, writer, "operator", operation, tuple(names), tuple(values)))
+
+    def spawn(
+        self,
+        bottle_type: str,
+        x: float,
+        y: float,
+        *,
+        theta: float = 0.0,
+        vx: float = 0.0,
+        vy: float = 0.0,
+        omega: float = 0.0,
+        writer: str = "spawn",
+    ) -> None:
+        """Queue a bottle of a type of the scene, at (x, y) m and theta rad, moving at m/s and rad/s.
+
+        The next tick puts it on the line and its command result has the ID (`bottles`), or refuses it: for an unknown
+        type, an overlap, a place on no belt, or a speed beyond the one that the time step follows from.
+        """
+        values = (x, y, theta, vx, vy, omega)
+        self.give(Input(SPAWN, writer, "test", SPAWN, (bottle_type,), values))
+
+    def delete(self, *bottles: int, writer: str = "delete") -> None:
+        """Queue the removal of bottles, by ID. The next tick removes all of them, or refuses the input."""
+        self.give(Input(DELETE, writer, "test", DELETE, (), tuple(bottles)))
 
     def take_outcomes(self) -> list[CommandOutcome]:
         """Return the results of commands and other inputs since the last call, in order."""

@@ -41,6 +41,7 @@ class Recorder(contextlib.AbstractContextManager["Recorder"]):
     path: the folder to create, which must not exist or be empty. topics: names of OUTPUTS to record (default: all).
     start: writes the checkpoint at which the run begins to a path, because a replay begins there; None: tick 0.
     sources: files that the scene was read from, by path from its folder; they are attached to the file.
+    namespace: prefix of all topics, such as "/cell_1".
     A separate thread flushes, also when no more messages come. Any thread may call the methods.
     Raise BagError before the simulation starts if the folder can't be written; then the folder is removed.
     """
@@ -53,9 +54,11 @@ class Recorder(contextlib.AbstractContextManager["Recorder"]):
         distro: str | None = None,
         start: Callable[[Path], object] | None = None,
         sources: Mapping[str, bytes] | None = None,
+        namespace: str = "",
     ) -> None:
         self.path = Path(path)
         self._sources = sources or {}
+        self._namespace = namespace
         self._distro = distro or default_distro()
         self._ended = False
         self._failure: BagError | None = None
@@ -86,7 +89,7 @@ class Recorder(contextlib.AbstractContextManager["Recorder"]):
 
     def _register(self, topic: str) -> int:
         schema, metadata = schema_of(topic, self._distro), metadata_of(topic, self._distro)
-        return self._file.add_topic(f"/{topic}", schema, ENCODING, metadata)
+        return self._file.add_topic(f"{self._namespace}/{topic}", schema, ENCODING, metadata)
 
     def wants(self, topic: str) -> bool:
         """Return True if the topic is recorded."""
@@ -100,7 +103,7 @@ class Recorder(contextlib.AbstractContextManager["Recorder"]):
                 raise BagError(f"{self.path}: the recording has ended and takes no more messages")
             try:
                 if topic == LINE_TOPIC and not self._begun:
-                    line = LineCopy(f"/{topic}", OUTPUTS[topic].type, stamp_ns, data)
+                    line = LineCopy(f"{self._namespace}/{topic}", OUTPUTS[topic].type, stamp_ns, data)
                     self._file.add_metadata(LINE_COPY, line.to_record())
                     for name, content in self._sources.items():
                         kind = _MEDIA_TYPES.get(PurePath(name).suffix, "text/plain")

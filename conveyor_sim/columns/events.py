@@ -11,6 +11,8 @@ Kind = Literal[
     "bottle_fed",
     "bottle_removed",
     "bottle_rejected",
+    "bottle_spawned",
+    "bottle_deleted",
     "alarm_raised",
     "alarm_cleared",
     "alarm_latched",
@@ -41,8 +43,9 @@ class Event(NamedTuple):
     kind: str
     """One of `Kind`."""
     name: str
-    """Name of the device for bottle events, of the signal for machine states; else of the alarm, fault, command, limit,
-    forced signal, device with a new mode, or controller that took or released the line."""
+    """Name of the device for bottle events, of the writer for spawned and deleted bottles, of the signal for machine
+    states; else of the alarm, fault, command, limit, forced signal, device with a new mode, or controller that took or
+    released the line."""
     bottle: int
     """Bottle ID; -1: none."""
     value: float

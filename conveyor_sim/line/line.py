@@ -19,6 +19,7 @@ from conveyor_sim.line.commands.forcing import Forcing
 from conveyor_sim.line.commands.inputs import FAULT, INJECT, SET, WATCHDOG, CommandOutcome, Input, normalized
 from conveyor_sim.line.commands.modes import Modes
 from conveyor_sim.line.commands.operation import Operation
+from conveyor_sim.line.commands.placement import Placement
 from conveyor_sim.line.commands.read_back import ReadBack
 from conveyor_sim.line.commands.refusal import moved_belts, refusal, shown
 from conveyor_sim.line.device import Device, ScanContext
@@ -184,6 +185,8 @@ class Line:
         objecting = [device for device in devices if type(device).objection is not Device.objection]
         self._objecting = {command.name: device for device in objecting for command in device.commands}
         self._counters = ProductionCounters(devices, scene.counts_starts)
+        self.placement = Placement(state, lambda: self._pending, self._log.note)
+        """Bottles that inputs put on the line or remove."""
         self._operations = {
             SET: Operation(self._set_refusal, self._set),
             INJECT: Operation(self._inject_refusal, self._set),
@@ -191,6 +194,7 @@ class Line:
             **self.forcing.operations(),
             **self._alarms.operations(),
             RESET_COUNTERS: Operation(self._counters.refusal, self._counters.reset),
+            **self.placement.operations(),
         }
         self._surfaces = BeltSurfaces(state)
         self._parts = {
@@ -308,9 +312,10 @@ class Line:
                 reason = self._refusal(rest)
                 if not reason:
                     self._operations[rest.operation].apply(rest, self.now)
-                self._note(CommandOutcome(tick, rest, not reason, reason))
+                self._note(CommandOutcome(tick, rest, not reason, reason, bottles=self.placement.take_added()))
             if request.operation == SET and request.writer_kind in MAY[SET].writers:  # even if refused
                 self._alarms.report(tick, request.names, request.values)
+        self.placement.end(self.now)
         for mover in self._watched:
             if name := mover.watch(self.now):
                 stopped = Input(WATCHDOG, WATCHDOG, "line", SET, (name,), (0.0,))

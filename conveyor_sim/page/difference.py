@@ -95,11 +95,41 @@ class RecordingComparison:
     def head(self) -> dict[str, Any]:
         """Return for the page: names of the recordings, end, kind of comparison, and number of stretches."""
         paths = [str(bag.path) for bag in self._bags]
-        return {"names": paths, "end": self.end, "exact": self.exact, "stretches": self.stretches}
+        return {
+            "names": paths,
+            "start": self._first * self._tick_ns * 1e-9,
+            "end": self.end,
+            "exact": self.exact,
+            "stretches": self.stretches,
+        }
 
     def part(self, number: int = 0) -> list[dict[str, Any]]:
         """Return the differences of a stretch for the page, as `find` does."""
         return [vars(one) for one in self.find(number)]
+
+    def peaks(self, number: int = 0) -> list[dict[str, float] | None]:
+        """Return the largest force on a bottle in a stretch: force (N), time (s) and bottle, of A and of B.
+
+        None: the recording has no forces. Raise BagError.
+        """
+        start = self._first + number * self._length
+        stop = min(start + self._length, self._last + 1)
+        has_bottles = any(row.name == "bottles" for row in self._rows["bottles"])
+        return [self._peak(place, start, stop) if has_bottles else None for place in (0, 1)]
+
+    def _peak(self, place: int, start: int, stop: int) -> dict[str, float] | None:
+        most = {"force": 0.0, "time": start * self._tick_ns * 1e-9, "bottle": -1}
+        for _, tick, raw in self._stamps[place].messages({"bottles"}, start, stop):
+            bottles: BottleColumns = TOPICS["bottles"].unpack(self._bags[place].decode("bottles", raw))
+            if not len(bottles.id):
+                continue
+            index = int(np.argmax(bottles.peak_force))  # the first NaN, if there is one
+            if np.isnan(bottles.peak_force[index]):
+                return None
+            if bottles.peak_force[index] > most["force"]:
+                force, bottle = float(bottles.peak_force[index]), int(bottles.id[index])
+                most = {"force": force, "time": tick * self._tick_ns * 1e-9, "bottle": bottle}
+        return most
 
     def find(self, number: int = 0) -> list[RecordingDifference]:
         """Return the first difference of each kind in a stretch, counted from 0. Raise BagError."""

@@ -80,6 +80,7 @@ def write_page(
             comparison = RecordingComparison(opened[0], opened[1], math.inf)
             head["compared"] = comparison.head()
             parts["difference/0"] = _deflated(text(comparison.part()))
+            parts["peaks/0"] = _deflated(text(comparison.peaks()))
             parts.update(_parts(recordings[1], "other/", {}))
         parts.update(_parts(recordings[0], "", head, None if watch is None or watch.end < 0 else watch.blocks()))
         page = one_file(parts, recordings[0].name)

@@ -46,7 +46,7 @@ class RecordingServer(AbstractContextManager["RecordingServer"]):
     def answer(self, name: str) -> bytes:
         """Return the deflated part with a name. Raise KeyError if there is none, and BagError.
 
-        Names: head, story/<n>, block/<n>, each of them after other/ for the other recording, and difference/<n>.
+        Names: head, story/<n>, block/<n>, each of them after other/ for the other recording, difference/<n> and peaks/<n>.
         """
         place = int(name.startswith("other/"))
         if place >= len(self._blocks):
@@ -58,13 +58,15 @@ class RecordingServer(AbstractContextManager["RecordingServer"]):
             return self._deflated(self._block_lock, lambda: text({**blocks.head(), **compared}))
         counts = {"story": stories.stories, "block": blocks.blocks}
         if comparison is not None and not place:
-            counts["difference"] = comparison.stretches
+            counts["difference"] = counts["peaks"] = comparison.stretches
         if kind not in counts or not (number.isdecimal() and len(number) < 10) or int(number) >= counts[kind]:
             raise KeyError(name)
         if kind == "block":
             return self._deflated(self._block_lock, lambda: blocks.block(int(number)))
         if kind == "difference" and comparison is not None:
             return self._deflated(self._story_lock, lambda: text(comparison.part(int(number))))
+        if kind == "peaks" and comparison is not None:
+            return self._deflated(self._story_lock, lambda: text(comparison.peaks(int(number))))
         return self._deflated(self._story_lock, lambda: stories.story(int(number)))
 
     def __exit__(self, *_: object) -> None:

@@ -7,7 +7,7 @@ from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
 
 from conveyor_sim.bag.messages.topics import TOPICS
-from conveyor_sim.ros.publishers import ros_qos
+from conveyor_sim.ros.qos_overrides import publisher_qos
 from conveyor_sim.run.pacing import RateCap
 
 UNKNOWN = "_NODE_NAME_UNKNOWN_"  # of a publisher whose node is not discovered yet
@@ -73,7 +73,7 @@ class ClockPublisher:
     """Publishes simulated time at most `rate` times per wall second."""
 
     def __init__(self, node: Node, rate: float) -> None:
-        self._publisher = node.create_publisher(Clock, "/clock", ros_qos(TOPICS["/clock"].qos))
+        self._publisher = node.create_publisher(Clock, "/clock", publisher_qos(node, "/clock", TOPICS["/clock"].qos))
         self.topic: str = self._publisher.topic_name
         """Full name of the topic, after remapping."""
         self._cap = RateCap(rate)

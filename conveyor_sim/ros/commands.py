@@ -18,7 +18,7 @@ from conveyor_sim.bag.messages.topics import CMD_SPEED, TOPICS
 from conveyor_sim.line.commands.inputs import SET, Input
 from conveyor_sim.line.tag import speed_topics
 from conveyor_sim.ros.direct import Aside, take_message
-from conveyor_sim.ros.publishers import ros_qos
+from conveyor_sim.ros.qos_overrides import subscription_qos
 from conveyor_sim.ros.sent_inputs import received_inputs
 from conveyor_sim.run.inbox import MESSAGE_BYTES, TOO_LARGE
 from conveyor_sim.run.stepper import Stepper
@@ -97,12 +97,13 @@ class CommandTopic:
         self._kind = kind
         self._read = read
         self._gaps = Gaps()
-        self._most = qos.depth
+        profile = subscription_qos(node, name, qos)
+        self._most = profile.depth
         self.subscription: Subscription = node.create_subscription(
             kind,
             name,
             lambda _: None,
-            ros_qos(qos),
+            profile,
             callback_group=Aside(),
             raw=True,
             event_callbacks=SubscriptionEventCallbacks(matched=self._on_matched),

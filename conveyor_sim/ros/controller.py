@@ -35,6 +35,7 @@ from conveyor_sim.errors import ConveyorError
 from conveyor_sim.ros.clock import to_time
 from conveyor_sim.ros.direct import Aside, WaitSet, send_request, take_response
 from conveyor_sim.ros.publishers import require_same_definition, ros_qos
+from conveyor_sim.ros.qos_overrides import publisher_qos, subscription_qos
 from conveyor_sim.ros.sent_inputs import alarm_messages
 from conveyor_sim.ros.service_names import of_simulation
 from conveyor_sim.ros.spinner import Spinner
@@ -85,7 +86,9 @@ class AlarmPublisher:
     """
 
     def __init__(self, node: Node) -> None:
-        self._publisher = node.create_publisher(DiagnosticArray, "alarms", ros_qos(TOPICS["alarms"].qos))
+        self._publisher = node.create_publisher(
+            DiagnosticArray, "alarms", publisher_qos(node, "alarms", TOPICS["alarms"].qos)
+        )
         self._source = node.get_name()
         self._published: dict[str, bool] = {}
 
@@ -120,7 +123,9 @@ class VariablePublisher:
         if not names:
             return
         if self._publisher is None:
-            self._publisher = self._node.create_publisher(Message, "variables", ros_qos(TOPICS["variables"].qos))
+            self._publisher = self._node.create_publisher(
+                Message, "variables", publisher_qos(self._node, "variables", TOPICS["variables"].qos)
+            )
         message = Message(tick=tick, name=list(names), value=list(values))
         message.header.stamp = to_time(stamp_ns)
         self._publisher.publish(message)
@@ -211,7 +216,9 @@ class ControllerRun:
         self._has_line = threading.Event()
         self._alarms = AlarmPublisher(node)
         self._variables = VariablePublisher(node)
-        lines = node.create_subscription(Line, "line", self._on_line, ros_qos(TOPICS["line"].qos), raw=True)
+        lines = node.create_subscription(
+            Line, "line", self._on_line, subscription_qos(node, "line", TOPICS["line"].qos), raw=True
+        )
         self._line_topic = lines.topic_name
         self._lockstep = LockstepClient(node)
         self._spinner = Spinner(died=self._died)
@@ -259,7 +266,9 @@ class ControllerRun:
         """Scan the signals that arrive until a stop request. Raise ConveyorError if a scan fails."""
         self._find(lambda: True)
         free = _FreeScans(self._node, self._scan_ticks, self._scanner, lambda: self._line)
-        self._node.create_subscription(Signals, "signals", free.on_signals, ros_qos(TOPICS["signals"].qos))
+        self._node.create_subscription(
+            Signals, "signals", free.on_signals, subscription_qos(self._node, "signals", TOPICS["signals"].qos)
+        )
         self._node.get_logger().info(f"controls {printable(self._line.scene_name)} as its signals arrive")
         self._stop.wait()
         if self._error is not None:
@@ -337,7 +346,9 @@ class _FreeScans:
     """Scans signals as they arrive, every `scan_ticks` ticks or less often."""
 
     def __init__(self, node: Node, scan_ticks: int, scanner: Callable[[Any], Scanner], line: Callable[[], Any]) -> None:
-        self._commands = node.create_publisher(Commands, "commands", ros_qos(TOPICS["commands"].qos))
+        self._commands = node.create_publisher(
+            Commands, "commands", publisher_qos(node, "commands", TOPICS["commands"].qos)
+        )
         self._scan_ticks = scan_ticks
         self._make = scanner
         self._present = line

@@ -32,7 +32,9 @@ MODES = ("lockstep", "free")
 PARAMETERS = (
     DeclaredParameter("controller", "", "program.st, library.so, module:factory or file.py:factory."),
     DeclaredParameter("parameters", "", "Parameters of the factory or program by name: a YAML mapping, or its file."),
-    DeclaredParameter("mode", "lockstep", "lockstep: the simulation waits for every scan; free: it does not."),
+    DeclaredParameter(
+        "mode", "lockstep", "lockstep: the simulation waits for every scan; free: it does not.", choices=MODES
+    ),
     DeclaredParameter("scan_ticks", 1, "Ticks from one scan to the next.", 1, 10**6),
     DeclaredParameter("run_id", NAME, "Name under which it owns the simulation in lockstep; the same after a restart."),
     DeclaredParameter("released", "", "Devices that others may command in lockstep: patterns, separated by commas."),
@@ -43,8 +45,6 @@ def run(stop: StopRequest) -> None:
     """Control until the end of the run, or a stop request. Raise ConveyorError."""
     node = new_node(NAME)
     values = declare_table(node, PARAMETERS)
-    if values["mode"] not in MODES:
-        raise ConveyorError(f"parameter mode: {values['mode']!r} given, expected {' or '.join(MODES)}")
     parameters = controller_parameters(values["parameters"], "parameter parameters")
 
     def make(line: Any) -> Controller:

@@ -12,7 +12,8 @@ from rclpy.node import Node
 from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.ros.clock import GraphWatch, to_time
 from conveyor_sim.ros.observer import TICK, WALL
-from conveyor_sim.ros.publishers import RosSink, ros_qos
+from conveyor_sim.ros.publishers import RosSink
+from conveyor_sim.ros.qos_overrides import publisher_qos
 from conveyor_sim.run.run_state import SimulationState
 from conveyor_sim.run.stepper import Stepper
 from conveyor_sim.support.printable import printable
@@ -32,7 +33,9 @@ class Diagnostics:
         self._sink = sink
         self._graph = graph
         self._name = f"{node.get_name()}: simulation"
-        self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", ros_qos(TOPICS["/diagnostics"].qos))
+        self._publisher = node.create_publisher(
+            DiagnosticArray, "/diagnostics", publisher_qos(node, "/diagnostics", TOPICS["/diagnostics"].qos)
+        )
         self._last_wall = time.monotonic()
         self._last_tick = 0
         self._last_run = ""

@@ -179,10 +179,12 @@ class SimNode:
         clock = ClockPublisher(node, values.clock_rate) if values.publish_clock else None
 
         scene, threads = self._scene, values.threads or None
+        namespace = node.get_namespace().rstrip("/")
 
         def open_session(runs: int, loaded: Simulation | None) -> RunSession:
             simulation = loaded or Simulation(scene, threads)
-            return RunSession(simulation, sink, bag_folder(values.record, runs), values.frame_id, self._distro)
+            bag = bag_folder(values.record, runs)
+            return RunSession(simulation, sink, bag, values.frame_id, self._distro, namespace=namespace)
 
         def read_checkpoint(path: Path) -> Simulation:
             return Simulation.load(path, threads, scene, values.checkpoint_folder)

@@ -20,7 +20,10 @@ _KINDS = {bool: "true or false", int: "a whole number", float: "a number", str: 
 
 @dataclass(frozen=True)
 class DeclaredParameter:
-    """One parameter. A number must lie in [low, high]. Only a parameter that is not `fixed` may change later."""
+    """One parameter. A number must lie in [low, high], a text be one of `choices`, if there are any.
+
+    Only a parameter that is not `fixed` may change later.
+    """
 
     name: str
     default: bool | int | float | str
@@ -28,6 +31,7 @@ class DeclaredParameter:
     low: float = 0.0
     high: float = 0.0
     fixed: bool = True
+    choices: tuple[str, ...] = ()
 
     def refusal(self, value: object) -> str:
         """Return why `value` is invalid for this parameter, empty if it is valid."""
@@ -38,6 +42,8 @@ class DeclaredParameter:
             return f"{self.name}: {printable(repr(value))} given, expected {_KINDS[kind]}"
         if isinstance(value, (int, float)) and kind is not bool and not self.low <= value <= self.high:
             return f"{self.name}: {value} given, expected {_KINDS[kind]} from {self.low:g} to {self.high:g}"
+        if self.choices and value not in self.choices:
+            return f"{self.name}: {printable(repr(value))} given, expected {' or '.join(self.choices)}"
         return ""
 
     def descriptor(self) -> ParameterDescriptor:
@@ -50,19 +56,22 @@ class DeclaredParameter:
         return descriptor
 
 
+def declare_one(node: Node, entry: DeclaredParameter) -> Any:
+    """Declare a parameter on `node`. Return its value. Raise ConveyorError if it is invalid."""
+    # Checked before rclpy knows the limits, so that our error states the expected values.
+    value = node.declare_parameter(entry.name, entry.default, ParameterDescriptor(dynamic_typing=True)).value
+    if reason := entry.refusal(value):
+        raise ConveyorError(f"parameter {reason}")
+    if type(value) is not type(entry.default):
+        value = type(entry.default)(value)
+        node.set_parameters([Parameter(entry.name, value=value)])
+    node.set_descriptor(entry.name, entry.descriptor())
+    return value
+
+
 def declare_table(node: Node, table: Sequence[DeclaredParameter]) -> dict[str, Any]:
     """Declare parameters on `node`, with checks. Return their values by name. Raise ConveyorError if one is invalid."""
-    values = {}
-    for entry in table:
-        # Checked before rclpy knows the limits, so that our error states the expected values.
-        value = node.declare_parameter(entry.name, entry.default, ParameterDescriptor(dynamic_typing=True)).value
-        if reason := entry.refusal(value):
-            raise ConveyorError(f"parameter {reason}")
-        values[entry.name] = type(entry.default)(value)
-        if type(value) is not type(entry.default):
-            node.set_parameters([Parameter(entry.name, value=values[entry.name])])
-        node.set_descriptor(entry.name, entry.descriptor())
-
+    values = {entry.name: declare_one(node, entry) for entry in table}
     entries = {entry.name: entry for entry in table}
 
     def convert(parameters: list[Parameter]) -> list[Parameter]:

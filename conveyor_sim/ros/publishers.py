@@ -17,6 +17,7 @@ from conveyor_sim.bag.messages.qos import Qos
 from conveyor_sim.bag.messages.topics import Topic
 from conveyor_sim.bag.messages.typestore import default_distro, type_hash
 from conveyor_sim.errors import ConveyorError
+from conveyor_sim.ros.qos_overrides import publisher_qos
 from conveyor_sim.run.pacing import RateCap
 
 NO_EVENTS = PublisherEventCallbacks(use_default_callbacks=False)
@@ -55,11 +56,12 @@ class RosSink:
         self.published: Counter[str] = Counter()
         self._caps = caps
         self._publishers: dict[str, Publisher] = {}
-        self._latched = {name for name, topic in topics.items() if topic.qos.latched}
+        self._latched: set[str] = set()
         for name, topic in topics.items():
-            publisher = node.create_publisher(
-                message_class(topic.type), name, ros_qos(topic.qos), event_callbacks=NO_EVENTS
-            )
+            qos = publisher_qos(node, name, topic.qos)
+            if qos.durability == DurabilityPolicy.TRANSIENT_LOCAL:
+                self._latched.add(name)
+            publisher = node.create_publisher(message_class(topic.type), name, qos, event_callbacks=NO_EVENTS)
             check_type(node, publisher.topic_name, topic.type, distro)
             self._publishers[name] = publisher
 

@@ -30,7 +30,8 @@ from conveyor_sim.bag.reader import Bag, open_bag
 from conveyor_sim.errors import BagError, ConveyorError
 from conveyor_sim.ros.clock import ClockPublisher, GraphWatch
 from conveyor_sim.ros.context import new_node, start_ros
-from conveyor_sim.ros.publishers import message_class, published_hashes, ros_qos
+from conveyor_sim.ros.publishers import message_class, published_hashes
+from conveyor_sim.ros.qos_overrides import publisher_qos
 from conveyor_sim.ros.service_names import create_service
 from conveyor_sim.ros.services import settled
 from conveyor_sim.ros.spinner import Spinner
@@ -120,7 +121,7 @@ class ReplayNode:
                 left_out, kind_name = printable(topic.name), printable(topic.type)
                 self._node.get_logger().warning(f"{left_out}: left out, {kind_name} is not installed here")
                 continue
-            publisher = self._node.create_publisher(kind, topic.name, ros_qos(topic.qos))
+            publisher = self._node.create_publisher(kind, topic.name, publisher_qos(self._node, topic.name, topic.qos))
             # Bytes are published as recorded. With another definition, they would be garbage.
             if topic.type_hash and topic.type_hash not in published_hashes(self._node, publisher.topic_name):
                 self._node.destroy_publisher(publisher)

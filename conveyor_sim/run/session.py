@@ -47,10 +47,13 @@ class RunSession:
         distro: str,
         controller: Controller | None = None,
         record: Sequence[str] = (),
+        *,
+        namespace: str = "",
     ) -> None:
         """Start the run at the present tick of `simulation`. bag: folder to record to, or None.
 
         controller: owns the line and scans at every tick, if one is passed. record: patterns of its recorded variables.
+        namespace: prefix of the recorded topics.
         Raises BagError if the folder can't be written, and ConveyorError for a controller that does not fit the line;
         nothing has been published then.
         """
@@ -67,7 +70,9 @@ class RunSession:
         self._began = simulation.time
         keep_start = simulation.save if simulation.tick > 0 else None
         sources = sources_of(simulation.scene)
-        self._recorder = Recorder(bag, distro=distro, start=keep_start, sources=sources) if bag else None
+        self._recorder = (
+            Recorder(bag, distro=distro, start=keep_start, sources=sources, namespace=namespace) if bag else None
+        )
         sinks = [sink] if self._recorder is None else [self._recorder, sink]
         self.outputs = OutputWriter(self.simulation, sinks, frame_id=frame_id, run_id=self.run_id)
         self.outputs.start()

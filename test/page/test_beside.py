@@ -47,6 +47,47 @@ def test_it_opens_before_the_first_difference_and_says_and_marks_it(pair: Any) -
     assert clock(pair) == pytest.approx(6.0, abs=0.05)
 
 
+def figures(bag: Path, until: float = 24.0) -> list[str]:
+    """Return throughput, OEE, peak force and number of alarms of a recording, as the page writes them."""
+    left, alarms, oee, peak = 0, 0, 0.0, 0.0
+    with open_bag(bag) as opened:
+        for frame in opened.read("events"):
+            kinds = [kind for at, kind in zip(frame.data.at, frame.data.kind, strict=True) if at * 0.01 <= until]
+            left += kinds.count("bottle_removed")
+            alarms += kinds.count("alarm_raised")
+        for frame in opened.read("counters"):
+            if frame.time <= until:
+                oee = frame.data.oee[list(frame.data.name).index("line")]
+        for frame in opened.bottles():
+            if frame.time <= until:
+                peak = max(peak, frame.data.peak_force.max(initial=0.0))
+    return [f"{round(left * 3600 / until)} /h", f"{100 * oee:.1f} %", f"{float(f'{peak:.3g}'):g} N", f"{alarms}"]
+
+
+def shown_figures(page: Any, column: int) -> list[str]:
+    page.wait_for_selector("body[data-peaks]")
+    settled(page)
+    rows = page.locator("#panel_compare .figures tr").all()[1:]
+    assert [row.locator("th").inner_text() for row in rows] == [
+        "throughput", "OEE of the line", "peak force", "alarms raised",
+    ]  # fmt: skip
+    return [str(row.locator("td").nth(column).inner_text()) for row in rows]
+
+
+def test_it_leads_with_the_figures_of_both(pair: Any, bag: Path, other_bag: Path) -> None:
+    assert [shown_figures(pair, column) for column in (0, 1)] == [figures(bag), figures(other_bag)]
+    change = shown_figures(pair, 2)
+    assert change[0].startswith("+") and change[1].endswith(" points") and change[3] == "0"
+    top, first = (
+        pair.locator(f"#panel_compare {part}").bounding_box()["y"] for part in (".figures", ".first >> nth=0")
+    )
+    assert top < first
+    pair.locator("#panel_compare .figures button").click()
+    pair.click("#tab_bottle")
+    settled(pair)
+    assert "speed" in pair.inner_text("#panel_bottle"), "the bottle with the largest force is chosen"
+
+
 def test_a_click_on_a_difference_goes_there_and_chooses_the_bottle_in_both(pair: Any) -> None:
     row = pair.locator("#panel_compare .first").nth(3)
     bottle = row.inner_text().split("bottle ")[-1].split()[0]
@@ -141,6 +182,7 @@ def test_a_served_pair_finds_the_same_and_goes_on_where_one_has_ended(browser: A
         assert page.inner_text("#notice").startswith(
             "A and B first differ at 6.00 s: in B alone: command gates/hold/open"
         )
+        assert shown_figures(page, 1) == figures(bag, 8.0), "the part that both have"
         page.click("#plan", position={"x": 20, "y": 20})
         press(page, "End")
         assert clock(page) == pytest.approx(24.0, abs=0.05)

@@ -5,12 +5,14 @@ from fnmatch import fnmatchcase
 from typing import NamedTuple
 
 from conveyor_sim.line.commands.inputs import (
+    DELETE,
     DISOWN,
     FORCE,
     INJECT,
     MODE,
     OWN,
     SET,
+    SPAWN,
     UNFORCE,
     WRITER_KINDS,
     Input,
@@ -48,6 +50,11 @@ MAY: Mapping[str, Right] = {
     "reset_counters": Right(
         ("controller", *PEOPLE, "test"), "Resets counters and times of the named devices; of all if no names are given."
     ),
+    SPAWN: Right(
+        ("controller", *PEOPLE, "test"),
+        "Puts bottles of the types in names on the line; values: x, y (m), theta (rad), vx, vy (m/s), omega (rad/s).",
+    ),
+    DELETE: Right(("controller", *PEOPLE, "test"), "Removes the bottles with the IDs in values."),
 }
 """Rights by operation. An operation that is not listed is forbidden."""
 

@@ -68,6 +68,19 @@ async function read(source, name) {
   return JSON.parse(new TextDecoder().decode(await source.bytes(name)));
 }
 
+// Reads the largest forces of both recordings.
+async function readPeaks(view, source, { stretches }) {
+  for (let part = 0; part < stretches; part++) {
+    try {
+      view.compare.addPeaks(await read(source, `peaks/${part}`), (part + 1) / stretches);
+    } catch (error) {
+      warn(`The peak forces can't be read further: ${error.message}`);
+      return;
+    }
+  }
+  document.body.dataset.peaks = "yes";
+}
+
 // Compares both recordings until the first difference of each kind, then moves to just before the first of all.
 async function compare(view, source, { stretches }) {
   const untouched = !view.clock.playing && view.clock.time === view.clock.recording.start;
@@ -162,7 +175,7 @@ async function startRecording() {
   for (let part = 0; other && part < other.recording.head.times.stories; part++) {
     if (other.recording.head.times.stories > 1) unread = await told(behind, part, (more) => view.toldMoreOf(other.story, more)) || unread;
   }
-  if (other) await compare(view, source, head.compared);
+  if (other) await Promise.all([compare(view, source, head.compared), readPeaks(view, source, head.compared)]);
 }
 
 start().catch((error) => {

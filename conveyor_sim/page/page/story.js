@@ -90,7 +90,7 @@ export class Story {
     this.reasons = new Map(); // reasons of stops by machine and time
     const now = new Map();
     for (const event of this.events) {
-      if (event.kind === "bottle_fed") this.fed.set(event.bottle, event.time);
+      if (event.kind === "bottle_fed" || event.kind === "bottle_spawned") this.fed.set(event.bottle, event.time);
       if (event.kind === "bottle_rejected") this.rejected.add(event.bottle);
       if (event.kind === "machine_state") this._state(event, now);
     }

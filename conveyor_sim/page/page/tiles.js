@@ -2,9 +2,7 @@
 
 import { CATEGORIES } from "./colours.js";
 import { element, keyOf, titled } from "./dom.js";
-
-const NOTHING = "–";
-const percent = (share) => (share === null || share === undefined ? NOTHING : `${(100 * share).toFixed(1)} %`);
+import { NONE, inPercent } from "./production.js";
 
 export class Tiles {
   constructor(view) {
@@ -39,10 +37,10 @@ export class Tiles {
         }));
       return element("article", { class: "tile" },
         element("h3", { title: name }, name.replace("machines/", "")),
-        row.oee === null ? null : element("div", { class: "oee" }, element("strong", {}, percent(row.oee)), element("span", {}, "OEE")),
+        row.oee === null ? null : element("div", { class: "oee" }, element("strong", {}, inPercent(row.oee)), element("span", {}, "OEE")),
         element("dl", {},
-          ...[["availability", percent(row.availability)], ["effectiveness", percent(row.effectiveness)], ["quality", percent(row.quality)],
-            ["bottles", `${row.processed}`]].filter(([, value]) => value !== NOTHING).flatMap(([term, value]) => [element("dt", {}, term), element("dd", {}, value)])),
+          ...[["availability", inPercent(row.availability)], ["effectiveness", inPercent(row.effectiveness)], ["quality", inPercent(row.quality)],
+            ["bottles", `${row.processed}`]].filter(([, value]) => value !== NONE).flatMap(([term, value]) => [element("dt", {}, term), element("dd", {}, value)])),
         all ? bar : null,
         row.stop_reason && row.category !== "running" ? element("p", { class: "muted" }, [row.category, "none"].includes(row.stop_reason) ? row.category : `${row.category}: ${row.stop_reason}`) : null);
     }));

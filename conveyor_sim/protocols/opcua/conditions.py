@@ -85,6 +85,8 @@ _BOTTLES, _STATES, _HANDS, _WRONG = 1, 100, 300, 500
 SEVERITIES = {
     "bottle_fed": _BOTTLES,
     "bottle_removed": _BOTTLES,
+    "bottle_spawned": _BOTTLES,
+    "bottle_deleted": _BOTTLES,
     "bottle_rejected": _BOTTLES,
     "machine_state": _STATES,
     "mode_changed": _HANDS,
