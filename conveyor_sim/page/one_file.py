@@ -96,6 +96,7 @@ def _parts(
 ) -> Iterator[tuple[str, bytes]]:
     """Yield names and content of the parts. blocks: deflated; None: those of the recording."""
     yield f"{prefix}head", _deflated(text({**recording.head(), **more}))
+    yield f"{prefix}fullest", _deflated(text(recording.fullest()))
     yield f"{prefix}story/0", _deflated(recording.story())
     for number in range(recording.blocks) if blocks is None else ():
         yield f"{prefix}block/{number}", _deflated(recording.block(number))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +16,7 @@ from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.bag.reader import Bag
 from conveyor_sim.columns.bottles import BottleColumns
 from conveyor_sim.columns.variables import VariableColumns
+from conveyor_sim.errors import BagError
 from conveyor_sim.page.block import SECONDS, BlockContent, block_ticks, pack
 from conveyor_sim.page.head import head
 from conveyor_sim.page.story import TOPICS_READ, Story
@@ -66,6 +68,10 @@ class Stamps:
 
 DRAWN = ("bottles", "contacts", "belts", "signals")
 """Topics that blocks contain."""
+_LOOKS = 24
+"""Moments among which the fullest one is searched, at most."""
+_LOOK_EVERY = 1.0
+"""Least simulated time between two of them, s; more of them would read the same chunks again."""
 VARIABLES = "variables"
 """Topic of a controller's variables, which are further columns of the signals."""
 
@@ -181,6 +187,23 @@ class PageRecording:
     def stories(self) -> int:
         """Number of stretches of the story."""
         return 1 + math.floor((self.last - self._began) * self._tick_ns * 1e-9 / self._detail.story)
+
+    def fullest(self) -> int:
+        """Return the tick of the displayed part with the most bottles, among ticks that are evenly spaced.
+
+        It is the first one of equals, and the first tick if no bottles were recorded. Unreadable ticks are skipped.
+        """
+        if not self._bag.counts.get("bottles"):
+            return self.first
+        count = min(_LOOKS, 1 + round((self.last - self.first) * self._tick_ns * 1e-9 / _LOOK_EVERY))
+        looks = np.linspace(self.first, self.last, count).astype(np.int64).tolist()
+        # The size of a message grows with the number of its bottles, so it needs no decoding.
+        sizes = {}
+        for look, stop in zip(looks, [*looks[1:], self.last + 1], strict=True):
+            with suppress(BagError):
+                _, tick, raw = next(self._stamps.messages(("bottles",), look, stop), ("", look, b""))
+                sizes[tick] = len(raw)
+        return max(sizes, key=lambda tick: sizes[tick], default=self.first)
 
     def head(self) -> dict[str, Any]:
         """Return the data of `head.head`, with the times and the numbers of blocks and stretches."""

@@ -46,7 +46,8 @@ class RecordingServer(AbstractContextManager["RecordingServer"]):
     def answer(self, name: str) -> bytes:
         """Return the deflated part with a name. Raise KeyError if there is none, and BagError.
 
-        Names: head, story/<n>, block/<n>, each of them after other/ for the other recording, difference/<n> and peaks/<n>.
+        Names: head, fullest, story/<n> and block/<n>, each of them after other/ for the other recording; difference/<n>
+        and peaks/<n>.
         """
         place = int(name.startswith("other/"))
         if place >= len(self._blocks):
@@ -56,6 +57,8 @@ class RecordingServer(AbstractContextManager["RecordingServer"]):
         if kind == "head" and not number:
             compared = {"compared": comparison.head()} if comparison is not None and not place else {}
             return self._deflated(self._block_lock, lambda: text({**blocks.head(), **compared}))
+        if kind == "fullest" and not number:
+            return self._deflated(self._story_lock, lambda: text(stories.fullest()))
         counts = {"story": stories.stories, "block": blocks.blocks}
         if comparison is not None and not place:
             counts["difference"] = counts["peaks"] = comparison.stretches

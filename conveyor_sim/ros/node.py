@@ -33,6 +33,7 @@ from conveyor_sim.ros.publishers import RosSink
 from conveyor_sim.ros.service_names import SIMULATION, create_service
 from conveyor_sim.ros.services import CheckpointServices, Services, settled
 from conveyor_sim.ros.spinner import Spinner
+from conveyor_sim.ros.static_frames import publish_frames
 from conveyor_sim.run.active_run import ActiveRun
 from conveyor_sim.run.compilation import Cancelled, Compilation
 from conveyor_sim.run.lockstep import Refused
@@ -209,6 +210,7 @@ class SimNode:
             InputServices(node, executor, stepper)
             lockstep = LockstepService(node, stepper, values.frame_id, died=self._die)
             self._intake = Intake(node.context, lockstep, commands, died=self._die)
+            publish_frames(node, scene, values.frame_id)
             diagnostics = Diagnostics(node, stepper, sink, GraphWatch(node, clock.topic if clock else None))
 
         def on_set(changed: list[Parameter]) -> None:

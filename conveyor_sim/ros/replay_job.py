@@ -27,7 +27,8 @@ from rclpy.publisher import Publisher
 from std_srvs.srv import Trigger
 
 from conveyor_sim.bag.reader import Bag, open_bag
-from conveyor_sim.errors import BagError, ConveyorError
+from conveyor_sim.bag.recorded_scene import recorded_scene
+from conveyor_sim.errors import BagError, ConveyorError, SceneError
 from conveyor_sim.ros.clock import ClockPublisher, GraphWatch
 from conveyor_sim.ros.context import new_node, start_ros
 from conveyor_sim.ros.publishers import message_class, published_hashes
@@ -35,9 +36,10 @@ from conveyor_sim.ros.qos_overrides import publisher_qos
 from conveyor_sim.ros.service_names import create_service
 from conveyor_sim.ros.services import settled
 from conveyor_sim.ros.spinner import Spinner
+from conveyor_sim.ros.static_frames import TF_STATIC, publish_frames
 from conveyor_sim.run.calls import CallQueue
 from conveyor_sim.run.playback import Playback, PlayedMessage, PlayedTopic, Player
-from conveyor_sim.support.printable import printable
+from conveyor_sim.support.printable import SENTENCE, printable
 from conveyor_sim.support.progress import ProgressBar
 from conveyor_sim.support.stop_request import StopRequest
 
@@ -80,6 +82,8 @@ class ReplayNode:
         )
         try:
             self._publishers = self._advertise(bag, playback.topics)
+            if all(topic.name.lstrip("/") != TF_STATIC.lstrip("/") for topic in playback.topics):
+                self._publish_frames(bag)
             clock = ClockPublisher(self._node, CLOCK_RATE)
             self.player = Player(playback, rate, start=start, paused=paused, publish=self._publish, beat=clock.beat)
         except BaseException:
@@ -133,6 +137,15 @@ class ReplayNode:
         if not publishers:
             raise BagError(f"{bag.path}: no topic of a type that is installed here, expected at least one")
         return publishers
+
+    def _publish_frames(self, bag: Bag) -> None:
+        """Publish the frames of the recorded scene, which recordings of this package don't hold as messages."""
+        try:
+            scene = recorded_scene(bag.line, f"{bag.path} (recorded scene)")
+        except SceneError as error:
+            self._node.get_logger().warning(f"no frames on {TF_STATIC}: {printable(error, SENTENCE)}")
+        else:
+            publish_frames(self._node, scene, str(bag.line.header.frame_id))
 
     def _publish(self, message: PlayedMessage) -> None:
         if publisher := self._publishers.get(message.topic):

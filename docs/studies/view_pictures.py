@@ -59,7 +59,7 @@ class Studio:
         """Yield a page that is completely loaded."""
         with self.opened(size) as page:
             page.goto(html.as_uri())
-            page.wait_for_selector("body[data-told]")
+            page.wait_for_selector("body[data-told]", state="attached")
             yield page
 
     @contextmanager
@@ -190,7 +190,7 @@ def live(studio: Studio) -> None:
         served = Live(studio.folder, source)
         served.serve()
         page.goto(served.url)
-        page.wait_for_selector("body[data-told]")
+        page.wait_for_selector("body[data-told]", state="attached")
         signed_in(page, "jo")
         soon(page, lambda: clock(page) > 15.0, "the capper has jammed")
         put_into_mode(page, "3")

@@ -62,15 +62,21 @@ def page(browser: Any, html: Path) -> Iterator[Any]:
 
 
 @contextmanager
-def opened_page(browser: Any, html: Path, size: tuple[int, int] = (1280, 720)) -> Iterator[Any]:
-    """Open a file as `page` does, in a window of a size in px."""
+def opened_page(
+    browser: Any, html: Path, size: tuple[int, int] = (1280, 720), script: str = "", part: str = ""
+) -> Iterator[Any]:
+    """Open a file as `page` does, in a window of a size in px.
+
+    script: runs before those of the page. part: follows the address, with "#".
+    """
     context = browser.new_context(viewport={"width": size[0], "height": size[1]}, offline=True)
     context.set_default_timeout(60_000)
     opened, wrong = context.new_page(), []
     opened.on("pageerror", lambda error: wrong.append(str(error)))
     opened.on("console", lambda message: message.type == "error" and wrong.append(message.text))
     opened.on("dialog", lambda dialog: (wrong.append(dialog.message), dialog.dismiss()))
-    opened.goto(html.as_uri())
+    opened.add_init_script(script)
+    opened.goto(html.as_uri() + part)
     opened.wait_for_selector("body[data-ready]")
     yield opened
     context.close()

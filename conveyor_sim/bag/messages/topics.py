@@ -360,6 +360,14 @@ _ROWS = (
         by_controller=True,
     ),
     Topic(
+        "/tf_static",
+        "tf2_msgs/msg/TFMessage",
+        "frames of belts and devices in `frame_id`, named as in the scene: `belts/feeder`, `photo_eyes/exit`",
+        "once, latched",
+        LATCHED,
+        recorded=False,
+    ),
+    Topic(
         "/clock",
         "rosgraph_msgs/msg/Clock",
         "simulated time, while paused too",

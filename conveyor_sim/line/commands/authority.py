@@ -52,7 +52,7 @@ MAY: Mapping[str, Right] = {
     ),
     SPAWN: Right(
         ("controller", *PEOPLE, "test"),
-        "Puts bottles of the types in names on the line; values: x, y (m), theta (rad), vx, vy (m/s), omega (rad/s).",
+        "Puts bottles on the line: types as names, position and motion as values.",
     ),
     DELETE: Right(("controller", *PEOPLE, "test"), "Removes the bottles with the IDs in values."),
 }

@@ -16,9 +16,9 @@ import numpy as np
 from conveyor_sim.line.commands.inputs import DELETE, SPAWN, SPAWN_VALUES, Input
 from conveyor_sim.line.commands.operation import Operation
 from conveyor_sim.line.device import ScanContext
-from conveyor_sim.line.devices.entry import CLEAR
 from conveyor_sim.physics.state import State
 from conveyor_sim.scene.polygons import inside
+from conveyor_sim.scene.types import TOUCH
 from conveyor_sim.support.printable import printable
 
 Cause = Literal["form", "type", "place", "overlap", "bottle", "held"]
@@ -155,7 +155,7 @@ class Occupancy:
             return f"{name}: theta {one.theta:g} rad given, expected at most a full turn"
         fastest = model.plant.impact_speed
         rim = abs(one.omega) * float(model.type_radius[one.kind])
-        if max(math.hypot(one.vx, one.vy), rim) > fastest * (1.0 + CLEAR):
+        if max(math.hypot(one.vx, one.vy), rim) > fastest * (1.0 + TOUCH):
             motion = f"{math.hypot(one.vx, one.vy):g} m/s and {one.omega:g} rad/s"
             return f"{name}: {motion} given, expected at most {fastest:g} m/s, for which the time step is short enough"
         return ""
@@ -187,7 +187,7 @@ class Occupancy:
         for rail in self._state.rails():
             for piece in rail.pieces:
                 gap = piece.distance(places) - radius
-                if (gap < -CLEAR).any():
+                if (gap < -TOUCH).any():
                     return f"{_place(new[int(np.argmin(gap))], self._state)}: overlaps rail {rail.name}"
         return ""
 
@@ -198,7 +198,7 @@ class Occupancy:
         radii, old = np.append(self._radius, radius), len(self._id)
         for number, one in enumerate(new):
             others = slice(0, old + number)
-            near = (x[others] - one.x) ** 2 + (y[others] - one.y) ** 2 < (radii[others] + radius[number] - CLEAR) ** 2
+            near = (x[others] - one.x) ** 2 + (y[others] - one.y) ** 2 < (radii[others] + radius[number] - TOUCH) ** 2
             if near.any():
                 return f"{_place(one, self._state)}: overlaps bottle {ids[int(np.argmax(near))]}"
         return ""

@@ -1,7 +1,7 @@
 // Conversion between metres and pixels of the canvas: zoomed by wheel, two fingers or keys, moved by dragging.
 
 const MOST = 20000; // px per metre
-const UNDER = 36; // px at the lower edge that the legend may cover
+const MARGIN = 40; // px around what the window shows
 
 export class Camera extends EventTarget {
   constructor(bounds) {
@@ -11,6 +11,7 @@ export class Camera extends EventTarget {
     this.x = (bounds[0] + bounds[2]) / 2;
     this.y = (bounds[1] + bounds[3]) / 2;
     this.width = this.height = 1;
+    this.under = 36; // px at the lower edge that the legend covers
     this.fitted = true; // true until the user moves it: then it follows the size of the window
   }
 
@@ -20,13 +21,31 @@ export class Camera extends EventTarget {
     else this._changed();
   }
 
-  fit(box = this.bounds, margin = 40) {
-    const [x0, y0, x1, y1] = box;
-    this.x = (x0 + x1) / 2;
-    const fitting = Math.min((this.width - 2 * margin) / Math.max(x1 - x0, 0.01), (this.height - UNDER - 2 * margin) / Math.max(y1 - y0, 0.01));
-    this.scale = Math.min(MOST, Math.max(1, fitting));
-    this.y = (y0 + y1 - UNDER / this.scale) / 2;
+  // Shows the complete plant, and continues to do so when the window changes.
+  fit() {
+    this._enclose(this.bounds);
     this._changed(true);
+  }
+
+  // Shows a part of the plant. box: least x and y, greatest x and y, m.
+  showBox(box) {
+    this._enclose(box);
+    this._changed();
+  }
+
+  // px: height of what covers the lower edge.
+  coverBelow(px) {
+    if (px === this.under) return;
+    this.under = px;
+    if (this.fitted) this.fit();
+  }
+
+  _enclose([x0, y0, x1, y1]) {
+    const margin = Math.min(MARGIN, 0.1 * Math.min(this.width, this.height));
+    this.x = (x0 + x1) / 2;
+    const fitting = Math.min((this.width - 2 * margin) / Math.max(x1 - x0, 0.01), (this.height - this.under - 2 * margin) / Math.max(y1 - y0, 0.01));
+    this.scale = Math.min(MOST, Math.max(1, fitting));
+    this.y = (y0 + y1 - this.under / this.scale) / 2;
   }
 
   toX(x) {

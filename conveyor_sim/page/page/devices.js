@@ -2,6 +2,7 @@
 
 import { short } from "./dom.js";
 import { outside, placeAt } from "./labels.js";
+import { inside } from "./shapes.js";
 import { stateColour, stateName, stateOf } from "./story.js";
 
 const FOLDERS = {
@@ -10,6 +11,7 @@ const FOLDERS = {
 };
 
 const LONG = 2; // regions with a larger ratio of width to height have their names above or below
+export const CHOSEN = 8; // importance of the name of the selected device
 const SHOWN_BAD = 0.5; // s for which an inspection is lit after a bad bottle
 
 export const deviceOf = (mark) => `${FOLDERS[mark.kind] ?? `${mark.kind}s`}/${mark.name}`;
@@ -57,6 +59,17 @@ export function drawAreas(context, camera, colours, view) {
   }
 }
 
+const across = new WeakMap(); // by mark: place beside the straight belt that it lies on, or null
+
+// Returns the place of a name beside the belt below a mark; null if there is no straight one.
+function acrossBelt({ surfaces }, mark) {
+  if (!across.has(mark)) {
+    const belt = surfaces.find(({ kind, outline }) => kind === "straight" && inside(outline, ...middle(mark.points)));
+    across.set(mark, belt ? placeAt(belt.angle + Math.PI / 2) : null);
+  }
+  return across.get(mark);
+}
+
 // beyond: px by which the drawing exceeds its points.
 function label(view, camera, mark, note, importance, colour, beyond = 0) {
   const [x, y] = middle(mark.points), isLine = mark.points.length === 2, [from, to] = mark.points;
@@ -64,8 +77,9 @@ function label(view, camera, mark, note, importance, colour, beyond = 0) {
   const reach = Math.max(...mark.points.map(far)) * camera.scale;
   const width = Math.max(...mark.points.map((point) => Math.abs(point[0] - x))) * camera.scale;
   const towards = isLine ? placeAt(Math.atan2(to[1] - from[1], to[0] - from[0])) // behind the end of a beam
-    : width > LONG * reach ? [0, -1] : null;
-  view.labels.add(short(mark.name) + note, camera.toX(x), camera.toY(y), { importance, reach: Math.min(reach, 80) + beyond, colour, bold: importance > 5, towards });
+    : width > LONG * reach ? [0, -1] : acrossBelt(view.recording.head, mark);
+  const device = deviceOf(mark);
+  view.labels.add(device, short(mark.name) + note, camera.toX(x), camera.toY(y), { importance: view.device === device ? CHOSEN : importance, reach: Math.min(reach, 80) + beyond, colour, bold: importance > 5, towards });
 }
 
 export function drawLines(context, camera, colours, view) {
@@ -162,6 +176,6 @@ export function drawMovers(context, camera, colours, view) {
     const ends = moverEnds(mover, position), [x, y] = middle(ends), [ax, ay] = mover.along;
     const reach = 4 + 0.5 * camera.scale * Math.max(Math.abs(ends[1][0] - ends[0][0]), Math.abs(ends[1][1] - ends[0][1]));
     const towards = ax || ay ? outside(Math.atan2(ay, ax)) : null; // direction of its motion
-    view.labels.add(short(mover.name.split("/")[1]), camera.toX(x), camera.toY(y), { importance: 4, reach, colour: colours.mover, towards });
+    view.labels.add(mover.name, short(mover.name.split("/")[1]), camera.toX(x), camera.toY(y), { importance: view.device === mover.name ? CHOSEN : 4, reach, colour: colours.mover, towards });
   }
 }

@@ -18,6 +18,7 @@ export class Faceplate {
     this.body = element("div", { class: "plate" });
     this.root = element("section", {}, element("h2", {}, "Device"), this.choice, this.body);
     this.rows = this.alarms = this.groups = [];
+    this.count = element("span", { class: "badge" });
     if (this.devices.length) this.show(this.devices[0]);
   }
 

@@ -25,13 +25,14 @@ function wire(view) {
   byId("speed").addEventListener("change", (event) => clock.setSpeed(+event.target.value));
   const clicks = {
     play: () => clock.toggle(), back: () => clock.step(-1), ahead: () => clock.step(1), fit: () => view.wholePlant(),
-    dismiss: () => say(""), closer: () => camera.zoom(1.5), farther: () => camera.zoom(1 / 1.5),
+    approach: () => view.zoomToSelection(), dismiss: () => say(""), closer: () => camera.zoom(1.5), farther: () => camera.zoom(1 / 1.5),
     to_start: () => { clock.seek(clock.recording.start); view.snap(); },
     theme: () => { document.documentElement.dataset.theme = isDark() ? "light" : "dark"; view.touch(); },
     toggle_trends: () => {
       const hidden = byId("drawer").toggleAttribute("hidden");
       byId("toggle_trends").setAttribute("aria-expanded", !hidden);
     },
+    choices: () => byId("choices").setAttribute("aria-expanded", byId("display").toggleAttribute("data-open")),
   };
   for (const [id, action] of Object.entries(clicks)) byId(id).addEventListener("click", action);
   byId("wear").append(...Object.entries(WEARS).map(([name, { label }]) => element("option", { value: name }, label)));
@@ -43,6 +44,7 @@ function wire(view) {
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => view.touch());
   camera.listen(byId("plan"), (px, py) => view.clicked(px, py), () => view.setFollowing(false));
   listenToKeys(view);
+  if (matchMedia("(max-width: 600px)").matches) byId("toggle_trends").click(); // the plan needs the height
   new ResizeObserver(() => view.resize()).observe(byId("stage"));
   view.setColouring("type");
 }
@@ -61,6 +63,15 @@ async function told(source, part, take) {
     return "";
   } catch (error) {
     return error.message;
+  }
+}
+
+// Returns the tick with the most bottles; the first one if it can't be read.
+async function fullest(source) {
+  try {
+    return await read(source, "fullest");
+  } catch {
+    return 0;
   }
 }
 
@@ -83,7 +94,7 @@ async function readPeaks(view, source, { stretches }) {
 
 // Compares both recordings until the first difference of each kind, then moves to just before the first of all.
 async function compare(view, source, { stretches }) {
-  const untouched = !view.clock.playing && view.clock.time === view.clock.recording.start;
+  const untouched = !view.clock.playing && view.clock.time === view.link.opened;
   for (let part = 0; part < stretches && !view.compare.complete; part++) {
     const before = view.compare.found.length;
     try {
@@ -130,6 +141,7 @@ async function start() {
     view.resize();
     view.receive();
     document.body.dataset.told = "yes";
+    view.link.follow();
     run(view);
   }, { once: true });
 }
@@ -142,6 +154,7 @@ function run(view) {
     if (view.dirty) {
       view.dirty = false;
       view.draw(now);
+      view.link.update();
       document.body.dataset.ready = "yes";
     }
     requestAnimationFrame(loop);
@@ -162,8 +175,11 @@ async function startRecording() {
     warn(failure.text);
     view.clock.seek(Math.max(recording.start, failure.time - 5));
   }
+  const linked = view.link.follow();
+  if (!failure && !linked) view.clock.seek(await fullest(source) * head.tick);
   await Promise.all(view.clock.all.map((one) => one.load(one.number(view.clock.time))));
   view.snap();
+  view.link.opened = linked ? null : view.clock.time;
   run(view);
   // The story of a long recording is read while the page already draws.
   for (let part = 0; parts > 1 && part < parts; part++) {

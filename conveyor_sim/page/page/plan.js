@@ -1,11 +1,12 @@
 // The plan: the line at a moment, drawn in one pass over the canvas.
 
-import { Surfaces } from "./surfaces.js";
+import { Surfaces, parallel } from "./surfaces.js";
 import { COLOURINGS, palette } from "./colours.js";
 import { Crowd, MANY } from "./crowd.js";
-import { drawAreas, drawLines, drawMovers } from "./devices.js";
+import { CHOSEN, drawAreas, drawLines, drawMovers } from "./devices.js";
 import { byId, short } from "./dom.js";
 import { Labels, outside, placeAt } from "./labels.js";
+import { drawSelection, outlinesOf } from "./selection.js";
 import { drawUnderlay } from "./underlay.js";
 
 const WIDTHS = 6; // widths of contact lines
@@ -28,7 +29,7 @@ export class Plan {
 
   // Elements over the plan, which must cover no names.
   cover() {
-    const { left, top } = this.canvas.getBoundingClientRect(), over = byId("stage").querySelectorAll("#legend, #zoom, #news:not(.none), .caption");
+    const { left, top } = this.canvas.getBoundingClientRect(), over = byId("stage").querySelectorAll("#legend, #zoom, #map:not([hidden]), #news:not(.none), .caption");
     this.covered = Array.from(over, (one) => one.getBoundingClientRect()).map((box) => [box.left - left, box.top - top, box.right - left, box.bottom - top]);
     this.said = byId("notice").textContent;
   }
@@ -64,6 +65,7 @@ export class Plan {
     this.surfaces.draw(context, camera, colours, speeds);
     drawAreas(context, camera, colours, view);
     this._rails(colours);
+    if (view.device) drawSelection(context, camera, colours, outlinesOf(view, view.device));
     view.wear.draw(context, camera);
     if (frame) this._bottles(frame, colours);
     if (frame && view.showForces) this._forces(frame, colours);
@@ -104,7 +106,7 @@ export class Plan {
         const { image, half } = this._sprite(this.sprites[bottle.type], colour, radius, colours.edge, crossed);
         if (!crowd?.add(image, (x - half) * ratio, (y - half) * ratio)) context.drawImage(image, x - half, y - half, 2 * half, 2 * half);
       } else this._circle(context, x, y, radius, colour, colours.edge, crossed);
-      if (radius > 16) this.labels.add(`${bottle.id}`, x, y - radius - 4, { importance: 1, reach: -11 });
+      if (radius > 16) this.labels.add(`number ${bottle.id}`, `${bottle.id}`, x, y - radius - 4, { importance: 1, reach: -11 });
     }
     crowd?.draw(context, camera.width, camera.height);
   }
@@ -179,12 +181,22 @@ export class Plan {
       const [x, y] = belt.kind === "straight"
         ? [0, 1].map((k) => (belt.outline[0][k] + belt.outline[2][k]) / 2)
         : [belt.centre[0] + radius * Math.cos(angle), belt.centre[1] + radius * Math.sin(angle)];
+      const beside = head.surfaces.filter((other) => other === belt || parallel(other, belt)).map((other) => this._across(belt, other));
       const towards = belt.kind === "straight" ? placeAt(belt.angle + Math.PI / 2) : outside(angle);
-      this.labels.add(`${short(belt.name)} ${speeds[i].toFixed(2)} m/s`, camera.toX(x), camera.toY(y), {
-        importance: 2, reach: Math.min(60, 0.5 * belt.width * camera.scale), colour: colours.muted,
+      const device = `belts/${belt.name}`;
+      this.labels.add(device, `${short(belt.name)} ${speeds[i].toFixed(2)} m/s`, camera.toX(x), camera.toY(y), {
+        importance: this.view.device === device ? CHOSEN : 3, reach: Math.min(60, Math.max(...beside) * camera.scale), colour: colours.muted,
         towards,
       });
     });
+  }
+
+  // Returns the distance of the far edge of a parallel surface from the middle of a belt, m.
+  _across(belt, other) {
+    const apart = belt.kind === "straight"
+      ? (other.corner[1] - belt.corner[1]) * Math.cos(belt.angle) - (other.corner[0] - belt.corner[0]) * Math.sin(belt.angle)
+      : other.inner - belt.inner;
+    return Math.max(Math.abs(apart - belt.width / 2), Math.abs(apart + other.width - belt.width / 2));
   }
 
   _selected(frame, colours) {
@@ -203,7 +215,7 @@ export class Plan {
     context.arc(camera.toX(bottle.x), camera.toY(bottle.y), radius + 4, 0, 2 * Math.PI);
     context.lineWidth = 3;
     context.stroke();
-    this.labels.add(`bottle ${bottle.id}`, camera.toX(bottle.x), camera.toY(bottle.y), { importance: 9, reach: radius + 4, colour: colours.select, bold: true });
+    this.labels.add("bottle", `bottle ${bottle.id}`, camera.toX(bottle.x), camera.toY(bottle.y), { importance: 9, reach: radius + 4, colour: colours.select, bold: true });
   }
 
   // Returns the bottle, or else the device, at a point of the canvas.

@@ -1,4 +1,4 @@
-// Sources of the page's data, bytes by name ("head", "story", "block/0"): the page itself, or a server.
+// Sources of the page's data, bytes by name ("head", "fullest", "story/0", "block/0"): the page itself, or a server.
 
 import { byId, say, warn } from "./dom.js";
 

@@ -4,6 +4,8 @@ export class Surfaces {
   constructor(surfaces) {
     this.surfaces = surfaces;
     this.gone = surfaces.map(() => 0); // distance that each drawn surface has moved, m
+    // Of parallel surfaces of one belt, only the one with its name has arrows.
+    this.plain = surfaces.map((one) => !one.named && surfaces.some((other) => other.named && parallel(one, other)));
   }
 
   // speeds: of the belt of each surface, m/s; seconds: simulated time since the last frame.
@@ -23,10 +25,11 @@ export class Surfaces {
       context.lineWidth = 1;
       context.strokeStyle = colours.beltEdge;
       context.stroke();
-      if (surface.belt !== null && seen(surface, camera)) this._texture(context, camera, colours, surface, this.gone[i], speeds[i] ?? 0);
+      if (surface.belt !== null && seen(surface, camera)) this._texture(context, camera, colours, surface, this.gone[i], this.plain[i] ? null : speeds[i] ?? 0);
     });
   }
 
+  // speed: null without arrows.
   _texture(context, camera, colours, surface, gone, speed) {
     const pitch = slatPitch(camera.scale), length = lengthOf(surface);
     if (pitch) {
@@ -40,7 +43,7 @@ export class Surfaces {
     }
     const size = Math.min(0.5 * surface.width, 16 / camera.scale), rows = Math.min(6, Math.max(1, Math.round(surface.width / (6 * size))));
     const spacing = Math.max(5 * size, 70 / camera.scale), sign = Math.sign(speed) || 1;
-    if (size * camera.scale < 3) return;
+    if (speed === null || size * camera.scale < 3) return;
     context.beginPath();
     for (let row = 0; row < rows; row++) {
       const middle = ((row + 0.5) / rows) * surface.width;
@@ -58,6 +61,15 @@ export class Surfaces {
     context.stroke();
     context.globalAlpha = 1;
   }
+}
+
+// Returns true if two surfaces of a belt move side by side.
+export function parallel(one, other) {
+  if (one.name !== other.name || one.kind !== other.kind) return false;
+  const same = (a, b) => Math.abs(a - b) < 1e-6, cos = Math.cos(one.angle), sin = Math.sin(one.angle);
+  if (one.kind !== "straight") return [0, 1].every((k) => same(one.centre[k], other.centre[k])) && same(one.start, other.start) && same(one.span, other.span);
+  const along = ({ corner }) => corner[0] * cos + corner[1] * sin;
+  return same(one.angle, other.angle) && same(one.length, other.length) && same(along(one), along(other));
 }
 
 const mod = (a, b) => ((a % b) + b) % b;

@@ -10,22 +10,26 @@ import { Clock } from "./clock.js";
 import { COLOURINGS, SCALES, colourings } from "./colours.js";
 import { Compare } from "./compare.js";
 import { Desk } from "./desk.js";
-import { deviceOf, middle } from "./devices.js";
+import { deviceOf } from "./devices.js";
 import { byId, element, expire, keyOf, say, seconds, warn } from "./dom.js";
 import { Events } from "./events.js";
 import { Failure } from "./failure.js";
 import { Faceplate } from "./faceplate.js";
+import { Link } from "./link.js";
 import { LiveClock } from "./live_clock.js";
+import { Minimap } from "./minimap.js";
 import { Plan } from "./plan.js";
 import { Scrubber } from "./scrubber.js";
-import { awayFrom, boundsOf, inside } from "./shapes.js";
+import { boxOf, deviceAt, outlinesOf } from "./selection.js";
 import { Series } from "./series.js";
+import { boundsOf } from "./shapes.js";
 import { Tabs } from "./tabs.js";
 import { Tiles } from "./tiles.js";
 import { Trends } from "./trends.js";
 import { Watch } from "./watch.js";
 import { NO_WEAR, WEARS, Wear } from "./wear.js";
 
+const PLANT_SCALE = 5; // px, radius of the largest bottles below which a click selects devices rather than bottles
 const MEASURED = 5000; // forces of a block from which the scale is made
 const MOST_EVENTS = 5000; // events of a running line; beyond that, events before the visible time are dropped
 const PANELS_EVERY = 120; // ms between two updates of the panels during playback
@@ -34,7 +38,7 @@ export class View {
   // other: a second recording that is shown beside the first, and its story; else null. line: of a running line, its
   // message "begin"; else null.
   constructor(recording, story, other, line = null, about = null) {
-    Object.assign(this, { recording, story, line, bottle: null, following: false, colouring: "type", shownWear: "", showForces: true, showNames: true, dirty: true });
+    Object.assign(this, { recording, story, line, bottle: null, device: null, following: false, colouring: "type", shownWear: "", showForces: true, showNames: true, dirty: true });
     this.rival = null; // the other view
     this.letter = ""; // A, if two recordings are shown side by side
     this.fastest = 0.1;
@@ -47,6 +51,7 @@ export class View {
     this.camera = new Camera(boundsOf([recording, other?.recording]));
     this.series = new Series(this);
     this.wear = new Wear(this);
+    this.minimap = new Minimap(this);
     this.plan = new Plan(byId("plan"), this);
     this.plans = [this.plan];
     if (other) {
@@ -73,6 +78,7 @@ export class View {
       one.addEventListener("loaded", () => this._loaded());
       one.addEventListener("failed", (event) => warn(event.detail));
     }
+    this.link = new Link(this);
     this.snapping = false;
   }
 
@@ -185,11 +191,10 @@ export class View {
     this.clock.pause();
     this.clock.seek(time);
     if (bottle >= 0) this.selectBottle(bottle, false);
-    const mark = this.recording.head.marks.find((other) => tag && (tag === deviceOf(other) || tag.startsWith(`${deviceOf(other)}/`)));
-    if (!mark) return;
-    this.setFollowing(false);
-    this.camera.show(...middle(mark.points));
-    this.faceplate.show(deviceOf(mark));
+    const { marks, movers, surfaces } = this.recording.head;
+    const devices = [...marks.map(deviceOf), ...movers.map(({ name }) => name), ...surfaces.map(({ name }) => `belts/${name}`)];
+    const device = devices.find((name) => tag && (tag === name || tag.startsWith(`${name}/`)));
+    if (device) this.selectDevice(device);
   }
 
   nextMark(by) {
@@ -213,11 +218,34 @@ export class View {
     if (ids.length) this.selectBottle(ids[(place < 0 ? (by > 0 ? 0 : ids.length - 1) : place + by + ids.length) % ids.length]);
   }
 
+  // Shows the faceplate of a device and its outline on the plan, moved to it if needed.
   selectDevice(name) {
+    this.device = name;
     this.faceplate.show(name);
-    const mark = this.recording.head.marks.find((other) => deviceOf(other) === name);
-    if (mark) this.camera.show(...middle(mark.points));
+    const box = boxOf(outlinesOf(this, name));
+    if (box) {
+      this.setFollowing(false);
+      this.camera.show((box[0] + box[2]) / 2, (box[1] + box[3]) / 2);
+    }
+    byId("said").textContent = `${name} selected`;
     this.touch();
+  }
+
+  // Zooms to the selected device, else to the selected bottle.
+  zoomToSelection() {
+    const box = boxOf(this.device ? outlinesOf(this, this.device) : this._bottleOutline());
+    if (!box) {
+      say("Select a device or a bottle first.");
+      return;
+    }
+    this.setFollowing(false);
+    this.camera.showBox(box);
+  }
+
+  // Returns the place of the selected bottle as a list of outlines.
+  _bottleOutline() {
+    const bottle = this.plan.frame?.bottles.find(({ id }) => id === this.bottle);
+    return bottle ? [[[bottle.x, bottle.y]]] : [];
   }
 
   setFollowing(on) {
@@ -227,6 +255,7 @@ export class View {
 
   letGo() {
     this.setFollowing(false);
+    this.device = null;
     this.selectBottle(null, false);
   }
 
@@ -262,27 +291,38 @@ export class View {
     else if (shown) entries.push(element("span", { class: "entry" }, `no ${shown} on rails`));
     if (lines) entries.push(element("span", { class: "entry" }, "contacts 0 ", element("span", { class: "wedge" }), ` ${+this.strongest.toPrecision(2)} N`));
     byId("legend").replaceChildren(...entries);
+    this._coverBelow();
+    this._cover();
+  }
+
+  // The legend and the buttons cover a part of the lower edge.
+  _coverBelow() {
+    this.camera.coverBelow(Math.max(byId("legend").offsetHeight, byId("zoom").offsetHeight));
+  }
+
+  // Names on the plan move aside from what covers it.
+  _cover() {
     for (const plan of this.plans) plan.cover();
-    this.touch(); // names move aside
+    this.touch();
   }
 
   clicked(px, py, plan = this.plan) {
-    const bottle = plan.bottleAt(px, py), { head } = plan.view.recording;
+    const device = deviceAt(plan.view, ...this.camera.at(px, py)), { types } = plan.view.recording.head;
+    const small = Math.max(...types.map(({ radius }) => radius)) * this.camera.scale < PLANT_SCALE;
+    const bottle = small && device ? null : plan.bottleAt(px, py);
     if (bottle !== null) {
       this.selectBottle(bottle);
       return;
     }
-    const [x, y] = this.camera.at(px, py), near = 12 / this.camera.scale;
-    const mark = head.marks.find(({ points }) => inside(points, x, y) || points.some((point, k) => awayFrom(point, points[(k + 1) % points.length], x, y) < near));
-    const surface = mark ? null : [...head.surfaces].reverse().find(({ outline }) => inside(outline, x, y));
-    const device = mark ? deviceOf(mark) : surface?.name ? `belts/${surface.name}` : null;
-    if (device) {
-      this.faceplate.show(device);
-      this.tabs.show("device");
-    }
+    if (!device) return;
+    this.selectDevice(device);
+    this.tabs.show("device");
   }
 
   resize() {
+    const { clientWidth, clientHeight } = byId("stage");
+    this.minimap.resize(clientWidth, clientHeight);
+    this._coverBelow();
     this.beside?.resize();
     this.plan.resize();
     this.touch();
@@ -293,6 +333,7 @@ export class View {
     this._follow();
     for (const plan of this.plans) plan.draw();
     this._legend();
+    if (this.minimap.draw(this.device ? outlinesOf(this, this.device) : [])) this._cover();
     this.beside?.draw();
     this.scrubber.draw();
     const { clock, camera } = this, play = byId("play");
