@@ -55,7 +55,7 @@ class DeviceCounter:
         self.before = self._counts()
         self.ticks = dict.fromkeys(CATEGORIES, 0) if machine is None else machine.time.up_to(tick)
         self.set_work = 0.0 if machine is None else machine.time.set_work_up_to(tick)
-        self.begun = 0.0 if machine is None else machine.begun_part
+        self.begun = 0.0 if machine is None or self._counts_starts else machine.begun_part
 
     def counted(self) -> tuple[int, int, int, int]:
         """Return bottles processed, defective and rejected, and failures, since the reset."""
