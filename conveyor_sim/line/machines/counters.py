@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import fields, replace
-from typing import Any
+from dataclasses import fields
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -22,6 +22,23 @@ RESET_COUNTERS = "reset_counters"
 
 TEXTS = ("name", "category", "stop_reason")
 """Columns that hold texts."""
+
+
+class Interval(NamedTuple):
+    """Sums of one device over an interval."""
+
+    counted: tuple[int, int, int, int]
+    """Bottles processed, defective and rejected, and failures."""
+    cycles: float
+    """Completed cycles. Of one that had begun before the interval: the part within it."""
+    set_cycles: float
+    """Cycles at the set rate in the time running."""
+    times: Mapping[str, float]
+    """Time by category, s."""
+    nominal: float
+    """Nominal rate, 1/s; NaN without one."""
+    reference: float
+    """Fastest permitted rate, 1/s; NaN without one."""
 
 
 class DeviceCounter:
@@ -92,16 +109,17 @@ class DeviceCounter:
         """Fastest permitted rate, 1/s; NaN without one."""
         return math.nan if self._machine is None else self._machine.reference_rate
 
+    def interval(self, tick: int, length: float) -> Interval:
+        """Return all sums since the reset. length: of a tick, s."""
+        set_cycles, times = self.set_cycles(tick, length), self.times(tick, length)
+        return Interval(self.counted(), self.cycles(), set_cycles, times, self.nominal, self.reference)
+
     def row(self, tick: int, length: float) -> dict[str, Any]:
         """Return the entry of CounterColumns, by field."""
         category = reason = ""
         if self._machine is not None:
             category, reason = self._machine.category, self._reasons[self._machine.reason]
-        processed, defective, _, failures = self.counted()
-        set_cycles, good = self.set_cycles(tick, length), processed - defective
-        work = Work(self.cycles(), set_cycles, self.reference, good, processed, failures)
-        times, texts = self.times(tick, length), (category, reason)
-        return _row(self._device.name, self.since, self.counted(), times, self.nominal, work, *texts)
+        return counter_row(self._device.name, self.since, self.interval(tick, length), category, reason)
 
     def _counts(self) -> tuple[int, int, int, int]:
         bottles = self._device.counts()
@@ -192,39 +210,11 @@ class ProductionCounters:
         if not self._devices:
             return None
         rows = [counter.row(tick, length) for counter in self._devices.values()]
-        rows.append(self._line_row(tick, length))
+        slowest = [counter.interval(tick, length) for counter in self._slowest.values()]
+        rows.append(line_row(self.line.since, self.line.counted(), slowest, self._counts_starts))
         columns: dict[str, Any] = {name: np.array([row[name] for row in rows]) for name in rows[0]}
         columns |= {name: tuple(row[name] for row in rows) for name in TEXTS}
         return CounterColumns(**columns, bottleneck=tuple(self._slowest))
-
-    def _line_row(self, tick: int, length: float) -> dict[str, Any]:
-        """Return the row of the line: its bottles; times, failures and cycles of the machines of the bottleneck.
-
-        Each machine counts by its share of their fastest permitted rate.
-        """
-        slowest = list(self._slowest.values())
-        left, defective, rejected = self.line.counted()
-        reference = sum(counter.reference for counter in slowest) if slowest else math.nan
-        nominal = sum(counter.nominal for counter in slowest) if slowest else math.nan
-        times: dict[str, float] = dict.fromkeys(CATEGORIES, 0.0)
-        for counter in slowest:
-            for category, time in counter.times(tick, length).items():
-                times[category] += time * (counter.reference / reference)
-        failures = sum(counter.counted()[3] for counter in slowest)
-        work = Work(
-            sum(counter.cycles() for counter in slowest),
-            sum(counter.set_cycles(tick, length) for counter in slowest) if slowest else math.nan,
-            reference,
-            left - defective,
-            left + rejected,
-            failures / (len(slowest) or 1),
-        )
-        counted = left, defective, rejected, failures
-        if self._counts_starts:  # as in recordings before format 3
-            each = [counter.times(tick, length) for counter in slowest]
-            times = {name: sum(time[name] for time in each) / (len(each) or 1) for name in times}
-            work = replace(work, cycles=left, made=left)
-        return _row(LINE, self.line.since, counted, times, nominal, work)
 
 
 def bottleneck(machines: Sequence[MachineDevice]) -> list[MachineDevice]:
@@ -247,6 +237,37 @@ def nominal_rate(machine: MachineDevice) -> float:
 
 def _adds(device: Device, role: Adds) -> bool:
     return any(tag.adds_to == role for tag in device.tags)
+
+
+def line_row(
+    since: int, counted: tuple[int, int, int], slowest: Sequence[Interval], counts_starts: bool = False
+) -> dict[str, Any]:
+    """Return the row of the line: its bottles; times, failures and cycles of the machines of the bottleneck.
+
+    Each machine counts by its share of their fastest permitted rate. counted: bottles that left, defective ones among
+    them, and rejected ones. counts_starts: `Scene.counts_starts`.
+    """
+    left, defective, rejected = counted
+    reference = sum(each.reference for each in slowest) if slowest else math.nan
+    times: dict[str, float] = dict.fromkeys(CATEGORIES, 0.0)
+    for each in slowest:
+        for category, time in each.times.items():
+            times[category] += time * (1.0 / len(slowest) if counts_starts else each.reference / reference)
+    failures = sum(each.counted[3] for each in slowest)
+    cycles = float(left) if counts_starts else sum(each.cycles for each in slowest)
+    made = left if counts_starts else left + rejected
+    set_cycles = sum(each.set_cycles for each in slowest) if slowest else math.nan
+    work = Work(cycles, set_cycles, reference, left - defective, made, failures / (len(slowest) or 1))
+    nominal = sum(each.nominal for each in slowest) if slowest else math.nan
+    return _row(LINE, since, (left, defective, rejected, failures), times, nominal, work)
+
+
+def counter_row(name: str, since: int, interval: Interval, category: str, stop_reason: str) -> dict[str, Any]:
+    """Return the row of one device, as an entry of CounterColumns by field."""
+    processed, defective, _, failures = interval.counted
+    good = processed - defective
+    work = Work(interval.cycles, interval.set_cycles, interval.reference, good, processed, failures)
+    return _row(name, since, interval.counted, interval.times, interval.nominal, work, category, stop_reason)
 
 
 def _row(
