@@ -38,21 +38,26 @@ autodoc_typehints = "signature"
 autodoc_default_options = {"members": True, "undoc-members": True}
 default_role = "code"  # docstrings are Markdown in this
 
+PARTS = sorted(page.stem for page in ROOT.glob("docs/parts/*.md"))
+MEASURED = sorted(page.stem for page in ROOT.glob("docs/performance/*.md"))
 STUDIES = sorted(ROOT.glob("docs/accuracy/*/tables.md"))
 NAVIGATION = {
     "README": {
-        "First steps": [
-            *("docs/build_a_line", "docs/testing_control_logic", "docs/structured_text", "docs/ros"),
-            *("docs/scada", "docs/opcua", "docs/plc"),
+        "Tutorials": ["docs/build_a_line", "docs/tutorial_plc", "docs/tutorial_scada", "docs/tutorial_ros"],
+        "Control and protocols": [
+            *("docs/testing_control_logic", "docs/structured_text", "docs/plc"),
+            *("docs/scada", "docs/opcua", "docs/ros"),
         ],
         "A line": [
-            *("docs/scene", "docs/layout", "docs/conveyors", "docs/placement", "docs/check", "docs/line"),
+            *("docs/index", "docs/scene", "docs/layout", "docs/conveyors", "docs/placement", "docs/check", "docs/line"),
             *("docs/alarms", "docs/report", "docs/studies", "docs/view", "docs/drawings"),
             *("docs/effects", "docs/base", "docs/energy_and_damage", "docs/glossary"),
         ],
         "What to rely on": ["docs/accuracy", "docs/stability", "docs/reliability", "docs/performance", "docs/paper"],
         "Inside": ["docs/architecture", "docs/extending", "docs/api/index", "CONTRIBUTING", "CHANGELOG"],
     },
+    "docs/scene": {"Parts": [f"parts/{page}" for page in PARTS]},
+    "docs/performance": {"Tables": [*(f"performance/{page}" for page in MEASURED), "studies/performance_history"]},
     "docs/accuracy": {"Tables": ["accuracy/promises", *(f"accuracy/{page.parent.name}/tables" for page in STUDIES)]},
     "docs/stability": {"Tables": ["stability/cases", "stability/fuzz"]},
     "docs/api/index": {"Modules": ["simulation", "observations", "testing", "control", "recordings", "errors"]},

@@ -92,7 +92,7 @@ def test_package_xml_names_every_ros_package_that_is_imported() -> None:
             names += [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
             imported |= {name.partition(".")[0] for name in names}
     ros = {name for name in imported if name.endswith(("_msgs", "_srvs", "_interfaces")) or name.startswith("launch")}
-    assert ros | {"rclpy"} <= declared | {"simulation_interfaces"}  # served only where it is installed
+    assert ros | {"rclpy"} <= declared
 
 
 def set_up_module() -> Any:
@@ -185,13 +185,29 @@ def test_launch_file_hands_the_node_parameters_that_it_has() -> None:
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
-    entities = module.generate_launch_description().entities
+    *entities, opaque = module.generate_launch_description().entities
     arguments = {entity.name: entity for entity in entities if isinstance(entity, launch.DeclareLaunchArgument)}
-    assert set(arguments) - {entry.name for entry in TABLE} == {"controller"}
+    assert set(arguments) - {entry.name for entry in TABLE} == {"namespace", "params_file", "controller", "rviz"}
     assert all(argument.description for argument in arguments.values())
     node = {entry.name: (type(entry.default), str(entry.default).lower()) for entry in TABLE}
     for name, default, kind, _ in module.SIMULATION_ARGUMENTS:
         assert (kind, default) == node[name]
+
+    def names(**given: str) -> list[str]:
+        """Full names of the nodes that are started."""
+        context = importlib.import_module("launch").LaunchContext()
+        values = {name: "" for name, _, _, _ in module.SIMULATION_ARGUMENTS}
+        values |= {name: default for name, default, _, _ in module.LAUNCH_ARGUMENTS}
+        context.launch_configurations.update(values | given)
+        nodes = [one for one in opaque.execute(context) if isinstance(one, launch.ExecuteProcess)]
+        for one in nodes:
+            one._perform_substitutions(context)  # launch does this when it starts a node
+        return [one.node_name for one in nodes]
+
+    assert names() == ["/conveyor_sim"]
+    assert names(namespace="cell_1", controller="true") == ["/cell_1/conveyor_sim", "/cell_1/controller"]
+    with pytest.raises(FileNotFoundError, match=stating("params_file", "'nowhere.yaml' given")):
+        names(params_file="nowhere.yaml")
 
 
 @pytest.fixture

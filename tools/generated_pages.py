@@ -19,15 +19,18 @@ DOCS = ROOT / "docs"
 
 def pages() -> Iterator[tuple[Path, str]]:
     """Each page, and its text as it should be."""
-    for name, package in (("scene", "scene"), ("effects", "physics.effects")):
-        yield DOCS / f"{name}.md", importlib.import_module(f"conveyor_sim.{package}.reference").reference()
+    yield DOCS / "effects.md", importlib.import_module("conveyor_sim.physics.effects.reference").reference()
     sys.path[:0] = [str(DOCS / "studies"), str(ROOT / "test"), str(ROOT / "tools")]
     rules = importlib.import_module("import_rules")
     yield rules.PAGE, rules.page(rules.PAGE.read_text(encoding="utf-8"))
     with_parts = importlib.import_module("page_parts").with_parts
-    for package, name in (("bag.messages", "ros"), ("line", "line")):
-        tables, page = importlib.import_module(f"conveyor_sim.{package}.reference").tables(), DOCS / f"{name}.md"
-        yield page, with_parts(page, page.read_text(encoding="utf-8"), tables)
+    tables: dict[str, dict[str, str]] = {}
+    for package in ("bag.messages", "line", "scene"):
+        for name, parts in importlib.import_module(f"conveyor_sim.{package}.reference").tables().items():
+            tables[name] = {**tables.get(name, {}), **parts}
+    for name, parts in tables.items():
+        page = DOCS / f"{name}.md"
+        yield page, with_parts(page, page.read_text(encoding="utf-8"), parts)
     accuracy, promises, stability = (importlib.import_module(name) for name in ("accuracy", "promises", "stability"))
     text = (DOCS / "accuracy.md").read_text(encoding="utf-8")
     yield DOCS / "accuracy.md", accuracy.page(text)

@@ -1,4 +1,4 @@
-"""Tables of tags in docs/line.md, generated from a scene with one device of each kind."""
+"""Tables of tags in docs/line.md and docs/parts/, generated from a scene with one device of each kind."""
 
 from collections.abc import Iterator
 
@@ -49,31 +49,33 @@ indicators: {i: {counter: c, zone: z, belt: b, backup: z, jam_time: 5}}
 """
 """Scene with one device of each kind, and all its optional features."""
 
-SECTIONS = {
-    "belts": ("belts",),
-    "drives": ("drives",),
-    "feeds": ("infeeds", "outfeeds"),
-    "machines": ("machines",),
-    "movers": ("gates", "pushers", "diverters"),
-    "spills": ("spills",),
-    "photo_eyes": ("photo_eyes",),
-    "zones": ("zones",),
-    "counters": ("counters",),
-    "indicators": ("indicators",),
-    "alarms": ("alarm_counts", "alarms"),
-    "run": ("run",),
+PAGES: dict[str, dict[str, tuple[str, ...]]] = {
+    "parts/belts": {"belts": ("belts", "drives")},
+    "parts/infeeds": {"feeds": ("infeeds", "outfeeds"), "spills": ("spills",)},
+    "parts/machines": {"machines": ("machines",)},
+    "parts/movers": {"movers": ("gates", "pushers", "diverters")},
+    "parts/photo_eyes": {"photo_eyes": ("photo_eyes",)},
+    "parts/zones": {"zones": ("zones",), "counters": ("counters",)},
+    "parts/indicators": {"indicators": ("indicators",)},
+    "parts/alarms": {"alarms": ("alarm_counts", "alarms")},
+    "line": {"run": ("run",)},
 }
-"""Fields of a scene whose devices a section of the page lists, by section."""
+"""Fields of a scene whose devices a table of tags lists, by page of docs/ and name of the table."""
 
 
-def tables() -> dict[str, str]:
-    """Return the tables, by the name of their section of the page."""
+def tables() -> dict[str, dict[str, str]]:
+    """Return the tables by their names; pages by their path in docs/ without suffix."""
     tags = image_of(parse_scene(EVERYTHING)).tags
-    sections = {
-        section: "\n".join(_rows([tag for tag in tags if tag.name.split("/")[0] in fields]))
-        for section, fields in SECTIONS.items()
+    pages = {
+        page: {
+            name: "\n".join(_rows([tag for tag in tags if tag.name.split("/")[0] in fields]))
+            for name, fields in sections.items()
+        }
+        for page, sections in PAGES.items()
     }
-    return {"authority": "\n".join(_rights()), "weihenstephan": "\n".join(_data_points()), **sections}
+    pages["line"]["authority"] = "\n".join(_rights())
+    pages["parts/data_points"] = {"weihenstephan": "\n".join(_data_points())}
+    return pages
 
 
 def _rights() -> Iterator[str]:
@@ -92,12 +94,18 @@ def _data_points() -> Iterator[str]:
 
 
 def _rows(tags: list[Tag]) -> Iterator[str]:
+    """Yield the rows of a table. Tags of several devices that differ in the device only share a row."""
     yield "| tag | role | kind, unit | initial | meaning |"
     yield "|---|---|---|---|---|"
+    names: dict[str, list[str]] = {}
     for tag in tags:
         kind = tag.kind if tag.unit == "1" else tag.unit
         texts = f" {tag.listed_texts}." if tag.texts else ""
-        yield f"| `{_pattern(tag)}` | {tag.role} | {kind} | {tag.initial:g} | {tag.description}{texts} |"
+        signal = tag.name.rpartition("/")[2]
+        row = f"{tag.role} | {kind} | {tag.initial:g} | {tag.description}{texts} |"
+        names.setdefault(f"{signal} | {row}", []).append(f"`{_pattern(tag)}`")
+    for key, named in names.items():
+        yield f"| {', '.join(named)} | {key.partition(' | ')[2]}"
 
 
 def _pattern(tag: Tag) -> str:

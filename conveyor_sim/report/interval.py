@@ -18,7 +18,7 @@ from conveyor_sim.bag.messages.encode import to_image
 from conveyor_sim.bag.reader import Bag, Frame
 from conveyor_sim.columns.counters import CounterColumns
 from conveyor_sim.line.commands.inputs import SET
-from conveyor_sim.line.machines.counters import TEXTS, Interval, counter_row, line_row
+from conveyor_sim.line.machines.counter_rows import TEXTS, DeviceSums, counter_row, line_row
 from conveyor_sim.line.machines.efficiency import CATEGORIES
 from conveyor_sim.report.periods import Period
 from conveyor_sim.report.span import Span
@@ -72,7 +72,7 @@ def counters_within(
         set_cycles = _at_set_rate(ran, rates[name], math.inf) if name in rates else 0.0
         numbers = tuple(counted[row].tolist())
         rated = float(last.rate[row]), float(last.rate_limit[row])
-        intervals[name] = Interval(numbers, cycles, set_cycles, times, *rated)
+        intervals[name] = DeviceSums(numbers, cycles, set_cycles, times, *rated)
     rows = [
         counter_row(name, span.start, intervals[name], last.category[row], last.stop_reason[row])
         for row, name in enumerate(names[:-1])

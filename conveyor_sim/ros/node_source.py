@@ -10,9 +10,10 @@ from contextlib import AbstractContextManager
 from functools import partial
 from typing import Any
 
-from conveyor_msgs import srv
+from conveyor_msgs.srv import Operate
 from rclpy.context import Context
 from rclpy.task import Future
+from simulation_interfaces import srv
 from std_srvs.srv import Trigger
 
 from conveyor_sim.bag.messages.encode import LINE
@@ -67,7 +68,7 @@ class NodeSource(LineMirror, AbstractContextManager["NodeSource"]):
                 for name in (*STATE_TOPICS, *(DRAWING_TOPICS if drawn else ()))
             }
             self._alive_client = self._node.create_client(srv.GetSimulationState, of_simulation("get_simulation_state"))
-            self._operate = self._node.create_client(srv.Operate, of_simulation("operate"))
+            self._operate = self._node.create_client(Operate, of_simulation("operate"))
             self._services: dict[str, Any] = {
                 "pause": self._node.create_client(Trigger, of_simulation("pause")),
                 "resume": self._node.create_client(Trigger, of_simulation("resume")),
@@ -103,7 +104,7 @@ class NodeSource(LineMirror, AbstractContextManager["NodeSource"]):
                 self._refusals.append(Event(int(answer.tick), "command_refused", name, -1, value, answer.reason))
                 self._waiting.wake()
 
-        request = srv.Operate.Request(
+        request = Operate.Request(
             writer=command.writer,
             writer_kind=command.writer_kind,
             operation=command.operation,

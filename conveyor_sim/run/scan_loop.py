@@ -185,7 +185,7 @@ class ScanLoop:
             self.scan(Inputs(signals, simulation.time, simulation.tick, simulation.scene.tick))
         except ControlError as error:
             raise ConveyorError(f"at {simulation.time:.2f} s: {error}") from error
-        except Exception as error:  # of the user's Python code
+        except (Exception, SystemExit) as error:  # of the user's Python code
             raise ConveyorError(f"at {simulation.time:.2f} s: controller: {located(error)}") from error
 
     def before_tick(self, outputs: OutputWriter | None) -> None:

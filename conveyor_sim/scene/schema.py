@@ -1,6 +1,6 @@
 """The scene: a user's description of a line, typed. SI units, angles in rad.
 
-A scene is read with `load_scene`; `docs/scene.md` is generated from the fields below.
+A scene is read with `load_scene`; tables in `docs/scene.md` and `docs/parts/` are generated from the fields below.
 """
 
 from collections.abc import Iterator, Mapping

@@ -14,7 +14,7 @@ DOCUMENTED = Path(__file__).parents[2] / "config" / "ros" / "params.yaml"
 
 
 def test_the_documented_file_holds_every_default() -> None:
-    documented = parameter_dict_from_yaml_file(str(DOCUMENTED), target_nodes=["conveyor_sim"])
+    documented = parameter_dict_from_yaml_file(str(DOCUMENTED), target_nodes=["/**/conveyor_sim"])
     values = {name: Parameter.from_parameter_msg(message).value for name, message in documented.items()}
     assert values == {entry.name: entry.default for entry in TABLE}
 

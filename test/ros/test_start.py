@@ -10,10 +10,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from conveyor_msgs.msg import SimulationState
-from conveyor_msgs.srv import SetSimulationState
 from ros.conftest import SMALL_LINE
 from ros.line_client import LineClient, until
+from simulation_interfaces.msg import SimulationState
+from simulation_interfaces.srv import SetSimulationState
 
 from conveyor_sim.ros.child import Child
 

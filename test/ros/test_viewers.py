@@ -21,8 +21,9 @@ DISPLAYS = {
 def test_rviz_is_shown_topics_of_its_displays_types_with_a_quality_of_service_that_fits() -> None:
     manager = YAML(typ="safe").load(VIEWERS / "line.rviz")["Visualization Manager"]
     assert manager["Global Options"]["Fixed Frame"] == "world"
-    assert len(manager["Displays"]) == 3
-    for display in manager["Displays"]:
+    *displays, frames = manager["Displays"]
+    assert (len(displays), frames["Class"]) == (3, "rviz_default_plugins/TF")
+    for display in displays:
         asked = display["Topic"]
         topic = TOPICS[asked["Value"].removeprefix("/")]
         assert topic.type == DISPLAYS[display["Class"]]

@@ -1,16 +1,14 @@
 """The reference of the scene file is what the schema says, and says all that is needed."""
 
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 from pydantic import BaseModel
 
 from conveyor_sim.scene.part import Part
-from conveyor_sim.scene.reference import sections
+from conveyor_sim.scene.reference import sections, tables
 from conveyor_sim.scene.words import expectation, field_names, unit_of
 
-DOCS = Path(__file__).parents[2] / "docs" / "scene.md"
 MODELS = [model for _, model in sections()]
 
 
@@ -38,3 +36,8 @@ def test_every_field_says_what_it_is_what_it_takes_and_in_which_unit(model: type
         words = ("number", "an angle", "points [", "a point [", "a velocity [", "ranges [", "corners [")
         numeric = any(word in takes for word in words)
         assert bool(unit_of(field)) == numeric, name
+
+
+def test_every_section_is_on_one_page() -> None:
+    headings = [line for page in tables().values() for text in page.values() for line in text.splitlines()]
+    assert [title for title, _ in sections() if headings.count(f"### {title}") != 1] == []

@@ -33,6 +33,10 @@ def test_without_a_controller_the_queue_presses_as_it_says(tmp_path: Path) -> No
         assert plant.simulation.contacts().normal_force.max() == pytest.approx(float(newtons), rel=0.02)
 
 
+def test_the_example_is_the_scene_of_the_page() -> None:
+    assert (Path(__file__).parents[2] / "examples" / "my_line.yaml").read_text() == BLOCKS["my_line.yaml"]
+
+
 def test_the_scene_passes_its_check(tmp_path: Path) -> None:
     (tmp_path / "my_line.yaml").write_text(f"# my_line.yaml\n{BLOCKS['my_line.yaml']}")
     done = run(["-c", "from conveyor_sim.cli import main; main()", "check", "my_line.yaml"], cwd=tmp_path)

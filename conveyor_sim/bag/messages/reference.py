@@ -7,11 +7,11 @@ from conveyor_sim.bag.messages.topics import TOPICS, Topic
 from conveyor_sim.scene.schema import Outputs
 
 
-def tables() -> dict[str, str]:
-    """Return the tables by the name of the part of the page that holds them."""
+def tables() -> dict[str, dict[str, str]]:
+    """Return the tables by their names; pages by their path in docs/ without suffix."""
     ours = sorted((topic for topic in TOPICS.values() if not topic.subscribed), key=lambda topic: topic.rate is None)
     theirs = [topic for topic in TOPICS.values() if topic.subscribed]
-    return {
+    tables = {
         "published": _table(
             ("published", "type", "what", "when (simulated time)"),
             [(f"`{topic.name}`", _type(topic), topic.what, topic.when or _rate(topic)) for topic in ours],
@@ -27,6 +27,7 @@ def tables() -> dict[str, str]:
             ],
         ),
     }
+    return {"ros": tables}
 
 
 def _table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:

@@ -3,42 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import fields
-from typing import Any, NamedTuple
+from collections.abc import Collection, Sequence
+from typing import Any
 
 import numpy as np
 
 from conveyor_sim.columns.counters import LINE, CounterColumns
 from conveyor_sim.line.commands.inputs import Input
 from conveyor_sim.line.device import Device, ScanContext
-from conveyor_sim.line.machines.efficiency import CATEGORIES, Work, efficiency
+from conveyor_sim.line.machines.counter_rows import TEXTS, DeviceSums, counter_row, line_row
+from conveyor_sim.line.machines.efficiency import CATEGORIES
 from conveyor_sim.line.machines.machine import MachineDevice
 from conveyor_sim.line.tag import Adds
 from conveyor_sim.support.printable import printable
 
 RESET_COUNTERS = "reset_counters"
 """Operation: devices that count bottles, or "line", by name; without names, all of them."""
-
-TEXTS = ("name", "category", "stop_reason")
-"""Columns that hold texts."""
-
-
-class Interval(NamedTuple):
-    """Sums of one device over an interval."""
-
-    counted: tuple[int, int, int, int]
-    """Bottles processed, defective and rejected, and failures."""
-    cycles: float
-    """Completed cycles. Of one that had begun before the interval: the part within it."""
-    set_cycles: float
-    """Cycles at the set rate in the time running."""
-    times: Mapping[str, float]
-    """Time by category, s."""
-    nominal: float
-    """Nominal rate, 1/s; NaN without one."""
-    reference: float
-    """Fastest permitted rate, 1/s; NaN without one."""
 
 
 class DeviceCounter:
@@ -109,17 +89,17 @@ class DeviceCounter:
         """Fastest permitted rate, 1/s; NaN without one."""
         return math.nan if self._machine is None else self._machine.reference_rate
 
-    def interval(self, tick: int, length: float) -> Interval:
+    def sums(self, tick: int, length: float) -> DeviceSums:
         """Return all sums since the reset. length: of a tick, s."""
         set_cycles, times = self.set_cycles(tick, length), self.times(tick, length)
-        return Interval(self.counted(), self.cycles(), set_cycles, times, self.nominal, self.reference)
+        return DeviceSums(self.counted(), self.cycles(), set_cycles, times, self.nominal, self.reference)
 
     def row(self, tick: int, length: float) -> dict[str, Any]:
         """Return the entry of CounterColumns, by field."""
         category = reason = ""
         if self._machine is not None:
             category, reason = self._machine.category, self._reasons[self._machine.reason]
-        return counter_row(self._device.name, self.since, self.interval(tick, length), category, reason)
+        return counter_row(self._device.name, self.since, self.sums(tick, length), category, reason)
 
     def _counts(self) -> tuple[int, int, int, int]:
         bottles = self._device.counts()
@@ -210,7 +190,7 @@ class ProductionCounters:
         if not self._devices:
             return None
         rows = [counter.row(tick, length) for counter in self._devices.values()]
-        slowest = [counter.interval(tick, length) for counter in self._slowest.values()]
+        slowest = [counter.sums(tick, length) for counter in self._slowest.values()]
         rows.append(line_row(self.line.since, self.line.counted(), slowest, self._counts_starts))
         columns: dict[str, Any] = {name: np.array([row[name] for row in rows]) for name in rows[0]}
         columns |= {name: tuple(row[name] for row in rows) for name in TEXTS}
@@ -237,63 +217,3 @@ def nominal_rate(machine: MachineDevice) -> float:
 
 def _adds(device: Device, role: Adds) -> bool:
     return any(tag.adds_to == role for tag in device.tags)
-
-
-def line_row(
-    since: int, counted: tuple[int, int, int], slowest: Sequence[Interval], counts_starts: bool = False
-) -> dict[str, Any]:
-    """Return the row of the line: its bottles; times, failures and cycles of the machines of the bottleneck.
-
-    Each machine counts by its share of their fastest permitted rate. counted: bottles that left, defective ones among
-    them, and rejected ones. counts_starts: `Scene.counts_starts`.
-    """
-    left, defective, rejected = counted
-    reference = sum(each.reference for each in slowest) if slowest else math.nan
-    times: dict[str, float] = dict.fromkeys(CATEGORIES, 0.0)
-    for each in slowest:
-        for category, time in each.times.items():
-            times[category] += time * (1.0 / len(slowest) if counts_starts else each.reference / reference)
-    failures = sum(each.counted[3] for each in slowest)
-    cycles = float(left) if counts_starts else sum(each.cycles for each in slowest)
-    made = left if counts_starts else left + rejected
-    set_cycles = sum(each.set_cycles for each in slowest) if slowest else math.nan
-    work = Work(cycles, set_cycles, reference, left - defective, made, failures / (len(slowest) or 1))
-    nominal = sum(each.nominal for each in slowest) if slowest else math.nan
-    return _row(LINE, since, (left, defective, rejected, failures), times, nominal, work)
-
-
-def counter_row(name: str, since: int, interval: Interval, category: str, stop_reason: str) -> dict[str, Any]:
-    """Return the row of one device, as an entry of CounterColumns by field."""
-    processed, defective, _, failures = interval.counted
-    good = processed - defective
-    work = Work(interval.cycles, interval.set_cycles, interval.reference, good, processed, failures)
-    return _row(name, since, interval.counted, interval.times, interval.nominal, work, category, stop_reason)
-
-
-def _row(
-    name: str,
-    since: int,
-    counted: tuple[int, int, int, int],
-    times: Mapping[str, float],
-    rate: float,
-    work: Work,
-    category: str = "",
-    stop_reason: str = "",
-) -> dict[str, Any]:
-    """Return an entry of CounterColumns, by field."""
-    processed, defective, rejected, failures = counted
-    made = efficiency(times, work)
-    bottles = {"processed": processed, "good": processed - defective, "defective": defective, "rejected": rejected}
-    return {
-        "name": name,
-        "since": np.uint64(max(since, 0)),
-        # Only an edited checkpoint makes these negative.
-        **{field: np.uint64(max(value, 0)) for field, value in (bottles | {"failures": failures}).items()},
-        **times,
-        "rate": rate,
-        **{field.name: getattr(made, field.name) for field in fields(made)},
-        "oee": made.oee,
-        "category": category,
-        "stop_reason": stop_reason,
-        "rate_limit": work.rate,
-    }

@@ -105,7 +105,7 @@ class Efficiency:
 
 
 @dataclass(frozen=True)
-class Work:
+class CycleSums:
     """Work of one machine, or of machines in parallel, over an interval."""
 
     cycles: float
@@ -121,7 +121,7 @@ class Work:
     """Failures per machine."""
 
 
-def efficiency(times: Mapping[str, float], work: Work) -> Efficiency:
+def efficiency(times: Mapping[str, float], work: CycleSums) -> Efficiency:
     """Return the indicators over an interval. times: s, by category."""
     running = times["running"]
     return Efficiency(

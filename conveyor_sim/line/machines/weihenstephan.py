@@ -23,7 +23,7 @@ class DataPoint(NamedTuple):
     tags: tuple[str, ...]
     """Last parts of the names of the machine's tags that it is derived from, if they exist."""
     what: str
-    """Description, one sentence for docs/line.md."""
+    """Description, one sentence for docs/parts/data_points.md."""
 
 
 DATA_POINTS: Mapping[str, DataPoint] = {

@@ -1,6 +1,7 @@
 // A second recording of a line, drawn beside the first: same time, camera and colours.
 
 import { byId, element, seconds } from "./dom.js";
+import { Heat } from "./heat.js";
 import { Plan } from "./plan.js";
 import { Series } from "./series.js";
 import { Wear } from "./wear.js";
@@ -20,6 +21,7 @@ export class Beside {
     Object.assign(this.other, { recording, story, rival: view, letter: "B", badge: () => {}, jump: (...where) => view.jump(...where) });
     this.other.series = new Series(this.other);
     this.other.wear = new Wear(this.other);
+    this.other.heat = new Heat(this.other);
     this.plan = this.other.plan = new Plan(this.canvas, this.other);
     view.rival = this.other;
     view.camera.listen(this.canvas, (px, py) => view.clicked(px, py, this.plan), () => view.setFollowing(false));

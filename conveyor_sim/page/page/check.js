@@ -46,7 +46,7 @@ class CheckView {
   _plan(plan) {
     byId("scene").textContent = document.title = plan.scene;
     const recording = new Still(plan), { camera } = this;
-    const quiet = { touch: () => this.draw(), signal: () => undefined, wear: { draw() {} }, showForces: false, showNames: true, bottle: null, colouring: "type" };
+    const quiet = { touch: () => this.draw(), signal: () => undefined, wear: { draw() {} }, heat: { draw() {} }, showForces: false, showNames: true, bottle: null, colouring: "type" };
     this.plan = new Plan(byId("plan"), { ...quiet, recording, camera, clock: { time: 0, playing: false } });
     camera.bounds = boundsOf([recording]);
     this.plan.resize();

@@ -6,7 +6,7 @@ import { MARKS } from "./scrubber.js";
 const TABLE = [
   ["Space, K", "play or pause"], ["← →", "one second back, ahead"], ["Shift ← →", "ten seconds back, ahead"], [", .", "one frame back, ahead"],
   ["< >", "slower, faster"], ["Home End", "to the start, the end"], ["0 to 9", "to tenths of the recording"], ["N P", "next, previous alarm, fault or failure"],
-  ["+ −", "zoom"], ["W A S D", "move the plan"], ["Z", "whole plant"], ["G", "zoom to the selected device or bottle"], ["B, shift B", "choose the next, the previous bottle"], ["F", "follow the chosen bottle"], ["C", "next colouring of bottles"], ["T", "trends"], ["Esc", "let go of what is chosen"], ["?", "these keys"],
+  ["+ −", "zoom"], ["W A S D", "move the plan"], ["Z", "whole plant"], ["G", "zoom to the selected device or bottle"], ["B, shift B", "choose the next, the previous bottle"], ["F", "follow the chosen bottle"], ["C", "next colouring of bottles"], ["H", "next heat map"], ["T", "trends"], ["Esc", "let go of what is chosen"], ["?", "these keys"],
 ];
 
 const table = (rows) => element("table", {}, ...rows.map(([sign, what]) => element("tr", {}, element("th", {}, sign), element("td", {}, what))));
@@ -32,7 +32,7 @@ export function listenToKeys(view) {
     Home: () => seek(recording.start), End: () => seek(recording.end), n: () => view.nextMark(1), p: () => view.nextMark(-1),
     "+": () => camera.zoom(1.25), "=": () => camera.zoom(1.25), "-": () => camera.zoom(0.8), z: () => view.wholePlant(), g: () => view.zoomToSelection(),
     w: () => pan(0, 60), s: () => pan(0, -60), a: () => pan(60, 0), d: () => pan(-60, 0),
-    b: () => view.nextBottle(1), B: () => view.nextBottle(-1), f: () => view.setFollowing(!view.following), c: () => view.nextColouring(), t: () => byId("toggle_trends").click(),
+    b: () => view.nextBottle(1), B: () => view.nextBottle(-1), f: () => view.setFollowing(!view.following), c: () => view.nextColouring(), h: () => view.nextHeat(), t: () => byId("toggle_trends").click(),
     Escape: () => view.letGo(), "?": () => dialog.showModal(),
   };
   addEventListener("keydown", (event) => {

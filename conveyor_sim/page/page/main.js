@@ -3,6 +3,7 @@
 import { SPEEDS } from "./clock.js";
 import { COLOURINGS, colourings, isDark } from "./colours.js";
 import { byId, element, say, seconds, warn } from "./dom.js";
+import { HEATS, LAST } from "./heat.js";
 import { listenToKeys } from "./keys.js";
 import { Line } from "./live.js";
 import { LiveRecording } from "./live_recording.js";
@@ -37,6 +38,11 @@ function wire(view) {
   for (const [id, action] of Object.entries(clicks)) byId(id).addEventListener("click", action);
   byId("wear").append(...Object.entries(WEARS).map(([name, { label }]) => element("option", { value: name }, label)));
   byId("wear").addEventListener("change", (event) => { view.shownWear = event.target.value; view.touch(); });
+  byId("heat").append(...Object.entries(HEATS).map(([name, { label }]) => element("option", { value: name }, label)));
+  byId("heat").addEventListener("change", (event) => view.setHeat(event.target.value));
+  const whole = view.line ? "received data" : "whole recording";
+  byId("span").append(...Object.entries({ last: `last ${LAST} s`, whole }).map(([name, label]) => element("option", { value: name }, label)));
+  byId("span").addEventListener("change", (event) => { view.shownSpan = event.target.value; view.touch(); });
   view.worn();
   for (const [id, field] of [["forces", "showForces"], ["names", "showNames"]]) {
     byId(id).addEventListener("change", (event) => { view[field] = event.target.checked; view.touch(); });

@@ -9,6 +9,7 @@ import { Labels, outside, placeAt } from "./labels.js";
 import { drawSelection, outlinesOf } from "./selection.js";
 import { drawUnderlay } from "./underlay.js";
 
+const UNDER_HEAT = 0.3; // opacity of bottles over a heat map
 const WIDTHS = 6; // widths of contact lines
 
 export class Plan {
@@ -63,11 +64,14 @@ export class Plan {
     if (this.said !== byId("notice").textContent) this.cover();
     drawUnderlay(context, camera, colours, recording.head.underlay, () => view.touch());
     this.surfaces.draw(context, camera, colours, speeds);
+    view.heat.draw(context, camera);
     drawAreas(context, camera, colours, view);
     this._rails(colours);
     if (view.device) drawSelection(context, camera, colours, outlinesOf(view, view.device));
     view.wear.draw(context, camera);
+    context.globalAlpha = view.shownHeat ? UNDER_HEAT : 1;
     if (frame) this._bottles(frame, colours);
+    context.globalAlpha = 1;
     if (frame && view.showForces) this._forces(frame, colours);
     drawMovers(context, camera, colours, view);
     drawLines(context, camera, colours, view);

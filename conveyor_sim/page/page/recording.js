@@ -74,17 +74,23 @@ export class Recording extends EventTarget {
     read(block);
   }
 
-  async _read(wanted) {
-    const { first, block: length } = this.head.times, { number } = wanted;
-    let block;
-    this.reading++;
+  // Reads a block that need not stay in memory.
+  async read(number) {
+    const { first, block: length } = this.head.times, there = this.blocks.get(number);
+    if (there) return there;
     try {
       const bytes = await this.source.bytes(`block/${number}`);
-      block = readBlock(bytes, this.head.steps, first + number * length, this.head.tick);
+      return readBlock(bytes, this.head.steps, first + number * length, this.head.tick);
     } catch (error) {
       this.dispatchEvent(new CustomEvent("failed", { detail: error.message }));
-      block = emptyBlock(); // the block can't be read; the time continues over it
+      return emptyBlock(); // the block can't be read; the time continues over it
     }
+  }
+
+  async _read(wanted) {
+    const { number } = wanted;
+    this.reading++;
+    const block = await this.read(number);
     this.blocks.set(number, block);
     for (const old of this.blocks.keys()) {
       if (this.blocks.size <= KEPT) break;

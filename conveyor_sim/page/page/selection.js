@@ -1,7 +1,7 @@
 // Shapes of devices on the plan: for clicks, for the outline of the selected device, and to zoom to it.
 
 import { deviceOf, moverEnds } from "./devices.js";
-import { awayFrom, inside } from "./shapes.js";
+import { awayFrom, inside, signedArea } from "./shapes.js";
 
 const ROOM = 0.6; // m, least distance from the middle of a device to the edges of the window that shows it
 const NEAR = 12, FINGER = 20; // px from a line or point within which a click, or a touch, selects its device
@@ -34,14 +34,12 @@ export function boxOf(outlines) {
   return [x - across, y - up, x + across, y + up];
 }
 
-const areaOf = (points) => Math.abs(points.reduce((sum, [x, y], k) => sum + x * (points[(k + 1) % points.length][1] - points.at(k - 1)[1]), 0)) / 2;
-
 // Returns the device at a point, m: the smallest around it or the nearest; a belt where there is no other device; or null.
 export function deviceAt(view, x, y) {
   const near = (matchMedia("(pointer: coarse)").matches ? FINGER : NEAR) / view.camera.scale;
   const found = smallDevices(view).map(({ device, points }) => {
     const far = Math.min(...points.map((point, k) => awayFrom(point, points[(k + 1) % points.length], x, y)));
-    return { device, far: inside(points, x, y) ? 0 : far, area: areaOf(points) };
+    return { device, far: inside(points, x, y) ? 0 : far, area: Math.abs(signedArea(points)) };
   }).filter(({ far }) => far < near).sort((a, b) => a.area - b.area || a.far - b.far);
   const belt = view.recording.head.surfaces.findLast(({ name, outline }) => name && inside(outline, x, y));
   return found[0]?.device ?? (belt ? beltOf(belt) : null);

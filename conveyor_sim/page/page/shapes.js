@@ -18,6 +18,9 @@ export function inside(points, x, y) {
   return found;
 }
 
+// Returns the area of a polygon, m²; negative if its points run clockwise.
+export const signedArea = (points) => points.reduce((sum, [x, y], k) => sum + x * (points[(k + 1) % points.length][1] - points.at(k - 1)[1]), 0) / 2;
+
 // Returns the distance of a point from the segment between two others.
 export function awayFrom([ax, ay], [bx, by], x, y) {
   const length = (bx - ax) ** 2 + (by - ay) ** 2;

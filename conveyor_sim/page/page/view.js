@@ -7,7 +7,7 @@ import { Beside } from "./beside.js";
 import { Bottle } from "./bottle.js";
 import { Camera } from "./camera.js";
 import { Clock } from "./clock.js";
-import { COLOURINGS, SCALES, colourings } from "./colours.js";
+import { COLOURINGS, SCALES, colourings, isDark } from "./colours.js";
 import { Compare } from "./compare.js";
 import { Desk } from "./desk.js";
 import { deviceOf } from "./devices.js";
@@ -15,6 +15,7 @@ import { byId, element, expire, keyOf, say, seconds, warn } from "./dom.js";
 import { Events } from "./events.js";
 import { Failure } from "./failure.js";
 import { Faceplate } from "./faceplate.js";
+import { HEATS, Heat, heatColours } from "./heat.js";
 import { Link } from "./link.js";
 import { LiveClock } from "./live_clock.js";
 import { Minimap } from "./minimap.js";
@@ -38,7 +39,7 @@ export class View {
   // other: a second recording that is shown beside the first, and its story; else null. line: of a running line, its
   // message "begin"; else null.
   constructor(recording, story, other, line = null, about = null) {
-    Object.assign(this, { recording, story, line, bottle: null, device: null, following: false, colouring: "type", shownWear: "", showForces: true, showNames: true, dirty: true });
+    Object.assign(this, { recording, story, line, bottle: null, device: null, following: false, colouring: "type", shownWear: "", shownHeat: "", shownSpan: "last", showForces: true, showNames: true, dirty: true });
     this.rival = null; // the other view
     this.letter = ""; // A, if two recordings are shown side by side
     this.fastest = 0.1;
@@ -51,6 +52,7 @@ export class View {
     this.camera = new Camera(boundsOf([recording, other?.recording]));
     this.series = new Series(this);
     this.wear = new Wear(this);
+    this.heat = new Heat(this);
     this.minimap = new Minimap(this);
     this.plan = new Plan(byId("plan"), this);
     this.plans = [this.plan];
@@ -269,6 +271,18 @@ export class View {
     this.touch();
   }
 
+  // name: of HEATS; "" for none.
+  setHeat(name) {
+    this.shownHeat = byId("heat").value = name;
+    byId("span").hidden = !name;
+    this.touch();
+  }
+
+  nextHeat() {
+    const names = Object.keys(HEATS);
+    this.setHeat(names[(names.indexOf(this.shownHeat) + 1) % names.length]);
+  }
+
   nextColouring() {
     const names = colourings(this);
     this.setColouring(names[(names.indexOf(this.colouring) + 1) % names.length]);
@@ -276,8 +290,8 @@ export class View {
 
   // Writes the legend of colours and lines, once their scales are known.
   _legend() {
-    const colouring = COLOURINGS[this.colouring], entries = [], { shown, most } = this.wear, lines = this.showForces && this.touching;
-    const key = [this.colouring, colouring.ends?.(this), shown, most, lines && this.strongest].join(" ");
+    const colouring = COLOURINGS[this.colouring], entries = [], { shown, most } = this.wear, lines = this.showForces && this.touching, { heat } = this;
+    const key = [heat.shown.of && heat.grid && [heat.shown.label, heat.extent, heat.most, isDark()], this.colouring, colouring.ends?.(this), shown, most, lines && this.strongest].join(" ");
     if (key === this.legendKey) return;
     this.legendKey = key;
     const ramp = (colours, low, high) => {
@@ -289,6 +303,9 @@ export class View {
     else entries.push(...keyOf(colouring.legend(this)));
     if (shown && most > NO_WEAR) entries.push(ramp(SCALES.force, "rails 0", `${+most.toPrecision(2)} ${WEARS[shown].unit}`));
     else if (shown) entries.push(element("span", { class: "entry" }, `no ${shown} on rails`));
+    if (heat.shown.of && heat.grid) {
+      entries.push(element("span", { class: "entry heat" }, ramp(heatColours(), `${heat.shown.label} 0`, `≥ ${+heat.most.toPrecision(2)} ${heat.shown.unit}`), element("small", {}, heat.extent)));
+    }
     if (lines) entries.push(element("span", { class: "entry" }, "contacts 0 ", element("span", { class: "wedge" }), ` ${+this.strongest.toPrecision(2)} N`));
     byId("legend").replaceChildren(...entries);
     this._coverBelow();
@@ -329,7 +346,10 @@ export class View {
   }
 
   draw(now) {
-    for (const plan of this.plans) plan.update();
+    for (const plan of this.plans) {
+      plan.update();
+      plan.view.heat.update(now);
+    }
     this._follow();
     for (const plan of this.plans) plan.draw();
     this._legend();

@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import pytest
 
-from conveyor_sim.line.machines.efficiency import CATEGORIES, DEFINITIONS, Efficiency, Work, busy, efficiency
+from conveyor_sim.line.machines.efficiency import CATEGORIES, DEFINITIONS, CycleSums, Efficiency, busy, efficiency
 
 SHIFT = {"running": 300.0, "starved": 60.0, "blocked": 20.0, "down": 100.0, "planned": 100.0, "idle": 20.0}
 """s, of 600."""
 
 
-MADE = Work(cycles=540.0, set_cycles=570.0, rate=2.0, good=480, made=540, failures=4)
+MADE = CycleSums(cycles=540.0, set_cycles=570.0, rate=2.0, good=480, made=540, failures=4)
 
 
 def test_a_shift_by_hand() -> None:
@@ -34,7 +34,7 @@ def test_a_shift_by_hand() -> None:
 
 def test_what_is_not_known_yet_is_no_number() -> None:
     """At the start, and for a machine that has not failed."""
-    fresh = efficiency(dict.fromkeys(CATEGORIES, 0.0), Work(0.0, 0.0, 2.0, 0, 0, 0))
+    fresh = efficiency(dict.fromkeys(CATEGORIES, 0.0), CycleSums(0.0, 0.0, 2.0, 0, 0, 0))
     assert all(
         math.isnan(value) for value in (fresh.availability, fresh.effectiveness, fresh.quality, fresh.oee, fresh.mttr)
     )

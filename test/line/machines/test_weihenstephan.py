@@ -23,7 +23,7 @@ from conveyor_sim.report.tags import tag_rows
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 
-PAGE = (Path(__file__).parents[3] / "docs" / "line.md").read_text()
+PAGE = (Path(__file__).parents[3] / "docs" / "parts" / "data_points.md").read_text()
 
 
 def points(sim: Simulation, machine: str) -> dict[str, float]:

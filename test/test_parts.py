@@ -1,0 +1,46 @@
+"""The pages of docs/parts/: each has a scene that can be copied, and its picture."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from study_page import load_study
+
+from conveyor_sim.scene import parse_scene
+from conveyor_sim.scene.reference import PAGES
+from conveyor_sim.simulation import Simulation
+
+ROOT = Path(__file__).parent.parent
+PARTS = ROOT / "docs" / "parts"
+MOST_BYTES = 5_000_000
+"""Largest sum of the sizes of all pictures of the docs."""
+
+
+@pytest.mark.parametrize("name", sorted(PAGES))
+def test_the_scene_of_a_page_runs_without_a_report_of_the_guard(name: str) -> None:
+    scene = parse_scene(load_study("part_pictures").scene_text(PARTS / f"{name}.md"))
+    assert scene.name == name
+    simulation = Simulation(scene, threads=1)
+    simulation.advance(300)
+    assert [event.text for event in simulation.take_events().guard] == []
+    assert len(simulation.bottles().x) > 0
+
+
+def test_each_page_has_a_picture_and_is_linked() -> None:
+    index = (ROOT / "docs" / "scene.md").read_text() + (ROOT / "docs" / "line.md").read_text()
+    for page in PARTS.glob("*.md"):
+        assert f"](parts/{page.name})" in index
+        if page.stem in PAGES:
+            assert f"](../images/parts/{page.stem}.webp)" in page.read_text()
+            assert (ROOT / "docs" / "images" / "parts" / f"{page.stem}.webp").exists()
+
+
+def test_pages_of_folders_are_linked_from_the_page_of_the_folder() -> None:
+    for page in (ROOT / "docs" / "performance").glob("*.md"):
+        assert f"](performance/{page.name})" in (ROOT / "docs" / "performance.md").read_text()
+
+
+def test_pictures_are_small() -> None:
+    files = [file for file in (ROOT / "docs" / "images").rglob("*") if file.is_file()]
+    assert sum(file.stat().st_size for file in files) <= MOST_BYTES
