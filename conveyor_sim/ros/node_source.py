@@ -222,7 +222,8 @@ class NodeSource(LineMirror, AbstractContextManager["NodeSource"]):
         except ConveyorError as error:
             self._mismatch = str(error)
         else:
-            self._mismatch = ""
+            if self._mismatch:
+                self._mismatch = self._why = ""
 
     def _look(self, now: float) -> None:
         """Check that the node still runs."""

@@ -163,15 +163,14 @@ def test_a_recording_of_an_earlier_format_is_published_in_the_present_definition
     rclpy.init(context=context)
     end = threading.Event()
     with (
+        open_bag(SECOND) as older,
+        closing(ReplayNode(older, 0.0, None, True, end.set, context=context)),
         client.listen(Line, "line") as line,
         client.listen(AlarmStates, "alarm_states") as alarms,
         client.listen(CommandOutcome, "outcomes") as outcomes,
-        open_bag(SECOND) as older,
-        closing(ReplayNode(older, 0.0, None, True, end.set, context=context)),
     ):
         message = line.first()
-        until(lambda: client.node.count_publishers("/outcomes"), "the node")
-        assert client.call(Trigger, "resume").success
+        assert client.call(Trigger, "conveyor_replay/resume").success
         assert end.wait(PATIENCE)
         until(lambda: len(outcomes.messages) == 10, "all command results")
         until(lambda: "follows" in alarms.messages[-1].id, "all alarms")
