@@ -23,7 +23,7 @@ RULES: Mapping[str, str] = {
     "line": "columns engine errors physics scene support | numpy",
     "simulation": "columns engine line physics scene | numpy",
     "__init__": "scene simulation",
-    "bag": "columns errors line scene simulation support | lz4 mcap numpy rosbags yaml zstandard",
+    "bag": "columns errors line scene simulation support | lz4 mcap numpy pandas pyarrow rosbags yaml zstandard",
     "page": "bag columns errors scene simulation support | ezdxf numpy ruamel",
     "run": "bag columns control engine errors line physics scene simulation support | click numpy",
     "report": "bag columns errors line page physics run scene simulation statistics support | "

@@ -10,7 +10,7 @@ from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import dataclass, fields
 from functools import cached_property, lru_cache
 from pathlib import Path, PurePath
-from typing import Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,9 +28,13 @@ from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.bag.messages.typestore import type_hash
 from conveyor_sim.bag.own_reader import own_reader
 from conveyor_sim.bag.rosbags_reader import RosbagsReader
+from conveyor_sim.bag.tables import frame_of
 from conveyor_sim.columns.bottles import BeltColumns, BottleColumns, ContactColumns
 from conveyor_sim.errors import BagError, ConveyorError
 from conveyor_sim.support.printable import SENTENCE, printable
+
+if TYPE_CHECKING:
+    import pandas
 
 T = TypeVar("T")
 
@@ -221,6 +225,15 @@ class Bag(AbstractContextManager["Bag"]):
     def outcomes(self) -> Iterator[Frame[Outcome]]:
         """Yield the result of every command, in order. The tick is that at which it was applied or refused."""
         return self.read("outcomes")
+
+    def frame(self, topic: str) -> pandas.DataFrame:
+        """Return the table of a topic as a pandas DataFrame, with one row per bottle, contact, event or tick.
+
+        topic: bottles, contacts, signals, events or belts. The first columns are `time` (s) and `tick`. Names of bottle
+        types, belts and rails are categories. `attrs["units"]` holds the SI unit by column. Raise BagError for another
+        topic, one that was not recorded, or if pandas is not installed.
+        """
+        return frame_of(self, topic)
 
     def bottle_series(self, ids: Collection[int]) -> dict[int, BottleSeries]:
         """Return the histories of some bottles, from one pass over the bag; ids that never occur are left out."""

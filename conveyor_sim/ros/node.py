@@ -225,6 +225,7 @@ class SimNode:
 
         node.add_post_set_parameters_callback(on_set)
         node.get_logger().info(_greeting(stepper))
+        node.get_logger().debug(setting_line(stepper.simulation.model))
         stepper.start()
 
     def _report(self) -> None:
@@ -237,6 +238,5 @@ class SimNode:
 
 def _greeting(stepper: Stepper) -> str:
     session = stepper.run.session
-    model = session.simulation.model
-    bag = f", recorded to {session.bag}" if session.bag else ""
-    return f"scene {model.name}, run {session.run_id}, {stepper.run.state.name}, {setting_line(model)}{bag}"
+    name = session.simulation.model.name
+    return f"scene {name}, {stepper.run.state.name.lower()}, run {session.run_id}{session.to_bag}"
