@@ -88,6 +88,14 @@ def test_a_scene_that_never_settles_says_so() -> None:
     assert missing(three_lines(never)[0], ["1 %", rest.reason, "predicted", "0.042 %"]) == []
 
 
+def test_a_predicted_error_is_never_zero() -> None:
+    of = study()
+    assert of.answer is not None
+    points = tuple(replace(point, predicted_resting=0.0) for point in of.points)
+    forces = three_lines(replace(of, points=points, rest=None, answer=replace(of.answer, resting=None)))[0]
+    assert missing(forces, ["Resting load", "predicted error below 0.01 %"]) == []
+
+
 def test_no_answer_is_three_lines_too() -> None:
     forces, throughput, cost = three_lines(replace(study(), answer=None, tolerance=1e-9))
     assert missing(forces, ["Forces", "no setting", "1e-7 %", "best"]) == []
