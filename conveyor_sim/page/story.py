@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Story of a stretch of a recording for the page, as JSON: events, alarms, read-back values, counters.
 
 Every list is in the order of time. States are listed when they change.
@@ -22,6 +23,7 @@ _COUNTED = (
     "processed", "good", "defective", "rejected", "failures",
     "running", "starved", "blocked", "down", "planned", "idle",
     "rate", "availability", "effectiveness", "quality", "oee", "mtbf", "mttr", "category", "stop_reason",
+    "rate_limit", "set_effectiveness",
 )  # fmt: skip
 
 _WORN = ("scuffing_work", "impulse")
