@@ -36,9 +36,12 @@ def test_each_page_has_a_picture_and_is_linked() -> None:
             assert (ROOT / "docs" / "images" / "parts" / f"{page.stem}.webp").exists()
 
 
-def test_pages_of_folders_are_linked_from_the_page_of_the_folder() -> None:
-    for page in (ROOT / "docs" / "performance").glob("*.md"):
-        assert f"](performance/{page.name})" in (ROOT / "docs" / "performance.md").read_text()
+@pytest.mark.parametrize("folder", ["performance", "ros"])
+def test_pages_of_a_folder_are_linked_from_its_index(folder: str) -> None:
+    index = (ROOT / "docs" / f"{folder}.md").read_text()
+    pages = sorted((ROOT / "docs" / folder).glob("*.md"))
+    assert pages
+    assert [page.name for page in pages if f"]({folder}/{page.name})" not in index] == []
 
 
 def test_pictures_are_small() -> None:

@@ -220,7 +220,9 @@ class NodeSource(LineMirror, AbstractContextManager["NodeSource"]):
         try:
             require_same_definition(self._node, self._topics["line"].topic_name, LINE)
         except ConveyorError as error:
-            self._mismatch = str(error)
+            if not self._mismatch:
+                self._say(str(error))  # even while the client still waits for a first line
+            self._mismatch = self._reported = str(error)
         else:
             if self._mismatch:
                 self._mismatch = self._why = ""

@@ -113,11 +113,15 @@ def require_same_definition(node: Node, topic: str, type_name: str) -> None:
     for one in node.get_publishers_info_by_topic(topic):
         theirs = str(one.topic_type_hash)
         if theirs not in (ours, _NO_HASH):
+            name = f"{one.node_namespace.rstrip('/')}/{one.node_name}"
+            node_name = "a node" if _UNKNOWN in name else f"the node {name}"
             raise ConveyorError(
-                f"{topic}: the node {one.node_namespace.rstrip('/')}/{one.node_name} publishes another definition of "
-                f"{type_name} ({theirs}) than this client has ({ours}); expected one version of conveyor_sim"
+                f"{topic}: {node_name} publishes another definition of {type_name} ({theirs}) than this client has "
+                f"({ours}); expected one version of conveyor_sim"
             )
 
 
+_UNKNOWN = "_UNKNOWN_"
+"""Part of the name of a node that was discovered after its publisher."""
 _NO_HASH = "INVALID"
 """Hash of a publisher that states none."""

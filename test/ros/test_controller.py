@@ -204,5 +204,5 @@ def test_a_node_with_other_messages_is_named(client: LineClient, start_controlle
     child = start_controller()
     until(lambda: child.exit_code is not None, "its end")
     assert child.exit_code == 1
-    assert missing(child.obituary(), "/line", client.node.get_name(), "conveyor_msgs/msg/Line", "one version") == []
+    assert missing(child.obituary(), "/line", "conveyor_msgs/msg/Line", "one version") == []
     client.between_callbacks(lambda: client.node.destroy_publisher(publisher))

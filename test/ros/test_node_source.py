@@ -112,7 +112,8 @@ def test_a_node_with_other_messages_is_named(client: LineClient) -> None:
     said: list[str] = []
     with NodeSource(said.append, "older") as source:
         until(lambda: "/older/line" in source.snapshot.lost, "the definition")
-        assert missing(source.snapshot.lost, client.node.get_name(), "conveyor_msgs/msg/Line", "one version") == []
+        assert missing(source.snapshot.lost, "conveyor_msgs/msg/Line", "one version") == []
         assert source.give(setpoint(0.1)) == source.snapshot.lost
+        assert len(said) == 1 and "/older/line" in said[0]
         client.between_callbacks(lambda: client.node.destroy_publisher(publisher))
         until(lambda: "/older/line" not in source.snapshot.lost, "its end")

@@ -69,7 +69,7 @@ class Topic:
     """Relative to the node's namespace, unless it begins with /. <...> stands for a name of the scene."""
     type: str
     what: str
-    """Description for docs/ros.md, like `when`."""
+    """Description for docs/ros/topics.md, like `when`."""
     when: str = ""
     """Times of its messages in words; "": at its rate."""
     qos: Qos = DATA
@@ -186,7 +186,7 @@ _ROWS = (
     Topic(
         "guard",
         "conveyor_msgs/msg/GuardEvent",
-        "report of the [guard](stability.md): bottle, place, reason, and remedy",
+        "report of the [guard](../stability.md): bottle, place, reason, and remedy",
         "when it happens",
         EVENTS,
         events=lambda events: events.guard,
@@ -314,7 +314,7 @@ _ROWS = (
     Topic(
         "alarm_states",
         encode.ALARM_STATES,
-        "all [alarms](alarms.md), with their declarations and states by ISA-18.2",
+        "all [alarms](../alarms.md), with their declarations and states by ISA-18.2",
         "latched, each tick with a change",
         LATCHED,
         state=lambda now: now.sim.line.alarms.changes(),
@@ -326,7 +326,7 @@ _ROWS = (
     Topic(
         "variables",
         "conveyor_msgs/msg/Variables",
-        "a PLC program's variables that are [recorded](structured_text.md#variables-in-recordings). In ROS, "
+        "a PLC program's variables that are [recorded](../structured_text.md#variables-in-recordings). In ROS, "
         "`controller_node` publishes the topic",
         "each scan of the program",
         columns=VariableColumns,
