@@ -57,7 +57,15 @@ NAVIGATION = {
         ],
         "A line": [
             *("docs/index", "docs/scene", "docs/layout", "docs/conveyors", "docs/placement", "docs/check", "docs/line"),
-            *("docs/alarms", "docs/report", "docs/studies", "docs/view", "docs/drawings"),
+            *(
+                "docs/cli",
+                "docs/recordings",
+                "docs/alarms",
+                "docs/report",
+                "docs/studies",
+                "docs/view",
+                "docs/drawings",
+            ),
             *("docs/effects", "docs/base", "docs/energy_and_damage", "docs/glossary"),
         ],
         "What to rely on": ["docs/accuracy", "docs/stability", "docs/reliability", "docs/performance", "docs/paper"],

@@ -172,6 +172,8 @@ def export(bag: Path, parquet: bool, as_csv: bool, tables: tuple[str, ...], out:
 @click.argument("bag", type=click.Path(path_type=Path))
 @click.option("--out", type=click.Path(path_type=Path), help="Folder for the pictures (default: BAG/report).")
 @click.option("--no-pictures", is_flag=True, help="Print only.")
+@click.option("--from", "start", type=float, help="First simulated time in s (default: the end of the warm-up).")
+@click.option("--to", "stop", type=float, help="Last simulated time in s (default: the end).")
 def report(bag: Path, **chosen: Any) -> None:
     """Report how the line in BAG produced: bottles, times, OEE, MTBF, MTTR, stop reasons and longest stops."""
     from conveyor_sim.report.production_report import report_production

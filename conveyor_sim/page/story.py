@@ -22,6 +22,7 @@ _COUNTED = (
     "processed", "good", "defective", "rejected", "failures",
     "running", "starved", "blocked", "down", "planned", "idle",
     "rate", "availability", "effectiveness", "quality", "oee", "mtbf", "mttr", "category", "stop_reason",
+    "rate_limit", "set_effectiveness",
 )  # fmt: skip
 
 _WORN = ("scuffing_work", "impulse")

@@ -75,7 +75,7 @@ def _with_warnings(lines: list[str], warnings: Sequence[str]) -> list[str]:
 
 
 def _bottles(summary: Summary) -> str:
-    floor = f" ({summary.on_floor} of them on no belt)" if summary.on_floor else ""
+    floor = f" ({summary.on_floor} of them on no belt)" if summary.on_floor and summary.belts else ""
     return f"{summary.bottles.sentence}{floor}"
 
 

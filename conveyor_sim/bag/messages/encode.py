@@ -27,6 +27,7 @@ FORMAT = 3
 change that a reader must know; `older.py` reads the earlier ones.
 """
 
+COUNTERS = "conveyor_msgs/msg/Counters"
 SIGNALS = "conveyor_msgs/msg/Signals"
 COMMANDS = "conveyor_msgs/msg/Commands"
 LINE = "conveyor_msgs/msg/Line"

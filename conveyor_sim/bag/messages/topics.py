@@ -255,7 +255,7 @@ _ROWS = (
     ),
     Topic(
         "counters",
-        "conveyor_msgs/msg/Counters",
+        encode.COUNTERS,
         "bottles, times and efficiency of each machine and of the line since their last reset",
         rate="counters",
         state=lambda now: now.sim.line.counters(),

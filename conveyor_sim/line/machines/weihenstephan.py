@@ -40,7 +40,7 @@ DATA_POINTS: Mapping[str, DataPoint] = {
     "WS_Not_Of_Fail_Code": DataPoint(
         10000, ("fault", "stop_reason"), "Stop reason while the machine has failed, else 0."
     ),
-    "WS_Tot_Containers": DataPoint(50005, ("produced", "taken", "processed"), "Bottles."),
+    "WS_Tot_Containers": DataPoint(50005, ("produced", "processed"), "Bottles whose cycle is complete."),
     "WS_Good_Containers": DataPoint(50006, ("good",), "Bottles, of stations."),
 }
 """Data points by name."""

@@ -29,8 +29,8 @@ _TYPE = 5
 
 _COUNTS: Mapping[str, tuple[str, ...]] = {
     "ProdConsumedCount": ("taken",),
-    "ProdProcessedCount": ("produced", "taken", "processed"),
-    "ProdDefectiveCount": ("taken_bad", "defective"),
+    "ProdProcessedCount": ("produced", "processed"),
+    "ProdDefectiveCount": ("defective",),
 }
 """Counter tags of a machine by variable, in order of preference."""
 
