@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Story of a stretch of a recording for the page, as JSON: events, alarms, read-back values, counters.
 
 Every list is in the order of time. States are listed when they change.

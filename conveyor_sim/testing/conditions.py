@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Texts of conditions: as the test wrote them, and in words without Python."""
 
 from __future__ import annotations

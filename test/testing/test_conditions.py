@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Texts of conditions."""
 
 from conveyor_sim.testing.conditions import text_of, words_of
