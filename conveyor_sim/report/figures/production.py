@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Figures of a line's production: machine states over time, lost time by reason, output against the bottleneck."""
 
 from __future__ import annotations

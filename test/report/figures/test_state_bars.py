@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """State bars, stop reasons and efficiency are drawn as they were."""
 
 from __future__ import annotations
