@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Import rules of the package, and the diagram of docs/architecture.md that is generated from them.
 
 `test/test_imports.py` compares the rules with the imports of all sources.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Scene of a recording with the integrator and steps of the recorded run, in place of the present defaults."""
 
 from dataclasses import replace

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Commands on a recording: recover, replay, sources, events, alarms, report, plot."""
 
 from __future__ import annotations

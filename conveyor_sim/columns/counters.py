@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Production counters and time categories of machines."""
 
 from collections.abc import Sequence

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`Line`: the devices of a scene, and the commands and faults that reach them at ticks."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Alarms of a recording: for each one its occurrences, the time that it was active, and its state at the end."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Numbers of bottles of a recording at a tick: the one set of counts of summaries, figures and reports."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Counters of a time span of a recording, from its events and process images.
 
 Times are exact to the tick. Bottles are those between the first process image from the start on and the last one up to

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Production report: tables, and figures with their paths."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Time span that a report covers: chosen times, or the recording without its warm-up."""
 
 from __future__ import annotations

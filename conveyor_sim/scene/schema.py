@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The scene: a user's description of a line, typed. SI units, angles in rad.
 
 A scene is read with `load_scene`; tables in `docs/scene.md` and `docs/parts/` are generated from the fields below.

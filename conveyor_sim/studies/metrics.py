@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Metrics of a run, by their names in a study."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The first three lines of an answer: what a line engineer can act on without a word about integrators."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Recordings in earlier formats are read, played and served in the present definitions."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Tags of shipped lines have no empty fields, and their statements are true."""
 
 from collections.abc import Sequence

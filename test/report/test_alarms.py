@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`conveyor-sim alarms`: one row per alarm of a recording."""
 
 import json

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Figures of a time span of a recording, against counters of the same run that were reset at its start."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Production of a recorded line: read from its bag, printed and drawn."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The answer in three lines, in the words of a line engineer: forces, throughput, cost."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Serialization of columns as messages: CDR bytes that are published and recorded alike."""
 
 from __future__ import annotations

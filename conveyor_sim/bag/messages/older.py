@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Messages of recordings in earlier formats, converted to the present definitions.
 
 Format 1: until lines had tags. Format 2: until tags were messages (`Line.tags`). Both have no number: their definitions

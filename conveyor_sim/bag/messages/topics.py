@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The topics, one row each, for publishing, recording, reading, replaying, comparing and listing them."""
 
 from __future__ import annotations

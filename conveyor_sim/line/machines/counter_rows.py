@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Rows of production counters, from sums of devices over an interval."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Production counts and times of devices and of the line since the last reset. Sums are updated at changes only."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Efficiency of machines from counted times and cycles: the indicators of ISO 22400-2, and MTBF and MTTR.
 
 The quotients are those of ISO 22400-2 as cited in OPC 40501-1, C.2.4; the text of the standard was not available. Its

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`MachineDevice`: PackML states, rate, failures and planned stops of machines that feed or take bottles."""
 
 from collections.abc import Collection, Sequence

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Sources: upstream machines that feed bottles at a rate. A source without room for a bottle is blocked."""
 
 from collections.abc import Sequence

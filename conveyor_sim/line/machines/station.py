@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Machines that take bottles from a region: their queue, the fill level at which they start, sinks and stations.
 
 Stations work on a bottle for one cycle, and give it back at another place.

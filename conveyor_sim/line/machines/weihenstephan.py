@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A machine's data points of the Weihenstephan Standards, derived from its tags on request.
 
 Values of mode and program are those of OPC 40600. States are those of PackML, with Lack, Tailback and Prepared below

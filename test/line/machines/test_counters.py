@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Counters of machines and of the line: sums, resets, late readers, checkpoints."""
 
 from __future__ import annotations

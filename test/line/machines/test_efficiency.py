@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Efficiency from times and bottles, against numbers worked out by hand."""
 
 from __future__ import annotations

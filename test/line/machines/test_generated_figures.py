@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Figures of generated lines: no ratio passes 100 %, and counters, signals and protocol servers agree."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Machines and the PackML state model: automatic transitions, commands, and stop reasons."""
 
 from pathlib import Path

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Machines that feed, take, inspect and reject bottles; spills."""
 
 from pathlib import Path

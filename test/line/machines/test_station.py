@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Stations: the same bottle with its loads after a cycle; settings and tests, also wrong tests."""
 
 import json

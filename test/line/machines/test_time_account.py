@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Times by category, summed at changes only."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Data points of the Weihenstephan Standards, derived from tags of machines."""
 
 import re
