@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The docs site: Sphinx over the Markdown pages of the checkout, README.md first (`make site`).
 
 Pages stay plain Markdown that a forge shows as well: what only the site needs, its navigation and captions, is added

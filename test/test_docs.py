@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the pages of docs/ name is there."""
 
 from __future__ import annotations

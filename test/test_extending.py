@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The worked examples of docs/extending.md work: each is applied to a copy of the package, and its last block is run.
 
 A section is a heading `## ...` with fenced blocks that have a title: `python title="conveyor_sim/..."` and

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Outline of a run in at most twelve lines: speed, bottles, forces, alarms, warnings, files."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A run summed up while its bag goes by."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The pictures of the page in docs/ and README: python docs/studies/view_pictures.py [NAME ...].
 
 Needs playwright, Pillow and Chromium, as the tests do. Without names all are made anew, in about three minutes.
