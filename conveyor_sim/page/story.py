@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from conveyor_sim.bag.messages.topics import TOPICS
+from conveyor_sim.columns.alarms import AlarmColumns
 
 TOPICS_READ = ("events", "alarm_states", "readback", "counters", "rail_wear", "run_state")
 """Topics from which a story is collected."""
@@ -63,7 +64,7 @@ class Story:
         events["text"] += list(columns.text)
 
     def _alarm_states(self, message: Any, time: float) -> None:
-        columns = TOPICS["alarm_states"].unpack(message)
+        columns = message if isinstance(message, AlarmColumns) else TOPICS["alarm_states"].unpack(message)
         before = self._last["alarms"]
         for place, number in enumerate(columns.number.tolist()):
             self.data["alarms"][number] = {name: _plain(getattr(columns, name)[place]) for name in _DECLARED}

@@ -100,6 +100,10 @@ def read_production(path: Path, times: Times | None = None) -> Production:
             if frame.time <= end + 0.5 * tick:
                 alarms.states = frame.data
         good, resets = _accumulated(frames)
+        time = np.array([frame.time for frame in frames])
+        shown = (time >= start) & (time <= end)
+        if shown.sum() > 1:  # else the complete series, because a shorter one shows nothing
+            time, good = time[shown], good[shown]
         return Production(
             printable(bag.line.scene_name),
             start,
@@ -108,7 +112,7 @@ def read_production(path: Path, times: Times | None = None) -> Production:
             resets,
             periods,
             alarms.figures(end - start, tick),
-            np.array([frame.time for frame in frames]),
+            time,
             good,
             forced_signals(bag),
             "" if span is None else span.remark,
