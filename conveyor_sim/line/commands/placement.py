@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """`BottlePlacement`: the operations that put bottles on the line and remove them.
 
-Both are applied at the start of a tick, so the check made between two ticks (`BottlePlacement.later`) is the one of the tick.
+Both are applied at the start of a tick, so the check made between two ticks (`BottlePlacement.later`) is that of the
+tick.
 """
 
 from __future__ import annotations
