@@ -66,6 +66,7 @@ numba-next: set-up-test
 lint: set-up-test
 	@$(PYTHON) -m ruff check .
 	@$(PYTHON) -m ruff format --check .
+	@sh tools/ament_lint.sh $(VENV)/bin conveyor_sim launch examples tools
 	@$(PYTHON) tools/check_prose.py
 	@$(PYTHON) -m mypy
 

@@ -60,6 +60,7 @@ setup(
         "scada": requirements("scada"),
         "mqtt": requirements("mqtt"),
         "foxglove": requirements("foxglove"),
+        "tables": requirements("tables"),
         "studies": requirements("studies"),
         "optimise": [*requirements("studies"), *requirements("optimise")],
         "dask": requirements("dask"),

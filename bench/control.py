@@ -18,9 +18,6 @@ from conveyor_sim.support.resources import scene_path
 from conveyor_sim.testing import Scenario
 
 ROOT = Path(__file__).resolve().parent.parent
-BEFORE = ROOT / "docs" / "performance" / "control_before.csv"
-"""Measurements at the commit before the line's sensors were compiled."""
-
 CASE = "control"
 FACTOR, OUTSIDE, WHOLE = "times real time", "us a tick outside the step kernels", "us a tick"
 BESIDE = "us a tick of scan, conditions, history and outputs"
@@ -123,12 +120,11 @@ class _Clock:
 
 
 def tables(rows: Rows) -> str:
-    """One table, with what was measured before."""
-    before = Rows.read(BEFORE)
+    """Return one table."""
     body = []
     for name in rows.contestants(CASE):
         for quantity in (FACTOR, WHOLE, OUTSIDE, BESIDE):
             now = rows.spread(CASE, 0.0, name, quantity)
             if now is not None:
-                body.append([name, quantity, before.spread(CASE, 0.0, name, quantity), now])
-    return markdown(["", "", "before", "now"], body)
+                body.append([name, quantity, now])
+    return markdown(["", "", "measured"], body)

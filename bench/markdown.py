@@ -1,4 +1,4 @@
-"""Tables of Markdown, and their place between the markers of docs/performance.md."""
+"""Tables of Markdown, and their place between the markers of a page."""
 
 from __future__ import annotations
 

@@ -39,10 +39,18 @@ autodoc_default_options = {"members": True, "undoc-members": True}
 default_role = "code"  # docstrings are Markdown in this
 
 PARTS = sorted(page.stem for page in ROOT.glob("docs/parts/*.md"))
+MEASURED = sorted(page.stem for page in ROOT.glob("docs/performance/*.md"))
 STUDIES = sorted(ROOT.glob("docs/accuracy/*/tables.md"))
 NAVIGATION = {
     "README": {
-        "Tutorials": ["docs/build_a_line", "docs/tutorial_plc", "docs/tutorial_scada", "docs/tutorial_ros"],
+        "Tutorials": [
+            "docs/build_a_line",
+            "docs/tutorial_plc",
+            "docs/tutorial_scada",
+            "docs/tutorial_ros",
+            "docs/troubleshooting",
+            "docs/gallery",
+        ],
         "Control and protocols": [
             *("docs/testing_control_logic", "docs/structured_text", "docs/plc"),
             *("docs/scada", "docs/opcua", "docs/ros"),
@@ -55,7 +63,9 @@ NAVIGATION = {
         "What to rely on": ["docs/accuracy", "docs/stability", "docs/reliability", "docs/performance", "docs/paper"],
         "Inside": ["docs/architecture", "docs/extending", "docs/api/index", "CONTRIBUTING", "CHANGELOG"],
     },
+    "docs/ros": {"Pages": [f"ros/{page.stem}" for page in sorted(ROOT.glob("docs/ros/*.md"))]},
     "docs/scene": {"Parts": [f"parts/{page}" for page in PARTS]},
+    "docs/performance": {"Tables": [*(f"performance/{page}" for page in MEASURED), "studies/performance_history"]},
     "docs/accuracy": {"Tables": ["accuracy/promises", *(f"accuracy/{page.parent.name}/tables" for page in STUDIES)]},
     "docs/stability": {"Tables": ["stability/cases", "stability/fuzz"]},
     "docs/api/index": {"Modules": ["simulation", "observations", "testing", "control", "recordings", "errors"]},

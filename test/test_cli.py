@@ -15,6 +15,7 @@ from warm import run
 
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.cli import main
+from conveyor_sim.report.labelled import MOST_LINES
 from conveyor_sim.scene import load_scene
 
 Command = Callable[..., Result]
@@ -59,7 +60,7 @@ def test_check_takes_the_name_of_a_shipped_scene(command: Command, tmp_path: Pat
     speed, bound, change, _ = result.output.splitlines()[-4:]
     assert re.match(r"speed: about \d+ x real time on one core with 2 bottles, an estimate", speed)
     assert bound.startswith("bound: impact of two bottles needs 2 steps a tick")
-    assert change.startswith("change: fewer steps: accuracy: {preset: draft}")
+    assert change.startswith("change: no single change")
     assert (tmp_path / "pictures" / "two_bottles.png").exists()
 
 
@@ -77,11 +78,26 @@ def test_run_records_sums_up_and_draws(command: Command, tmp_path: Path) -> None
         assert bag.counts["signals"] == 41
     assert json.loads((folder / "summary.json").read_text())["simulated"] == pytest.approx(0.4)
     assert list((folder / "pictures").glob("*.png"))
-    assert result.output.startswith("leapfrog, dt = 100 us")
-    for words in ("real-time factor", "predicted error", "achieved"):
+    lines = outline_of(result)
+    assert missing(lines[0], ["small_line", "0.4 s", "x real time"]) == []
+    assert [line.split()[0] for line in lines[1:]] == ["bottles", "forces", "recorded", "next"]
+    assert missing(lines[-2], [str(folder.relative_to(tmp_path)), "page.html", "summary.json", "pictures"]) == []
+
+
+def outline_of(result: Result) -> list[str]:
+    """The lines that a command printed to the standard output: at most twelve, without trailing spaces."""
+    lines = result.stdout.splitlines()
+    assert len(lines) <= MOST_LINES, result.stdout
+    assert [line.rstrip() for line in lines] == lines
+    return lines
+
+
+def test_details_of_a_run_are_printed_on_request(command: Command) -> None:
+    result = command("run", SMALL_LINE, "--duration", "0.1", "--no-pictures", "--details")
+    assert result.exit_code == 0, result.output
+    for words in ("leapfrog, dt = 100 us", "predicted error", "achieved", "straight", "signals"):
         assert words in result.output
     assert [line.partition(":")[0] for line in result.output.splitlines()[-3:]] == ["speed", "bound", "change"]
-    assert str(folder.relative_to(tmp_path)) in result.output
 
 
 def test_run_draws_nothing_where_that_is_asked_for(command: Command, tmp_path: Path) -> None:
@@ -113,16 +129,22 @@ def test_run_of_a_duration_that_is_no_number_of_ticks_is_refused(command: Comman
 def test_run_without_a_recording(command: Command, tmp_path: Path) -> None:
     result = command("run", SMALL_LINE, "--no-record", "--duration", "0.1")
     assert result.exit_code == 0, result.output
-    setting, *_, peak, speed, bound, change = result.output.splitlines()
-    assert setting.startswith("leapfrog, dt = 100 us (100 steps a tick, given in the scene; ")
-    assert "; predicted error: " in setting
+    lines = outline_of(result)
+    assert missing(lines[0], ["small_line", "0.1 s", "x real time"]) == []
+    assert missing(lines[1], ["forces", "peak"]) == []
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_details_of_a_run_without_a_recording(command: Command) -> None:
+    result = command("run", SMALL_LINE, "--no-record", "--duration", "0.1", "--details")
+    assert result.exit_code == 0, result.output
+    *_, speed, bound, change = result.stdout.splitlines()
+    assert "100 steps a tick, given in the scene" in result.output and "; predicted error: " in result.output
     assert re.fullmatch(r"speed: 0\.10 s simulated in .* x real time; \d+ % in the kernels, .*", speed)
-    assert peak.startswith("peak force ")
     # On a busy machine the few steps of 0.1 s may take less time than what comes with each tick.
     steps = "bound: 100 steps a tick are given in the scene; contact friction needs "
     assert bound.startswith((steps, "bound: devices and the guard, which act once a tick"))
     assert change.startswith("change: ")
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_record_is_another_name_of_out(command: Command, tmp_path: Path) -> None:
@@ -191,7 +213,7 @@ def test_plot_draws_into_a_folder(command: Command, tmp_path: Path) -> None:
     assert_refused(command("plot", "bag", "--time", "99"), "99")
 
 
-@pytest.mark.parametrize("name", ["replay", "plot", "recover"])
+@pytest.mark.parametrize("name", ["replay", "plot", "recover", "events", "alarms"])
 def test_bag_that_is_not_there_is_refused(command: Command, name: str) -> None:
     assert_refused(command(name, "gone"), "gone: no ")
 

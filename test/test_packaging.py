@@ -92,7 +92,7 @@ def test_package_xml_names_every_ros_package_that_is_imported() -> None:
             names += [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
             imported |= {name.partition(".")[0] for name in names}
     ros = {name for name in imported if name.endswith(("_msgs", "_srvs", "_interfaces")) or name.startswith("launch")}
-    assert ros | {"rclpy"} <= declared | {"simulation_interfaces"}  # served only where it is installed
+    assert ros | {"rclpy"} <= declared
 
 
 def set_up_module() -> Any:
@@ -137,6 +137,45 @@ def test_an_extra_brings_what_scenarios_run_with(tmp_path: Path) -> None:
 def test_colcon_lists_both_packages() -> None:
     listed = run(COLCON, "--log-base", "/dev/null", "list", "--base-paths", ".", "msg_defs", "--names-only", cwd=ROOT)
     assert sorted(listed.stdout.split()) == ["conveyor_msgs", "conveyor_sim"]
+
+
+def test_a_workspace_has_both_packages_side_by_side(tmp_path: Path) -> None:
+    folder = tmp_path / "my workspace"
+    for _ in range(2):
+        linked = run("tools/workspace.sh", folder, cwd=ROOT)
+        assert linked.returncode == 0, linked.stderr
+    listed = run(COLCON, "--log-base", "/dev/null", "list", cwd=folder).stdout.splitlines()
+    assert {tuple(line.split("\t")) for line in listed} == {
+        ("conveyor_msgs", "src/conveyor_msgs", "(ros.ament_cmake)"),
+        ("conveyor_sim", "src/conveyor_sim", "(ros.ament_python)"),
+    }
+    assert (folder / "src" / "conveyor_msgs").resolve() == ROOT / "msg_defs"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "facts"),
+    [
+        ((), ["0 arguments given", "expected one"]),
+        (("",), ["expected one"]),
+        (("build/workspace",), ["build/workspace", "lies in the checkout", "outside"]),
+        (("{tmp}/taken",), ["conveyor_msgs exists already"]),
+        (("{tmp}/file",), ["can't be made"]),
+    ],
+)
+def test_a_workspace_that_cannot_be_is_refused(arguments: tuple[str, ...], facts: list[str], tmp_path: Path) -> None:
+    (tmp_path / "taken" / "src" / "conveyor_msgs").mkdir(parents=True)
+    (tmp_path / "file").touch()
+    refused = run("tools/workspace.sh", *(one.replace("{tmp}", str(tmp_path)) for one in arguments), cwd=ROOT)
+    assert refused.returncode == 1
+    assert missing(refused.stderr.splitlines()[-1], ["workspace.sh", *facts]) == []
+    assert not (ROOT / "build" / "workspace").exists()
+
+
+def test_packages_name_their_authors_and_addresses() -> None:
+    for file in ("package.xml", "msg_defs/package.xml"):
+        package = ElementTree.parse(ROOT / file)
+        assert {url.get("type") for url in package.iter("url")} == {"website", "repository"}
+        assert package.findtext("author") == package.findtext("maintainer")
 
 
 def test_colcon_install_has_what_ros_looks_for(tmp_path: Path) -> None:

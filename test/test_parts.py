@@ -36,6 +36,14 @@ def test_each_page_has_a_picture_and_is_linked() -> None:
             assert (ROOT / "docs" / "images" / "parts" / f"{page.stem}.webp").exists()
 
 
+@pytest.mark.parametrize("folder", ["performance", "ros"])
+def test_pages_of_a_folder_are_linked_from_its_index(folder: str) -> None:
+    index = (ROOT / "docs" / f"{folder}.md").read_text()
+    pages = sorted((ROOT / "docs" / folder).glob("*.md"))
+    assert pages
+    assert [page.name for page in pages if f"]({folder}/{page.name})" not in index] == []
+
+
 def test_pictures_are_small() -> None:
     files = [file for file in (ROOT / "docs" / "images").rglob("*") if file.is_file()]
     assert sum(file.stat().st_size for file in files) <= MOST_BYTES

@@ -19,7 +19,8 @@ DOCS = ROOT / "docs"
 
 def pages() -> Iterator[tuple[Path, str]]:
     """Each page, and its text as it should be."""
-    yield DOCS / "effects.md", importlib.import_module("conveyor_sim.physics.effects.reference").reference()
+    for name, package in (("effects", "physics.effects"), ("cli", "cli")):
+        yield DOCS / f"{name}.md", importlib.import_module(f"conveyor_sim.{package}.reference").reference()
     sys.path[:0] = [str(DOCS / "studies"), str(ROOT / "test"), str(ROOT / "tools")]
     rules = importlib.import_module("import_rules")
     yield rules.PAGE, rules.page(rules.PAGE.read_text(encoding="utf-8"))

@@ -23,7 +23,7 @@ RULES: Mapping[str, str] = {
     "line": "columns engine errors physics scene support | numpy",
     "simulation": "columns engine line physics scene | numpy",
     "__init__": "scene simulation",
-    "bag": "columns errors line scene simulation support | lz4 mcap numpy rosbags yaml zstandard",
+    "bag": "columns errors line scene simulation support | lz4 mcap numpy pandas pyarrow rosbags yaml zstandard",
     "page": "bag columns errors scene simulation support | ezdxf numpy ruamel",
     "run": "bag columns control engine errors line physics scene simulation support | click numpy",
     "report": "bag columns errors line page physics run scene simulation support | click matplotlib numpy rich",
@@ -35,7 +35,7 @@ RULES: Mapping[str, str] = {
     "SALib annotated_types distributed matplotlib numpy optuna pyarrow pydantic rich scipy",
     "ros": "bag columns control errors line protocols report run scene simulation support | "
     "builtin_interfaces click conveyor_msgs diagnostic_msgs geometry_msgs numpy rcl_interfaces rclpy rosgraph_msgs "
-    "std_msgs std_srvs",
+    "simulation_interfaces std_msgs std_srvs",
     "testing": "bag control errors line page protocols report ros run scene simulation support | numpy pytest",
     "cli": "accuracy bag errors page physics protocols report ros run scene studies support | click rich",
 }

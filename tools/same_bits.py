@@ -43,7 +43,7 @@ IGNORED = {"conveyor_msgs/msg/Line": {"run_id", "versions", "engine_hash", "mach
 """Fields that differ between two recordings of the same bits, by message type."""
 
 TEXTS = {
-    "conveyor_msgs/msg/Line": {"dt_reason", "scene_text", "tag_descriptions"},
+    "conveyor_msgs/msg/Line": {"dt_reason", "scene_text", "tags.description"},
     "conveyor_msgs/msg/CommandOutcome": {"reason"},
     "conveyor_msgs/msg/RunState": {"reason"},
     "conveyor_msgs/msg/Events": {"text"},
@@ -51,7 +51,7 @@ TEXTS = {
     "conveyor_msgs/msg/DamageEvent": {"text"},
     "conveyor_msgs/msg/AlarmStates": {"text"},
 }
-"""Fields that hold sentences for people. Of scene_text only comments and layout may change."""
+"""Fields that hold sentences for people, without indices. Of scene_text only comments and layout may change."""
 
 
 @dataclass
@@ -320,7 +320,7 @@ def _compare_topic(place: str, topic: str, old: Recording, new: Recording, compa
         differing = [leaf for leaf in leaves if leaf[0].split("[")[0] not in IGNORED.get(kind, ())]
         for path, value, changed in differing:
             where = f"{place}{topic}: {tick}: {path}"
-            name = path.split("[")[0]
+            name = re.sub(r"\[\d+\]", "", path)
             if name in TEXTS.get(kind, ()) and (name != "scene_text" or _same_yaml(value, changed)):
                 comparison.reword(where, value, changed)
             else:

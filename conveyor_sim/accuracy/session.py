@@ -28,7 +28,7 @@ class Session:
     """One study of a scene for somebody who waits. To be called in this order: `predict`, then `run`."""
 
     def __init__(self, scene: Scene, tolerance: float, answer: Say, say: Say) -> None:
-        """tolerance: relative error. answer: called with each line of answers; say: with what is under way."""
+        """tolerance: relative error. answer: called with each line of the answer; say: of progress, interim answers."""
         self.scene = scene
         self.setting: Setting | None = None
         """Recommended in the end; None: nothing is."""
@@ -43,7 +43,7 @@ class Session:
         """Show what is predicted, and say what is to come; nothing runs yet."""
         if not self._known.touches:
             return
-        self._show(self._best.title, self._best.lines)
+        self._show_interim(self._best)
         minutes = effort.budget / PROCESSORS / 60.0
         self._say(
             f"study of {self.scene.name} in {folder}: on {PROCESSORS} free processors a preliminary answer within a "
@@ -78,11 +78,15 @@ class Session:
     def _report(self, interim: Interim) -> None:
         self._best = interim
         if interim.title == PRELIMINARY:
-            self._show(interim.title, interim.lines)
+            self._show_interim(interim)
 
     def _show_without_contact(self, looked: float | None) -> None:
         self.setting, lines = without_contact(self.scene, self._known, looked)
         self._show(ANSWER, lines)
+
+    def _show_interim(self, interim: Interim) -> None:
+        for line in (interim.title, *interim.lines):
+            self._say(line)
 
     def _show(self, title: str, lines: tuple[str, ...] | list[str]) -> None:
         for line in (title, *lines):

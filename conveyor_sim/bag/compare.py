@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, is_dataclass
 from typing import Any
 
 import numpy as np
@@ -58,7 +58,7 @@ def first_difference(topic: str, line: Any, recorded: Any, replayed: Any, *, exa
     if exact and recorded.header.stamp != replayed.header.stamp:
         return difference("header.stamp", _seconds(recorded), _seconds(replayed))
     for field in row.fields:
-        then, now = np.atleast_1d(getattr(recorded, field)), np.atleast_1d(getattr(replayed, field))
+        then, now = _entries(getattr(recorded, field)), _entries(getattr(replayed, field))
         if len(then) != len(now):
             return difference(f"the number of entries ({field})", len(then), len(now))
         unequal = np.flatnonzero(_unequal(then, now, None if exact else compare.within.get(field)))
@@ -66,6 +66,12 @@ def first_difference(topic: str, line: Any, recorded: Any, replayed: Any, *, exa
             index = int(unequal[0])
             return difference(field, repr(then[index].item()), repr(now[index].item()), index)
     return None
+
+
+def _entries(values: Any) -> NDArray[Any]:
+    """Return the entries of a field: numbers or texts; of a list of AlarmIds, the ids of each as one text."""
+    is_ids = isinstance(values, list) and values and is_dataclass(values[0])
+    return np.atleast_1d([str(list(one.ids)) for one in values] if is_ids else values)
 
 
 def _seconds(message: Any) -> str:

@@ -10,7 +10,7 @@ from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import dataclass, fields
 from functools import cached_property, lru_cache
 from pathlib import Path, PurePath
-from typing import Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,14 +21,20 @@ from conveyor_sim.bag.mcap.records import mapped
 from conveyor_sim.bag.mcap.storage import other_storage, packed_message
 from conveyor_sim.bag.mcap_reader import McapFilesReader
 from conveyor_sim.bag.message_reader import MessageReader
-from conveyor_sim.bag.messages.encode import LINE, Outcome
+from conveyor_sim.bag.messages.encode import FORMAT, LINE, Outcome
+from conveyor_sim.bag.messages.older import CONVERTED, WITHOUT_NUMBER, upgraded
 from conveyor_sim.bag.messages.qos import Qos
 from conveyor_sim.bag.messages.topics import TOPICS
+from conveyor_sim.bag.messages.typestore import type_hash
 from conveyor_sim.bag.own_reader import own_reader
 from conveyor_sim.bag.rosbags_reader import RosbagsReader
+from conveyor_sim.bag.tables import frame_of
 from conveyor_sim.columns.bottles import BeltColumns, BottleColumns, ContactColumns
 from conveyor_sim.errors import BagError, ConveyorError
 from conveyor_sim.support.printable import SENTENCE, printable
+
+if TYPE_CHECKING:
+    import pandas
 
 T = TypeVar("T")
 
@@ -87,6 +93,8 @@ class Bag(AbstractContextManager["Bag"]):
         if not line_topics:
             raise BagError(f"{path}: no message of type {LINE}, expected the latched topic line")
         self.namespace = line_topics[0].rpartition("/")[0]
+        self.format = self._recorded_format()
+        """Format of the recording, from 1 to encode.FORMAT."""
         self.line: Any = next(iter(self.messages("line"))).data
 
     def __exit__(self, *_: object) -> None:
@@ -150,10 +158,26 @@ class Bag(AbstractContextManager["Bag"]):
         if start_ns is None and stop_ns is None and count < stated:
             raise BagError(f"{self.path}: only {count} of {stated} messages can be read; damaged or cut short?")
 
+    @cached_property
+    def older_topics(self) -> frozenset[str]:
+        """Topics of older definitions, whose messages `decode` converts to the present ones."""
+        if self.format == FORMAT:
+            return frozenset()
+        return frozenset(
+            topic
+            for topic, kind in self.types.items()
+            if kind in CONVERTED and self.type_hash(topic) != type_hash(kind)
+        )
+
     def decode(self, topic: str, data: bytes) -> Any:
-        """Return a rosbags message object. Raise BagError if the bytes are not a message of the topic's type."""
+        """Return a rosbags message object. Raise BagError if the bytes are not a message of the topic's type.
+
+        Messages of earlier formats have the fields of the present definition.
+        """
+        kind = self.types[topic]
         with in_one_sentence(self.path, f"a message of topic {topic} can't be decoded", data):
-            return self._source.deserialize(data, self.types[topic])
+            message = self._source.deserialize(data, kind)
+            return upgraded(kind, message, self.format) if topic in self.older_topics else message
 
     def sense(self) -> AbstractContextManager[None]:
         """Return a context for code that interprets messages. If the bag is not verified, errors become BagErrors."""
@@ -202,6 +226,15 @@ class Bag(AbstractContextManager["Bag"]):
         """Yield the result of every command, in order. The tick is that at which it was applied or refused."""
         return self.read("outcomes")
 
+    def frame(self, topic: str) -> pandas.DataFrame:
+        """Return the table of a topic as a pandas DataFrame, with one row per bottle, contact, event or tick.
+
+        topic: bottles, contacts, signals, events or belts. The first columns are `time` (s) and `tick`. Names of bottle
+        types, belts and rails are categories. `attrs["units"]` holds the SI unit by column. Raise BagError for another
+        topic, one that was not recorded, or if pandas is not installed.
+        """
+        return frame_of(self, topic)
+
     def bottle_series(self, ids: Collection[int]) -> dict[int, BottleSeries]:
         """Return the histories of some bottles, from one pass over the bag; ids that never occur are left out."""
         wanted = np.array(sorted(ids), dtype=np.uint64)
@@ -214,6 +247,21 @@ class Bag(AbstractContextManager["Bag"]):
                 for name in names[1:]:
                     row[name].append(getattr(frame.data, name)[index])
         return {bottle: BottleSeries(**{n: np.array(v) for n, v in row.items()}) for bottle, row in rows.items()}
+
+    def _recorded_format(self) -> int:
+        """Return the format of the recording. Raise BagError for one that this version does not know."""
+        if (number := WITHOUT_NUMBER.get(hash_ := self.type_hash("line"))) is not None:
+            return number
+        _, _, data = next(iter(self.raw({"line"})))
+        with in_one_sentence(self.path, "a message of topic line can't be decoded", data):
+            line = self._source.deserialize(data, LINE)
+        if not hasattr(line, "format"):
+            raise BagError(f"{self.path}: has an unknown definition of Line ({hash_}), expected one of conveyor_sim")
+        if not 1 <= line.format <= FORMAT:
+            raise BagError(
+                f"{self.path}: format {line.format} given, expected 1 to {FORMAT}; recorded by a newer conveyor_sim?"
+            )
+        return int(line.format)
 
     def _relative(self, topic: str) -> str:
         return topic.removeprefix(f"{self.namespace}/")

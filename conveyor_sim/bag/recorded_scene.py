@@ -10,7 +10,7 @@ def recorded_scene(line: Any, name: str) -> Scene:
     """Return the scene of a recorded Line message. Raise SceneError, with `name` for its file, if it is refused now.
 
     The scene is not read with the present defaults, which it may not allow. Random streams have the keys of the time of
-    the recording: while they were keyed by places in lists, lines had no tags.
+    the recording: in format 1, places in lists.
     """
     overrides = parse_overrides(line.overrides)
     accuracy = overrides.get("accuracy")
@@ -18,5 +18,5 @@ def recorded_scene(line: Any, name: str) -> Scene:
     recorded = {"integrator": str(line.integrator), "per_tick": int(line.steps_per_tick)}
     pinned = {**others, "preset": None, "tolerance": None, "dt": None, **recorded}
     scene = parse_again(line.scene_text, name, {**overrides, "accuracy": pinned})
-    scene._source = replace(scene._source, streams_by_index=not hasattr(line, "tag_names"))
+    scene._source = replace(scene._source, streams_by_index=line.format == 1)
     return scene

@@ -163,7 +163,7 @@ class _Replay:
         return [outcome for outcome in outcomes if outcome.source != ARRIVAL]  # those never reached the line
 
     def _compare_outcomes(self, recorded: list[Outcome]) -> ReplayDifference | None:
-        replayed = [Outcome.of(o.input, o.accepted, o.reason) for o in self._sim.take_outcomes()]
+        replayed = [*map(Outcome.of, self._sim.take_outcomes())]
         if self._outcomes is not None:
             self._compared["outcomes"] = self._compared.get("outcomes", 0) + len(recorded)
         else:
@@ -190,7 +190,7 @@ class _Replay:
             return ReplayDifference(tick, time, topic, "the number of messages", "1", "0")
         if topic == "signals":
             state = Image(state.values[self._signals], *NOTHING_FORCED)
-        # The present definition; the bag's may be an older one with fewer fields.
+        # The present definition, to which messages of earlier formats were converted.
         replayed = typestore().deserialize_cdr(row.pack(state, header), row.type)
         return first_difference(topic, self._bag.line, recorded, replayed, exact=self._exact)
 

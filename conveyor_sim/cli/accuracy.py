@@ -40,8 +40,6 @@ def accuracy(
         raise ConveyorError("accuracy: scipy is not installed, expected it (pip install 'conveyor_sim[accuracy]')")
     if not 0.0 < tolerance <= 0.5:
         raise ConveyorError(f"--tolerance: {tolerance:g} given, expected a number greater than 0, at most 0.5")
-    if write and options.are_choices:
-        raise ConveyorError("--apply: given with --set, --variant or --format, expected none: the copy would lack them")
     with held_back():
         from conveyor_sim.accuracy.effort import DEFAULT, THOROUGH
         from conveyor_sim.accuracy.report.apply import apply
@@ -62,10 +60,9 @@ def accuracy(
         if can_draw():
             from conveyor_sim.accuracy.figures.draw import plot_accuracy
 
-            for picture in plot_accuracy(study, folder):
-                click.echo(f"picture: {picture}")
-        click.echo(f"numbers: {folder}/study.json, and CSV files beside it")
+            plot_accuracy(study, folder)
+        click.echo(f"Files: {folder} (study.json, CSV tables, pictures)")
     if write and session.setting is not None:
         copy = folder / scene_path(scene).name
         apply(loaded, session.setting, copy)
-        click.echo(f"scene with the setting: {copy}")
+        click.echo(f"Scene with the setting: {copy}")

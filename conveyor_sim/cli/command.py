@@ -16,7 +16,7 @@ from conveyor_sim.cli.attach import attach
 from conveyor_sim.cli.demo import demo
 from conveyor_sim.cli.drawings import draw, import_
 from conveyor_sim.cli.optimise import optimise
-from conveyor_sim.cli.recordings import events, plot, recover, replay, report, sources
+from conveyor_sim.cli.recordings import alarms, events, export, plot, recover, replay, report, sources
 from conveyor_sim.cli.run import run
 from conveyor_sim.cli.scenes import check, explain, tags
 from conveyor_sim.cli.schema import schema
@@ -66,6 +66,6 @@ def main(context: click.Context) -> None:
 
 for command in (
     demo, check, schema, tags, explain, draw, import_, run, serve, attach, user, accuracy, recover, replay, events,
-    report, plot, sources, view, sweep, optimise, study_,
+    alarms, export, report, plot, sources, view, sweep, optimise, study_,
 ):  # fmt: skip
     main.add_command(command)

@@ -1,4 +1,4 @@
-"""Commands on a recording: recover, replay, sources, events, report, plot."""
+"""Commands on a recording: recover, replay, sources, events, alarms, report, plot."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from conveyor_sim.cli.output import show
+from conveyor_sim.cli.output import line_width, show_json, show_lines
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.support.printable import SENTENCE, printable
 from conveyor_sim.support.progress import ProgressBar
@@ -106,17 +106,66 @@ def sources(bag: Path, out: Path | None) -> None:
 @click.option("--name", "names", multiple=True, help="Only of this device, alarm, ...: machines/*, ...; repeatable.")
 @click.option("--from", "start", type=float, help="Only from this simulated time in s on.")
 @click.option("--to", "stop", type=float, help="Only up to this simulated time in s.")
-@click.option("--csv", "file", type=click.Path(path_type=Path), help="Write them to this file and print none.")
-def events(bag: Path, file: Path | None, **chosen: Any) -> None:
-    """Print what happened on the line in BAG: bottles, alarms, states of machines, faults, refusals, limits passed."""
-    from conveyor_sim.report.events import chosen_events, event_table, write_csv
+@click.option("--all", "every", is_flag=True, help="Print repeated events one by one.")
+@click.option("--json", "as_json", is_flag=True, help="Print all of them as JSON.")
+@click.option("--csv", "file", type=click.Path(path_type=Path), help="Write all of them to this file and print none.")
+def events(bag: Path, file: Path | None, every: bool, as_json: bool, **chosen: Any) -> None:
+    """List the events in BAG: bottles, alarms, states of machines, faults, refusals, limits passed.
 
+    Events that are repeated, such as those of each cycle of a machine, are counted in one line between other events.
+    """
+    from conveyor_sim.report.events import chosen_events, event_listing, write_csv
+
+    if file is not None and as_json:
+        raise ConveyorError("--csv: given with --json, expected one of them")
     rows = chosen_events(bag, **chosen)
-    if file is None:
-        show(event_table(rows))
-    else:
+    if file is not None:
         write_csv(rows, file, bag)
         click.echo(f"{len(rows)} events written to {file}")
+    elif as_json:
+        show_json(row._asdict() for row in rows)
+    else:
+        show_lines(event_listing(rows, line_width(), every))
+
+
+@click.command()
+@click.argument("bag", type=click.Path(path_type=Path))
+@click.option("--kind", "kinds", multiple=True, help="Only of this class: error, warning, message; repeatable.")
+@click.option("--name", "names", multiple=True, help="Only this alarm: infeed*, ...; repeatable.")
+@click.option("--json", "as_json", is_flag=True, help="Print them as JSON.")
+def alarms(bag: Path, as_json: bool, **chosen: Any) -> None:
+    """List the alarms of BAG: how often each was raised, how long it was active, its state at the end."""
+    from conveyor_sim.report.alarms import alarm_listing, chosen_alarms
+
+    rows = chosen_alarms(bag, **chosen)
+    if as_json:
+        show_json(row._asdict() for row in rows)
+    else:
+        show_lines(alarm_listing(rows, line_width()))
+
+
+@click.command()
+@click.argument("bag", type=click.Path(path_type=Path))
+@click.option("--parquet", is_flag=True, help="Write Parquet files, with units in the metadata of the columns.")
+@click.option("--csv", "as_csv", is_flag=True, help="Write CSV files.")
+@click.option("--table", "tables", multiple=True, help="bottles, contacts, signals, events or belts; repeatable.")
+@click.option("--out", type=click.Path(path_type=Path), help="Folder for the files (default: BAG/tables).")
+def export(bag: Path, parquet: bool, as_csv: bool, tables: tuple[str, ...], out: Path | None) -> None:
+    """Write BAG as tables for other programs: bottles, contacts, signals and events.
+
+    Each table is one file with one row per bottle, contact, event or tick. Simulated time and tick come first.
+    """
+    from conveyor_sim.bag.export import export_tables
+
+    if not (parquet or as_csv):
+        raise ConveyorError("neither --parquet nor --csv given, expected one of them")
+    formats = [name for name, on in (("parquet", parquet), ("csv", as_csv)) if on]
+    folder = out or (bag if bag.is_dir() else bag.parent) / "tables"
+    with ProgressBar(f"export {bag}", 0.0, counted="messages") as bar:
+        written = export_tables(bag, folder, formats, tables, bar.update)
+    for file, rows in written.items():
+        click.echo(f"{file.name:<17}{rows} rows, {file.stat().st_size / 1e6:.3g} MB")
+    click.echo(f"written to {folder}")
 
 
 @click.command()

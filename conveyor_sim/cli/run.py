@@ -22,6 +22,7 @@ from conveyor_sim.support.progress import ProgressBar
 @controller_options
 @click.option("--no-record", is_flag=True, help="Simulate only; nothing is written.")
 @click.option("--no-pictures", is_flag=True, help="Draw nothing; `conveyor-sim plot` does, any time later.")
+@click.option("--details", is_flag=True, help="Print setting, checks of forces, belts, topics and speed, too.")
 @click.option("--threads", type=click.IntRange(1), help="Threads to step with (default: as many as prove fastest).")
 @scene_options
 def run(
@@ -33,19 +34,19 @@ def run(
     variables: tuple[str, ...],
     no_record: bool,
     no_pictures: bool,
+    details: bool,
     threads: int | None,
     options: SceneOptions,
 ) -> None:
     """Simulate SCENE without ROS, and record it.
 
-    It runs as fast as possible, and records what the node would.
+    It runs as fast as possible, and records the topics that the ROS node would.
     """
     with collected_later():
         from conveyor_sim.bag.folder import require_recordable
         from conveyor_sim.bag.recorder import run_folder
         from conveyor_sim.physics.model import build_model
         from conveyor_sim.report.drawing import Drawing
-        from conveyor_sim.report.explain.choices import setting_line
         from conveyor_sim.report.report import report, report_unrecorded
         from conveyor_sim.run.compilation import Compilation
         from conveyor_sim.run.runner import run_scene
@@ -54,7 +55,6 @@ def run(
     controls = None if source is None else source.load()
     loaded = options.load(scene, duration)
     model = build_model(loaded)
-    click.echo(setting_line(model))
     folder = drawing = None
     if not no_record:
         folder = click.get_current_context().with_resource(run_folder(out))
@@ -66,8 +66,8 @@ def run(
     with ProgressBar(loaded.name, loaded.duration) as bar:
         done = run_scene(loaded, folder, bar.update, threads, controls, variables, say)
     if done.interrupted:
-        click.echo(f"interrupted at {done.simulated:.2f} s")
+        say(f"interrupted at {done.simulated:.2f} s")
     if done.bag is None:
-        report_unrecorded(loaded, model, done)
+        report_unrecorded(loaded, model, done, details)
     else:
-        report(done.bag, done.wall, drawing, done.spent)
+        report(done.bag, done.wall, drawing, done.spent, details)

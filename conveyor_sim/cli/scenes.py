@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from conveyor_sim.cli.output import say, show
+from conveyor_sim.cli.output import line_width, say, show, show_json, show_lines
 from conveyor_sim.cli.scene_options import SceneOptions, scene_options
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.support.progress import ProgressBar
@@ -86,28 +86,48 @@ def _watch(path: Path, port: int, options: SceneOptions) -> None:
 
 @click.command()
 @click.argument("scene")
-@click.option("--csv", "as_csv", is_flag=True, help="As CSV, with all that is known of each tag.")
-@click.option("--modbus", is_flag=True, help="As the map of their Modbus addresses, as CSV.")
+@click.option("--kind", "kinds", multiple=True, help="Only of this role or data type: command, bool, ...; repeatable.")
+@click.option("--name", "names", multiple=True, help="Only these tags: belts/*, ...; repeatable.")
+@click.option("--json", "as_json", is_flag=True, help="Print all properties of each tag as JSON.")
+@click.option("--csv", "as_csv", is_flag=True, help="Print all properties of each tag as CSV.")
+@click.option("--modbus", is_flag=True, help="Print the map of Modbus addresses of all tags as CSV.")
 @click.option("--map", "kept", type=click.Path(path_type=Path), help="With --modbus: a map to keep, which only grows.")
 @click.option("--word-order", type=click.Choice(["big", "little"]), default="big", help="Of Modbus: ABCD or CDAB.")
 @scene_options
 def tags(
-    scene: str, as_csv: bool, modbus: bool, kept: Path | None, word_order: WordOrder, options: SceneOptions
+    scene: str,
+    kinds: tuple[str, ...],
+    names: tuple[str, ...],
+    as_json: bool,
+    as_csv: bool,
+    modbus: bool,
+    kept: Path | None,
+    word_order: WordOrder,
+    options: SceneOptions,
 ) -> None:
-    """List the tags of SCENE: all that can be read, commanded and injected, with units, ranges and meaning."""
+    """List the tags of SCENE: signals, commands and faults, with units, ranges and meaning."""
     from conveyor_sim.protocols.modbus.address_map import keep_map, modbus_map
-    from conveyor_sim.report.tags import line_tags, tag_csv, tag_table
+    from conveyor_sim.report.tags import chosen_tags, line_tags, tag_csv, tag_listing, tag_objects
     from conveyor_sim.support.modbus_rows import to_csv
 
+    given = [option for option, on in (("--json", as_json), ("--csv", as_csv), ("--modbus", modbus)) if on]
+    if len(given) > 1:
+        raise ConveyorError(f"{given[1]}: given with {given[0]}, expected one of them")
+    if modbus and (kinds or names):
+        raise ConveyorError("--modbus: given with --kind or --name, expected neither: the map has the addresses of all")
     loaded = options.load(scene)
     if modbus:
         tags = line_tags(loaded)
         rows = modbus_map(tags, word_order=word_order) if kept is None else keep_map(kept, tags, word_order)
         click.echo(to_csv(rows), nl=False)
-    elif as_csv:
-        click.echo(tag_csv(loaded), nl=False)
+        return
+    chosen = chosen_tags(loaded, names, kinds)
+    if as_csv:
+        click.echo(tag_csv(loaded, chosen), nl=False)
+    elif as_json:
+        show_json(tag_objects(loaded, chosen))
     else:
-        show(tag_table(loaded))
+        show_lines(tag_listing(chosen, line_width()))
 
 
 @click.command()

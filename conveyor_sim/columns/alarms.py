@@ -22,8 +22,8 @@ class AlarmColumns:
     tag: Sequence[str]
     """Signal that the alarm monitors; empty: none."""
     group: Sequence[str]
-    suppressed_by: Sequence[str]
-    """JSON lists of ids."""
+    suppressed_by: Sequence[Sequence[str]]
+    """Ids of the alarms that each alarm follows from."""
     latching: NDArray[np.bool_]
     declared_by: Sequence[str]
     """line, scene or the name of the controller that declared the alarm; empty: not declared."""

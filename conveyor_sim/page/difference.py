@@ -195,7 +195,7 @@ class RecordingComparison:
     def _signals(self, then: Any, now: Any) -> tuple[list[str], list[str]]:
         """Return sentences on the signals of both recordings that differ, and their names."""
         names = [self._names(place, "signal_names") for place in (0, 1)]
-        units = dict(zip(names[0], self._names(0, "signal_units"), strict=True))
+        units = {tag.name: tag.unit for tag in self._bags[0].line.tags}
         a, b = (
             dict(zip(own, to_image(image).values, strict=False)) for own, image in zip(names, (then, now), strict=True)
         )

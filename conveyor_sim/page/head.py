@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -28,7 +27,7 @@ def head(line: Any, scene: Scene) -> dict[str, Any]:
         **plan_head(scene),
         "run": line.run_id,
         "seed": int(line.seed),
-        "where": getattr(line, "where", ""),
+        "where": line.where,
         "tick": float(line.tick_ns * 1e-9),
         "types": [
             {"name": name, "radius": float(radius)}
@@ -119,25 +118,26 @@ def _points(points: Any) -> list[list[float]]:
 
 
 def _tags(line: Any) -> list[dict[str, Any]]:
-    """Return all tags; the signals of a recording that is older than tags."""
-    if not hasattr(line, "tag_names"):
-        signals = zip(line.signal_names, line.signal_units, strict=True)
-        return [{"name": name, "unit": unit, "role": "actual"} for name, unit in signals]
-    columns = {
-        "name": line.tag_names,
-        "kind": line.tag_kinds,
-        "role": line.tag_roles,
-        "unit": line.tag_units,
-        "min": _finite(line.tag_min),
-        "max": _finite(line.tag_max),
-        "initial": _finite(line.tag_initial),
-        "texts": line.tag_texts,
-        "description": line.tag_descriptions,
-        "device": line.tag_devices,
-        "class": line.tag_classes,
-    }
-    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+    """Return all tags; of a recording of format 1, the signals."""
+    return [
+        {
+            "name": tag.name,
+            "kind": tag.kind,
+            "role": tag.role,
+            "unit": tag.unit,
+            "min": _finite(tag.min),
+            "max": _finite(tag.max),
+            "initial": _finite(tag.initial),
+            "texts": ", ".join(
+                f"{value} {text}" for value, text in zip(tag.state_values, tag.state_texts, strict=True)
+            ),
+            "description": tag.description,
+            "device": tag.device,
+            "class": tag.device_class,
+        }
+        for tag in line.tags
+    ]
 
 
-def _finite(values: Any) -> Sequence[float | None]:
-    return [float(value) if np.isfinite(value) else None for value in values]
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

@@ -56,13 +56,13 @@ class AlarmFigures:
         return bool(self.raised or self.standing)
 
     @property
-    def sentence(self) -> str:
-        """Return one sentence: number of alarms, the most frequent ones, and active alarms."""
+    def lines(self) -> list[str]:
+        """Number of alarms with the most frequent ones, then active alarms. Without any of these, no line."""
         often = [f"{times} x {id}" for id, times in self.by_alarm.items()]
-        came = f"{self.raised} came: {_listed(often)}" if often else "none came"
         flood = f"; a flood, {self.most_in_window} in ten minutes" if self.flood else ""
         standing = [f"{one.id} since {one.since:g} s" for one in self.standing]
-        return f"{came}{flood}" + (f"\nstanding at the end: {_listed(standing)}" if standing else "")
+        raised = [f"{self.raised} raised: {_listed(often)}{flood}"] if often else []
+        return raised + ([f"active at the end: {_listed(standing)}"] if standing else [])
 
 
 def _listed(texts: Sequence[str]) -> str:

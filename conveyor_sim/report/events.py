@@ -1,27 +1,29 @@
-"""Events of a recording (topic `events`), selected by kind, name and time, as a table or as CSV."""
+"""Events of a recording (topic `events`), selected by kind, name and time, as a listing or as CSV."""
 
 from __future__ import annotations
 
 import csv
 import io
 import math
+from collections import Counter
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import NamedTuple, get_args
-
-from rich.box import SIMPLE
-from rich.console import RenderableType
-from rich.table import Table
 
 from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.bag.reader import mcap_files, open_bag
 from conveyor_sim.columns.events import Kind
 from conveyor_sim.errors import BagError, ConveyorError
+from conveyor_sim.report.listing import ListingRow, listing, matches
 from conveyor_sim.support.files import FileError, write_file
 from conveyor_sim.support.printable import SENTENCE, printable
 
 KINDS: tuple[str, ...] = get_args(Kind)
+
+OFTEN = 3
+"""Number of equal events from which they are folded."""
 
 
 class EventRow(NamedTuple):
@@ -59,12 +61,8 @@ def chosen_events(
     if not first <= last:
         raise ConveyorError(f"--from and --to: {first:g} and {last:g} given, expected two times in s, in this order")
     return [
-        row for row in _all(path) if first <= row.time <= last and _fits(row.kind, kinds) and _fits(row.name, names)
+        row for row in _all(path) if first <= row.time <= last and matches(row.kind, kinds) and matches(row.name, names)
     ]
-
-
-def _fits(text: str, patterns: Sequence[str]) -> bool:
-    return not patterns or any(fnmatchcase(text, pattern) for pattern in patterns)
 
 
 def _all(path: Path) -> Iterator[EventRow]:
@@ -92,22 +90,61 @@ def _all(path: Path) -> Iterator[EventRow]:
                 )
 
 
-def event_table(rows: Sequence[EventRow]) -> RenderableType:
-    """For a terminal."""
+def event_listing(rows: Sequence[EventRow], width: int | None, every: bool = False) -> list[str]:
+    """Return the lines for a terminal. width: see `report.listing.listing`. every: print repeated events one by one."""
     if not rows:
-        return "no such event"
-    table = Table(box=SIMPLE, pad_edge=False)
-    table.add_column("time, s", justify="right", no_wrap=True)
-    table.add_column("tick", justify="right", no_wrap=True)
-    for head in ("kind", "name"):
-        table.add_column(head, overflow="fold")
-    for head in ("bottle", "value"):
-        table.add_column(head, justify="right", no_wrap=True)
-    table.add_column("text", overflow="fold")
+        return ["no such event"]
+    folds = [Fold(row) for row in rows] if every else folded(rows)
+    records = [ListingRow((f"{fold.first.time:.3f}", fold.first.kind, fold.first.name), fold.text) for fold in folds]
+    return listing(("time, s", "kind", "name", "text"), records, width, right=[0])
+
+
+@dataclass
+class Fold:
+    """Equal events in one line: the first one, their number, and the time of the last one."""
+
+    first: EventRow
+    count: int = 1
+    last: float = 0.0
+    """s, time of the last one."""
+
+    @property
+    def text(self) -> str:
+        """Text of the event, and its number of occurrences."""
+        row = self.first
+        if row.kind.startswith("bottle_"):
+            return f"bottle {row.bottle}" if self.count == 1 else f"{self.count} bottles until {self.last:.3f} s"
+        implied = row.kind.startswith("alarm_") or (row.kind == "machine_state" and row.text)
+        value = "" if row.value is None or implied else f"{row.value:g}"
+        text = ": ".join(filter(None, (value, row.text)))
+        return text if self.count == 1 else f"{text} ({self.count} times until {self.last:.3f} s)".lstrip()
+
+
+def folded(rows: Sequence[EventRow]) -> list[Fold]:
+    """Return the events in order with repeated ones folded.
+
+    Events that happen at least OFTEN times are repeated. All of them between two other events are one line each, so
+    that a machine that starves in each cycle hides nothing.
+    """
+    counts = Counter(map(_sort_of, rows))
+    folds: list[Fold] = []
+    open_folds: dict[tuple[object, ...], Fold] = {}
     for row in rows:
-        bottle, value = ("" if number is None else f"{number:g}" for number in (row.bottle, row.value))
-        table.add_row(f"{row.time:.3f}", str(row.tick), row.kind, row.name, bottle, value, row.text)
-    return table
+        sort = _sort_of(row)
+        if counts[sort] < OFTEN:
+            folds.append(Fold(row))
+            open_folds = {}
+        elif (fold := open_folds.get(sort)) is not None:
+            fold.count, fold.last = fold.count + 1, row.time
+        else:
+            folds.append(Fold(row))
+            open_folds[sort] = folds[-1]
+    return folds
+
+
+def _sort_of(row: EventRow) -> tuple[object, ...]:
+    """Return the properties that equal events share. Those of bottles share no ID and no count."""
+    return (row.kind, row.name) if row.kind.startswith("bottle_") else (row.kind, row.name, row.value, row.text)
 
 
 def write_csv(rows: Sequence[EventRow], file: Path, bag: Path) -> None:

@@ -1,8 +1,9 @@
-"""Output at the end of a run: summary, paths of page and figures, speed."""
+"""Output at the end of a run: outline, paths of page and figures; details on request."""
 
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -16,7 +17,9 @@ from conveyor_sim.page.one_file import write_page
 from conveyor_sim.physics.model import Model
 from conveyor_sim.physics.model.remedies import step_limit
 from conveyor_sim.report.drawing import Drawing
+from conveyor_sim.report.explain.choices import setting_line
 from conveyor_sim.report.figures.files import PNG
+from conveyor_sim.report.outline import counted, file_lines, on_occasions, outline, outline_unrecorded
 from conveyor_sim.report.summarize import summarize
 from conveyor_sim.report.summary import Summary, write_summary
 from conveyor_sim.run.force_check import achieved, pressed
@@ -26,67 +29,45 @@ from conveyor_sim.scene import Scene
 
 
 def render(summary: Summary) -> Group:
-    """Return the summary for a terminal."""
+    """Return the details of a summary for a terminal, without quantities that are absent."""
     account = Table.grid(padding=(0, 2))
     for name, text in _account(summary):
         account.add_row(name, text)
     energy = summary.energy
     work = [] if energy is None else ["work, J"]
-    belts = _table("belt", "bottles now", "came on, per min", "second half, per min", *work)
+    belts = _table("belt", "bottles at the end", "arrivals, 1/min", "second half, 1/min", *work)
     for name, flow in summary.belts.items():
         done = [] if energy is None else [f"{energy.belts[name]:.4g}"]
         belts.add_row(name, str(flow.bottles), f"{flow.per_minute:.1f}", f"{flow.per_minute_second_half:.1f}", *done)
     topics = _table("topic", "messages", "bytes")
     for name, count in sorted(summary.topics.items()):
-        topics.add_row(name, f"{count.messages}", f"{count.bytes}")
+        if count.messages:
+            topics.add_row(name, f"{count.messages}", f"{count.bytes}")
     return Group(account, belts, topics) if summary.belts else Group(account, topics)
 
 
 def _account(summary: Summary) -> list[tuple[str, str]]:
-    wall, factor = summary.wall, summary.real_time_factor
-    force = "not recorded"
-    if summary.peak_force is not None:
-        force = f"peak {summary.peak_force:.2f} N, 99th percentile of peaks {summary.peak_force_99:.2f} N"
-    loop = "no bottle has come round"
-    if summary.loop is not None:
-        loop = (
-            f"{summary.loop.returns} bottles came back to {summary.loop.belt}, {summary.loop.per_minute:.1f} per min "
-            f"({summary.loop.per_minute_second_half:.1f} in the second half)"
-        )
-    return [
-        ("scene", summary.scene),
-        ("recording", summary.bag),
-        ("simulated", f"{summary.simulated:.2f} s"),
-        ("wall time", "not known" if wall is None else f"{wall:.2f} s"),
-        ("real-time factor", "not known" if factor is None else f"{factor:.2f}"),
-        ("bottles", f"{summary.bottles.sentence} ({summary.on_floor} on no belt)"),
-        ("loop", loop),
-        ("contact force", force),
+    rows: list[tuple[str, str | None]] = [
         ("setting", summary.setting),
-        ("predicted error", "not known" if summary.predicted is None else summary.predicted),
-        ("achieved", "not known" if summary.achieved is None else summary.achieved.sentence),
-        *([] if summary.pressed is None else [("load", summary.pressed.sentence)]),
-        ("guard", _told(summary.guard, summary.guard_texts)),
-        *([] if summary.borne is None else [("damage", summary.borne.sentence)]),
-        *([("limits passed", _told(summary.damage_events, summary.damage_texts))] if summary.damage_events else []),
-        *([("alarms", summary.alarms.sentence)] if summary.alarms is not None and summary.alarms.any else []),
-        *([] if summary.energy is None else [("energy", summary.energy.sentence)]),
-        ("commands", f"{summary.commands} recorded, {summary.refused} refused{_on_occasions(summary)}"),
+        ("predicted error", summary.predicted),
+        ("achieved", None if summary.achieved is None else summary.achieved.sentence),
+        ("load", None if summary.pressed is None else summary.pressed.sentence),
+        ("guard", _listed(summary.guard, summary.guard_texts)),
+        ("limits passed", _listed(summary.damage_events, summary.damage_texts)),
+        ("energy", None if summary.energy is None else summary.energy.sentence),
+        ("commands", _commands(summary)),
     ]
+    return [(name, text) for name, text in rows if text]
 
 
-def _on_occasions(summary: Summary) -> str:
-    """Return the number of occasions if it differs: a controller without control authority repeats refused commands."""
-    if summary.occasions in (None, summary.refused):
+def _commands(summary: Summary) -> str:
+    if not summary.commands:
         return ""
-    return f" on {summary.occasions} occasion{'s' * (summary.occasions != 1)}"
+    return f"{summary.commands} recorded, {summary.refused} refused{on_occasions(summary)}"
 
 
-def _told(kinds: dict[str, int], texts: list[str]) -> str:
-    if not kinds:
-        return "nothing to report"
-    counts = ", ".join(f"{count} x {kind.replace('_', ' ')}" for kind, count in kinds.items())
-    return "\n".join([counts, *texts])
+def _listed(kinds: dict[str, int], texts: list[str]) -> str:
+    return "\n".join([counted(kinds), *texts]) if kinds else ""
 
 
 def _table(*headings: str) -> Table:
@@ -100,38 +81,50 @@ PAGE_SECONDS = 600.0
 """s at the end of a run that its page draws: some MB at most."""
 
 
-def report(bag: Path, wall: float | None, drawing: Drawing | None, spent: Spent | None = None) -> None:
-    """Print the summary of a run that took `wall` s, and write it, a page and the pictures into the run's folder.
+def report(
+    bag: Path, wall: float | None, drawing: Drawing | None, spent: Spent | None = None, details: bool = False
+) -> None:
+    """Print the outline of a run that took `wall` s, and write its summary, a page and pictures into the run's folder.
 
-    drawing: None draws nothing.
+    drawing: None draws nothing. details: print everything that the summary contains, as well.
     """
     began = time.monotonic()
     if drawing is not None:
         drawing.begin(bag, suffixes=PNG)  # `conveyor-sim plot` draws SVG too
     summary = summarize(bag, wall)
-    Console(markup=False, highlight=False).print(render(summary))
+    for line in outline(summary):
+        click.echo(line)
+    files = [write_summary(summary, bag)]
+    pictures: Sequence[Path] = ()
     if drawing is not None:
-        click.echo(f"page: {write_page(bag, bag / 'page.html', PAGE_SECONDS)}")
-    click.echo(f"summary: {write_summary(summary, bag)}")
-    if drawing is not None and can_draw():
-        try:
-            for picture in drawing.pictures(bag / "pictures"):
-                click.echo(f"picture: {picture}")
-        except ConveyorError as error:  # such as a scene without bottles: nothing to draw, but a good run all the same
-            click.echo(f"no pictures: {error}", err=True)
+        files.insert(0, write_page(bag, bag / "page.html", PAGE_SECONDS))
+        if can_draw():
+            try:
+                pictures = drawing.pictures(bag / "pictures")
+            except ConveyorError as error:  # such as a scene without bottles: nothing to draw, but a good run
+                click.echo(f"no pictures: {error}", err=True)
+    for line in file_lines(bag, files, pictures):
+        click.echo(line)
+    if not details:
+        return
+    Console(markup=False, highlight=False).print(render(summary))
     after = 0.0 if drawing is None else time.monotonic() - began
     for line in measured(summary.simulated, wall, spent, after, summary.limit, summary.topics):
         click.echo(line)
 
 
-def report_unrecorded(scene: Scene, model: Model, run: Run) -> None:
-    """Print what is known of a run of which nothing was recorded."""
-    for check in (achieved(model, run.peak_force), pressed(model, run.load)):
-        if check is not None:
-            click.echo(check.sentence)
-    for said in run.guard:
-        click.echo(f"guard: {said}")
-    for line in measured(run.simulated, run.wall, run.spent, 0.0, step_limit(scene), {}):
+def report_unrecorded(scene: Scene, model: Model, run: Run, details: bool = False) -> None:
+    """Print the outline of a run that was not recorded. details: see `report`."""
+    checks = (achieved(model, run.peak_force), pressed(model, run.load))
+    for line in outline_unrecorded(scene.name, run, checks):
+        click.echo(line)
+    if not details:
+        return
+    for line in (
+        setting_line(model),
+        *(check.sentence for check in checks if check is not None),
+        *measured(run.simulated, run.wall, run.spent, 0.0, step_limit(scene), {}),
+    ):
         click.echo(line)
 
 

@@ -58,8 +58,10 @@ class LoadHistory:
 
     @property
     def sentence(self) -> str:
-        """Return one sentence with these values."""
+        """Return one sentence with these values; empty without any."""
         there = {field.name: worst for field in fields(LoadHistory) if (worst := getattr(self, field.name)) is not None}
+        if not there:
+            return ""
         return "at most " + "; ".join(
             f"{LOAD_WORDS[name].format(worst.value)} (bottle {worst.bottle})" for name, worst in there.items()
         )

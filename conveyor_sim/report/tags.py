@@ -1,19 +1,23 @@
-"""The tags of a scene, as a table or as CSV."""
+"""The tags of a scene, selected by name and kind, as a listing, as CSV or for JSON."""
 
 from __future__ import annotations
 
 import csv
 import io
-from typing import NamedTuple
+from collections.abc import Iterator, Sequence
+from fnmatch import fnmatchcase
+from typing import NamedTuple, get_args
 
-from rich.box import SIMPLE
-from rich.console import RenderableType
-from rich.table import Table
-
+from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.line import image_of
 from conveyor_sim.line.machines.weihenstephan import names_of
-from conveyor_sim.line.tag import MOST_COUNT, Tag
+from conveyor_sim.line.tag import MOST_COUNT, Kind, Role, Tag
+from conveyor_sim.report.listing import ListingRow, listing, matches
 from conveyor_sim.scene import Scene
+from conveyor_sim.support.printable import printable
+
+KINDS: tuple[str, ...] = (*get_args(Role), *get_args(Kind))
+"""Roles and data types."""
 
 NONE = "-"
 """Placeholder for an absent property: no nominal rate, no texts, no name in another standard."""
@@ -76,18 +80,46 @@ def _limit(tag: Tag, value: float) -> str:
     return f"{value:.0f}" if tag.kind == "count" else f"{value:.15g}"
 
 
-def tag_table(scene: Scene) -> RenderableType:
-    """For a terminal; what else is known is in `tag_csv`."""
-    table = Table(box=SIMPLE, pad_edge=False, caption=scene.where or None, caption_justify="left", leading=1)
-    table.add_column("tag", overflow="fold", ratio=1)
-    for head in ("role", "range", "initial", "unit", "UNECE"):
-        table.add_column(head, no_wrap=True)
-    for tag in line_tags(scene):
-        told = [f"{tag.name}\n  {tag.description}"]
-        told += [f"  {tag.listed_texts}"] if tag.texts else []
-        told += [] if tag.nominal is None else [f"  Nominal: {tag.nominal:g}."]
-        table.add_row("\n".join(told), tag.role, _range(tag), f"{tag.initial:g}", tag.unit, tag.unece.code)
-    return table
+def chosen_tags(scene: Scene, names: Sequence[str] = (), kinds: Sequence[str] = ()) -> list[Tag]:
+    """Return the tags of a scene's line that fit, in listing order.
+
+    names, kinds: patterns (`belts/*`), one of which must match the name, and the role or the data type; empty: all.
+    Raise ConveyorError for a pattern that matches no role and no data type.
+    """
+    for kind in kinds:
+        if not any(fnmatchcase(known, kind) for known in KINDS):
+            expected = f"one of {', '.join(KINDS)}, or a pattern with *"
+            raise ConveyorError(f"--kind: {printable(kind)} given, expected {expected}")
+    return [
+        tag
+        for tag in line_tags(scene)
+        if matches(tag.name, names) and (matches(tag.role, kinds) or matches(tag.kind, kinds))
+    ]
+
+
+def tag_listing(tags: Sequence[Tag], width: int | None) -> list[str]:
+    """Return the lines for a terminal; `tag_csv` has all properties. width: see `report.listing.listing`."""
+    if not tags:
+        return ["no such tag"]
+    records = [
+        ListingRow((tag.name, tag.role, _range(tag), tag.unit, f"{tag.initial:g}"), _description(tag)) for tag in tags
+    ]
+    return listing(("tag", "role", "range", "unit", "initial", "description"), records, width)
+
+
+def tag_objects(scene: Scene, tags: Sequence[Tag]) -> Iterator[dict[str, object]]:
+    """Yield the properties of tags with numbers as numbers, for JSON. Absent properties are None."""
+    for tag in tags:
+        row = _row(tag, scene.where)._asdict()
+        texts = {str(value): text for value, text in tag.texts.items()}
+        numbers = {"low": tag.low, "high": tag.high, "initial": tag.initial, "nominal": tag.nominal}
+        yield {**{name: None if text == NONE else text for name, text in row.items()}, **numbers, "texts": texts}
+
+
+def _description(tag: Tag) -> str:
+    texts = f" {tag.listed_texts}." if tag.texts else ""
+    nominal = "" if tag.nominal is None else f" Nominal: {tag.nominal:g}."
+    return f"{tag.description}{texts}{nominal}"
 
 
 def _range(tag: Tag) -> str:
@@ -98,10 +130,10 @@ def _range(tag: Tag) -> str:
     return f"{least} ... {most}".strip()
 
 
-def tag_csv(scene: Scene) -> str:
+def tag_csv(scene: Scene, tags: Sequence[Tag]) -> str:
     """Return one CSV line per tag, below a header."""
     text = io.StringIO(newline="")
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(TagRow._fields)
-    writer.writerows(tag_rows(scene))
+    writer.writerows(_row(tag, scene.where) for tag in tags)
     return text.getvalue()

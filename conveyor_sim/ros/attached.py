@@ -27,7 +27,7 @@ from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.bag.messages.typestore import default_distro
 from conveyor_sim.control.scan import ControlError, Inputs
 from conveyor_sim.errors import CommandError
-from conveyor_sim.line.commands.inputs import DECLARE, CommandOutcome
+from conveyor_sim.line.commands.inputs import SET, CommandOutcome
 from conveyor_sim.ros.context import new_node, start_ros
 from conveyor_sim.ros.domain import in_environment, own_domain
 from conveyor_sim.ros.lockstep_service import Intake, LockstepService
@@ -123,9 +123,9 @@ class AttachedNode(AttachedController):
             _, own, _ = turns.simulation.line.modes.divide(command)
             if own is not None and (reason := turns.simulation.line.refusal(own)):
                 raise CommandError(f"at {inputs.time:.2f} s a command was refused: {reason}")
-            if command.operation == DECLARE:
+            if command.operation != SET:
                 turns.simulation.give(command)
-        return dict(zip(request.names, request.values, strict=True))
+        return dict(zip(request.sent.names, request.sent.values, strict=True))
 
     def note(self, outcomes: Sequence[CommandOutcome]) -> None:
         """Store the command results of the last tick for the next answer."""

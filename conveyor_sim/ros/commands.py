@@ -19,8 +19,8 @@ from conveyor_sim.line.commands.inputs import SET, Input
 from conveyor_sim.line.tag import speed_topics
 from conveyor_sim.ros.direct import Aside, take_message
 from conveyor_sim.ros.qos_overrides import subscription_qos
+from conveyor_sim.ros.sent_inputs import received_inputs
 from conveyor_sim.run.inbox import MESSAGE_BYTES, TOO_LARGE
-from conveyor_sim.run.lockstep import inputs_of, is_empty
 from conveyor_sim.run.stepper import Stepper
 
 
@@ -74,12 +74,9 @@ def subscribe_commands(node: Node, stepper: Stepper) -> list[CommandTopic]:
 
 
 def _commands(message: Any) -> list[Input]:
-    """Return declared alarms, then commands. A message without either gives empty commands, which are refused."""
+    """Return the inputs of a Commands message. An empty message gives empty commands, which are refused."""
     name = "commands"
-    declared, commands = inputs_of(name, name, message.alarm_ids, message.alarms, message.names, message.values)
-    if is_empty(declared):
-        return [commands]
-    return [declared] if is_empty(commands) else [declared, commands]
+    return received_inputs(message).inputs(name, name) or [Input(name, name, "controller", SET, (), ())]
 
 
 def _speed(name: str, message: Any) -> list[Input]:

@@ -12,13 +12,15 @@ import time
 from collections.abc import Callable, Mapping, Sequence, Set
 from typing import Any
 
-from conveyor_msgs.msg import Commands, Line, Signals
+from conveyor_msgs.msg import Alarm, Commands, Line, Signals
 from conveyor_msgs.msg import Variables as Message
 from conveyor_msgs.srv import Lockstep
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
 from rclpy.publisher import Publisher
+from rclpy.serialization import deserialize_message
 
+from conveyor_sim.bag.messages.encode import LINE
 from conveyor_sim.bag.messages.qos import ANSWERS
 from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.control.recorded import RecordedVariables
@@ -32,8 +34,9 @@ from conveyor_sim.control.scan import (
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.ros.clock import to_time
 from conveyor_sim.ros.direct import Aside, WaitSet, send_request, take_response
-from conveyor_sim.ros.publishers import ros_qos
+from conveyor_sim.ros.publishers import require_same_definition, ros_qos
 from conveyor_sim.ros.qos_overrides import publisher_qos, subscription_qos
+from conveyor_sim.ros.sent_inputs import alarm_messages
 from conveyor_sim.ros.service_names import of_simulation
 from conveyor_sim.ros.spinner import Spinner
 from conveyor_sim.run.alarm_changes import AlarmChanges
@@ -160,10 +163,10 @@ class Scanner:
         except ControlError as error:
             raise ConveyorError(str(error)) from error
 
-    def take_declared(self) -> dict[str, list[str]]:
-        """Return the declared alarms as fields of a message at the first call, and none later."""
+    def take_declared(self) -> list[Alarm]:
+        """Return the declared alarms as messages at the first call, and none later."""
         declared, self._declared = self._declared, ()
-        return {"alarm_ids": [one.id for one in declared], "alarms": [one.as_text() for one in declared]}
+        return alarm_messages(declared)
 
     def scan(self, values: Sequence[float], tick: int, ticks: int) -> dict[str, float]:
         """Return the commands, and the alarms that come or go, of the scan at a tick. ticks: ticks to the next scan.
@@ -213,7 +216,10 @@ class ControllerRun:
         self._has_line = threading.Event()
         self._alarms = AlarmPublisher(node)
         self._variables = VariablePublisher(node)
-        node.create_subscription(Line, "line", self._on_line, subscription_qos(node, "line", TOPICS["line"].qos))
+        lines = node.create_subscription(
+            Line, "line", self._on_line, subscription_qos(node, "line", TOPICS["line"].qos), raw=True
+        )
+        self._line_topic = lines.topic_name
         self._lockstep = LockstepClient(node)
         self._spinner = Spinner(died=self._died)
         self._spinner.start(node)
@@ -272,6 +278,7 @@ class ControllerRun:
         self._node.get_logger().info("waiting for the simulation")
         while not (self._has_line.is_set() and ready()):
             self._require_going_on()
+            require_same_definition(self._node, self._line_topic, LINE)
             time.sleep(LOOK)
 
     def _scanner(self, line: Any) -> Scanner:
@@ -291,7 +298,7 @@ class ControllerRun:
         line: Any,
         target: int,
         commands: Mapping[str, float],
-        declared: Mapping[str, list[str]] | None = None,
+        declared: Sequence[Alarm] = (),
         release: bool = False,
     ) -> Any:
         """Return the answer to a request in the run of a line. The request is repeated until there is an answer.
@@ -306,7 +313,7 @@ class ControllerRun:
             release=release,
             sim_run_id=line.run_id,
             released=self._released,
-            **(declared or {}),
+            alarms=declared,
         )
         numbers = set()
         while True:
@@ -325,8 +332,9 @@ class ControllerRun:
         if self._stop.requested:
             raise Stopped
 
-    def _on_line(self, line: Any) -> None:
-        self._line = line
+    def _on_line(self, data: bytes) -> None:
+        require_same_definition(self._node, self._line_topic, LINE)
+        self._line = deserialize_message(data, Line)
         self._has_line.set()
 
     def _died(self, error: Exception) -> None:
@@ -359,9 +367,9 @@ class _FreeScans:
         self._last = message.tick
         commands = self._scanner.scan(message.values, message.tick, ticks)
         declared = self._scanner.take_declared()
-        if commands or declared["alarm_ids"]:
+        if commands or declared:
             names, values = list(commands), list(commands.values())
-            answer = Commands(tick=message.tick, names=names, values=values, **declared)
+            answer = Commands(tick=message.tick, names=names, values=values, alarms=declared)
             answer.header = message.header
             self._commands.publish(answer)
 

@@ -51,13 +51,12 @@ def run(stop: StopRequest) -> None:
         try:
             controller = load(values["controller"], parameters)
             if line is not None:
-                kinds = dict(zip(line.tag_names, line.tag_kinds, strict=True))
+                tags = {tag.name: tag for tag in line.tags}
                 signals, commands = (
-                    {name: kinds[name] for name in names} for names in (line.signal_names, line.command_names)
+                    {name: tags[name].kind for name in names} for names in (line.signal_names, line.command_names)
                 )
-                ranges = zip(line.tag_min, line.tag_max, strict=True)
-                limits = dict(zip(line.tag_names, ranges, strict=True))
-                bind(controller, LineTags(signals, commands, {name: limits[name] for name in commands}))
+                limits = {name: (tags[name].min, tags[name].max) for name in commands}
+                bind(controller, LineTags(signals, commands, limits))
                 for sentence in getattr(controller, "left_over", ()):
                     node.get_logger().info(printable(sentence, SENTENCE))
             return controller

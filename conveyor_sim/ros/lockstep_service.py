@@ -23,6 +23,7 @@ from conveyor_sim.line.commands.inputs import CommandOutcome
 from conveyor_sim.ros.clock import to_time
 from conveyor_sim.ros.direct import Aside, WaitSet, take_request
 from conveyor_sim.ros.publishers import ros_qos
+from conveyor_sim.ros.sent_inputs import received_inputs
 from conveyor_sim.ros.service_names import Deprecation
 from conveyor_sim.run.lockstep import LockstepAnswer, LockstepRequest, Refused
 from conveyor_sim.simulation import Simulation
@@ -88,12 +89,9 @@ class LockstepService:
         wanted = LockstepRequest(
             request.run_id,
             request.target_tick,
-            tuple(request.names),
-            tuple(request.values),
+            received_inputs(request),
             request.release,
             request.sim_run_id,
-            tuple(request.alarm_ids),
-            tuple(request.alarms),
             tuple(request.released),
         )
         with self._lock:
@@ -188,6 +186,7 @@ def _outcome(outcome: CommandOutcome, tick_ns: int, frame_id: str) -> OutcomeMes
     message.writer_kind = outcome.input.writer_kind
     message.operation = outcome.operation
     message.texts = list(outcome.input.texts)
+    message.bottles = list(outcome.bottles)
     return message
 
 

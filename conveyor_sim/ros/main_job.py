@@ -7,9 +7,10 @@ import shutil
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
+from typing import Any
 
 from conveyor_sim.support.interrupt import STATUS, one_line, while_importing
 
@@ -23,6 +24,7 @@ with while_importing():
     from conveyor_sim.ros.domain import private_domain
     from conveyor_sim.ros.observer import Observer
     from conveyor_sim.scene import Scene, load_scene
+    from conveyor_sim.scene.choices import choices, settings_of
     from conveyor_sim.support.garbage import collected_later
     from conveyor_sim.support.printable import printable_lines
     from conveyor_sim.support.progress import ProgressBar, told_if_long
@@ -41,15 +43,22 @@ def run_in_lockstep(
     duration: float | None = None,
     outside_tables: bool = False,
     started: Callable[[], None] = lambda: None,
+    settings: Sequence[str] = (),
+    variant: str | None = None,
+    format: str | None = None,
 ) -> float | None:
     """Run node and controller to the end of `duration` (s; None: that of the scene), and record to `bag`.
 
-    started: called once the first tick has passed.
+    started: called once the first tick has passed. settings: texts NAME=VALUE for parameters of the scene. variant,
+    format: those of the scene to run; None: those that its file names.
     Returns the wall time from the first tick to the last (s), if the node reported it.
     Raises ConveyorError if one of them ends earlier, or on Ctrl-C or SIGTERM. All processes are ended in any case.
     """
     file = scene_path(scene_name).resolve()
-    scene = load_scene(file, {"duration": duration} if duration is not None else None, outside_tables)
+    overrides = choices(settings_of(settings), variant, format)
+    if duration is not None:
+        overrides["duration"] = duration
+    scene = load_scene(file, overrides, outside_tables)
     driven = [belt for belt in CONTROLLED if belt in scene.belts and scene.belts[belt].drive_name is not None]
     if driven:
         raise ConveyorError(
@@ -73,6 +82,9 @@ def run_in_lockstep(
         node_parameters = {
             "scene": file,
             "outside_tables": outside_tables,
+            "set": ";".join(settings),
+            "variant": variant or "",
+            "format": format or "",
             "duration": scene.duration,
             "start_paused": True,
             "real_time_factor": 0.0,
@@ -132,16 +144,20 @@ def _keep_logs(logs: Path, bag: Path) -> None:
 @click.argument("scene", default="paper_plant")
 @click.option("--out", type=click.Path(path_type=Path), help="Folder to record to (default: runs/<UTC time>).")
 @click.option("--duration", type=float, help="Simulated time in s, instead of that of the scene.")
-@click.option("--outside-tables", is_flag=True, help="Let SCENE refer to tables (CSV) outside its folder.")
-def main(scene: str, out: Path | None, duration: float | None, outside_tables: bool) -> None:
+@click.option("--details", is_flag=True, help="Print setting, checks of forces, belts and topics, too.")
+@click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="A parameter of SCENE: 'length=3 m'.")
+@click.option("--variant", metavar="NAME", help="A variant of SCENE.")
+@click.option("--format", metavar="NAME", help="A format of SCENE: its bottle and parameters.")
+@click.option("--outside-tables", is_flag=True, help="Let SCENE name files that lie outside its own folder.")
+def main(scene: str, out: Path | None, duration: float | None, details: bool, **chosen: Any) -> None:
     """Run SCENE as a ROS 2 node in lockstep with a controller node; record, summarize and draw it."""
     try:
         with run_folder(out) as bag, Drawing() as drawing:
             # Drawing gets ready after the start, because starting processes keep all cores busy.
-            wall = run_in_lockstep(scene, bag, duration, outside_tables, drawing.get_ready)
+            wall = run_in_lockstep(scene, bag, duration, started=drawing.get_ready, **chosen)
             from conveyor_sim.report.report import report
 
-            report(bag, wall, drawing)
+            report(bag, wall, drawing, details=details)
     except ConveyorError as error:
         print(f"main job: {printable_lines(error)}", file=sys.stderr)
         sys.exit(STATUS if isinstance(error, Interrupted) else 1)

@@ -24,14 +24,17 @@ from conveyor_sim.line.commands.authority import PEOPLE
 from conveyor_sim.line.commands.inputs import FAULT, INJECT, OPERATE, Input
 from conveyor_sim.report.explain.choices import setting_line
 from conveyor_sim.ros import parameters
+from conveyor_sim.ros.answers import settled
 from conveyor_sim.ros.clock import ClockPublisher, GraphWatch
 from conveyor_sim.ros.commands import subscribe_commands
 from conveyor_sim.ros.context import new_node, one_sentence
 from conveyor_sim.ros.diagnostics import Diagnostics
+from conveyor_sim.ros.entities import EntityServices
 from conveyor_sim.ros.lockstep_service import Intake, LockstepService
 from conveyor_sim.ros.publishers import RosSink
 from conveyor_sim.ros.service_names import SIMULATION, create_service
-from conveyor_sim.ros.services import CheckpointServices, Services, settled
+from conveyor_sim.ros.services import CheckpointServices, Services
+from conveyor_sim.ros.simulate_steps import SimulateSteps
 from conveyor_sim.ros.spinner import Spinner
 from conveyor_sim.ros.static_frames import publish_frames
 from conveyor_sim.run.active_run import ActiveRun
@@ -208,6 +211,8 @@ class SimNode:
             self._services.serve(stepper)
             CheckpointServices(node, executor, stepper, values.checkpoint_folder, read_checkpoint)
             InputServices(node, executor, stepper)
+            EntityServices(node, executor, stepper, values.frame_id)
+            SimulateSteps(node, executor, stepper)
             lockstep = LockstepService(node, stepper, values.frame_id, died=self._die)
             self._intake = Intake(node.context, lockstep, commands, died=self._die)
             publish_frames(node, scene, values.frame_id)
@@ -220,6 +225,7 @@ class SimNode:
 
         node.add_post_set_parameters_callback(on_set)
         node.get_logger().info(_greeting(stepper))
+        node.get_logger().debug(setting_line(stepper.simulation.model))
         stepper.start()
 
     def _report(self) -> None:
@@ -232,6 +238,5 @@ class SimNode:
 
 def _greeting(stepper: Stepper) -> str:
     session = stepper.run.session
-    model = session.simulation.model
-    bag = f", recorded to {session.bag}" if session.bag else ""
-    return f"scene {model.name}, run {session.run_id}, {stepper.run.state.name}, {setting_line(model)}{bag}"
+    name = session.simulation.model.name
+    return f"scene {name}, {stepper.run.state.name.lower()}, run {session.run_id}{session.to_bag}"

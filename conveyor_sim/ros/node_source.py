@@ -10,11 +10,13 @@ from contextlib import AbstractContextManager
 from functools import partial
 from typing import Any
 
-from conveyor_msgs import srv
+from conveyor_msgs.srv import Operate
 from rclpy.context import Context
 from rclpy.task import Future
+from simulation_interfaces import srv
 from std_srvs.srv import Trigger
 
+from conveyor_sim.bag.messages.encode import LINE
 from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.columns.events import Event
 from conveyor_sim.errors import ConveyorError
@@ -23,7 +25,7 @@ from conveyor_sim.protocols.tags.line_mirror import DRAWING_TOPICS, STATE_TOPICS
 from conveyor_sim.protocols.tags.tag_provider import MOST_WAITING, Control
 from conveyor_sim.ros.context import new_node, one_sentence, start_ros
 from conveyor_sim.ros.direct import Aside, WaitSet, take_message
-from conveyor_sim.ros.publishers import message_class, ros_qos
+from conveyor_sim.ros.publishers import message_class, require_same_definition, ros_qos
 from conveyor_sim.ros.service_names import of_simulation
 from conveyor_sim.ros.spinner import Spinner
 from conveyor_sim.support.printable import SENTENCE, printable
@@ -66,7 +68,7 @@ class NodeSource(LineMirror, AbstractContextManager["NodeSource"]):
                 for name in (*STATE_TOPICS, *(DRAWING_TOPICS if drawn else ()))
             }
             self._alive_client = self._node.create_client(srv.GetSimulationState, of_simulation("get_simulation_state"))
-            self._operate = self._node.create_client(srv.Operate, of_simulation("operate"))
+            self._operate = self._node.create_client(Operate, of_simulation("operate"))
             self._services: dict[str, Any] = {
                 "pause": self._node.create_client(Trigger, of_simulation("pause")),
                 "resume": self._node.create_client(Trigger, of_simulation("resume")),
@@ -78,6 +80,7 @@ class NodeSource(LineMirror, AbstractContextManager["NodeSource"]):
         self._refusals: deque[Event] = deque(maxlen=MOST_WAITING)
         self._alive = self._heard = 0.0  # s of wall time
         self._sign: Future | None = None
+        self._mismatch = ""  # reason why messages of the node can't be read
         self._why = ""  # reason why the line can't be shown although the node runs
         self._reported = ""
         self._waiting = WaitSet(self._context, subscriptions=list(self._topics.values()))
@@ -101,7 +104,7 @@ class NodeSource(LineMirror, AbstractContextManager["NodeSource"]):
                 self._refusals.append(Event(int(answer.tick), "command_refused", name, -1, value, answer.reason))
                 self._waiting.wake()
 
-        request = srv.Operate.Request(
+        request = Operate.Request(
             writer=command.writer,
             writer_kind=command.writer_kind,
             operation=command.operation,
@@ -189,6 +192,10 @@ class NodeSource(LineMirror, AbstractContextManager["NodeSource"]):
             taken = []
             while (message := take_message(subscription)) is not None:
                 taken.append(message[0])
+            if name == "line" and taken:
+                self._compare_definitions()
+            if self._mismatch:
+                continue
             for data in taken if name == "events" else taken[-1:]:
                 came = True
                 self.pass_on(name, data)
@@ -202,9 +209,23 @@ class NodeSource(LineMirror, AbstractContextManager["NodeSource"]):
                     strange = error
         while self._refusals:
             self.add(self._refusals.popleft())
+        if self._mismatch:
+            raise LineMirrorError(self._mismatch)
         if strange is not None:
             raise strange
         return came
+
+    def _compare_definitions(self) -> None:
+        """Note a node with other definitions of messages, whose messages can't be read."""
+        try:
+            require_same_definition(self._node, self._topics["line"].topic_name, LINE)
+        except ConveyorError as error:
+            if not self._mismatch:
+                self._say(str(error))  # even while the client still waits for a first line
+            self._mismatch = self._reported = str(error)
+        else:
+            if self._mismatch:
+                self._mismatch = self._why = ""
 
     def _look(self, now: float) -> None:
         """Check that the node still runs."""
@@ -214,6 +235,10 @@ class NodeSource(LineMirror, AbstractContextManager["NodeSource"]):
             else:
                 self._alive_client.remove_pending_request(sign)
         self._sign = None
+        self._compare_definitions()
+        if self._mismatch:
+            self._lose(self._mismatch)
+            return
         if not self._alive_client.service_is_ready():
             self._lose("no node is there that simulates a line, or its run has not begun")
             return

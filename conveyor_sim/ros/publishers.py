@@ -15,7 +15,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from conveyor_sim.bag.messages.qos import Qos
 from conveyor_sim.bag.messages.topics import Topic
-from conveyor_sim.bag.messages.typestore import type_hash
+from conveyor_sim.bag.messages.typestore import default_distro, type_hash
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.ros.qos_overrides import publisher_qos
 from conveyor_sim.run.pacing import RateCap
@@ -102,3 +102,26 @@ def published_hashes(node: Node, topic: str) -> list[str]:
     own = (node.get_name(), node.get_namespace())
     endpoints = node.get_publishers_info_by_topic(topic)
     return [str(one.topic_type_hash) for one in endpoints if (one.node_name, one.node_namespace) == own]
+
+
+def require_same_definition(node: Node, topic: str, type_name: str) -> None:
+    """Raise ConveyorError if a publisher on `topic` (absolute) has another definition of a type than this version.
+
+    DDS matches types by name, so a subscriber would receive garbage.
+    """
+    ours = type_hash(type_name, default_distro())
+    for one in node.get_publishers_info_by_topic(topic):
+        theirs = str(one.topic_type_hash)
+        if theirs not in (ours, _NO_HASH):
+            name = f"{one.node_namespace.rstrip('/')}/{one.node_name}"
+            node_name = "a node" if _UNKNOWN in name else f"the node {name}"
+            raise ConveyorError(
+                f"{topic}: {node_name} publishes another definition of {type_name} ({theirs}) than this client has "
+                f"({ours}); expected one version of conveyor_sim"
+            )
+
+
+_UNKNOWN = "_UNKNOWN_"
+"""Part of the name of a node that was discovered after its publisher."""
+_NO_HASH = "INVALID"
+"""Hash of a publisher that states none."""

@@ -29,12 +29,12 @@ from std_srvs.srv import Trigger
 from conveyor_sim.bag.reader import Bag, open_bag
 from conveyor_sim.bag.recorded_scene import recorded_scene
 from conveyor_sim.errors import BagError, ConveyorError, SceneError
+from conveyor_sim.ros.answers import settled
 from conveyor_sim.ros.clock import ClockPublisher, GraphWatch
 from conveyor_sim.ros.context import new_node, start_ros
 from conveyor_sim.ros.publishers import message_class, published_hashes
 from conveyor_sim.ros.qos_overrides import publisher_qos
 from conveyor_sim.ros.service_names import create_service
-from conveyor_sim.ros.services import settled
 from conveyor_sim.ros.spinner import Spinner
 from conveyor_sim.ros.static_frames import TF_STATIC, publish_frames
 from conveyor_sim.run.calls import CallQueue

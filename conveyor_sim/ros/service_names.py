@@ -30,6 +30,17 @@ def create_service(node: Node, kind: Any, name: str, handler: Callable[[Any, Any
     node.create_service(kind, name, handle_old, **options)
 
 
+def create_standard_service(
+    node: Node, kind: Any, name: str, handler: Callable[[Any, Any], Any], **options: Any
+) -> None:
+    """Create a service of simulation_interfaces, below the node's name and in its namespace.
+
+    Gazebo has the former names, Isaac Sim and O3DE the latter. options: of Node.create_service.
+    """
+    for place in (f"~/{name}", name):
+        node.create_service(kind, place, handler, **options)
+
+
 class Deprecation:
     """Warning of a service's old name, logged at its first use."""
 

@@ -1,8 +1,6 @@
-"""Services with the names and meaning of simulation_interfaces, plus pause and resume; services for checkpoints.
+"""Services of simulation_interfaces that control the run, plus pause and resume; services for checkpoints.
 
-Each service has the type of conveyor_msgs. If simulation_interfaces is installed, the service exists with the type of
-that package as well, under `simulation_interfaces/`. The type of a service therefore does not depend on installed
-packages. Both types have the same fields, so one handler serves both.
+The installed version of simulation_interfaces decides which features exist (`FEATURES`).
 """
 
 from __future__ import annotations
@@ -10,25 +8,24 @@ from __future__ import annotations
 import threading
 import traceback
 from collections.abc import Awaitable, Callable
-from concurrent.futures import Future, wait
+from concurrent.futures import Future
 from contextlib import suppress
-from importlib import import_module
 from pathlib import Path
-from types import ModuleType
 from typing import Any, TypeVar
 
-from conveyor_msgs import srv as own_srv
 from conveyor_msgs.srv import LoadCheckpoint, SaveCheckpoint
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.executors import Executor
 from rclpy.node import Node
-from rclpy.task import Future as RosFuture
+from simulation_interfaces import srv
+from simulation_interfaces.msg import Result, SimulatorFeatures
 from std_srvs.srv import Trigger
 
 from conveyor_sim import __version__
 from conveyor_sim.errors import CheckpointError, ConveyorError
+from conveyor_sim.ros.answers import settled, with_result
 from conveyor_sim.ros.clock import to_time
-from conveyor_sim.ros.service_names import create_service
+from conveyor_sim.ros.service_names import create_service, create_standard_service
 from conveyor_sim.run.calls import settle
 from conveyor_sim.run.lockstep import Refused
 from conveyor_sim.run.run_state import SimulationState
@@ -38,33 +35,30 @@ from conveyor_sim.support.printable import SENTENCE, printable
 
 T = TypeVar("T")
 
-# simulation_interfaces/msg/Result
-UNSUPPORTED, OK, INCORRECT_STATE, OPERATION_FAILED = 0, 1, 3, 4
-# simulation_interfaces/srv/SetSimulationState
-ALREADY_IN_TARGET_STATE, STATE_TRANSITION_ERROR = 101, 102
-# simulation_interfaces/msg/SimulatorFeatures: reset (of all at once), state getting, setting and pausing, stepping
-FEATURES = (20, 24, 25, 26, 31, 32)
-# simulation_interfaces/srv/ResetSimulation
-SCOPE_DEFAULT, SCOPE_TIME, SCOPE_STATE = 0, 1, 2
+FEATURES = (
+    "SPAWNING",
+    "DELETING",
+    "ENTITY_TAGS",
+    "ENTITY_BOUNDS",
+    "ENTITY_BOUNDS_BOX",
+    "ENTITY_CATEGORIES",
+    "ENTITY_STATE_GETTING",
+    "ENTITY_INFO_GETTING",
+    "SPAWNABLES",
+    "SIMULATION_RESET",
+    "SIMULATION_STATE_GETTING",
+    "SIMULATION_STATE_SETTING",
+    "SIMULATION_STATE_PAUSE",
+    "STEP_SIMULATION_SINGLE",
+    "STEP_SIMULATION_MULTIPLE",
+    "STEP_SIMULATION_ACTION",
+    "SPAWNING_ENTITIES",
+)
+"""Supported features, as constants of simulation_interfaces/SimulatorFeatures. Older versions lack some of them."""
 
-PREFIX = "simulation_interfaces/"
-PROMPT = 0.001
-"""Time that the executor waits for an answer itself, s of wall time. Most answers take less than waking it."""
-
-
-async def settled(executor: Executor, future: Future[T]) -> T:
-    """Return the result of a future that another thread sets. Awaited in a callback of `executor`."""
-    if wait([future], PROMPT).done:
-        return future.result()
-    arrived = RosFuture(executor=executor)
-
-    def wake(_: Future[T]) -> None:
-        arrived.set_result(None)
-        executor.wake()  # nothing else wakes the executor when the callback can go on
-
-    future.add_done_callback(wake)
-    await arrived
-    return future.result()
+_SCOPES = srv.ResetSimulation.Request
+EVERYTHING = _SCOPES.SCOPE_TIME | _SCOPES.SCOPE_STATE | _SCOPES.SCOPE_SPAWNED
+"""Smallest scope of a reset: time, state and spawned bottles are reset together."""
 
 
 class Services:
@@ -82,26 +76,20 @@ class Services:
         self._stepper: Stepper | None = None
         # Reentrant, because a service that waits for ticks must not block the others.
         self._group = ReentrantCallbackGroup()
-        self._real_srv = _real_types()
-        self._create("GetSimulatorFeatures", self._get_features)
-        self._create("GetSimulationState", self._get_state)
-        self._create("SetSimulationState", self._set_state)
+        self._create(srv.GetSimulatorFeatures, "get_simulator_features", self._get_features)
+        self._create(srv.GetSimulationState, "get_simulation_state", self._get_state)
+        self._create(srv.SetSimulationState, "set_simulation_state", self._set_state)
 
     def serve(self, stepper: Stepper) -> None:
         """Create the services of a run."""
         self._stepper = stepper
-        self._create("StepSimulation", self._step)
-        self._create("ResetSimulation", self._reset)
+        self._create(srv.StepSimulation, "step_simulation", self._step)
+        self._create(srv.ResetSimulation, "reset_simulation", self._reset)
         create_service(self._node, Trigger, "pause", self._pause, callback_group=self._group)
         create_service(self._node, Trigger, "resume", self._resume, callback_group=self._group)
 
-    def _create(self, name: str, handler: Callable[[Any, Any], Any]) -> None:
-        topic = _snake_case(name)
-        create_service(self._node, getattr(own_srv, name), topic, handler, callback_group=self._group)
-        if self._real_srv is not None:
-            self._node.create_service(
-                getattr(self._real_srv, name), PREFIX + topic, handler, callback_group=self._group
-            )
+    def _create(self, kind: Any, name: str, handler: Callable[[Any, Any], Any]) -> None:
+        create_standard_service(self._node, kind, name, handler, callback_group=self._group)
 
     @property
     def _run(self) -> Stepper:
@@ -114,16 +102,15 @@ class Services:
         return await settled(self._executor, self._run.call(function))
 
     def _get_features(self, _: Any, response: Any) -> Any:
-        # The response of conveyor_msgs is flat; that of simulation_interfaces has the fields in `features`.
-        features = response if isinstance(response, own_srv.GetSimulatorFeatures.Response) else response.features
-        features.features = FEATURES
+        features = response.features
+        features.features = [getattr(SimulatorFeatures, name) for name in FEATURES if hasattr(SimulatorFeatures, name)]
         features.custom_info = f"conveyor_sim {__version__}; also offers lockstep and checkpoints, see docs/ros.md"
         return response
 
     def _get_state(self, _: Any, response: Any) -> Any:
         state = SimulationState.STOPPED if self._stepper is None else self._stepper.run.state
         response.state.state = int(SimulationState.QUITTING if self._quitting else state)
-        return _set(response, OK, self._waiting_for() if self._stepper is None else "")
+        return with_result(response, Result.RESULT_OK, self._waiting_for() if self._stepper is None else "")
 
     async def _set_state(self, request: Any, response: Any) -> Any:
         wanted = request.state.state
@@ -132,11 +119,11 @@ class Services:
             if self._stepper is not None:
                 self._stepper.run.state = SimulationState.QUITTING
             self._quit_soon()
-            return _set(response, OK)
+            return with_result(response, Result.RESULT_OK)
         try:
             stepper = self._run
         except Refused as error:
-            return _set(response, INCORRECT_STATE, str(error))
+            return with_result(response, Result.RESULT_INCORRECT_STATE, str(error))
         actions = {
             SimulationState.STOPPED: stepper.stop,
             SimulationState.PLAYING: stepper.play,
@@ -144,23 +131,26 @@ class Services:
         }
         if wanted not in actions:
             text = f"state: {wanted} given, expected STOPPED (0), PLAYING (1), PAUSED (2) or QUITTING (3)"
-            return _set(response, UNSUPPORTED, text)
+            return with_result(response, Result.RESULT_FEATURE_UNSUPPORTED, text)
         if wanted == stepper.run.state:
-            return _set(response, ALREADY_IN_TARGET_STATE, f"the simulation is {SimulationState(wanted).name} already")
-        return await self._carry_out(response, self._ask(actions[SimulationState(wanted)]), STATE_TRANSITION_ERROR)
+            text = f"the simulation is {SimulationState(wanted).name} already"
+            return with_result(response, response.ALREADY_IN_TARGET_STATE, text)
+        action = self._ask(actions[SimulationState(wanted)])
+        return await self._carry_out(response, action, response.STATE_TRANSITION_ERROR)
 
     async def _step(self, request: Any, response: Any) -> Any:
         async def step() -> None:
             await settled(self._executor, await self._ask(lambda: self._run.step(request.steps)))
 
-        return await self._carry_out(response, step(), OPERATION_FAILED)
+        return await self._carry_out(response, step(), Result.RESULT_OPERATION_FAILED)
 
     async def _reset(self, request: Any, response: Any) -> Any:
-        both = SCOPE_TIME | SCOPE_STATE
-        if request.scope != SCOPE_DEFAULT and request.scope & both != both:
-            text = f"scope: {request.scope} given, expected 0 or 255 (all): time and state are reset together"
-            return _set(response, UNSUPPORTED, text)
-        return await self._carry_out(response, self._ask(self._run.reset), OPERATION_FAILED)
+        scope = request.scope
+        if scope != request.SCOPE_DEFAULT and scope & EVERYTHING != EVERYTHING:
+            together = "time, state and spawned bottles are reset together"
+            text = f"scope: {scope} given, expected 0 or 255 (all): {together}"
+            return with_result(response, Result.RESULT_FEATURE_UNSUPPORTED, text)
+        return await self._carry_out(response, self._ask(self._run.reset), Result.RESULT_OPERATION_FAILED)
 
     async def _pause(self, _: Any, response: Any) -> Any:
         return await self._trigger(response, self._run.pause)
@@ -181,27 +171,11 @@ class Services:
         try:
             await what
         except Refused as error:
-            return _set(response, OPERATION_FAILED if code == OPERATION_FAILED else INCORRECT_STATE, str(error))
+            failed = Result.RESULT_OPERATION_FAILED
+            return with_result(response, failed if code == failed else Result.RESULT_INCORRECT_STATE, str(error))
         except ConveyorError as error:
-            return _set(response, code, str(error))
-        return _set(response, OK)
-
-
-def _set(response: Any, code: int, text: str = "") -> Any:
-    response.result.result = code
-    response.result.error_message = text
-    return response
-
-
-def _real_types() -> ModuleType | None:
-    try:
-        return import_module("simulation_interfaces.srv")
-    except ImportError:
-        return None
-
-
-def _snake_case(name: str) -> str:
-    return "".join(f"_{letter.lower()}" if letter.isupper() else letter for letter in name).lstrip("_")
+            return with_result(response, code, str(error))
+        return with_result(response, Result.RESULT_OK)
 
 
 LONGEST = 1000

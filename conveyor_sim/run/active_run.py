@@ -165,6 +165,8 @@ class Advance:
     paced: bool
     done: Callable[[], None]
     failed: Callable[[Exception], None]
+    passed: Callable[[], None] = lambda: None
+    """Called after each tick."""
 
 
 def refuse(advance: Advance | None, reason: str) -> None:

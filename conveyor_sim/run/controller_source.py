@@ -6,12 +6,14 @@ import traceback
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from sysconfig import get_path
 
 from conveyor_sim.control.scan import ControlError, Controller
 from conveyor_sim.control.st.load import load
 from conveyor_sim.errors import ConveyorError
 
-PACKAGE = Path(__file__).parents[1]
+LIBRARIES = (Path(__file__).parents[1], *(Path(get_path(name)) for name in ("stdlib", "purelib", "platlib")))
+"""Folders whose code is not the user's."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +40,10 @@ class ControllerSource:
 def located(error: BaseException) -> str:
     """Return the type and text of an error of user code, with the last line of that code on the way to the error."""
     frames = traceback.extract_tb(error.__traceback__)
-    own = [frame for frame in frames if not Path(frame.filename).is_relative_to(PACKAGE)]
+    own = [frame for frame in frames if Path(frame.filename).is_file() and not _is_library(Path(frame.filename))]
     frame = (own or frames)[-1]
     return f"{Path(frame.filename).name}:{frame.lineno}: {type(error).__name__}: {error}"
+
+
+def _is_library(file: Path) -> bool:
+    return any(map(file.is_relative_to, LIBRARIES))

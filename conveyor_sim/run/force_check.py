@@ -38,6 +38,16 @@ class ForceCheck:
         return self.peak_force <= HARDER * self.expected_force
 
     @property
+    def warning(self) -> str:
+        """Sentence on a force beyond the expected one; empty if the force stayed within it."""
+        if self.as_expected:
+            return ""
+        return (
+            f"peak force {self.peak_force:.3g} N, above the {self.expected_force:.3g} N of the predicted error: "
+            "forces may be less accurate than predicted"
+        )
+
+    @property
     def sentence(self) -> str:
         """Result, in words."""
         expected = f"the {self.expected_force:.3g} N assumed for the predicted error ({self.expected_of})"
@@ -63,6 +73,16 @@ class Pressed:
     def as_expected(self) -> bool:
         """True if the load stayed within the expected one."""
         return self.load <= self.expected
+
+    @property
+    def warning(self) -> str:
+        """Sentence on a load beyond the expected one; empty if the load stayed within it."""
+        if self.as_expected:
+            return ""
+        return (
+            f"resting load {self.load:.3g} N, above the {self.expected:.3g} N of stable friction: it may chatter; "
+            "friction_solver: implicit or more steps per tick help"
+        )
 
     @property
     def sentence(self) -> str:

@@ -8,14 +8,13 @@ reason. No rule depends on wall time.
 from __future__ import annotations
 
 import struct
-from collections.abc import Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from conveyor_sim.columns.image import Image
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.line.commands.inputs import DECLARE, SET, CommandOutcome, Input
+from conveyor_sim.line.commands.inputs import DECLARE, DELETE, SET, SPAWN, CommandOutcome, Input
 from conveyor_sim.support.printable import MOST, printable
 
 if TYPE_CHECKING:
@@ -26,22 +25,37 @@ LOCKSTEP = "lockstep"
 """Source of commands in lockstep."""
 
 
-def inputs_of(
-    source: str,
-    writer: str,
-    alarm_ids: Sequence[str],
-    alarms: Sequence[str],
-    names: Sequence[str],
-    values: Sequence[float],
-) -> tuple[Input, Input]:
-    """Return the inputs of a message of a controller: declared alarms, then commands. Either may be empty."""
-    declared = Input(source, writer, "controller", DECLARE, tuple(alarm_ids), (), tuple(alarms))
-    return declared, Input(source, writer, "controller", SET, tuple(names), tuple(values))
+class SentInputs(NamedTuple):
+    """Inputs that a controller sends together, as their fields."""
 
+    alarm_ids: tuple[str, ...] = ()
+    """Declared alarms."""
+    alarms: tuple[str, ...] = ()
+    """Their declarations, as JSON."""
+    deleted: tuple[int, ...] = ()
+    """Ids of the bottles to remove."""
+    spawned: tuple[str, ...] = ()
+    """Types of the bottles to put on the line."""
+    spawn_values: tuple[float, ...] = ()
+    """SPAWN_VALUES of each of these bottles."""
+    names: tuple[str, ...] = ()
+    """Commands and alarms."""
+    values: tuple[float, ...] = ()
 
-def is_empty(command: Input) -> bool:
-    """Return True if an input has no names, values or texts."""
-    return not (command.names or command.values or command.texts)
+    def inputs(self, source: str, writer: str) -> list[Input]:
+        """Return the inputs in the order in which they are applied, without empty ones."""
+        rows = (
+            (DECLARE, self.alarm_ids, (), self.alarms),
+            (DELETE, (), self.deleted, ()),
+            (SPAWN, self.spawned, self.spawn_values, ()),
+            (SET, self.names, self.values, ()),
+        )
+        return [Input(source, writer, "controller", *row) for row in rows if any(row[1:])]
+
+    def key(self) -> tuple[object, ...]:
+        """Return a key that is equal for equal bits."""
+        bits = [struct.pack(f"<{len(values)}d", *values) for values in (self.spawn_values, self.values)]
+        return (*self._replace(spawn_values=(), values=()), *bits)
 
 
 class Refused(ConveyorError):
@@ -54,12 +68,9 @@ class LockstepRequest:
 
     run_id: str
     target_tick: int
-    names: tuple[str, ...]
-    values: tuple[float, ...]
+    sent: SentInputs
     release: bool
     sim_run_id: str = ""
-    alarm_ids: tuple[str, ...] = ()
-    alarms: tuple[str, ...] = ()
     released: tuple[str, ...] = ()
 
     def same_as(self, other: LockstepRequest | None) -> bool:
@@ -68,12 +79,11 @@ class LockstepRequest:
 
     @property
     def inputs(self) -> list[Input]:
-        """Inputs of the request that are not empty: declared alarms, then commands."""
-        inputs = inputs_of(LOCKSTEP, self.run_id, self.alarm_ids, self.alarms, self.names, self.values)
-        return [command for command in inputs if not is_empty(command)]
+        """Inputs of the request, in the order in which they are applied."""
+        return self.sent.inputs(LOCKSTEP, self.run_id)
 
     def _key(self) -> dict[str, object]:
-        return {**vars(self), "values": struct.pack(f"<{len(self.values)}d", *self.values)}
+        return {**vars(self), "sent": self.sent.key()}
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 from conveyor_sim.bag.messages import encode, topics
 from conveyor_sim.bag.messages.encode import Header, Outcome, to_outcome
 from conveyor_sim.bag.messages.qos import EVENTS, LATCHED, Qos
+from conveyor_sim.bag.messages.typestore import typestore
 from conveyor_sim.bag.reader import Bag
 from conveyor_sim.errors import BagError
 from conveyor_sim.line.commands.inputs import SET
@@ -46,7 +47,7 @@ class PlayedTopic:
     type: str
     qos: Qos
     type_hash: str | None
-    """RIHS01 hash of the recorded type; None if messages are made here."""
+    """RIHS01 hash of the recorded type; None if messages are made or converted here."""
 
     @property
     def latched(self) -> bool:
@@ -66,7 +67,7 @@ class Playback:
     Some topics are not recorded because others hold their content. Playback derives these messages from the recorded
     ones and publishes them first. Commands come from `outcomes`: on `belts/<belt>/cmd_speed` or
     `drives/<drive>/cmd_speed` if they were sent there, else on `commands`, even refused ones. `photo_eyes/<eye>` come
-    from `signals`.
+    from `signals`. Messages of earlier formats are played in the present definition.
     """
 
     def __init__(self, bag: Bag, only: Collection[str] | None = None) -> None:
@@ -87,7 +88,7 @@ class Playback:
         self.last_tick = -(-last_ns // self.tick_ns)
         qos = bag.qos
         recorded = [
-            PlayedTopic(name, kind, qos[name], bag.type_hash(name))
+            PlayedTopic(name, kind, qos[name], None if name in bag.older_topics else bag.type_hash(name))
             for name, kind in bag.types.items()
             if (name if name.startswith("/") else f"{bag.namespace}/{name}") not in OWN and name != RUN_STATE
             if only is None or name in only
@@ -142,14 +143,26 @@ class Playback:
             self._next = next(self._stream, None)
             if topic in self._latched and stamp <= self._cued_ns:
                 continue
-            yield from self._with_made(PlayedMessage(topic, data))
+            yield from self._with_made(self._played(topic, data))
+
+    def decode(self, topic: str, data: bytes) -> Any:
+        """Return the decoded message of a recorded topic that was played. Raise BagError as `Bag.decode`."""
+        if topic not in self._bag.older_topics:
+            return self._bag.decode(topic, data)
+        return typestore().deserialize_cdr(data, self._bag.types[topic])
+
+    def _played(self, topic: str, data: bytes) -> PlayedMessage:
+        """Return a recorded message as it is played: as recorded, or in the present definition if it has an older."""
+        if topic in self._bag.older_topics:
+            data = bytes(typestore().serialize_cdr(self._bag.decode(topic, data), self._bag.types[topic]))
+        return PlayedMessage(topic, data)
 
     def _with_made(self, message: PlayedMessage) -> Iterator[PlayedMessage]:
         """Yield the messages derived from a message, then the message itself."""
         if message.topic == "outcomes":
             yield from self._sent(message.data)
         elif message.topic == "signals" and self._eyes:
-            signals = self._bag.decode("signals", message.data)
+            signals = self.decode("signals", message.data)
             for eye, column in self._eyes.items():
                 blocked = bool(signals.values[column])
                 if self._seen.get(eye) is not blocked:
@@ -168,7 +181,7 @@ class Playback:
                 last[topic] = (stamp, place, data)
             missing -= last.keys()
             stop_ns, span = start_ns, 2 * span
-        return [PlayedMessage(topic, last[topic][2]) for topic in sorted(last, key=lambda name: last[name][:2])]
+        return [self._played(topic, last[topic][2]) for topic in sorted(last, key=lambda name: last[name][:2])]
 
     def _first_after(self, start_ns: int, topics: set[str]) -> list[PlayedMessage]:
         """Return the first message of each topic from a time on, in the order of recording."""
@@ -177,11 +190,11 @@ class Playback:
             first.setdefault(topic, data)
             if len(first) == len(topics):
                 break
-        return [PlayedMessage(topic, data) for topic, data in first.items()]
+        return [self._played(topic, data) for topic, data in first.items()]
 
     def _sent(self, data: bytes) -> Iterator[PlayedMessage]:
         """Yield the command of a command result, if it was sent as one and its topic is not recorded."""
-        message = self._bag.decode("outcomes", data)
+        message = self.decode("outcomes", data)
         outcome: Outcome = to_outcome(message)
         if outcome.operation != SET or outcome.input.by_line:  # it was not sent as a command
             return

@@ -107,14 +107,16 @@ class RunSession:
 
     @property
     def account(self) -> str:
-        """Speed of the run, and the check of its forces, in one line."""
+        """Speed and peak force of the run, in one line."""
         simulation = self.simulation
         simulated = simulation.time - self._began
         account = f"{simulated:g} s simulated in {self.wall:.2f} s"
         if self.wall > 0.0:
             account += f", {simulated / self.wall:.3g} x real time"
         reached = achieved(simulation.model, self._peaks.force)
-        return account if reached is None else f"{account}; {reached.sentence}"
+        if reached is None or not reached.peak_force:
+            return account
+        return f"{account}; {reached.warning or f'peak force {reached.peak_force:.3g} N'}"
 
     @property
     def to_bag(self) -> str:

@@ -78,6 +78,8 @@ class StepLoop:
         self._beat(simulation.stamp_ns, now)
         if simulation.tick >= active.session.last_tick:
             active.end()
+        if active.advance is not None:
+            active.advance.passed()
         if active.advance is not None and simulation.tick >= active.advance.target:
             advance, active.advance = active.advance, None
             advance.done()
@@ -150,6 +152,7 @@ class Stepper:
         self._calls = CallQueue()
         self._loop = StepLoop(self.run, self._calls, self.pacer, beat, died)
         self._thread = threading.Thread(target=self._loop.run, name="stepper", daemon=True)
+        self._step: tuple[Future[None], Advance] | None = None  # last step that was begun
 
     @property
     def simulation(self) -> Simulation:
@@ -245,8 +248,11 @@ class Stepper:
         if simulation.tick >= self.run.session.last_tick:
             self.run.end()
 
-    def step(self, ticks: int) -> Future[None]:
-        """Advance by `ticks` at full speed. Raise Refused if that is not possible."""
+    def step(self, ticks: int, passed: Callable[[int], None] = lambda done: None) -> Future[None]:
+        """Advance by `ticks` at full speed. Raise Refused if that is not possible.
+
+        passed: called in the stepping thread after each tick, with the number of ticks so far.
+        """
         self.run.require_paused()
         self.run.require_free()
         tick, last = self.simulation.tick, self.run.session.last_tick
@@ -255,8 +261,16 @@ class Stepper:
         if tick + ticks > last:
             raise Refused(f"steps: {ticks} given, but the run ends in {last - tick} ticks, at tick {last}")
         future: Future[None] = Future()
-        self.run.advance = Advance(tick + ticks, False, partial(future.set_result, None), future.set_exception)
+        done, failed = partial(future.set_result, None), future.set_exception
+        self.run.advance = Advance(tick + ticks, False, done, failed, lambda: passed(self.simulation.tick - tick))
+        self._step = future, self.run.advance
         return future
+
+    def end_step(self, step: Future[None]) -> None:
+        """Complete a step at the present tick, if it is still under way."""
+        if self._step is not None and self._step[0] is step and self.run.advance is self._step[1]:
+            self.run.advance = None
+            step.set_result(None)
 
     def advance_lockstep(self, request: LockstepRequest) -> Future[LockstepAnswer]:
         """Advance as a controller requests; a repeated request gets the same answer.

@@ -38,18 +38,18 @@ class Accuracy(Part):
 
     preset: Preset | None = quantity("A row of the table of presets in docs/accuracy.md.", default=None)
     tolerance: Tolerance | None = quantity(
-        "Relative error in contact force to stay below; the time step follows.", "1", default=None
+        "Largest relative error in contact force; the time step is derived from it.", "1", default=None
     )
     integrator: IntegratorName = quantity(
-        "Integration method; semi_implicit_euler is the paper's, (5)-(6). docs/accuracy.md says how to choose.",
+        "Integration method; semi_implicit_euler is the paper's, (5)-(6). docs/accuracy.md helps to choose.",
         default="leapfrog",
     )
     dt: Positive | None = quantity(
-        "Longest time step: a tick is divided into the fewest equal steps that keep it.", "s", default=None
+        "Longest time step. A tick is divided into the smallest number of equal steps within it.", "s", default=None
     )
-    per_tick: StepCount | None = quantity("The same as a number of steps.", "1", default=None)
+    per_tick: StepCount | None = quantity("Number of steps per tick, instead of `dt`.", "1", default=None)
     error: Positive | None = quantity(
-        "Largest error of a step, dormand_prince only, which divides the steps of dt itself. Left out: 1e-6.",
+        "Largest error per step, for dormand_prince only, which divides steps of dt by itself. Left out: 1e-6.",
         "m/s",
         default=None,
     )

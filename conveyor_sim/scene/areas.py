@@ -11,7 +11,7 @@ class StraightArea(Part):
 
     kind: Literal["straight"] = quantity("Its shape.")
     start: Point = quantity(
-        "Corner where it begins, on the right-hand side seen along `angle`; the width grows to the left.", "m"
+        "Corner at the start, on the right-hand side seen along `angle`; the belt extends to the left of it.", "m"
     )
     angle: Angle = quantity(
         "Direction of its length, from the x-axis, counter-clockwise. A belt travels in this direction at positive "
@@ -34,7 +34,7 @@ class CurvedArea(Part):
     from_: Point | None = quantity("One end of the inner arc.", "m", default=None, alias="from")
     to: Point | None = quantity("The other end of the inner arc.", "m", default=None)
     side: Literal["left", "right"] | None = quantity(
-        "Side of the line from `from` to `to` on which the centre lies; the shorter arc is meant.", default=None
+        "Side of the line from `from` to `to` on which the centre lies. The arc is the shorter one.", default=None
     )
 
 

@@ -13,7 +13,7 @@ from conveyor_sim.scene.problems import Path, Problem
 from conveyor_sim.scene.types import Flag, Holds, Name, Positive, quantity
 from conveyor_sim.scene.words import fields_of, shown
 
-_RATIO_TEXT = "Speed of the surface over that of the belt."
+_RATIO_TEXT = "Speed of the surface divided by the speed of the belt."
 
 
 def _drive_tag(data: Any) -> str | None:
@@ -37,11 +37,11 @@ class _Belt(SpeedSetpoint):
 
     material: Name = quantity("Material, as named in `base`.")
     drive: _Drive | None = quantity(
-        "What moves it: a separate drive, or the name of one from `drives`, which then has the speed, the "
-        "speed_limits and the watchdog. Left out: it reaches the commanded speed within one tick.",
+        "Drive: a mapping for a separate drive, or the name of a drive in `drives`, which then has the speed, "
+        "the speed_limits and the watchdog. Left out: the belt reaches the commanded speed within one tick.",
         default=None,
     )
-    ratio: Positive = quantity("Speed of the belt over that of the drive that it names.", "1", default=1.0)
+    ratio: Positive = quantity("Speed of the belt divided by the speed of the drive that it names.", "1", default=1.0)
 
     @property
     def drive_name(self) -> str | None:
@@ -126,7 +126,7 @@ class PathBelt(_Belt):
 
     kind: Literal["path"] = quantity("The kind of belt.")
     surfaces: Annotated[tuple[BeltSurface, ...], Holds(_SURFACES)] = quantity(
-        "Its surfaces, along travel. Where they overlap, the last listed carries."
+        "Surfaces in the direction of travel. Where they overlap, the last one in the list carries."
     )
 
     def problems(self, path: Path, others: Others) -> Iterator[Problem]:

@@ -64,10 +64,11 @@ class Damping(Part):
         default=0.0,
     )
     restitution: Restitution | None = quantity(
-        "Instead of the coefficient: speed after over speed before a head-on impact.", "1", default=None
+        "Speed after a head-on impact divided by the speed before it, instead of the coefficient.", "1", default=None
     )
     speed: Positive | None = quantity(
-        "Speed of impact at which the restitution holds; needed for onset and viscoelastic, where it depends on it.",
+        "Impact speed at which the restitution holds; needed for onset and viscoelastic, whose restitution "
+        "depends on the speed.",
         "m/s",
         default=None,
     )
@@ -133,7 +134,7 @@ class BaseSpring(Part):
 class Base(Part):
     """Friction of bottles that stand on a belt or a plate."""
 
-    between: Pair = quantity("The bottle's material, then that of the belt or plate.")
+    between: Pair = quantity("Material of the bottle, then material of the belt or plate.")
     friction: NotNegative = quantity("Coefficient of friction of the bottle's base on the belt or plate.", "1")
     tangential: BaseSpring | None = quantity(
         "Static friction: a tangential spring with history between base and belt, in place of the friction curve, on "

@@ -9,14 +9,14 @@ from conveyor_sim.scene.problems import Path, Problem
 from conveyor_sim.scene.types import Limits, Number, Positive, quantity
 from conveyor_sim.scene.words import shown
 
-_JERK = "Greatest change of acceleration in a second: ramps become S-curves. Left out: there is no limit."
-_PULSES = "Pulses of the encoder on a metre of travel, counted down in reverse. Left out: there is no encoder."
+_JERK = "Largest change of acceleration per second: ramps become S-curves. Left out: there is no limit."
+_PULSES = "Pulses of the encoder per metre of travel, counted down in reverse. Left out: there is no encoder."
 
 
 class Drive(Part):
     """A motor with its controller: run, reverse, trip and reset, ramps, an encoder."""
 
-    acceleration: Positive = quantity("Greatest change of speed in a second, speeding up or slowing down.", "m/s^2")
+    acceleration: Positive = quantity("Largest change of speed per second, up or down.", "m/s^2")
     jerk: Positive | None = quantity(_JERK, "m/s^3", default=None)
     pulses_per_metre: Positive | None = quantity(_PULSES, "1/m", default=None)
 
@@ -25,7 +25,7 @@ class SpeedSetpoint(DevicePart):
     """A part that runs at a commanded speed."""
 
     speed: Number = quantity("Speed at the start, positive forward.", "m/s", default=0.0)
-    speed_limits: Limits = quantity("Least and greatest speed that a command may ask for.", "m/s", default=(-3.0, 3.0))
+    speed_limits: Limits = quantity("Smallest and largest speed that a command may set.", "m/s", default=(-3.0, 3.0))
     watchdog: Positive | None = quantity(
         "Without a speed command for this long, it stops. Left out: it keeps its speed.", "s", default=None
     )
@@ -52,8 +52,7 @@ class NamedDrive(SpeedSetpoint):
     KIND: ClassVar[str] = "drive"
 
     acceleration: Positive | None = quantity(
-        "Greatest change of speed in a second, speeding up or slowing down. "
-        "Left out: it reaches the commanded speed within one tick.",
+        "Largest change of speed per second, up or down. Left out: it reaches the commanded speed within one tick.",
         "m/s^2",
         default=None,
     )

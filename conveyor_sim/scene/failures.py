@@ -34,7 +34,7 @@ class FixedTimes(Part):
 
     kind: Literal["list"] = quantity("The kind of distribution.")
     times: Annotated[tuple[Positive, ...], Len(1), Holds("a list of numbers greater than 0, at least one")] = quantity(
-        "They are taken in order, and from the first one again after the last.", "s"
+        "Times in the order of use; after the last one, the first follows again.", "s"
     )
 
 
@@ -53,10 +53,10 @@ _Times = Annotated[Times, Holds('a mapping with kind "exponential", "weibull" or
 class Failure(Part):
     """A recurring failure of a machine."""
 
-    between: _Times = quantity("From the end of one repair, or the start of the run, to the next failure.")
-    repair: _Times = quantity("How long it is down.")
+    between: _Times = quantity("Time from the end of a repair, or from the start of the run, to the next failure.")
+    repair: _Times = quantity("Time to repair.")
     counted: Literal["running", "clock"] = quantity(
-        "What `between` counts. running: while it is in Execute, neither starved nor blocked; clock: all the time.",
+        "Time that `between` counts. running: time in Execute, neither starved nor blocked; clock: all time.",
         default="running",
     )
 
@@ -64,10 +64,10 @@ class Failure(Part):
 class PlannedStop(Part):
     """A planned stop: a break, a changeover, cleaning. The machine stops, and starts again automatically."""
 
-    start: NotNegative = quantity("When the first one begins.", "s")
-    duration: Positive = quantity("How long it lasts.", "s")
+    start: NotNegative = quantity("Start of the first one.", "s")
+    duration: Positive = quantity("Duration.", "s")
     every: Positive | None = quantity(
-        "From the beginning of one to that of the next. Left out: there is one.", "s", default=None
+        "Time from the start of one to the start of the next. Left out: there is only one.", "s", default=None
     )
 
     def problems(self, path: Path) -> Iterator[Problem]:

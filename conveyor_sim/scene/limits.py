@@ -14,20 +14,20 @@ class Limits(Part):
         "Sum of the normal forces that act on a bottle at once.", "N", default=None
     )
     opposed_force: Positive | None = quantity(
-        "Squeeze of a bottle by two contacts that oppose each other: the smaller force, times how straight they do.",
+        "Squeeze of a bottle between two contacts that oppose each other: the smaller force, times |cos| of the "
+        "angle between them.",
         "N",
         default=None,
     )
     impact_speed: Positive | None = quantity(
-        "Relative normal speed just before a contact closes, what glass is rated in.", "m/s", default=None
+        "Relative normal speed just before a contact closes; glass is rated by it.", "m/s", default=None
     )
     impact_force: Positive | None = quantity("Normal force of any one contact.", "N", default=None)
     tipping: Positive | None = quantity(
-        "Index of tipping, 1 where a load that lasts would tip the bottle; for types with `contact_height` and "
-        "`gravity_height`.",
+        "Index of tipping: at 1, a lasting load tips the bottle. For types with `contact_height` and `gravity_height`.",
         "1",
         default=None,
     )
     clogging_time: Positive | None = quantity(
-        "How long an outfeed may remove nothing while a bottle is held up on a running belt.", "s", default=None
+        "Longest time for which an outfeed removes no bottle although one waits on a running belt.", "s", default=None
     )

@@ -25,7 +25,7 @@ class PolylineRail(_Rail):
 
     kind: Literal["polyline"] = quantity("The kind of rail.")
     points: PointList = quantity("The corners in order.", "m")
-    closed: Flag = quantity("Whether a last piece leads back to the first point.", default=False)
+    closed: Flag = quantity("True: a last piece leads back to the first point.", default=False)
 
 
 class ArcRail(_Rail):

@@ -74,12 +74,12 @@ class BottleType(Part):
         "Moment of inertia about the axis. Left out: m R^2, a thin-walled cylinder.", "kg m^2", default=None
     )
     contact_height: Positive | None = quantity(
-        "Height at which it touches others and rails, for the index of tipping. Given with `gravity_height`.",
+        "Height at which bottles touch each other and rails, for the index of tipping. Needs `gravity_height`.",
         "m",
         default=None,
     )
     gravity_height: Positive | None = quantity(
-        "Height of its centre of gravity, for the index of tipping. Given with `contact_height`.", "m", default=None
+        "Height of the centre of gravity, for the index of tipping. Needs `contact_height`.", "m", default=None
     )
     base_radius: Positive | None = quantity(
         "Radius of the ring that the bottle stands on: sliding and spinning on it are one motion, solved explicitly "
@@ -112,7 +112,7 @@ class Single(Part):
     """One bottle at the start."""
 
     type: Name = quantity("Bottle type.")
-    position: Point = quantity("Where its axis is.", "m")
+    position: Point = quantity("Position of the axis.", "m")
     velocity: Velocity = quantity("Its velocity.", "m/s", default=(0.0, 0.0))
     angle: Angle = quantity("Its angle about its axis.", "rad", default=0.0)
     spin: Number = quantity("Its angular velocity, counter-clockwise.", "rad/s", default=0.0)
@@ -147,14 +147,14 @@ class Outputs(Part):
     contacts: NotNegative = quantity("Every contact with its forces.", "Hz", default=50.0)
     belts: NotNegative = quantity("Speeds of the belts.", "Hz", default=50.0)
     signals: NotNegative = quantity("The process image.", "Hz", default=100.0)
-    counters: NotNegative = quantity("What machines made, and where their time went.", "Hz", default=1.0)
+    counters: NotNegative = quantity("Counters and times of machines.", "Hz", default=1.0)
     ledger: NotNegative = quantity(
-        "The energy ledger: work of each belt, what is dissipated and stored, and what does not close.",
+        "Energy ledger: work of each belt, dissipated and stored energy, and the residual.",
         "Hz",
         default=0.0,
     )
     damage: NotNegative = quantity(
-        "What every bottle has borne (scuffing, crushing, impacts, tipping), and the wear of the rails.",
+        "Loads on every bottle (scuffing, crushing, impacts, tipping), and the wear of the rails.",
         "Hz",
         default=0.0,
     )
@@ -196,13 +196,13 @@ class Scene(Part):
     TOPICS: ClassVar[tuple[str, ...]] = tuple(Outputs.model_fields)
 
     name: Name = quantity("Name of the scene.")
-    description: Text = quantity("What it shows.", default="")
+    description: Text = quantity("Purpose of the scene.", default="")
     where: Where = quantity("Where the line is in a plant: area/cell/unit.", default="")
     start_time: StartTime = quantity(
-        "Date and time that simulated time 0 stands for. Nothing that is simulated depends on it.",
+        "Date and time at simulated time 0. Results do not depend on it.",
         default="2000-01-01T00:00:00Z",
     )
-    seed: Seed = quantity("Seed of everything that is drawn at random.", "1", default=0)
+    seed: Seed = quantity("Seed of all random draws.", "1", default=0)
     gravity: NotNegative = quantity("Acceleration of gravity g.", "m/s^2", default=9.81)
     duration: Positive = quantity("Simulated time, a whole number of ticks.", "s")
     tick: Positive = quantity(
@@ -218,14 +218,14 @@ class Scene(Part):
     )
     slip_limit: Positive = quantity("Speed v_lim below which friction is regularised (7)-(10).", "m/s", default=0.01)
     friction_curve: Literal["polynomial", "atan"] = quantity(
-        "How friction grows below and about v_lim. polynomial: (7)-(10), full at v_lim; "
-        "atan: 2/pi x atan(pi x speed / v_lim), of the same slope at rest, full only in the limit. "
-        "Ring-shaped bases have a special curve.",
+        "Friction as a function of slip. polynomial: (7)-(10), constant from v_lim on; atan: 2/pi x atan(pi x "
+        "speed / v_lim), with the same slope at rest. Ring-shaped bases have a special curve.",
         default="polynomial",
     )
     friction_solver: Literal["explicit", "implicit"] = quantity(
-        "explicit: friction bounds the time step; implicit: solved for the velocity at the end of a step, which does "
-        "not (with leapfrog, semi_implicit_euler, velocity_verlet and rk4; bases that are rings stay explicit).",
+        "explicit: friction bounds the time step. implicit: friction is solved for the velocity at the end of a "
+        "step, and does not bound it (with leapfrog, semi_implicit_euler, velocity_verlet and rk4; friction of "
+        "ring-shaped bases remains explicit).",
         default="explicit",
     )
     lever_arm: Literal["overlap", "radius"] = quantity(
@@ -234,7 +234,7 @@ class Scene(Part):
         default="overlap",
     )
     contacts: Annotated[tuple[Contact, ...], Holds("a list of contacts")] = quantity(
-        "What happens between materials that touch.", default=()
+        "Contact laws of the materials that can touch.", default=()
     )
     base: Annotated[tuple[Base, ...], Holds("a list of base frictions")] = quantity(
         "Friction of bottles on belts and plates.", default=()
@@ -246,13 +246,13 @@ class Scene(Part):
         "Drives that move several belts.", default={}
     )
     belts: Annotated[dict[Name, Belt], _named("belts")] = quantity(
-        "Belts. Where they overlap, the last listed carries.", default={}
+        "Belts. Where belts overlap, the last one in the list carries.", default={}
     )
     plates: Annotated[dict[Name, Plate], _named("plates")] = quantity(
-        "Surfaces at rest, over belts where they overlap.", default={}
+        "Surfaces at rest. Where they overlap belts, plates carry.", default={}
     )
     rails: Annotated[dict[Name, Rail], _named("rails")] = quantity(
-        "Rails. Those that join end to end, or end on another, are one surface.", default={}
+        "Rails. Rails that join end to end, or end on another rail, are one surface.", default={}
     )
     gates: Annotated[dict[Name, Gate], _named("gates")] = quantity(
         "Gates and stops: rails that open and close on command.", default={}
@@ -261,23 +261,23 @@ class Scene(Part):
         "Rails that push on command and return.", default={}
     )
     diverters: Annotated[dict[Name, Diverter], _named("diverters")] = quantity(
-        "Rails that swing into the way on command and return.", default={}
+        "Rails that swing into the path of bottles on command and return.", default={}
     )
     floor: Annotated[
         Annotated[Floor, Tag("(floor)")] | Annotated[Literal["none"], Tag("(none)")],
         Discriminator(_floor_tag),
         Holds('a mapping with the field friction, or "none"'),
     ] = quantity(
-        'What is under bottles that no belt carries; "none": nothing, they slide freely.',
+        'Support of bottles that no belt or plate carries; "none": they slide without friction.',
         default=Floor.model_construct(),
     )
-    infeeds: Annotated[dict[Name, Infeed], _named("infeeds")] = quantity("Where bottles enter.", default={})
-    outfeeds: Annotated[dict[Name, Outfeed], _named("outfeeds")] = quantity("Where bottles leave.", default={})
+    infeeds: Annotated[dict[Name, Infeed], _named("infeeds")] = quantity("Places where bottles enter.", default={})
+    outfeeds: Annotated[dict[Name, Outfeed], _named("outfeeds")] = quantity("Regions where bottles leave.", default={})
     machines: Annotated[dict[Name, Machine], _named("machines")] = quantity(
         "Machines at the line: sources and sinks of bottles, stations, inspections, rejects.", default={}
     )
     spills: Annotated[dict[Name, Spill], _named("spills")] = quantity(
-        "Where a test can have bottles dropped.", default={}
+        "Places where a test can put bottles.", default={}
     )
     photo_eyes: Annotated[dict[Name, PhotoEye], _named("photo-eyes")] = quantity(
         "Beams that bottles block.", default={}
@@ -287,10 +287,10 @@ class Scene(Part):
         "Lines that count the bottles that pass.", default={}
     )
     indicators: Annotated[dict[Name, Indicator], _named("indicators")] = quantity(
-        "What is known of exits: flow, jam, starved, blocked.", default={}
+        "Indicators of exits: flow, jam, starved, blocked.", default={}
     )
     alarms: Annotated[dict[Name, MeasuredAlarm], _named("alarms")] = quantity(
-        "Alarms on measured values, beside those that the line has by itself.", default={}
+        "Alarms on measured values, in addition to the alarms of the line.", default={}
     )
     bottles: Annotated[
         tuple[
@@ -307,7 +307,7 @@ class Scene(Part):
         )
     )
     effects: Annotated[Forced, Holds('a mapping of names of effects to "on" or "off"')] = quantity(
-        "Effects forced on or off against the choice by the scene; docs/effects.md lists them.", default={}
+        "Effects that are forced on or off; docs/effects.md lists all effects.", default={}
     )
 
     underlay: Annotated[Underlay | None, Holds("a mapping with the fields " + ", ".join(Underlay.model_fields))] = (

@@ -26,7 +26,7 @@ class Underlay(Part):
         "PNG, JPEG or DXF file in the scene's folder, of at most 4 MB. DXF needs ezdxf."
     )
     position: Point = quantity(
-        "Where the lower left corner of an image is, or the origin of a drawing.", "m", default=(0.0, 0.0)
+        "Position of the lower left corner of an image, or of the origin of a drawing.", "m", default=(0.0, 0.0)
     )
     scale: Positive | None = quantity(
         "Size of a pixel of an image, or of the unit of a drawing. Left out: 1 mm for an image, and the unit that a "
@@ -35,7 +35,7 @@ class Underlay(Part):
         default=None,
     )
     angle: Angle = quantity("Angle by which it is turned about `position`, counter-clockwise.", "rad", default=0.0)
-    opacity: Share = quantity("0: it can't be seen; 1: it covers what is below it.", "1", default=0.5)
+    opacity: Share = quantity("From 0, invisible, to 1, opaque.", "1", default=0.5)
 
 
 def read_underlay(underlay: Underlay, beside: Beside) -> tuple[str, str]:

@@ -79,7 +79,8 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
             self._bar.update(self._task, completed=done, total=self._total, state=self._state(done), left=left)
         elif done >= self._next_line:
             self._next_line += PLAIN_SHARE * self._total
-            self._console.print(f"{self._what}: {self._state(done)}", highlight=False, soft_wrap=True)
+            line = f"{self._what}: {self._state(done)}{self._estimate(done)}"
+            self._console.print(line, highlight=False, soft_wrap=True)
 
     def _state(self, done: float) -> str:
         if self._counted:
@@ -90,6 +91,13 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
         digits, wall = _decimals(self._total), max(time.monotonic() - start, 1e-9)
         speed = f", {(done - already) / wall:.3g} x real time" if done > already else ""
         return f"{done:.{digits}f} of {self._total:.{digits}f} s{speed}"
+
+    def _estimate(self, done: float) -> str:
+        """Return the estimated wall time left for a line without a terminal; empty at the end, or if it is stated."""
+        start, already = self._start or (time.monotonic(), done)
+        if not already < done < self._total or self._left is not None:
+            return ""
+        return f", about {(time.monotonic() - start) * (self._total - done) / (done - already):.0f} s left"
 
     def __exit__(self, *_: object) -> None:
         if self._bar is not None:

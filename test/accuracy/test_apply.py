@@ -7,11 +7,13 @@ from pathlib import Path
 
 import pytest
 from facts import stating
+from test_scene_options import SCENE as VERSIONS
 
 from conveyor_sim.accuracy.report.apply import apply
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.scene import load_scene
+from conveyor_sim.scene.choices import choices
 from conveyor_sim.support.resources import scene_path
 
 VERLET = Setting("velocity_verlet", 123)
@@ -45,6 +47,17 @@ def test_a_word_is_replaced_and_an_error_written(tmp_path: Path) -> None:
     written = apply(load_scene(file), Setting("dormand_prince", 7, error=1e-5), tmp_path / "copy.yaml")
     assert "accuracy: {integrator: dormand_prince, per_tick: 7, error: 1e-05}\n# between\n" in written.source_text
     assert (written.accuracy.preset, written.accuracy.error) == (None, 1e-5)
+
+
+def test_chosen_parameters_and_format_are_in_the_copy(tmp_path: Path) -> None:
+    """The copy is expanded: it needs no choice, and is the same line with the setting."""
+    file = tmp_path / "plant.yaml"
+    file.write_text(VERSIONS, encoding="utf-8")
+    scene = load_scene(file, choices({"length": "3 m"}, None, "fast"))
+    written = apply(scene, VERLET, tmp_path / "out" / "plant.yaml")
+    assert (written.accuracy.integrator, written.accuracy.per_tick) == ("velocity_verlet", 123)
+    assert written.belts == scene.belts != load_scene(file).belts
+    assert "length: 3 m" in (tmp_path / "out" / "plant.yaml").read_text()
 
 
 def test_tables_are_found_from_the_copy(tmp_path: Path) -> None:

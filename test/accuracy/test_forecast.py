@@ -49,18 +49,18 @@ def test_where_nothing_is_predicted_to_do_the_best_is_named() -> None:
     assert 1e-9 < known.best < 0.01
     answer = predicted(known)
     assert answer.title == PREDICTED
-    assert missing(answer.lines[0], ["Forces", "nothing", "predicted", "1e-7 %", "best"]) == []
+    assert missing(answer.lines[0], ["Forces", "no setting", "predicted", "1e-7 %", "best"]) == []
 
 
 def test_each_line_says_that_nothing_has_run() -> None:
     forces, throughput, cost, setting = predicted(forecast(line(), 0.01)).lines
     assert forces.startswith("Forces: ")
-    assert missing(forces, ["should", "1 %"]) == []
+    assert missing(forces, ["predicted", "1 %"]) == []
     assert throughput.startswith("Throughput: not known")
     assert missing(throughput, ["nothing has run"]) == []
-    assert missing(cost, ["Cost", "should", "2 bottles", "rule of thumb"]) == []
+    assert missing(cost, ["Cost", "should", "2 bottles", "estimate"]) == []
     assert setting.startswith("Setting: accuracy: {integrator: ")
-    assert setting.endswith("(don't rely on it before it is measured)")
+    assert setting.endswith("(not measured yet)")
 
 
 def test_cost_goes_as_the_steps_with_a_part_that_ticks_take() -> None:

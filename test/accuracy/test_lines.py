@@ -98,7 +98,7 @@ def test_below_them_the_setting_and_what_the_study_took() -> None:
     lines = summary(of)
     assert tuple(lines[:3]) == three_lines(of)
     assert "accuracy: {integrator: velocity_verlet, per_tick: 100}" in lines[3]
-    assert missing(lines[4], ["The scene's own setting", "impacts", "2.4 %", "resting load"]) == []
+    assert missing(lines[4], ["Scene", "impacts", "2.4 %", "resting load"]) == []
     assert lines[5] == of.moving
     assert missing(lines[6], ["412 s", "processor time", "75 s", "compiling"]) == []
     shaky = tuple(replace(point, beyond=1.99) if point.setting == of.own else point for point in of.points)

@@ -18,7 +18,7 @@ def edited(bag: Path, folder: Path, edit: Edit) -> Path:
     with open_bag(bag) as opened, Recorder(folder) as recorder:
         for topic, log_time, data in opened.raw():
             kind = OUTPUTS[topic].type
-            message = store.deserialize_cdr(data, kind)
+            message = opened.decode(topic, data)
             edit(topic, message)
             recorder.write(topic, bytes(store.serialize_cdr(message, kind)), log_time)
     return folder

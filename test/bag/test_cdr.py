@@ -26,11 +26,21 @@ def value_of(kind: int, details: Any, random: np.random.Generator, longest: int)
             if base != "bool"
             else bool(random.integers(2))
         )
-    ((_, (base, _)), _) = details
+    (part, _) = details
     count = int(random.integers(longest + 1))
+    if part[0] == 2:  # a message
+        return [message_of(part[1], random, longest) for _ in range(count)]
+    base, _ = part[1]
     if base == "string":
         return [str(text) for text in random.choice(TEXTS, count)]
     return np.frombuffer(random.bytes(8 * count), dtype=np.dtype(base))[:count].copy()
+
+
+def message_of(type_name: str, random: np.random.Generator, longest: int) -> Any:
+    """Some message that is part of another one."""
+    store = typestore()
+    fields = store.fielddefs[type_name][1]
+    return store.types[type_name](**{name: value_of(*what, random, longest) for name, what in fields})
 
 
 @pytest.mark.parametrize("type_name", TYPES)

@@ -15,7 +15,7 @@ from conveyor_sim.bag.messages.encode import Outcome
 from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.bag.messages.typestore import typestore
 from conveyor_sim.columns.bottles import BottleColumns, ContactColumns
-from conveyor_sim.line.commands.inputs import Input
+from conveyor_sim.line.commands.inputs import CommandOutcome, Input
 
 
 class Line:
@@ -112,7 +112,7 @@ def test_contact_is_named_by_its_bottles_or_rail() -> None:
 
 
 GIVEN = Input("commands", "plc", "controller", "set", ("belts/one/cmd_speed",), (math.nan,))
-OUTCOME = Outcome.of(GIVEN, False, "not a number")
+OUTCOME = Outcome.of(CommandOutcome(5, GIVEN, False, "not a number"))
 
 
 def test_equal_outcomes_have_no_difference_even_with_nan() -> None:

@@ -12,12 +12,14 @@ from bag.ros_decode import assert_same, deserialize
 from conveyor_sim.bag.messages import encode
 from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.bag.messages.typestore import typestore
+from conveyor_sim.columns.alarms import AlarmColumns
 from conveyor_sim.columns.bottles import BeltColumns, BottleColumns
 from conveyor_sim.columns.damage import DamageColumns, DamageEvent, RailWearColumns
 from conveyor_sim.columns.events import Event, event_columns
 from conveyor_sim.columns.image import NOTHING_FORCED, Image
 from conveyor_sim.columns.ledger import balance
-from conveyor_sim.line.commands.inputs import CommandOutcome, Input
+from conveyor_sim.line.commands.authority import MODES
+from conveyor_sim.line.commands.inputs import SPAWN, CommandOutcome, Input
 from conveyor_sim.scene import Scene
 from conveyor_sim.scene.recorded import recorded_source
 from conveyor_sim.simulation import Simulation
@@ -37,6 +39,24 @@ BORNE = DamageColumns(
 )
 WEAR = RailWearColumns(np.arange(3, dtype=np.uint32), *np.arange(15.0).reshape(5, 3))
 IMAGE = Image(np.array([1.0, math.nan]), np.array([1], dtype=np.uint32), np.array([-0.5]))
+ALARM_STATES = AlarmColumns(
+    number=np.array([1, 2], dtype=np.uint64),
+    id=["a", "ü"],
+    text=["A", "B"],
+    alarm_class=["error", "message"],
+    priority=np.array([800, 1], dtype=np.uint16),
+    tag=["", "belts/a/speed"],
+    group=["g", ""],
+    suppressed_by=[(), ("a", "b c")],
+    latching=np.array([True, False]),
+    declared_by=["line", "plc"],
+    state=np.array([0, 8], dtype=np.uint8),
+    active=np.array([False, True]),
+    first_out=np.array([True, False]),
+    shelved_until=np.array([-1, 70]),
+    since=np.array([0, 5], dtype=np.uint64),
+    changed_by=["", "anna"],
+)
 CASES: dict[str, tuple[str, Callable[[], bytes]]] = {
     "bottles": (TOPICS["bottles"].type, lambda: TOPICS["bottles"].pack(bottles(5), HEADER)),
     "no bottles": (TOPICS["bottles"].type, lambda: TOPICS["bottles"].pack(bottles(0), HEADER)),
@@ -45,6 +65,16 @@ CASES: dict[str, tuple[str, Callable[[], bytes]]] = {
     "belts": (TOPICS["belts"].type, lambda: TOPICS["belts"].pack(BeltColumns(np.arange(2.0), np.arange(2.0)), HEADER)),
     "signals": (TOPICS["signals"].type, lambda: TOPICS["signals"].pack(IMAGE, HEADER)),
     "ledger": (TOPICS["ledger"].type, lambda: TOPICS["ledger"].pack(LEDGER, HEADER)),
+    "alarm states": (TOPICS["alarm_states"].type, lambda: TOPICS["alarm_states"].pack(ALARM_STATES, HEADER)),
+    "spawned": (
+        TOPICS["outcomes"].type,
+        lambda: TOPICS["outcomes"].pack(
+            CommandOutcome(
+                9, Input("commands", "a", "test", SPAWN, ("glass",), (0.5,) * 6), True, "", bottles=(7, 2**63)
+            ),
+            HEADER,
+        ),
+    ),
     "bool": (encode.BOOL, lambda: encode.bool_message(True, HEADER)),
     "damage": (TOPICS["damage"].type, lambda: TOPICS["damage"].pack(BORNE, HEADER)),
     "rail wear": (TOPICS["rail_wear"].type, lambda: TOPICS["rail_wear"].pack(WEAR, HEADER)),
@@ -141,9 +171,15 @@ def test_line_holds_all_that_a_replay_needs(scene: Scene) -> None:
     assert dict(zip(line.bottle_types, line.type_radius.tolist(), strict=True)) == {"small": 0.03, "large": 0.05}
     assert dict(zip(line.bottle_types, line.type_mass.tolist(), strict=True)) == {"small": 0.1, "large": 0.3}
     assert line.dt == pytest.approx(line.tick_ns * 1e-9 / line.steps_per_tick)
-    assert len(line.signal_names) == len(line.signal_units) == len(simulation.signals())
+    tags = {tag.name: tag for tag in line.tags}
+    assert len(line.signal_names) == len(simulation.signals())
     assert line.command_names == ["belts/straight/cmd_speed", "belts/turn/cmd_speed"]
-    assert line.command_max.tolist() == [3.0, 3.0]
+    assert [(tags[name].unit, tags[name].unit_code, tags[name].max) for name in line.command_names] == [
+        ("m/s", "MTS", 3.0)
+    ] * 2
+    modes = tags["belts/turn/mode"]
+    assert dict(zip(modes.state_values.tolist(), modes.state_texts, strict=True)) == MODES
+    assert line.format == encode.FORMAT
     assert "curved_belts" in line.effects
     assert "normal_damping" not in line.effects
     assert any(version.startswith("numba=") for version in line.versions)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scenes import scene
 
+from conveyor_sim.bag.messages.encode import FORMAT
 from conveyor_sim.bag.recorded_scene import recorded_scene
 from conveyor_sim.line.devices.setup import random_stream
 from conveyor_sim.simulation import Simulation
@@ -30,14 +31,14 @@ def key(*numbers: int) -> dict[str, Any]:
     return np.random.PCG64(np.random.SeedSequence(9, spawn_key=numbers)).state  # type: ignore[return-value]
 
 
-@pytest.mark.parametrize("tags", [False, True], ids=["before lines had tags", "now"])
-def test_streams_are_those_of_when_it_was_recorded(tags: bool) -> None:
+@pytest.mark.parametrize("format", [1, 2, FORMAT])
+def test_streams_are_those_of_when_it_was_recorded(format: int) -> None:
     """By the place of a device in its list, with a branch for each purpose; and by names since."""
     made = scene(**LINE)
     line = SimpleNamespace(
-        scene_text=made.source_text, overrides="", integrator="leapfrog", steps_per_tick=10,
-        **({"tag_names": []} if tags else {}),
-    )  # fmt: skip
+        scene_text=made.source_text, overrides="", integrator="leapfrog", steps_per_tick=10, format=format
+    )
+    by_name = format > 1
     simulation = Simulation(recorded_scene(line, "bag"))
     devices: dict[str, Any] = {device.name: device for device in simulation._line._devices}
     found = {
@@ -46,13 +47,13 @@ def test_streams_are_those_of_when_it_was_recorded(tags: bool) -> None:
         ("photo_eyes/eye", "chatter"): (devices["photo_eyes/eye"], key(3, 0)),
     }
     for (device, purpose), (holder, before) in found.items():
-        expected = random_stream(9, device, purpose).bit_generator.state if tags else before
+        expected = random_stream(9, device, purpose).bit_generator.state if by_name else before
         drawn = 0 if purpose == "chatter" else holder.count  # those that came at once
         stream = np.random.Generator(np.random.PCG64())
         stream.bit_generator.state = expected
         stream.uniform(size=drawn)
         assert holder.random.bit_generator.state == stream.bit_generator.state, device
-    jitter = random_stream(9, "infeeds/second", "jitter") if tags else np.random.Generator(np.random.PCG64())
-    if not tags:
+    jitter = random_stream(9, "infeeds/second", "jitter") if by_name else np.random.Generator(np.random.PCG64())
+    if not by_name:
         jitter.bit_generator.state = key(1)
     assert devices["infeeds/second"].extra == list(jitter.uniform(-0.3, 0.3, size=2))[devices["infeeds/second"].fed]

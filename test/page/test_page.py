@@ -311,6 +311,51 @@ def test_signals_are_put_on_the_trends_and_taken_off(page: Any) -> None:
     assert chip.count() == 0
 
 
+def test_an_unknown_signal_is_refused_beside_the_field_with_the_nearest_names(page: Any) -> None:
+    before = page.locator(".chip").count()
+    page.fill("#trendbar input", "zones/before_caper/botles")
+    press(page, "Enter")
+    assert missing(page.inner_text("#trendbar .refusal"), "zones/before_caper/botles") == []
+    assert page.locator(".chip").count() == before and page.input_value("#trendbar input") != ""
+    page.locator("#trendbar .refusal button", has_text="zones/before_capper/bottles").click()
+    assert page.locator(".chip", has_text="zones/before_capper/bottles").count() == 1
+    assert page.inner_text("#trendbar .refusal") == "" and page.input_value("#trendbar input") == ""
+
+
+def test_commands_and_alarms_are_put_on_the_trends(page: Any) -> None:
+    for name in ("gates/hold/open", "alarms/queue_stands"):
+        page.fill("#trendbar input", name)
+        press(page, "Enter")
+    for time, values in ((5.5, ["on", "off"]), (8.0, ["off", "off"]), (20.0, ["on", "on"])):
+        seek(page, time)
+        shown = [page.locator(".chip", has_text=name).inner_text().split()[1] for name in ("hold/open", "queue_stands")]
+        assert shown == values, time
+
+
+def test_a_bottle_that_left_says_where_and_when(page: Any, bag: Path) -> None:
+    with open_bag(bag) as opened:
+        frames = (frame.data for frame in opened.read("events"))
+        at, device, bottle = next(
+            (int(data.at[place]) * 0.01, data.name[place], int(data.bottle[place]))
+            for data in frames
+            for place, kind in enumerate(data.kind)
+            if kind == "bottle_removed"
+        )
+    page.click("#tab_events")
+    page.check("#panel_events input[value=bottles]")
+    page.fill("#panel_events input[type=search]", f"removed {device}")
+    settled(page)
+    page.locator("#panel_events .event", has_text=f"bottle {bottle} ").or_(
+        page.locator("#panel_events .event", has_text=f"bottle {bottle}\n")
+    ).first.click()
+    page.click("#tab_bottle")
+    seek(page, at + 3.0)
+    assert missing(page.inner_text("#panel_bottle"), f"left by {device} at {at:.2f} s") == []
+    page.locator("#panel_bottle button", has_text=device).click()
+    settled(page)
+    assert clock(page) == pytest.approx(at, abs=0.05)
+
+
 def test_switches_have_a_lane_each_on_the_trends(page: Any) -> None:
     page.uncheck("#names")
     seek(page, 12.0)

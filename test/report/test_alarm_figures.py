@@ -20,14 +20,14 @@ def test_rates_are_for_ten_minutes_and_the_worst_ten_minutes_are_found() -> None
     assert (figures.raised, figures.per_window) == (5, 2.5)
     assert figures.most_in_window == 3  # 20 to 619 s, and 615 to 1190 s; that of 10 s is more than ten minutes before
     assert figures.by_alarm == {"jam": 5}
-    assert not figures.flood and figures.sentence == "5 came: 5 x jam"
+    assert not figures.flood and figures.lines == ["5 raised: 5 x jam"]
 
 
 def test_more_than_ten_are_a_flood() -> None:
     assert not tally([float(n) for n in range(10)]).figures(60.0, 0.01).flood
     flood = tally([float(n) for n in range(11)]).figures(60.0, 0.01)
     assert flood.flood
-    assert missing(flood.sentence, ["11 x jam", "flood", "11 in ten minutes"]) == []
+    assert missing(flood.lines[0], ["11 x jam", "flood", "11 in ten minutes"]) == []
 
 
 def test_none() -> None:
@@ -46,7 +46,7 @@ def test_what_stands_is_listed_by_priority_then_by_age() -> None:
         priority=np.array([500, 500, 800, 900, 900], dtype=np.uint16),
         tag=[""] * 5,
         group=[""] * 5,
-        suppressed_by=["[]"] * 5,
+        suppressed_by=[()] * 5,
         latching=np.zeros(5, dtype=np.bool_),
         declared_by=[""] * 5,
         state=np.array(states, dtype=np.uint8),
@@ -59,6 +59,5 @@ def test_what_stands_is_listed_by_priority_then_by_age() -> None:
     figures = counted.figures(10.0, 0.01)
     assert [(one.id, one.since) for one in figures.standing] == [("urgent", 3.0), ("old", 1.0), ("new", 2.0)]
     assert [one.text for one in figures.hidden] == ["shelved!"]
-    came, standing = figures.sentence.splitlines()
-    assert missing(came, ["none"]) == []
-    assert standing.endswith(": urgent since 3 s, old since 1 s, new since 2 s")
+    (active,) = figures.lines
+    assert active.endswith(": urgent since 3 s, old since 1 s, new since 2 s")

@@ -1,6 +1,7 @@
 """`conveyor-sim events`: what happened in a recording, chosen, as a table and as CSV."""
 
 import csv
+import json
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -8,6 +9,7 @@ from pathlib import Path
 import pytest
 from bag.small_line import SMALL_LINE
 from click.testing import CliRunner, Result
+from facts import missing
 
 from conveyor_sim.bag.mcap.writer import McapFileWriter, Schema
 from conveyor_sim.bag.messages.encode import Header, bool_message
@@ -17,7 +19,7 @@ from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.cli import main
-from conveyor_sim.report.events import KINDS
+from conveyor_sim.report.events import KINDS, EventRow, event_listing, folded
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 
@@ -57,36 +59,78 @@ def lines(result: Result) -> list[list[str]]:
 
 
 def test_all_of_them_are_printed_in_order(events: Events, bag: Path) -> None:
-    rows = lines(events())
+    rows = lines(events("--all"))
     with open_bag(bag) as opened:
         kinds = [kind for frame in opened.read("events") for kind in frame.data.kind]
-    assert [row[2] for row in rows] == kinds
+    assert [row[1] for row in rows] == kinds
     assert [float(row[0]) for row in rows] == sorted(float(row[0]) for row in rows)
 
 
 def test_they_are_chosen_by_kind(events: Events) -> None:
-    raised = [["0.100", "10", "alarm_raised"], ["0.400", "40", "alarm_raised"]]  # the second by a watchdog
-    assert [row[:3] for row in lines(events("--kind", "alarm_raised"))] == raised
+    raised = [["0.100", "alarm_raised"], ["0.400", "alarm_raised"]]  # the second by a watchdog
+    assert [row[:2] for row in lines(events("--kind", "alarm_raised"))] == raised
     both = lines(events("--kind", "alarm_*", "--kind", "command_refused"))
-    assert [row[1:3] for row in both] == [
-        ["10", "alarm_raised"],
-        ["20", "command_refused"],
-        ["40", "alarm_raised"],
-        ["50", "alarm_cleared"],
+    assert [row[:2] for row in both] == [
+        ["0.100", "alarm_raised"],
+        ["0.200", "command_refused"],
+        ["0.400", "alarm_raised"],
+        ["0.500", "alarm_cleared"],
     ]
 
 
 def test_they_are_chosen_by_name(events: Events) -> None:
-    assert {row[3] for row in lines(events("--name", "infeeds/*"))} == {"infeeds/supply"}
-    assert [row[1] for row in lines(events("--name", "alarms/*", "--name", "belts/no*"))] == ["10", "20", "40", "50"]
+    assert {row[2] for row in lines(events("--name", "infeeds/*"))} == {"infeeds/supply"}
+    chosen = lines(events("--name", "alarms/*", "--name", "belts/no*"))
+    assert [row[0] for row in chosen] == ["0.100", "0.200", "0.400", "0.500"]
 
 
 def test_they_are_chosen_by_time(events: Events) -> None:
-    everything = [row[1] for row in lines(events())]
-    assert [row[1] for row in lines(events("--from", 0.2, "--to", 0.5))] == [
-        tick for tick in everything if 20 <= int(tick) <= 50
+    everything = [row[0] for row in lines(events("--all"))]
+    assert [row[0] for row in lines(events("--all", "--from", 0.2, "--to", 0.5))] == [
+        time for time in everything if 0.2 <= float(time) <= 0.5
     ]
-    assert "20" in everything and "50" in everything
+    assert "0.200" in everything and "0.500" in everything
+
+
+def test_json_has_all_columns(events: Events, tmp_path: Path) -> None:
+    rows = json.loads(events("--json").stdout)
+    events("--csv", tmp_path / "events.csv")
+    with (tmp_path / "events.csv").open(newline="", encoding="utf-8") as stream:
+        assert [{name: str(value) if value is not None else "" for name, value in row.items()} for row in rows] == [
+            *csv.DictReader(stream)
+        ]
+    assert json.loads(events("--json", "--kind", "limit_passed").stdout) == []
+
+
+def test_equal_events_are_folded_between_others() -> None:
+    """A machine that starves in each cycle, and a fault in between."""
+    cycle = [("starved", 1.0), ("starved", 0.0)]
+    rows = [
+        EventRow(float(time), time, "machine_state", "machines/packer/starved", None, cycle[time % 2][1], "")
+        for time in range(1000)
+    ]
+    rows.insert(500, EventRow(499.5, 499, "fault_injected", "belts/line/trip", None, 1.0, ""))
+    told = [(fold.first.time, fold.first.value, fold.count, fold.last) for fold in folded(rows)]
+    assert told == [
+        (0.0, 1.0, 250, 498.0), (1.0, 0.0, 250, 499.0), (499.5, 1.0, 1, 0.0),
+        (500.0, 1.0, 250, 998.0), (501.0, 0.0, 250, 999.0),
+    ]  # fmt: skip
+    lines = event_listing(rows, None)
+    assert len(lines) == 6
+    assert missing(lines[1], ["machines/packer/starved", "250 times", "498.000 s"]) == []
+    assert len(event_listing(rows, None, every=True)) == 1002
+    bottles = [EventRow(float(n), n, "bottle_fed", "infeeds/in", n, float(n), "") for n in range(4)]
+    assert missing(event_listing(bottles, None)[1], ["4 bottles", "3.000 s"]) == []
+    assert len(folded(bottles[:2])) == 2
+
+
+@pytest.mark.parametrize("width", [40, 80, 120])
+def test_names_are_whole_in_any_width(width: int) -> None:
+    names = [f"machines/a_filler_with_a_long_name_{n}/stop_reason" for n in range(2)]
+    rows = [EventRow(float(n), n, "machine_state", name, None, 1.0, "no bottles") for n, name in enumerate(names)]
+    text = "\n".join(event_listing(rows, width))
+    assert missing(text, *names, "machine_state") == []
+    assert all(len(line) <= width or " " not in line.strip() for line in text.splitlines())
 
 
 def test_csv_has_all_columns_and_no_control_characters(events: Events, tmp_path: Path) -> None:

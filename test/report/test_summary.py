@@ -1,6 +1,7 @@
 """What a run amounts to, counted from its bag."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +19,13 @@ from conveyor_sim.line.commands.authority import AUTOMATIC, MANUAL
 from conveyor_sim.line.commands.inputs import MODE, Input
 from conveyor_sim.physics.model import build_model
 from conveyor_sim.physics.model.remedies import step_limit
+from conveyor_sim.report.alarm_figures import AlarmFigures, Listed
 from conveyor_sim.report.figures.recording import Recording
+from conveyor_sim.report.labelled import MOST_LINES
+from conveyor_sim.report.outline import FILES, outline
 from conveyor_sim.report.report import render
 from conveyor_sim.report.summarize import summarize
-from conveyor_sim.report.summary import Summary, write_summary
+from conveyor_sim.report.summary import LoadHistory, Loop, Summary, Worst, write_summary
 from conveyor_sim.scene import Scene, load_scene, parse_scene
 from conveyor_sim.simulation import Simulation
 
@@ -54,11 +58,13 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def shown(summary: Summary) -> str:
-    """As on a terminal."""
+    """The outline, and all details, as on a terminal."""
+    lines = outline(summary)
+    assert len(lines) <= MOST_LINES - FILES
     console = Console(width=200)
     with console.capture() as captured:
         console.print(render(summary))
-    return captured.get()
+    return "\n".join([*lines, captured.get()])
 
 
 def test_counts_are_those_of_the_simulation(tmp_path: Path) -> None:
@@ -137,9 +143,9 @@ def test_a_recording_that_this_version_refuses_has_no_prediction(bag: Path, tmp_
 
 
 def test_what_sets_the_steps_is_told(bag: Path, tmp_path: Path) -> None:
-    expected = step_limit(load_scene(SMALL_LINE))
-    assert expected.lines != []
     summary = summarize(bag)
+    expected = step_limit(load_scene(SMALL_LINE), bottles=summary.bottles.present)
+    assert expected.lines != []
     assert summary.limit == expected
     assert json.loads(write_summary(summary, tmp_path).read_text())["steps"] == expected.lines
 
@@ -257,14 +263,36 @@ def test_summary_can_be_read_on_a_terminal(bag: Path) -> None:
         "small_line",
         "peak force of impacts",
         "peak force",
-        "real-time factor",
-        "0.50",
+        "0.5 x real time",
         bottles,
         "straight",
         "signals",
         "2 refused",
     ):
         assert words in text
+
+
+def test_what_is_absent_has_no_line(bag: Path) -> None:
+    summary = summarize(bag)
+    bare = replace(
+        summary, loop=None, peak_force=None, borne=None, alarms=None, commands=0, refused=0, guard={}, achieved=None,
+        pressed=None, damage_events={},
+    )  # fmt: skip
+    assert [line.split()[0] for line in outline(bare)] == ["small_line:", "bottles"]
+
+
+def test_more_warnings_than_lines_are_counted(bag: Path) -> None:
+    """Ten lines are for the outline: what does not fit is behind --details."""
+    summary = replace(
+        summarize(bag), loop=Loop("straight", 3, 1.0, 1.0), borne=LoadHistory(tipping=Worst(0.5, 3)),
+        alarms=AlarmFigures(1, 1.0, 1, {"jam": 1}, [Listed("jam", "error", "", 0.5)], []),
+        guard={"soft": 2}, guard_texts=["first"], damage_events={"scuffing": 1}, damage_texts=["bottle 3"],
+        commands=9, refused=4,
+    )  # fmt: skip
+    lines = outline(summary)
+    assert len(lines) == MOST_LINES - FILES
+    assert missing(lines[-2], ["warning", "guard", "2 x soft", "first"]) == []
+    assert missing(lines[-1], ["2 more warnings", "--details"]) == []
 
 
 def test_bottles_in_stations_are_held_and_counted_once(tmp_path: Path) -> None:

@@ -11,10 +11,11 @@ from typing import Any
 
 import rclpy
 from conveyor_msgs import srv
-from conveyor_msgs.msg import SimulationState
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
+from simulation_interfaces import srv as standard_srv
+from simulation_interfaces.msg import SimulationState
 
 from conveyor_sim.bag.messages.qos import ANSWERS
 from conveyor_sim.bag.messages.topics import TOPICS
@@ -86,12 +87,14 @@ class LineClient:
 
     def step(self, ticks: int = 1) -> None:
         """Advance, and see that it was done."""
-        result = self.call(srv.StepSimulation, "step_simulation", steps=ticks).result
+        result = self.call(standard_srv.StepSimulation, "step_simulation", steps=ticks).result
         assert result.result == result.RESULT_OK, result.error_message
 
     def step_in_background(self, ticks: int) -> Callable[[], None]:
         """Begin to advance; what is returned waits for the end."""
-        future = self.client(srv.StepSimulation, "step_simulation").call_async(srv.StepSimulation.Request(steps=ticks))
+        future = self.client(standard_srv.StepSimulation, "step_simulation").call_async(
+            standard_srv.StepSimulation.Request(steps=ticks)
+        )
 
         def wait() -> None:
             result = until(future.result, "the end of a step").result
@@ -101,7 +104,7 @@ class LineClient:
 
     def reset(self) -> None:
         """Back to tick 0."""
-        result = self.call(srv.ResetSimulation, "reset_simulation").result
+        result = self.call(standard_srv.ResetSimulation, "reset_simulation").result
         assert result.result == result.RESULT_OK, result.error_message
 
     def reset_until(self, *listeners: Listener) -> None:
@@ -119,13 +122,13 @@ class LineClient:
 
     def state(self) -> int:
         """The state's number."""
-        return int(self.call(srv.GetSimulationState, "get_simulation_state").state.state)
+        return int(self.call(standard_srv.GetSimulationState, "get_simulation_state").state.state)
 
     def compiling(self) -> str:
         """Return why the run has not started, "" once it has."""
-        client = self.client(srv.GetSimulationState, "get_simulation_state")
+        client = self.client(standard_srv.GetSimulationState, "get_simulation_state")
         # A node that has not discovered the client of a request loses the answer, as ROS defines it.
-        response = until(lambda: client.call(srv.GetSimulationState.Request(), timeout_sec=5.0), "an answer")
+        response = until(lambda: client.call(standard_srv.GetSimulationState.Request(), timeout_sec=5.0), "an answer")
         return "" if response.state.state != SimulationState.STATE_STOPPED else str(response.result.error_message)
 
     def lockstep(self, target: int, run_id: str = "test", **fields: Any) -> Any:

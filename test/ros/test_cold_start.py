@@ -11,14 +11,14 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from conveyor_msgs import srv
-from conveyor_msgs.msg import Result, SimulationState
 from facts import missing
 from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.msg import ParameterType, ParameterValue
 from rcl_interfaces.srv import GetParameters, SetParameters
 from ros.conftest import SMALL_LINE
 from ros.line_client import LineClient, until
+from simulation_interfaces import srv as standard_srv
+from simulation_interfaces.msg import Result, SimulationState
 
 from conveyor_sim.ros.child import Child
 
@@ -54,24 +54,28 @@ def cold_node(domain: int, client: LineClient, tmp_path: Path) -> Iterator[Child
 
 
 def test_it_answers_while_it_compiles(cold_node: Child, client: LineClient, tmp_path: Path) -> None:
-    asked = client.call(srv.GetSimulationState, "get_simulation_state")
+    asked = client.call(standard_srv.GetSimulationState, "get_simulation_state")
     assert (asked.state.state, asked.result.result) == (SimulationState.STATE_STOPPED, Result.RESULT_OK)
     assert asked.result.error_message.startswith("compiling the kernels, ")
-    assert "conveyor_sim" in client.call(srv.GetSimulatorFeatures, "get_simulator_features").custom_info
+    features = client.call(standard_srv.GetSimulatorFeatures, "get_simulator_features").features
+    assert "conveyor_sim" in features.custom_info
     values = client.call(GetParameters, "conveyor_sim/get_parameters", names=["scene", "real_time_factor"]).values
     assert (values[0].string_value, values[1].double_value) == (str(SMALL_LINE), 1.0)
     factor = ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=2.0)
     factors = [ParameterMessage(name="real_time_factor", value=factor)]
     assert client.call(SetParameters, "conveyor_sim/set_parameters", parameters=factors).results[0].successful
     playing = SimulationState(state=SimulationState.STATE_PLAYING)
-    refused = client.call(srv.SetSimulationState, "set_simulation_state", state=playing).result
+    refused = client.call(standard_srv.SetSimulationState, "set_simulation_state", state=playing).result
     assert refused.result == Result.RESULT_INCORRECT_STATE
     assert missing(refused.error_message, ["get_simulation_state", "PAUSED or PLAYING"]) == []
     assert not client.node.count_services("conveyor_sim/lockstep")
     assert not client.node.count_publishers("/clock")
     assert not finished(tmp_path / "cache")
     quitting = SimulationState(state=SimulationState.STATE_QUITTING)
-    assert client.call(srv.SetSimulationState, "set_simulation_state", state=quitting).result.result == Result.RESULT_OK
+    assert (
+        client.call(standard_srv.SetSimulationState, "set_simulation_state", state=quitting).result.result
+        == Result.RESULT_OK
+    )
     until(lambda: cold_node.exit_code is not None, "the end of the node")
     assert cold_node.exit_code == 0
     assert not finished(tmp_path / "cache")

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from conveyor_msgs.msg import AlarmStates, Belts, CommandOutcome, Commands, Events
+from conveyor_msgs.msg import Alarm, AlarmStates, Belts, CommandOutcome, Commands, Events, Spawn
 from ros.line_client import LineClient, until
 from std_msgs.msg import Float64
 
@@ -94,16 +94,35 @@ def test_an_alarm_is_in_the_events_at_its_tick_even_beside_a_refused_command(sen
 
 
 def test_a_declaration_of_an_alarm_comes_before_the_commands_beside_it(sender: Sender) -> None:
-    declared = {"alarm_ids": ["declared"], "alarms": ['{"text": "it is there", "on_delay": 0.5}']}
-    outcome = sender.outcome_of(sender.commands, Commands(**declared))
+    declared = Alarm(id="declared", text="it is there", on_delay=0.5)
+    outcome = sender.outcome_of(sender.commands, Commands(alarms=[declared]))
     assert (outcome.accepted, outcome.operation, list(outcome.names)) == (True, "declare", ["declared"])
-    outcome = sender.outcome_of(sender.commands, Commands(alarm_ids=["declared"], alarms=['{"class": 1}']))
+    outcome = sender.outcome_of(sender.commands, Commands(alarms=[Alarm(id="declared", alarm_class="bad")]))
     assert not outcome.accepted
-    assert outcome.reason.startswith("alarm declared: class: no such field")
+    assert outcome.reason.startswith("alarm declared: alarm_class: ")
+    outcome = sender.outcome_of(sender.commands, Commands(alarms=[Alarm(id="declared", tag="x", high=math.nan)]))
+    assert not outcome.accepted and outcome.reason.startswith("alarm declared: high: ")
     with sender.line.listen(AlarmStates, "alarm_states") as states:  # a late subscriber
         message = until(lambda: states.messages and states.messages[-1], "alarm_states")
     at = list(message.id).index("declared")
     assert (message.text[at], message.state[at], message.declared_by[at]) == ("it is there", 0, "commands")
+
+
+def test_bottles_are_deleted_and_spawned_before_the_commands_beside_them(sender: Sender) -> None:
+    place = Spawn(type="bottle", x=2.5, y=-0.3)
+    outcome = sender.outcome_of(sender.commands, Commands(spawned=[place]))
+    assert (outcome.operation, outcome.accepted, outcome.reason) == ("spawn", True, "")
+    assert (list(outcome.names), list(outcome.values)) == (["bottle"], [2.5, -0.3, 0.0, 0.0, 0.0, 0.0])
+    (bottle,) = outcome.bottles
+    all_at_once = Commands(deleted=[bottle], spawned=[place], names=[TABLE], values=[0.2])
+    sender.outcome_of(sender.commands, all_at_once)
+    outcomes = until(lambda: len(sender.outcomes.messages) == 3 and sender.outcomes.messages, "all command results")
+    assert [(one.operation, one.accepted, one.reason) for one in outcomes] == [
+        ("delete", True, ""), ("spawn", True, ""), ("set", True, ""),
+    ]  # fmt: skip
+    assert list(outcomes[0].values) == [bottle] and list(outcomes[1].bottles) == [bottle + 1]
+    outcome = sender.outcome_of(sender.commands, Commands(spawned=[Spawn(type="bottle", x=math.nan)]))
+    assert not outcome.accepted and not outcome.bottles and "x nan given" in outcome.reason
 
 
 def test_a_speed_sent_to_a_belt_changes_that_belt(sender: Sender) -> None:

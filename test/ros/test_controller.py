@@ -15,6 +15,7 @@ from ros.conftest import SMALL_LINE
 from ros.line_client import LineClient, halted, until
 from ros.warm_child import WarmChild
 from rosbags.highlevel import AnyReader
+from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
 from conveyor_sim.bag.replay import replay
@@ -196,3 +197,12 @@ def test_a_reset_in_the_middle_of_a_scan_makes_it_begin_anew(
     before = line.lockstep(0, run_id="look").tick
     until(lambda: line.lockstep(0, run_id="look").tick > before + 30, "more scans")
     assert controller.exit_code is None
+
+
+def test_a_node_with_other_messages_is_named(client: LineClient, start_controller: StartController) -> None:
+    publisher = client.node.create_publisher(Float64, "/line", 1)
+    child = start_controller()
+    until(lambda: child.exit_code is not None, "its end")
+    assert child.exit_code == 1
+    assert missing(child.obituary(), "/line", "conveyor_msgs/msg/Line", "one version") == []
+    client.between_callbacks(lambda: client.node.destroy_publisher(publisher))

@@ -15,6 +15,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from ros.conftest import SMALL_LINE
 from ros.line_client import LineClient, until
+from simulation_interfaces import srv as standard_srv
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
@@ -144,7 +145,7 @@ def test_a_second_owner_is_refused_until_the_release(line: LineClient) -> None:
 
 def test_an_owner_excludes_steps_and_running_free(line: LineClient) -> None:
     line.lockstep(10, run_id="plc")
-    result = line.call(srv.StepSimulation, "step_simulation", steps=1).result
+    result = line.call(standard_srv.StepSimulation, "step_simulation", steps=1).result
     assert "run 'plc' owns the simulation" in result.error_message
     resumed = line.call(Trigger, "resume")
     assert not resumed.success
@@ -195,8 +196,8 @@ def test_a_reset_breaks_off_an_advance(line: LineClient) -> None:
 
 
 def test_a_reset_breaks_off_a_step(line: LineClient) -> None:
-    request = srv.StepSimulation.Request(steps=10**5)
-    future = line.client(srv.StepSimulation, "step_simulation").call_async(request)
+    request = standard_srv.StepSimulation.Request(steps=10**5)
+    future = line.client(standard_srv.StepSimulation, "step_simulation").call_async(request)
     until(lambda: line.lockstep(0).tick > 0, "the first tick")
     line.reset()
     result = until(future.result, "the answer to the step").result

@@ -19,6 +19,7 @@ from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recover import recover
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.ros.main_job import run_in_lockstep
+from conveyor_sim.scene import parse_scene
 
 
 def children_of(process: int) -> list[int]:
@@ -59,6 +60,18 @@ def test_two_runs_give_the_same_bytes_and_the_controller_its_commands(tmp_path: 
     with open_bag(tmp_path / "one") as bag:
         assert bag.line.overrides == "duration: 4.0\n"
     assert {path.name for path in (tmp_path / "one" / "logs").iterdir()} == {"sim_node.log", "controller_node.log"}
+
+
+@pytest.mark.usefixtures("nothing_left")
+def test_chosen_parameters_reach_the_node(tmp_path: Path) -> None:
+    scene = tmp_path / "line.yaml"
+    text = SMALL_LINE.read_text().replace("width: 0.2, speed: 0.5,", "width: 0.2, speed: pace,")
+    scene.write_text(f"parameters: {{pace: 0.5 m/s}}\n{text}")
+    run_in_lockstep(str(scene), tmp_path / "bag", 0.2, settings=["pace=0.3 m/s"])
+    with open_bag(tmp_path / "bag") as bag:
+        assert parse_scene(bag.line.scene_text).belts["feeder"].speed == 0.3
+    with pytest.raises(ConveyorError, match=stating("parameters.pce", "pace")):
+        run_in_lockstep(str(scene), tmp_path / "other", settings=["pce=3 m/s"])
 
 
 @pytest.mark.usefixtures("nothing_left")

@@ -16,6 +16,7 @@ from rclpy.signals import SignalHandlerOptions
 from ros.conftest import SMALL_LINE
 from ros.line_client import LineClient, until
 from ros.warm_child import WarmProcess
+from simulation_interfaces.srv import StepSimulation
 
 from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.bag.reader import open_bag
@@ -52,7 +53,7 @@ def bag(domain: int, client: LineClient, tmp_path_factory: pytest.TempPathFactor
     arguments = [*arguments_of("sim_node", parameters), "-r", "__ns:=/cell_1"]
     node = WarmProcess("sim_node", arguments, {**os.environ, "ROS_LOG_DIR": str(folder)}, folder)
     step = "/cell_1/conveyor_sim/step_simulation"
-    client.client(srv.StepSimulation, step)
+    client.client(StepSimulation, step)
     topics = topics_of(client, "conveyor_sim")
     assert all(topic.startswith("/cell_1/") for topic in topics)
     outcomes = client.listen(CommandOutcome, "/cell_1/outcomes", "outcomes")
@@ -60,7 +61,7 @@ def bag(domain: int, client: LineClient, tmp_path_factory: pytest.TempPathFactor
     publisher.publish(Commands(names=[FEEDER], values=[0.125]))
 
     def applied() -> bool:
-        client.call(srv.StepSimulation, step, steps=1)
+        client.call(StepSimulation, step, steps=1)
         return bool(outcomes.messages)
 
     until(applied, "the command")

@@ -8,7 +8,9 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from facts import missing
 from ros.line_client import LineClient, halted, until
+from std_msgs.msg import Float64
 
 from conveyor_sim.bag.replay import replay
 from conveyor_sim.line.commands.inputs import FORCE, MODE, OPERATE, SET, Input
@@ -97,8 +99,21 @@ def test_another_line_is_not_taken_for_this_one(
     first.stop()
     until(lambda: source.snapshot.lost, "its end")
     second = start_node(real_time_factor=1.0, start_paused=False, duration=600.0)
-    until(lambda: "another line than before" in source.snapshot.lost, "the other line")
+    until(lambda: not missing(source.snapshot.lost, "small_line", "expected zoned_line"), "the other line")
     second.stop()
     third = start_node(scene=ZONED, real_time_factor=1.0, start_paused=False, duration=600.0)
     until(lambda: not source.snapshot.lost, "the line")
     third.stop()
+
+
+def test_a_node_with_other_messages_is_named(client: LineClient) -> None:
+    """As of an older version: DDS matches types by name only, so their definitions are compared."""
+    publisher = client.node.create_publisher(Float64, "/older/line", 1)
+    said: list[str] = []
+    with NodeSource(said.append, "older") as source:
+        until(lambda: "/older/line" in source.snapshot.lost, "the definition")
+        assert missing(source.snapshot.lost, "conveyor_msgs/msg/Line", "one version") == []
+        assert source.give(setpoint(0.1)) == source.snapshot.lost
+        assert len(said) == 1 and "/older/line" in said[0]
+        client.between_callbacks(lambda: client.node.destroy_publisher(publisher))
+        until(lambda: "/older/line" not in source.snapshot.lost, "its end")

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from conveyor_msgs.msg import Belts, Bottles, Contacts, Ledger, Line, Signals
+from facts import stating
 from geometry_msgs.msg import PoseArray
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 from ros.conftest import SMALL_LINE
@@ -19,7 +20,7 @@ from conveyor_sim.bag.messages.topics import OUTPUTS, TOPICS
 from conveyor_sim.bag.messages.typestore import default_distro
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.ros.child import Child
-from conveyor_sim.ros.publishers import check_type
+from conveyor_sim.ros.publishers import check_type, require_same_definition
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 
@@ -156,6 +157,13 @@ def test_a_type_built_from_another_definition_is_told(line: LineClient) -> None:
     check_type(line.node, publisher.topic_name, "std_msgs/msg/Float64", default_distro())
     with pytest.raises(ConveyorError, match="conveyor_msgs/msg/Bottles: the installed message package was built from"):
         check_type(line.node, publisher.topic_name, "conveyor_msgs/msg/Bottles", default_distro())
+
+
+def test_a_subscriber_names_a_node_with_another_definition(line: LineClient) -> None:
+    publisher = line.node.create_publisher(Float64, "published_differently", 1)
+    require_same_definition(line.node, publisher.topic_name, "std_msgs/msg/Float64")
+    with pytest.raises(ConveyorError, match=stating("/published_differently", line.node.get_name(), "one version")):
+        require_same_definition(line.node, publisher.topic_name, "conveyor_msgs/msg/Line")
 
 
 def test_the_ledger_is_the_engines_where_it_is_asked_for(

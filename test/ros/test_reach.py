@@ -50,7 +50,7 @@ print("heard", *sorted(heard), flush=True)
 """
 RESET = """
 import rclpy
-from conveyor_msgs.srv import ResetSimulation
+from simulation_interfaces.srv import ResetSimulation
 rclpy.init()
 node = rclpy.create_node("stranger")
 client = node.create_client(ResetSimulation, "conveyor_sim/reset_simulation")

@@ -13,7 +13,8 @@ from typing import Any
 
 import pytest
 import rclpy
-from conveyor_msgs.msg import Bottles, Line, Signals
+from bag.test_older import SECOND
+from conveyor_msgs.msg import AlarmStates, Bottles, CommandOutcome, Line, Signals
 from conveyor_msgs.srv import Seek
 from ros.line_client import PATIENCE, LineClient, until
 from ros.recording import MADE, TICKS, record
@@ -154,6 +155,29 @@ def test_a_seek_beyond_the_end_is_refused_and_one_to_the_end_ends(client: LineCl
     assert client.call(Trigger, "conveyor_replay/resume").success
     assert ended.wait(PATIENCE)
     assert "has been played" in client.call(Seek, "conveyor_replay/seek", time=0.0).message
+
+
+def test_a_recording_of_an_earlier_format_is_published_in_the_present_definitions(client: LineClient) -> None:
+    """Format 2, of commit 7fa2643; its file keeps its bytes."""
+    context = rclpy.Context()
+    rclpy.init(context=context)
+    end = threading.Event()
+    with (
+        open_bag(SECOND) as older,
+        closing(ReplayNode(older, 0.0, None, True, end.set, context=context)),
+        client.listen(Line, "line") as line,
+        client.listen(AlarmStates, "alarm_states") as alarms,
+        client.listen(CommandOutcome, "outcomes") as outcomes,
+    ):
+        message = line.first()
+        assert client.call(Trigger, "conveyor_replay/resume").success
+        assert end.wait(PATIENCE)
+        until(lambda: len(outcomes.messages) == 10, "all command results")
+        until(lambda: "follows" in alarms.messages[-1].id, "all alarms")
+        states = alarms.messages[-1]
+    rclpy.shutdown(context=context)
+    assert message.format == 2 and {*message.signal_names} <= {tag.name for tag in message.tags}
+    assert list(states.suppressed_by[states.id.index("follows")].ids) == ["declared", "full"]
 
 
 def test_topics_of_types_that_are_not_installed_so_are_left_out(

@@ -26,7 +26,11 @@ def test_every_service_has_its_name_below_the_node_and_its_old_name(shared_node:
 
 
 def test_an_old_name_answers_and_is_logged_once(shared_node: Child, client: LineClient) -> None:
-    for kind, name in ((Trigger, "pause"), (srv.ResetSimulation, "reset_simulation"), (srv.Lockstep, "lockstep")):
+    for kind, name in (
+        (Trigger, "pause"),
+        (srv.SaveCheckpoint, "save_checkpoint"),
+        (srv.Lockstep, "lockstep"),
+    ):
         for _ in range(2):
             client.call(kind, f"/{name}")
         lines = [line for line in shared_node.log.read_text().splitlines() if f" /{name} " in line]

@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 import pytest
-from conveyor_msgs import srv
-from conveyor_msgs.msg import CommandOutcome, Line, Result, SimulationState
+from conveyor_msgs.msg import CommandOutcome, Line
 from facts import missing
 from ros.line_client import LineClient, until
+from simulation_interfaces import srv as standard_srv
+from simulation_interfaces.msg import Result, SimulationState, SimulatorFeatures
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
 from conveyor_sim.ros.child import Child
+from conveyor_sim.ros.services import FEATURES
 
 STOPPED, PLAYING, PAUSED = range(3)
 LAST = 400  # tick of the small line's end
@@ -29,19 +31,19 @@ def line(shared_node: Child, client: LineClient) -> Iterator[LineClient]:
     client.call(Trigger, "pause")
     client.reset()
     yield client
-    client.call(srv.SetSimulationState, "set_simulation_state", state=SimulationState(state=PAUSED))
+    client.call(standard_srv.SetSimulationState, "set_simulation_state", state=SimulationState(state=PAUSED))
 
 
 def set_state(line: LineClient, state: int) -> Result:
-    return line.call(srv.SetSimulationState, "set_simulation_state", state=SimulationState(state=state)).result
+    return line.call(standard_srv.SetSimulationState, "set_simulation_state", state=SimulationState(state=state)).result
 
 
 def step(line: LineClient, ticks: int) -> Result:
-    return line.call(srv.StepSimulation, "step_simulation", steps=ticks).result
+    return line.call(standard_srv.StepSimulation, "step_simulation", steps=ticks).result
 
 
 def reset(line: LineClient, scope: int = 0) -> Result:
-    return line.call(srv.ResetSimulation, "reset_simulation", scope=scope).result
+    return line.call(standard_srv.ResetSimulation, "reset_simulation", scope=scope).result
 
 
 def tick(line: LineClient) -> int:
@@ -54,11 +56,37 @@ def test_it_starts_paused_when_asked_to(line: LineClient) -> None:
     assert tick(line) == 0
 
 
-def test_features_tell_what_is_served(line: LineClient) -> None:
-    response = line.call(srv.GetSimulatorFeatures, "get_simulator_features")
-    reset_all, get, put, pause, single, multiple = 20, 24, 25, 26, 31, 32
-    assert set(response.features) == {reset_all, get, put, pause, single, multiple}
-    assert "conveyor_sim" in response.custom_info
+def test_every_feature_that_is_stated_is_served_and_no_other(line: LineClient) -> None:
+    features = line.call(standard_srv.GetSimulatorFeatures, "get_simulator_features").features
+    stated = {name for name in FEATURES if getattr(SimulatorFeatures, name) in features.features}
+    assert len(stated) == len(features.features) == len(FEATURES)  # the version of this distribution has all of them
+    interfaces = {
+        "SPAWNING": "spawn_entity",
+        "DELETING": "delete_entity",
+        "NAMED_POSES": "get_named_poses",
+        "POSE_BOUNDS": "get_named_pose_bounds",
+        "ENTITY_BOUNDS": "get_entity_bounds",
+        "ENTITY_STATE_GETTING": "get_entity_state",
+        "ENTITY_STATE_SETTING": "set_entity_state",
+        "ENTITY_INFO_GETTING": "get_entity_info",
+        "ENTITY_INFO_SETTING": "set_entity_info",
+        "SPAWNABLES": "get_spawnables",
+        "SPAWNING_ENTITIES": "spawn_entities",
+        "SIMULATION_RESET": "reset_simulation",
+        "SIMULATION_STATE_GETTING": "get_simulation_state",
+        "SIMULATION_STATE_SETTING": "set_simulation_state",
+        "STEP_SIMULATION_SINGLE": "step_simulation",
+        "STEP_SIMULATION_ACTION": "simulate_steps/_action/send_goal",
+        "WORLD_LOADING": "load_world",
+        "WORLD_UNLOADING": "unload_world",
+        "WORLD_INFO_GETTING": "get_current_world",
+        "AVAILABLE_WORLDS": "get_available_worlds",
+    }
+    offered = {name for name, _ in line.node.get_service_names_and_types_by_node("conveyor_sim", "/")}
+    for prefix in ("/", "/conveyor_sim/"):
+        served = {feature for feature, name in interfaces.items() if prefix + name in offered}
+        assert served == stated & interfaces.keys()
+    assert "conveyor_sim" in features.custom_info
 
 
 def test_a_step_advances_by_so_many_ticks_and_answers_when_done(line: LineClient) -> None:
@@ -128,12 +156,12 @@ def test_a_reset_goes_back_to_tick_0_in_a_new_run(line: LineClient) -> None:
 
 def test_a_reset_of_time_alone_is_not_supported(line: LineClient) -> None:
     line.step(3)
-    for scope in (srv.ResetSimulation.Request.SCOPE_TIME, srv.ResetSimulation.Request.SCOPE_STATE):
+    for scope in (standard_srv.ResetSimulation.Request.SCOPE_TIME, standard_srv.ResetSimulation.Request.SCOPE_STATE):
         result = reset(line, scope)
         assert result.result == Result.RESULT_FEATURE_UNSUPPORTED
         assert f"scope: {scope} given" in result.error_message
     assert tick(line) == 3
-    assert reset(line, srv.ResetSimulation.Request.SCOPE_ALL).result == Result.RESULT_OK
+    assert reset(line, standard_srv.ResetSimulation.Request.SCOPE_ALL).result == Result.RESULT_OK
 
 
 def test_at_the_end_it_pauses_until_a_reset(line: LineClient, shared_node: Child) -> None:
@@ -156,16 +184,3 @@ def test_at_the_end_it_pauses_until_a_reset(line: LineClient, shared_node: Child
     line.reset()
     line.step(1)
     assert tick(line) == 1
-
-
-def test_the_real_types_are_served_beside_where_they_are_installed(line: LineClient) -> None:
-    real = pytest.importorskip("simulation_interfaces.srv")
-    features = line.call(real.GetSimulatorFeatures, "simulation_interfaces/get_simulator_features").features
-    assert 32 in features.features
-    stepped = line.call(real.StepSimulation, "simulation_interfaces/step_simulation", steps=4)
-    assert stepped.result.result == Result.RESULT_OK
-    assert tick(line) == 4
-    state = line.call(real.GetSimulationState, "simulation_interfaces/get_simulation_state").state
-    assert state.state == PAUSED
-    assert line.call(real.ResetSimulation, "simulation_interfaces/reset_simulation").result.result == Result.RESULT_OK
-    assert tick(line) == 0

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from conveyor_msgs import srv
 from ros.line_client import LineClient, until
+from simulation_interfaces import srv as standard_srv
 
 from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.bag.messages.typestore import default_distro, typestore
@@ -20,7 +21,7 @@ from conveyor_sim.line.commands.inputs import CommandOutcome
 from conveyor_sim.ros.child import Child
 from conveyor_sim.run.active_run import ActiveRun
 from conveyor_sim.run.calls import MOST_CALLS
-from conveyor_sim.run.lockstep import LockstepRequest, Refused
+from conveyor_sim.run.lockstep import LockstepRequest, Refused, SentInputs
 from conveyor_sim.run.session import RunSession
 from conveyor_sim.run.stepper import Stepper
 from conveyor_sim.scene import load_scene
@@ -58,12 +59,12 @@ def test_a_flood_of_requests_is_refused_and_does_not_hold_up_the_end(
     """Each reset makes a recording; they were carried out for half a minute, and Ctrl-C waited for them."""
     node = start_node(record=tmp_path / "bag")
     resets, faults = (
-        client.client(srv.ResetSimulation, "reset_simulation"),
+        client.client(standard_srv.ResetSimulation, "reset_simulation"),
         client.client(srv.InjectFault, "inject_fault"),
     )
     futures = []
     for number in range(300):
-        futures.append(resets.call_async(srv.ResetSimulation.Request()))
+        futures.append(resets.call_async(standard_srv.ResetSimulation.Request()))
         if number % 5 == 4:
             futures.append(faults.call_async(srv.InjectFault.Request(name="x")))
         time.sleep(0.005)
@@ -73,13 +74,15 @@ def test_a_flood_of_requests_is_refused_and_does_not_hold_up_the_end(
         return [type(answer) for answer in answers if "100 requests wait for their answers" in str(answer)]
 
     # A busy machine may answer the first of them after the last request was sent.
-    until(lambda: set(refusals()) == {srv.ResetSimulation.Response, srv.InjectFault.Response}, "refusals")
+    until(lambda: set(refusals()) == {standard_srv.ResetSimulation.Response, srv.InjectFault.Response}, "refusals")
     refused = refusals()
     client.state()
     node.stop()
     assert node.exit_code == 0
     bags = sorted(tmp_path.glob("bag*"))
-    assert len(bags) <= 1 + 300 - refused.count(srv.ResetSimulation.Response), "a refused reset made a recording"
+    assert len(bags) <= 1 + 300 - refused.count(standard_srv.ResetSimulation.Response), (
+        "a refused reset made a recording"
+    )
     assert recover(bags[-1]).healthy
 
 
@@ -110,7 +113,7 @@ def test_what_the_run_is_doing_is_said_whenever_that_changes() -> None:
     stepper = Stepper(run, real_time_factor=0.0, beat=lambda stamp_ns, now: None, died=lambda error: None)
 
     def ask(target: int, release: bool = False) -> None:
-        request = LockstepRequest("plc", target, (), (), release)
+        request = LockstepRequest("plc", target, SentInputs(), release)
         stepper.call(lambda: stepper.advance_lockstep(request)).result(60.0).result(60.0)
 
     def end() -> None:

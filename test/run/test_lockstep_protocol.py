@@ -6,14 +6,15 @@ from concurrent.futures import Future
 import numpy as np
 import pytest
 
-from conveyor_sim.run.lockstep import Lockstep, LockstepAnswer, LockstepRequest, Refused
+from conveyor_sim.run.lockstep import Lockstep, LockstepAnswer, LockstepRequest, Refused, SentInputs
 
 END = 1000
 RUN = "5ee2"
 
 
 def request(target: int, run_id: str = "plc", speed: float = 0.1, release: bool = False) -> LockstepRequest:
-    return LockstepRequest(run_id, target, ("belts/feeder/cmd_speed",), (speed,), release)
+    sent = SentInputs(names=("belts/feeder/cmd_speed",), values=(speed,))
+    return LockstepRequest(run_id, target, sent, release)
 
 
 def answer_to(lockstep: Lockstep, asked: LockstepRequest, tick: int) -> Future[LockstepAnswer]:

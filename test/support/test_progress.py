@@ -18,6 +18,7 @@ def test_plain_lines_where_there_is_no_terminal() -> None:
     assert len(lines) == 10
     assert lines[-1].startswith("line: 2.0 of 2.0 s, ")
     assert lines[-1].endswith(" x real time")
+    assert all(missing(line, ["about", "s left"]) == [] for line in lines[:-1])
 
 
 @pytest.mark.parametrize(

@@ -44,41 +44,27 @@ def member(simulation: Any, name: str) -> Any:
     return getattr(owners[0], name)
 
 
-class LineSink:
-    """Sink that stores the message `line`, which names all commands and faults."""
-
-    data = b""
-
-    def wants(self, topic: str) -> bool:
-        """Return True for the topic `line`."""
-        return topic == "line"
-
-    def write(self, topic: str, data: bytes, stamp_ns: int) -> None:
-        """Store the message."""
-        self.data = data
-
-
 Step = tuple[str, tuple[Any, ...]]
 """Method of a simulation, and its arguments; those of `give` are the fields of an Input."""
 
 
-def exercises(line: Any, ticks: int) -> dict[int, list[Step]]:
+def exercises(image: Any, ticks: int) -> dict[int, list[Step]]:
     """Return inputs by tick: every command and fault with valid and refused values, and every operation."""
     plan: list[Step] = []
     for turn, share in enumerate((1.0, 0.0, 0.5, 0.75)):
-        plan += _commands(line, share)
-        plan += _faults(line, 1.0 - share)
-        plan += _operations(line, turn)
+        plan += _commands(image, share)
+        plan += _faults(image, 1.0 - share)
+        plan += _operations(image, turn)
     by_tick: dict[int, list[Step]] = {}
     for number, step in enumerate(plan):
         by_tick.setdefault(3 + number * max(1, ticks - 6) // len(plan), []).append(step)
     return by_tick
 
 
-def _commands(line: Any, share: float) -> list[Step]:
+def _commands(image: Any, share: float) -> list[Step]:
     plan: list[Step] = []
-    rows = zip(line.command_names, line.command_min, line.command_max, line.command_types, strict=True)
-    for number, (name, low, high, kind) in enumerate(rows):
+    for number, command in enumerate(image.commands):
+        name, low, high, kind = command.name, command.low, command.high, command.kind
         top = min(high, 1000.0)
         values = (
             [low + share * (top - low)]
@@ -95,9 +81,10 @@ def _commands(line: Any, share: float) -> list[Step]:
     return plan
 
 
-def _faults(line: Any, share: float) -> list[Step]:
+def _faults(image: Any, share: float) -> list[Step]:
     plan: list[Step] = []
-    for number, (name, low, high) in enumerate(zip(line.fault_names, line.fault_min, line.fault_max, strict=True)):
+    for number, fault in enumerate(image.faults):
+        name, low, high = fault.name, fault.low, fault.high
         plan.append(("inject", (name, min(high, 2.0) if share else max(low, 0.0))))
         if number % 7 == 2:
             plan.append(("inject", (name, high + 1e6)))
@@ -105,14 +92,14 @@ def _faults(line: Any, share: float) -> list[Step]:
     return plan
 
 
-def _operations(line: Any, turn: int) -> list[Step]:
+def _operations(image: Any, turn: int) -> list[Step]:
     """Return operations on alarms, signals, modes and the ownership of the line, by an operator and by others."""
     plan: list[Step] = [("operate", (operation, ids, ())) for ids in (("ours",), ()) for operation in OPERATIONS]
     plan.append(("operate", ("shelve", ("ours",), (0.5,))))
     plan += [("operate", ("reset_counters", (), ())), ("operate", ("unknown operation", ("ours",), (1.0,)))]
     engineer, other = ("operate", "engineer 1", "engineer"), ("commands", "controller 2", "controller")
-    devices = [name.rsplit("/", 1)[0] for name in line.command_names]
-    moving = [name for name, kind in zip(line.signal_names, line.signal_types, strict=True) if kind == "number"]
+    devices = [name.rsplit("/", 1)[0] for name in image.command_names]
+    moving = [signal.name for signal in image.signals if signal.kind == "number"]
     declared = ("theirs", "ours")
     texts = ('{"text": "theirs", "alarm_class": "error", "latching": true}', '{"priority": 0}' if turn else "{}")
     plan += [
@@ -126,8 +113,8 @@ def _operations(line: Any, turn: int) -> list[Step]:
     ]
     if devices:
         plan.append(("give", (*engineer, "mode", (devices[0],), (3.0,), ())))
-        plan.append(("command", ((line.command_names[0],), (line.command_max[0],))))
-        plan.append(("give", (*other, "set", (line.command_names[-1],), (line.command_min[-1],), ())))
+        plan.append(("command", ((image.commands[0].name,), (image.commands[0].high,))))
+        plan.append(("give", (*other, "set", (image.commands[-1].name,), (image.commands[-1].low,), ())))
         plan.append(("operate", ("mode", (devices[0],), (1.0,))))
         plan.append(("give", (*engineer, "mode", (devices[0],), (1.0,), ())))
     plan += [("give", (*other, "disown", (), (), ())), ("operate", ("unforce", (), ()))]
@@ -159,7 +146,7 @@ class Entry:
         simulation = self._simulation_class(scene, threads)
         inputs: dict[int, list[Step]] = {}
         if self._entry.get("exercise"):
-            inputs = exercises(self._line(simulation), ticks)
+            inputs = exercises(member(simulation, "process_image"), ticks)
         half = ticks // 2 if self._entry.get("checkpoint") else 0
         start = self._out / "half.npz"
         self._play(simulation, "bag", inputs, ticks, half, start)
@@ -167,17 +154,6 @@ class Entry:
             self._play(self._simulation_class.load(start, threads), "continued", inputs, ticks)
             start.unlink()
         (self._out / "hashes.json").write_text(json.dumps(self._hashes, indent=0) + "\n")
-
-    def _line(self, simulation: Any) -> Any:
-        """Return the decoded message `line` of a simulation."""
-        sink = LineSink()
-        self._outputs(simulation, [sink], run_id="exercise").start()
-        from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-
-        store = get_typestore(Stores.ROS2_JAZZY)
-        text = (self._source / "msg_defs" / "msg" / "Line.msg").read_text("utf-8")
-        store.register(get_types_from_msg(text, "conveyor_msgs/msg/Line"))
-        return store.deserialize_cdr(sink.data, "conveyor_msgs/msg/Line")
 
     def _play(
         self, simulation: Any, name: str, inputs: dict[int, Any], ticks: int, half: int = 0, start: Path | None = None

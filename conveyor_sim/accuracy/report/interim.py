@@ -1,4 +1,4 @@
-"""Answers on the way to the answer: what is known so far, marked as such, and what is not yet known of it."""
+"""Interim answers: what is known so far, marked as such, and what is not known yet."""
 
 from __future__ import annotations
 
@@ -32,29 +32,27 @@ def predicted(known: Forecast) -> Interim:
         return Interim(
             PREDICTED,
             (
-                f"Forces: nothing tried is predicted to be good to {asked}; the best to {percent(known.best)}.",
+                f"Forces: no setting is predicted to meet {asked}; the best has {percent(known.best)} error.",
                 "Throughput: not known, nothing has run.",
                 "Cost: not known.",
             ),
         )
     point = known.point
-    resting = (
-        f", and to {percent(point.predicted_resting)} where they press for long" if point.predicted_resting else ""
-    )
-    impacts = "there are none to be wrong: nothing in the scene can touch"
+    resting = f", {percent(point.predicted_resting)} in resting load" if point.predicted_resting else ""
+    impacts = "none, because nothing in the scene can touch"
     if point.predicted is not None:
-        impacts = f"should be good to {percent(point.predicted)} when bottles hit something{resting} (asked: {asked})"
-    better = "nothing tried should be ten times better"
+        impacts = f"{percent(point.predicted)} error in impacts{resting}, predicted (tolerance {asked})"
+    better = "no setting should be ten times as accurate"
     if known.better is not None:
-        better = f"ten times better should take {digits(known.better)} times as long"
+        better = f"ten times the accuracy should take {digits(known.better)} times as long"
     return Interim(
         PREDICTED,
         (
             f"Forces: {impacts}.",
             "Throughput: not known, nothing has run.",
-            f"Cost: a second of the line should take about {digits(known.seconds)} s of one processor with "
-            f"{known.bottles} bottle{'s' * (known.bottles != 1)}, by a rule of thumb; {better}.",
-            f"Setting: {line(point.setting)} (don't rely on it before it is measured)",
+            f"Cost: about {digits(known.seconds)} s of one processor per simulated second with "
+            f"{known.bottles} bottle{'s' * (known.bottles != 1)}, an estimate; {better}.",
+            f"Setting: {line(point.setting)} (not measured yet)",
         ),
     )
 
@@ -65,7 +63,7 @@ def preliminary(study: AccuracyStudy) -> Interim:
         PRELIMINARY,
         (
             *_without_throughput(study),
-            "Not known yet: what presses for long was not measured, nor was throughput, and a cheaper setting may do; "
+            "Not known yet: resting load and throughput were not measured, and a cheaper setting may suffice; "
             f"{len(study.points)} settings were measured.",
         ),
     )
@@ -73,7 +71,7 @@ def preliminary(study: AccuracyStudy) -> Interim:
 
 def after_measuring(study: AccuracyStudy) -> Interim:
     """Return the answer from all settings, before long runs."""
-    lines = (*_without_throughput(study), "Not known yet: throughput, and whether long runs agree with it.")
+    lines = (*_without_throughput(study), "Not known yet: throughput, and the verdict of long runs.")
     return Interim(MEASURED, lines)
 
 

@@ -1,4 +1,4 @@
-"""The answer in three lines, for somebody who has never heard of integrators: forces, throughput, cost."""
+"""The answer in three lines, in the words of a line engineer: forces, throughput, cost."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ def three_lines(study: AccuracyStudy) -> tuple[str, str, str]:
     """Return three lines on the recommended setting: accuracy of forces and throughput, cost of more accuracy."""
     if study.answer is None:
         return (
-            f"Forces: no setting that was tried is good to {percent(study.tolerance)}{_best(study)}.",
-            "Throughput: not looked at, for there is no setting to rely on.",
-            "Cost: none is known; try a larger --tolerance, or see why settings were left out (--details).",
+            f"Forces: no setting that was tried meets {percent(study.tolerance)}{_best(study)}.",
+            "Throughput: not examined, because no setting meets the tolerance.",
+            "Cost: not known; try a larger --tolerance, or see why settings were left out (--details).",
         )
     return _forces(study, study.answer), _throughput(study, study.answer), _cost(study.answer)
 
@@ -33,7 +33,7 @@ def summary(study: AccuracyStudy) -> list[str]:
     lines += [study.moving] if study.moving else []
     if study.cpu is not None and study.compiling is not None:
         lines.append(
-            f"The study took {duration(study.cpu)} of processor time, and {duration(study.compiling)} of compiling; "
+            f"Study: {duration(study.cpu)} of processor time, {duration(study.compiling)} of compiling; "
             "--details prints its tables."
         )
     return lines
@@ -45,24 +45,24 @@ def _own(study: AccuracyStudy) -> str:
     if point is None or (study.answer is not None and study.answer.setting == study.own):
         return ""
     if point.errors is None:
-        return f"The scene's own setting fails: {point.failure}."
+        return f"Scene: its setting fails: {point.failure}."
     resting = "" if point.resting is None else f" and {percent(point.resting)} in resting load"
     beyond = point.beyond is not None and point.beyond > 1.0
-    shaky = f", and its step is {digits(point.beyond)} x beyond a bound of stability" if beyond else ""
-    return f"The scene's own setting is off by {percent(point.errors.peak_force)} in impacts{resting}{shaky}."
+    shaky = f"; its step is {digits(point.beyond)} x beyond a bound of stability" if beyond else ""
+    return f"Scene: its setting has {percent(point.errors.peak_force)} error in impacts{resting}{shaky}."
 
 
 def _forces(study: AccuracyStudy, answer: Answer) -> str:
-    impacts = f"Forces: good to {percent(answer.error)} when bottles hit something"
+    impacts = f"Forces: {percent(answer.error)} error in impacts"
     if answer.resting is not None:
-        return f"{impacts}, and to {percent(answer.resting)} where they press for long (asked: {_asked(study)})."
-    why = "was not looked at" if study.rest is None else f"could not be compared ({study.rest.reason})"
+        return f"{impacts}, {percent(answer.resting)} in resting load (tolerance {_tolerance(study)})."
+    why = "" if study.rest is None else f", because {study.rest.reason}"
     foretold = next((point.predicted_resting for point in study.points if point.setting == answer.setting), None)
-    likely = "" if foretold is None else f", and is predicted to be good to {percent(foretold)}"
-    return f"{impacts} (asked: {_asked(study)}); what presses for long {why}{likely}."
+    likely = "" if foretold is None else f"; predicted error {percent(foretold)}"
+    return f"{impacts} (tolerance {_tolerance(study)}). Resting load: not measured{why}{likely}."
 
 
-def _asked(study: AccuracyStudy) -> str:
+def _tolerance(study: AccuracyStudy) -> str:
     return percent(study.tolerance)
 
 
@@ -72,15 +72,16 @@ def _throughput(study: AccuracyStudy, answer: Answer) -> str:
     only = "rely on this setting for impacts and resting forces only"
     if not rows and answer.setting == study.ensemble_reference:
         return (
-            f"Throughput: cheaper settings differ from this one in long runs, and none was run that is better; {only}."
+            "Throughput: cheaper settings differ from this one in long runs, and none that is more accurate was run; "
+            f"{only}."
         )
     if runs < FEW:
-        return f"Throughput: not known, too few long runs were made; {only} (--thorough makes more)."
+        return f"Throughput: not known, too few long runs; {only} (--thorough makes more)."
     flow = next((row for row in rows if row.observable == "throughput"), None)
-    known = "nothing leaves or comes round in this scene" if flow is None else _known(flow)
+    known = "none, because nothing leaves or returns in this scene" if flow is None else _known(flow)
     if answer.accepted:
         what = "; ".join(row.observable for row in rows if row is not flow)
-        agreed = f"; to {_asked(study)} {runs} long runs agree in {what}" if what else f" in {runs} long runs"
+        agreed = f"; within {_tolerance(study)} in {runs} long runs: {what}" if what else f" in {runs} long runs"
         return f"Throughput: {known}{agreed}."
     others = [f"{row.observable} {_bounds(row)}" for row in rows if row.verdict != "equivalent" and row is not flow]
     return f"Throughput: {'; '.join([known, *others])}; {only} ({runs} long runs)."
@@ -88,9 +89,9 @@ def _throughput(study: AccuracyStudy, answer: Answer) -> str:
 
 def _known(row: Comparison) -> str:
     if row.verdict == "equivalent":
-        return f"good to {percent(row.tolerance)}"
+        return f"within {percent(row.tolerance)}"
     if row.verdict == "different":
-        return f"off by {_bounds(row)}"
+        return f"different by {_bounds(row)}"
     return f"not known better than {_bounds(row)}" if math.isfinite(row.resolution) else "not known"
 
 
@@ -99,13 +100,13 @@ def _bounds(row: Comparison) -> str:
 
 
 def _cost(answer: Answer) -> str:
-    speed = f"Cost: a second of the line takes {digits(1.0 / answer.speed)} s of one processor"
+    speed = f"Cost: {digits(1.0 / answer.speed)} s of one processor per simulated second"
     if answer.exacter_cost is None:
-        return f"{speed}; nothing tried is ten times better."
-    return f"{speed}; ten times better takes {digits(answer.exacter_cost)} times as long."
+        return f"{speed}; nothing that was tried is ten times as accurate."
+    return f"{speed}; ten times the accuracy takes {digits(answer.exacter_cost)} times as long."
 
 
 def _best(study: AccuracyStudy) -> str:
     """Return a line on the least error within the stability bounds, if any setting ran there."""
     found = min((largest_error(point) for point in eligible(study.points, math.inf)), default=math.inf)
-    return f"; the best is good to {percent(found)}" if math.isfinite(found) else ""
+    return f"; the best has {percent(found)} error" if math.isfinite(found) else ""

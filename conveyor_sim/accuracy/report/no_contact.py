@@ -30,11 +30,11 @@ def without_contact(scene: Scene, known: Forecast, looked: float | None) -> tupl
     terms = [f"{percent(term.value)} in {term.quantity}" for term in prediction.terms]
     friction = f" (predicted: off by {', '.join(terms)})" if terms else ""
     lines = [
-        f"Forces: there are none to be wrong: {_why(scene, looked)}.",
+        f"Forces: none, because {_why(scene, looked)}.",
         f"Throughput: bottles only ride, so the friction of belts alone decides it{friction}.",
-        f"Cost: about {digits(seconds(scene, setting, known.bottles))} s of one processor for a second of the line "
-        f"with {known.bottles} bottle{'s' * (known.bottles != 1)}, by a rule of thumb; "
-        "a dearer setting gains nothing here.",
+        f"Cost: about {digits(seconds(scene, setting, known.bottles))} s of one processor per simulated second "
+        f"with {known.bottles} bottle{'s' * (known.bottles != 1)}, an estimate; "
+        "a more accurate setting gains nothing here.",
         f"Setting: {line(setting)}, the preset draft: the cheapest within every bound of stability"
         + (" (the scene has it already)." if own_setting(scene) == setting else "."),
     ]
@@ -52,9 +52,9 @@ def _why(scene: Scene, looked: float | None) -> str:
 
 
 def _otherwise(known: Forecast, draft: float | None) -> str:
-    """For the day on which bottles do meet there."""
-    impacts = "" if draft is None else f" draft is predicted to be good to {percent(draft)} in impacts;"
-    text = f"If they do touch one day (a stop, a jam, other commands),{impacts}"
+    """Return the line for the case that bottles do touch."""
+    impacts = "" if draft is None else f" draft has a predicted error of {percent(draft)} in impacts;"
+    text = f"If bottles touch (a stop, a jam, other commands),{impacts}"
     if known.point is None:
-        return f"{text} nothing tried is predicted to be good to {percent(known.tolerance)}."
-    return f"{text} predicted to be good to {percent(known.tolerance)}: {line(known.point.setting)}."
+        return f"{text} no setting is predicted to meet {percent(known.tolerance)}."
+    return f"{text} predicted to meet {percent(known.tolerance)}: {line(known.point.setting)}."

@@ -23,7 +23,7 @@ CODES = {
     "int64": "q", "uint64": "Q", "float32": "f", "float64": "d",
 }  # fmt: skip
 """Codes of struct, by ROS's names of types."""
-_BASE, _SEQUENCE = 1, 4  # rosbags' kinds of fields
+_BASE, _NAME, _SEQUENCE = 1, 2, 4  # rosbags' kinds of fields
 _NS = 1_000_000_000
 _ZEROS = [bytes(count) for count in range(8)]
 _COUNT = struct.Struct("<I")
@@ -105,14 +105,14 @@ class CdrWriter:
 
 
 class Packer:
-    """Writer of one type of conveyor_msgs: a header, a tick, then numbers, texts, and sequences of one of them."""
+    """Writer of one type of conveyor_msgs: header, tick, then numbers, texts, and sequences of these or of messages."""
 
     def __init__(self, type_name: str) -> None:
         """Raise ValueError for a type with other fields."""
         fields = typestore().fielddefs[type_name][1]
         if [name for name, _ in fields[:2]] != ["header", "tick"]:
             raise ValueError(f"{type_name} does not begin with a header and a tick")
-        self._fields = [(name, _appender(type_name, name, *definition)) for name, definition in fields[2:]]
+        self._fields = _appenders(type_name, fields[2:])
 
     def pack(self, frame_id: str, stamp_ns: int, tick: int, value_of: Callable[[str], Any]) -> bytes:
         """Return a message. stamp_ns: simulated time, ns; value_of: returns the value of each other field by name."""
@@ -128,16 +128,39 @@ packer = lru_cache(maxsize=32)(Packer)
 """Returns the Packer of a type, which is made once."""
 
 
-def _appender(type_name: str, name: str, kind: int, details: Any) -> Callable[[CdrWriter, Any], None]:
+_Append = Callable[[CdrWriter, Any], None]
+
+
+def _appenders(type_name: str, fields: Any) -> list[tuple[str, _Append]]:
+    """Return a function per field that appends its value."""
+    return [(name, _appender(type_name, name, *definition)) for name, definition in fields]
+
+
+def _appender(type_name: str, name: str, kind: int, details: Any) -> _Append:
+    if kind == _SEQUENCE and details[0][0] == _NAME:
+        return _messages(details[0][1])
     base, sequence = (details[0], False) if kind == _BASE else (details[0][1][0], True)
     if kind not in (_BASE, _SEQUENCE) or (sequence and details[0][0] != _BASE) or base not in (*CODES, "string"):
-        raise ValueError(f"{type_name}.{name} is neither a number nor a text nor a sequence of them")
+        raise ValueError(f"{type_name}.{name} is neither a number nor a text nor a sequence")
     if base == "string":
         return CdrWriter.strings if sequence else CdrWriter.string
     if not sequence:
         return lambda writer, value: writer.pack(CODES[base], value)
     dtype = np.dtype(base)
     return lambda writer, values: writer.numbers(dtype, values)
+
+
+def _messages(type_name: str) -> _Append:
+    """Return a function that appends a sequence of objects with the fields of a type."""
+    fields = _appenders(type_name, typestore().fielddefs[type_name][1])
+
+    def append(writer: CdrWriter, values: Any) -> None:
+        writer.pack("I", len(values))
+        for value in values:
+            for name, append_field in fields:
+                append_field(writer, getattr(value, name))
+
+    return append
 
 
 def tick_of(data: bytes) -> int:

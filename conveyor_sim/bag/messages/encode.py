@@ -3,27 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from conveyor_sim.bag.messages.cdr import CdrWriter, packer, pose_rows
+from conveyor_sim.columns.alarms import AlarmColumns
 from conveyor_sim.columns.bottles import BottleColumns
-from conveyor_sim.columns.image import NOTHING_FORCED, Image
-from conveyor_sim.line.commands.inputs import CommandOutcome, Input, recorded_input
+from conveyor_sim.columns.image import Image
+from conveyor_sim.line.commands.inputs import CommandOutcome, Input
 from conveyor_sim.line.run_state import RunState
+from conveyor_sim.line.tag import Tag
 from conveyor_sim.scene.recorded import recorded_source
 
 if TYPE_CHECKING:
     from conveyor_sim.simulation import Simulation
 
+FORMAT = 3
+"""Version of the messages and of the meaning of the recorded scene text (Line.format). It is raised by one at each
+change that a reader must know; `older.py` reads the earlier ones.
+"""
+
 SIGNALS = "conveyor_msgs/msg/Signals"
 COMMANDS = "conveyor_msgs/msg/Commands"
 LINE = "conveyor_msgs/msg/Line"
 OUTCOME = "conveyor_msgs/msg/CommandOutcome"
+ALARM_STATES = "conveyor_msgs/msg/AlarmStates"
 RUN_STATE = "conveyor_msgs/msg/RunState"
 BOOL = "std_msgs/msg/Bool"
 SPEED = "std_msgs/msg/Float64"
@@ -51,9 +59,7 @@ def columns_message(type_name: str, columns: Any, header: Header) -> bytes:
 
 
 def to_image(message: Any) -> Image:
-    """Return the process image of a Signals message; in an older message nothing is forced."""
-    if not hasattr(message, "forced"):
-        return Image(message.values, *NOTHING_FORCED)
+    """Return the process image of a Signals message."""
     return Image(message.values, message.forced, message.actual)
 
 
@@ -70,12 +76,15 @@ class Outcome:
     writer_kind: str
     operation: str
     texts: tuple[str, ...]
+    bottles: tuple[int, ...]
 
     @staticmethod
-    def of(request: Input, accepted: bool, reason: str) -> Outcome:
-        """Return the outcome of an input."""
-        source, writer, kind, operation, names, values, texts = request
-        return Outcome(source, names, values, accepted, reason, writer, kind, operation, texts)
+    def of(result: CommandOutcome) -> Outcome:
+        """Return the recorded form of a command result."""
+        source, writer, kind, operation, names, values, texts = result.input
+        return Outcome(
+            source, names, values, result.accepted, result.reason, writer, kind, operation, texts, result.bottles
+        )
 
     @property
     def input(self) -> Input:
@@ -85,25 +94,51 @@ class Outcome:
 
 def outcome_message(outcome: CommandOutcome, header: Header) -> bytes:
     """Return a conveyor_msgs/CommandOutcome."""
-    values = {**outcome.input._asdict(), "accepted": outcome.accepted, "reason": outcome.reason}
+    values = {
+        **outcome.input._asdict(),
+        "accepted": outcome.accepted,
+        "reason": outcome.reason,
+        "bottles": outcome.bottles,
+    }
     return _pack(OUTCOME, header, values)
 
 
 def to_outcome(message: Any) -> Outcome:
-    """Return the outcome of a CommandOutcome message. In an older one, the writer follows from the source."""
-    names, values = tuple(message.names), tuple(float(value) for value in message.values)
-    if hasattr(message, "operation"):
-        request = Input(
-            message.source, message.writer, message.writer_kind, message.operation, names, values, tuple(message.texts)
-        )
-    else:
-        request = recorded_input(message.source, names, values)
-    return Outcome.of(request, bool(message.accepted), message.reason)
+    """Return the outcome of a CommandOutcome message."""
+    return Outcome(
+        source=message.source,
+        names=tuple(message.names),
+        values=tuple(float(value) for value in message.values),
+        accepted=bool(message.accepted),
+        reason=message.reason,
+        writer=message.writer,
+        writer_kind=message.writer_kind,
+        operation=message.operation,
+        texts=tuple(message.texts),
+        bottles=tuple(int(bottle) for bottle in message.bottles),
+    )
+
+
+class AlarmIds(NamedTuple):
+    """Fields of conveyor_msgs/AlarmIds."""
+
+    ids: Sequence[str]
+
+
+def alarms_message(columns: AlarmColumns, header: Header) -> bytes:
+    """Return a conveyor_msgs/AlarmStates."""
+    return _pack(ALARM_STATES, header, {**vars(columns), "suppressed_by": [*map(AlarmIds, columns.suppressed_by)]})
+
+
+def to_alarms(message: Any) -> AlarmColumns:
+    """Return the columns of an AlarmStates message."""
+    columns = {field.name: getattr(message, field.name) for field in fields(AlarmColumns)}
+    return AlarmColumns(**{**columns, "suppressed_by": [tuple(causes.ids) for causes in message.suppressed_by]})
 
 
 def commands_message(names: Sequence[str], values: NDArray[np.float64], header: Header) -> bytes:
-    """Return a conveyor_msgs/Commands, without declarations of alarms."""
-    return _pack(COMMANDS, header, {"names": names, "values": values, "alarm_ids": (), "alarms": ()})
+    """Return a conveyor_msgs/Commands with setpoints only."""
+    return _pack(COMMANDS, header, {"names": names, "values": values, "alarms": (), "spawned": (), "deleted": ()})
 
 
 def speed_message(speed: float) -> bytes:
@@ -133,11 +168,51 @@ def bool_message(value: bool, header: Header) -> bytes:
     return writer.finish()
 
 
+class TagFields(NamedTuple):
+    """Fields of conveyor_msgs/Tag."""
+
+    name: str
+    kind: str
+    role: str
+    unit: str
+    unit_code: str
+    min: float
+    max: float
+    initial: float
+    nominal: float
+    state_values: Sequence[int]
+    state_texts: Sequence[str]
+    description: str
+    device: str
+    device_class: str
+
+    @staticmethod
+    def of(tag: Tag) -> TagFields:
+        """Return the fields of a tag."""
+        return TagFields(
+            name=tag.name,
+            kind=tag.kind,
+            role=tag.role,
+            unit=tag.unit,
+            unit_code=tag.unece.code,
+            min=tag.low,
+            max=tag.high,
+            initial=tag.initial,
+            nominal=tag.nominal or 0.0,
+            state_values=tuple(tag.texts),
+            state_texts=tuple(tag.texts.values()),
+            description=tag.description,
+            device=tag.device,
+            device_class=tag.device_class,
+        )
+
+
 def line_message(sim: Simulation, run_id: str, header: Header) -> bytes:
     """Return a conveyor_msgs/Line: the meaning of indices, and all data needed to run the same line again."""
     scene, model, image = sim.scene, sim.model, sim.process_image
     text, overrides = recorded_source(scene)
     values = {
+        "format": FORMAT,
         "run_id": run_id,
         "scene_name": scene.name,
         "scene_text": text,
@@ -155,35 +230,13 @@ def line_message(sim: Simulation, run_id: str, header: Header) -> bytes:
         "type_radius": model.type_radius,
         "type_mass": model.type_mass,
         "signal_names": list(image.signal_names),
-        "signal_units": [signal.unit for signal in image.signals],
         "command_names": list(image.command_names),
-        "command_units": [command.unit for command in image.commands],
-        "command_min": [command.low for command in image.commands],
-        "command_max": [command.high for command in image.commands],
-        "signal_types": [signal.kind for signal in image.signals],
-        "command_types": [command.kind for command in image.commands],
         "fault_names": list(image.fault_names),
-        "fault_units": [fault.unit for fault in image.faults],
-        "fault_types": [fault.kind for fault in image.faults],
-        "fault_min": [fault.low for fault in image.faults],
-        "fault_max": [fault.high for fault in image.faults],
         "versions": list(model.versions),
         "engine_hash": model.engine_hash,
         "machine": model.machine,
         "where": scene.where,
         "start_time": scene.start_time,
-        "tag_names": [tag.name for tag in image.tags],
-        "tag_kinds": [tag.kind for tag in image.tags],
-        "tag_roles": [tag.role for tag in image.tags],
-        "tag_units": [tag.unit for tag in image.tags],
-        "tag_unit_codes": [tag.unece.code for tag in image.tags],
-        "tag_min": [tag.low for tag in image.tags],
-        "tag_max": [tag.high for tag in image.tags],
-        "tag_initial": [tag.initial for tag in image.tags],
-        "tag_nominal": [tag.nominal or 0.0 for tag in image.tags],
-        "tag_texts": [tag.listed_texts for tag in image.tags],
-        "tag_descriptions": [tag.description for tag in image.tags],
-        "tag_devices": [tag.device for tag in image.tags],
-        "tag_classes": [tag.device_class for tag in image.tags],
+        "tags": [TagFields.of(tag) for tag in image.tags],
     }
     return _pack(LINE, header, values)

@@ -1,4 +1,4 @@
-"""The tables of docs/ros.md that list topics, from their rows."""
+"""The tables of docs/ros/topics.md that list topics, from their rows."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def tables() -> dict[str, dict[str, str]]:
             ],
         ),
     }
-    return {"ros": tables}
+    return {"ros/topics": tables}
 
 
 def _table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:

@@ -69,7 +69,7 @@ class Topic:
     """Relative to the node's namespace, unless it begins with /. <...> stands for a name of the scene."""
     type: str
     what: str
-    """Description for docs/ros.md, like `when`."""
+    """Description for docs/ros/topics.md, like `when`."""
     when: str = ""
     """Times of its messages in words; "": at its rate."""
     qos: Qos = DATA
@@ -186,7 +186,7 @@ _ROWS = (
     Topic(
         "guard",
         "conveyor_msgs/msg/GuardEvent",
-        "report of the [guard](stability.md): bottle, place, reason, and remedy",
+        "report of the [guard](../stability.md): bottle, place, reason, and remedy",
         "when it happens",
         EVENTS,
         events=lambda events: events.guard,
@@ -313,18 +313,20 @@ _ROWS = (
     ),
     Topic(
         "alarm_states",
-        "conveyor_msgs/msg/AlarmStates",
-        "all [alarms](alarms.md), with their declarations and states by ISA-18.2",
+        encode.ALARM_STATES,
+        "all [alarms](../alarms.md), with their declarations and states by ISA-18.2",
         "latched, each tick with a change",
         LATCHED,
         state=lambda now: now.sim.line.alarms.changes(),
+        write=encode.alarms_message,
+        read=encode.to_alarms,
         columns=AlarmColumns,
         compare=Compare(lambda line, message, index: f"alarm {message.id[index]}"),
     ),
     Topic(
         "variables",
         "conveyor_msgs/msg/Variables",
-        "a PLC program's variables that are [recorded](structured_text.md#variables-in-recordings). In ROS, "
+        "a PLC program's variables that are [recorded](../structured_text.md#variables-in-recordings). In ROS, "
         "`controller_node` publishes the topic",
         "each scan of the program",
         columns=VariableColumns,
@@ -383,7 +385,8 @@ _ROWS = (
     Topic(
         "commands",
         encode.COMMANDS,
-        "setpoints by name (`line.command_names`), applied together or refused together; alarms",
+        "setpoints by name (`line.command_names`), applied together or refused together; alarms; spawned and deleted "
+        "bottles",
         qos=EVENTS,
         recorded=False,
         subscribed=True,

@@ -53,9 +53,19 @@ def definition(name: str, distro: str = DEFAULT) -> str:
     The text of a conveyor_msgs type is that of its file, so that comments (units!) reach every reader of a bag.
     """
     text, _ = typestore(distro).generate_msgdef(name, ros_version=2)
-    package, _, short_name = name.split("/")
-    if package != PACKAGE:
-        return text
-    _, *dependencies = text.split(SEPARATOR)
-    own = (msg_defs_dir() / "msg" / f"{short_name}.msg").read_text(encoding="utf-8")
-    return SEPARATOR.join([own, *dependencies])
+    own, *dependencies = text.split(SEPARATOR)
+    if name.startswith(f"{PACKAGE}/"):
+        own = _file_text(name)
+    return SEPARATOR.join([own, *map(_with_comments, dependencies)])
+
+
+def _with_comments(dependency: str) -> str:
+    """Return the definition of a part of a type, with the text of its file if it is a conveyor_msgs type."""
+    head, _, _ = dependency.partition("\n")
+    name = head.removeprefix("MSG: ")
+    return f"{head}\n{_file_text(name)}" if name.startswith(f"{PACKAGE}/") else dependency
+
+
+def _file_text(name: str) -> str:
+    """Return the text of the file that defines a conveyor_msgs type."""
+    return (msg_defs_dir() / "msg" / f"{name.rpartition('/')[2]}.msg").read_text(encoding="utf-8")

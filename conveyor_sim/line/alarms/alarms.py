@@ -1,6 +1,5 @@
 """`Alarms`: all alarms of a line, with their conditions, suppression and first-out."""
 
-import json
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from graphlib import CycleError
@@ -271,7 +270,7 @@ class Alarms:
             priority=np.array([alarm.fields.severity for alarm in alarms], dtype=np.uint16),
             tag=[alarm.fields.tag or "" for alarm in alarms],
             group=[alarm.fields.group for alarm in alarms],
-            suppressed_by=[json.dumps(alarm.fields.suppressed_by, ensure_ascii=False) for alarm in alarms],
+            suppressed_by=[alarm.fields.suppressed_by for alarm in alarms],
             latching=np.array([alarm.fields.latching for alarm in alarms], dtype=np.bool_),
             declared_by=[alarm.declared_by for alarm in alarms],
             state=np.array([alarm.state for alarm in alarms], dtype=np.uint8),

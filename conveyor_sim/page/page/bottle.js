@@ -28,7 +28,7 @@ export class Bottle {
     const fed = story.fed.get(view.bottle), most = Math.max(0, ...points.map(({ force }) => force));
     const rows = [["id", `${view.bottle}`], ["type", frame ? recording.head.types[frame.type].name : "–"],
       ["on the line since", fed === undefined ? "before the start" : seconds(fed)],
-      ["place", frame ? `${frame.x.toFixed(3)}, ${frame.y.toFixed(3)} m` : "not on the line now"],
+      ["place", frame ? `${frame.x.toFixed(3)}, ${frame.y.toFixed(3)} m` : this._away(story.left.get(view.bottle), fed)],
       ["speed", frame ? `${frame.speed.toFixed(2)} m/s` : "–"], ["force", frame ? `${frame.force.toPrecision(3)} N` : "–"],
       [`peak of ${SHOWN} s`, `${most.toPrecision(3)} N`], ["rejected", story.rejected.has(view.bottle) ? "yes" : "no"]];
     this.facts.replaceChildren(...rows.flatMap(([term, value]) => [element("dt", {}, term), element("dd", {}, value)]));
@@ -37,6 +37,17 @@ export class Bottle {
       this._chart(this.speed, points.map(({ time, speed }) => [time, speed]), "speed", "m/s");
       this._chart(this.force, points.map(({ time, force }) => [time, force]), "force", "N");
     }
+  }
+
+  // Returns where a bottle went that is not on the plan, as a link to the event.
+  _away(left, fed) {
+    const { view } = this, { time } = view.clock;
+    if (fed > time + 1e-6) return `comes at ${seconds(fed)}`;
+    if (!left || left.time > time + 1e-6) return "not on a belt: held by a machine";
+    const how = { bottle_removed: "left", bottle_rejected: "rejected", bottle_deleted: "deleted" }[left.kind];
+    const text = `${how} by ${left.name} at ${seconds(left.time)}`;
+    if (this.away?.textContent !== text) this.away = element("button", { class: "link", title: "Show this time and place", onclick: () => view.jump(left.time, left.name, left.bottle) }, text);
+    return this.away;
   }
 
   _chart(canvas, points, name, unit) {

@@ -81,6 +81,12 @@ export class Camera extends EventTarget {
     this._changed();
   }
 
+  // Shows a point at a scale.
+  look(x, y, scale) {
+    [this.x, this.y, this.scale] = [x, y, Math.min(MOST, Math.max(1, scale))];
+    this._changed();
+  }
+
   // Centres a point unless it is visible.
   show(x, y, margin = 40) {
     const [px, py] = [this.toX(x), this.toY(y)];

@@ -2,7 +2,7 @@
 
 import { fillAlarms } from "./alarms.js";
 import { controlsOf } from "./controls.js";
-import { element, seconds, shown, titled } from "./dom.js";
+import { element, seconds, shown, titled, warn } from "./dom.js";
 import { restrict } from "./rights.js";
 
 const ORDER = ["status", "actual", "counter", "alarm", "command", "setpoint", "fault"];
@@ -65,9 +65,14 @@ export class Faceplate {
     this.rows.push({ tag, cells, note, choice });
     const name = tag.name.slice(device.length + 1) || tag.name;
     const head = signal === undefined ? name : element("button", { class: "link", title: "Put on the trends", onclick: () => this.view.trends.add(tag.name) }, name);
-    const watch = signal === undefined || !this.view.watch ? "" : element("button", { class: "quiet", title: "Put on the watch table", "aria-label": `Watch ${tag.name}`, onclick: () => this.view.watch.add(tag.name) }, "◎");
+    const watch = signal === undefined || !this.view.watch ? "" : element("button", { class: "quiet", title: "Put on the watch table", "aria-label": `Watch ${tag.name}`, onclick: () => this._watch(tag.name) }, "◎");
     const row = element("tr", { title: tag.description ?? "" }, element("th", { scope: "row" }, head, watch, note), ...cells.map(({ value }) => value));
     return hands ? [row, element("tr", { class: "hands" }, element("td", { colspan: "2" }, hands))] : [row];
+  }
+
+  _watch(name) {
+    const refused = this.view.watch.add(name);
+    if (refused) warn(refused);
   }
 
   draw() {

@@ -5,6 +5,7 @@ import { COLOURINGS, colourings, isDark } from "./colours.js";
 import { byId, element, say, seconds, warn } from "./dom.js";
 import { HEATS, LAST } from "./heat.js";
 import { listenToKeys } from "./keys.js";
+import { Layouts } from "./layouts.js";
 import { Line } from "./live.js";
 import { LiveRecording } from "./live_recording.js";
 import { Recording } from "./recording.js";
@@ -24,7 +25,9 @@ function wire(view) {
   byId("colour").addEventListener("change", (event) => view.setColouring(event.target.value));
   byId("speed").append(...SPEEDS.map((speed) => element("option", { value: speed }, `${speed}×`)));
   byId("speed").addEventListener("change", (event) => clock.setSpeed(+event.target.value));
+  const layouts = new Layouts(view);
   const clicks = {
+    arrange: () => layouts.open(),
     play: () => clock.toggle(), back: () => clock.step(-1), ahead: () => clock.step(1), fit: () => view.wholePlant(),
     approach: () => view.zoomToSelection(), dismiss: () => say(""), closer: () => camera.zoom(1.5), farther: () => camera.zoom(1 / 1.5),
     to_start: () => { clock.seek(clock.recording.start); view.snap(); },

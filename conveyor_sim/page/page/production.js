@@ -1,20 +1,29 @@
 // Figures of a line from its story: bottles that left it, throughput, OEE, and alarms.
 
+import { lastUpTo } from "./block.js";
+
 const EXITS = new Set(["sink", "outfeed"]); // classes of the devices by which bottles leave the line
 
-// Returns the devices by which bottles leave a line.
-const exitsOf = ({ recording: { head } }) => new Set(head.tags.filter((tag) => EXITS.has(tag.class)).map((tag) => tag.device));
+const TIMES = new WeakMap(); // by list of events, the times at which bottles left the line, and at which alarms came
 
-// Returns the number of events in a span that a condition selects.
-function counted({ story }, from, to, is) {
-  return story.events.reduce((sum, event) => sum + (event.time > from + 1e-6 && event.time <= to + 1e-6 && is(event)), 0);
+function timesOf({ story: { events }, recording: { head } }) {
+  if (!TIMES.has(events)) {
+    const exits = new Set(head.tags.filter((tag) => EXITS.has(tag.class)).map((tag) => tag.device)), times = { left: [], alarms: [], exits };
+    for (const { kind, name, time } of events) {
+      if (kind === "bottle_removed" && exits.has(name)) times.left.push(time);
+      if (kind === "alarm_raised") times.alarms.push(time);
+    }
+    TIMES.set(events, times);
+  }
+  return TIMES.get(events);
 }
+
+const counted = (times, from, to) => lastUpTo(times, to + 1e-6) - lastUpTo(times, from + 1e-6);
 
 // Returns the bottles per hour that left a line in a span; null: it has no exit, or the span has no length.
 export function throughput(view, from, to) {
-  const exits = exitsOf(view);
-  if (!exits.size || to - from < 1e-6) return null;
-  return (3600 * counted(view, from, to, ({ kind, name }) => kind === "bottle_removed" && exits.has(name))) / (to - from);
+  const { left, exits } = timesOf(view);
+  return exits.size && to - from > 1e-6 ? (3600 * counted(left, from, to)) / (to - from) : null;
 }
 
 // Returns the OEE of the line up to a time, since the last reset of its counters; null: it is unknown.
@@ -24,7 +33,7 @@ export function lineOee({ story, recording: { head } }, time) {
 }
 
 // Returns the number of alarms raised in a span.
-export const alarmsRaised = (view, from, to) => counted(view, from, to, ({ kind }) => kind === "alarm_raised");
+export const alarmsRaised = (view, from, to) => counted(timesOf(view).alarms, from, to);
 
 export const NONE = "–";
 export const perHour = (value) => (value === null ? NONE : `${Math.round(value)} /h`);

@@ -16,6 +16,12 @@ export class Series {
     return signalIndex.has(name) || head.commands.includes(name) || this._alarm(name) !== null || (head.trends ?? []).includes(name);
   }
 
+  // Returns the names of all signals, commands, and alarms that were raised.
+  names() {
+    const { recording: { head }, story } = this.view;
+    return [...head.signals, ...head.commands, ...Array.from(story.alarms.values(), ({ id }) => `${ALARMS}${id}`)];
+  }
+
   // Returns the tag of a name; undefined: it has none.
   tag(name) {
     return this.view.recording.tags.get(name) ?? (name.startsWith(ALARMS) ? { name, kind: "bool" } : undefined);

@@ -35,6 +35,7 @@ export function stateName(number, category) {
 export const stateColour = (number, category) => CATEGORIES[number === EXECUTE ? "running" : category] ?? CATEGORIES.idle;
 
 const HOLDS = /^(machine_state|signal_|fault_)/;
+const COMES = new Set(["bottle_fed", "bottle_spawned"]), GOES = new Set(["bottle_removed", "bottle_rejected", "bottle_deleted"]);
 const INTERVENES = /^(signal_|fault_)/;
 const OF_ONE = new Set(["alarm_changes", "readback"]); // lists whose second entry states the subject
 const timeOf = (row) => row.at ?? row[0];
@@ -86,11 +87,13 @@ export class Story {
     this.interventions = this.events.filter(({ kind }) => INTERVENES.test(kind));
     this.fed = new Map();
     this.rejected = new Set();
+    this.left = new Map(); // by bottle, the event by which it left
     this.machines = new Map(); // by machine, times of state changes
     this.reasons = new Map(); // reasons of stops by machine and time
     const now = new Map();
     for (const event of this.events) {
-      if (event.kind === "bottle_fed" || event.kind === "bottle_spawned") this.fed.set(event.bottle, event.time);
+      if (COMES.has(event.kind)) this.fed.set(event.bottle, event.time);
+      if (GOES.has(event.kind)) this.left.set(event.bottle, event);
       if (event.kind === "bottle_rejected") this.rejected.add(event.bottle);
       if (event.kind === "machine_state") this._state(event, now);
     }

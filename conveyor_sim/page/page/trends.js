@@ -2,6 +2,7 @@
 
 import { COLOURED, palette } from "./colours.js";
 import { byId, element, seconds, short, shown } from "./dom.js";
+import { SignalInput } from "./signal_input.js";
 
 const MOST = 8; // signals
 const MARKS = { alarm: "#d55e00", fault: "#cc79a7", refused: "#e69f00", failed: "#d1330d", difference: "#8250df" };
@@ -17,13 +18,15 @@ export class Trends {
     this.names = [];
     this.window = this._firstWindow();
     this.plot = null;
-    const { recording } = view;
-    this.input = element("input", { list: "signals", placeholder: "Add a signal …", "aria-label": "Add a signal to the trends", onchange: () => this._typed() });
+    this.field = new SignalInput("Add a signal to the trends", () => this.view.series.names(), (name) => {
+      this.add(name);
+      return "";
+    });
     this.chips = element("div", { class: "chips" });
     this.choice = element("select", { "aria-label": "Seconds shown", onchange: () => { this.window = +this.choice.value; view.touch(); } },
       ...WINDOWS.map((window) => element("option", { value: window, selected: window === this.window }, `${window} s`)));
-    byId("trendbar").append(this.chips, this.input,
-      element("datalist", { id: "signals" }, ...[...recording.head.signals, ...recording.head.commands].map((name) => element("option", { value: name }))), this.choice);
+    byId("trendbar").append(this.chips, this.field.input,
+      element("datalist", { id: "signals" }, ...view.series.names().map((name) => element("option", { value: name }))), this.choice, this.field.refusal);
     if (view.rival) byId("trendbar").append(element("small", {}, "dashed: B"));
     this.box = byId("trends");
     for (const name of this._first()) this.add(name);
@@ -45,23 +48,23 @@ export class Trends {
     return WINDOWS.find((window) => window >= 30 && (!action || time - action.time < 0.7 * window)) ?? WINDOWS[WINDOWS.length - 1];
   }
 
-  _typed() {
-    if (this.view.recording.signalIndex.has(this.input.value)) {
-      this.add(this.input.value);
-      this.input.value = "";
-    }
-  }
-
   add(name) {
     if (this.names.includes(name) || !this.view.series.has(name)) return;
     this.names = [...this.names, name].slice(-MOST);
     this._chipped();
   }
 
+  // Shows these signals alone. window: s.
+  show(names, window) {
+    this.names = names.slice(-MOST);
+    if (WINDOWS.includes(window)) this.choice.value = this.window = window;
+    this._chipped();
+  }
+
   remove(name) {
     this.names = this.names.filter((other) => other !== name);
     this._chipped();
-    this.input.focus(); // the focused element was removed
+    this.field.input.focus(); // the focused element was removed
   }
 
   _chipped() {

@@ -16,6 +16,7 @@ import { Events } from "./events.js";
 import { Failure } from "./failure.js";
 import { Faceplate } from "./faceplate.js";
 import { HEATS, Heat, heatColours } from "./heat.js";
+import { Kpi } from "./kpi.js";
 import { Link } from "./link.js";
 import { LiveClock } from "./live_clock.js";
 import { Minimap } from "./minimap.js";
@@ -62,6 +63,7 @@ export class View {
       this.plans.push(this.beside.plan);
     }
     this.banner = new Banner(this);
+    this.kpi = new Kpi(this);
     this.scrubber = new Scrubber(this);
     this.trends = new Trends(this);
     this.faceplate = new Faceplate(this);
@@ -376,6 +378,7 @@ export class View {
     this.panelsDrawn = now;
     expire();
     this.banner.draw();
+    this.kpi.draw();
     for (const alarms of this.alarms) alarms.draw();
     this.tabs.draw();
     this.trends.draw();

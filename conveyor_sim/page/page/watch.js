@@ -3,6 +3,7 @@
 import { field } from "./controls.js";
 import { element, shown } from "./dom.js";
 import { guarded, restrict } from "./rights.js";
+import { SignalInput } from "./signal_input.js";
 
 const MOST = 30;
 
@@ -10,21 +11,18 @@ export class Watch {
   constructor(view) {
     this.view = view;
     this.rows = new Map();
-    this.input = element("input", { list: "signals", placeholder: "Add a signal …", "aria-label": "Add a signal to the watch table", onchange: () => this._typed() });
+    this.field = new SignalInput("Add a signal to the watch table", () => view.recording.head.signals, (name) => this.add(name));
     this.list = element("ul", { class: "rows watched", "aria-label": "Watched signals" });
     this.none = element("p", { class: "muted" }, "Watched signals are listed here with their present values. ◎ in a faceplate adds one.");
     this.note = element("p", { class: "reason", hidden: true });
-    this.root = element("section", {}, element("h2", {}, "Watch table"), this.input, this.none, this.note, this.list);
+    this.root = element("section", {}, element("h2", {}, "Watch table"), ...this.field.parts, this.none, this.note, this.list);
   }
 
-  _typed() {
-    if (this.add(this.input.value)) this.input.value = "";
-  }
-
+  // Adds a signal. Returns why it is refused, or "".
   add(name) {
     const { view } = this, tag = view.recording.tags.get(name);
-    if (!view.recording.signalIndex.has(name) || this.rows.size >= MOST) return false;
-    if (this.rows.has(name)) return true;
+    if (this.rows.has(name)) return "";
+    if (this.rows.size >= MOST) return `The table holds ${MOST} signals: remove one first.`;
     const value = element("span", { class: "value" }), said = element("small", {});
     const remove = element("button", { class: "quiet", "aria-label": `Remove ${name}`, title: "Remove", onclick: () => { this.rows.delete(name); row.remove(); this.draw(); } }, "✕");
     const hands = view.desk?.commands ? element("div", { class: "choices" }, field(tag, "Force", (given) => view.desk.ask("force", [name], [given]), () => view.desk.rights.refusal("force"), view.signal(name)),
@@ -33,7 +31,7 @@ export class Watch {
     this.rows.set(name, { tag, value, said });
     this.list.append(row);
     this.draw();
-    return true;
+    return "";
   }
 
   draw() {

@@ -37,7 +37,7 @@ def contacts_in_use(plant: Plant, on: Collection[str]) -> Iterator[tuple[int, Co
 def _pairs(plant: Plant, on: Collection[str]) -> Cause | None:
     for path, entry in plant.scene.entries():
         if entry.most is None:
-            return Cause(path, "without end")
+            return Cause(path, "endless")
     most = plant.most_bottles or 0
     return Cause(("bottles" if plant.scene.bottles else "infeeds",), f"{most} bottles in all") if most > 1 else None
 

@@ -53,8 +53,8 @@ class BagTagProvider(LineMirror, AbstractContextManager["BagTagProvider"]):
         try:
             if not self._bag.counts.get("signals"):
                 raise BagError(f"{path}: holds no message of topic signals, expected some: tags are read from them")
-            playback = Playback(self._bag, (*STATE_TOPICS, *DRAWING_TOPICS))
-            self._player = Player(playback, speed, start=None, paused=paused, publish=self._keep, beat=_nothing)
+            self._playback = Playback(self._bag, (*STATE_TOPICS, *DRAWING_TOPICS))
+            self._player = Player(self._playback, speed, start=None, paused=paused, publish=self._keep, beat=_nothing)
             self._player.seek(self._player.span[0])
             self._bring()
         except BaseException:
@@ -164,8 +164,8 @@ class BagTagProvider(LineMirror, AbstractContextManager["BagTagProvider"]):
         states, self._states = self._states, {}
         events, self._new_events = self._new_events, []
         states.pop("run_state", None)  # the playback has its own state
-        self.receive(states, self._bag.decode)
-        self.receive_events(events, self._bag.decode)
+        self.receive(states, self._playback.decode)
+        self.receive_events(events, self._playback.decode)
         self.state_run(run)
         self.show()
 

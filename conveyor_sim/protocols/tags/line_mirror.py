@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import threading
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -374,31 +373,25 @@ def line_info(message: Any) -> LineInfo:
 
     Raises LineMirrorError for a recording from before there were tags.
     """
-    if not len(getattr(message, "tag_names", ())):
+    if message.format == 1:
         raise LineMirrorError(
             f"{message.scene_name}: recorded without tags, by an older version; expected a newer recording"
         )
-    columns: dict[str, Iterable[Any]] = {
-        "name": message.tag_names,
-        "kind": message.tag_kinds,
-        "role": message.tag_roles,
-        "description": message.tag_descriptions,
-        "unit": message.tag_units,
-        "low": message.tag_min.tolist(),
-        "high": message.tag_max.tolist(),
-        "initial": message.tag_initial.tolist(),
-        "nominal": (nominal or None for nominal in message.tag_nominal.tolist()),
-        "texts": map(_texts, message.tag_texts),
-        "device": message.tag_devices,
-        "device_class": message.tag_classes,
-    }
-    tags = tuple(Tag(**dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True))
+    tags = tuple(
+        Tag(
+            name=tag.name,
+            kind=tag.kind,
+            role=tag.role,
+            description=tag.description,
+            unit=tag.unit,
+            low=tag.min,
+            high=tag.max,
+            initial=tag.initial,
+            nominal=tag.nominal or None,
+            texts=dict(zip(tag.state_values.tolist(), tag.state_texts, strict=True)),
+            device=tag.device,
+            device_class=tag.device_class,
+        )
+        for tag in message.tags
+    )
     return LineInfo(message.scene_name, message.where, message.tick_ns * 1e-9, message.start_time, tags)
-
-
-def _texts(listed: str) -> dict[int, str]:
-    return {int(number): text for number, text in _TEXT.findall(listed)}
-
-
-_TEXT = re.compile(r"(-?\d+) (.*?)(?=, -?\d+ |$)")
-"""An entry of `Tag.listed_texts`."""

@@ -13,9 +13,10 @@ from conveyor_sim.support.printable import printable_lines
 def account(scene: Scene, model: Model) -> Table:
     """Return a table with contents, effects and time step, each with its reason, and expected errors."""
     table = Table.grid(padding=(0, 2))
-    fed = ["without end" if entry.most is None else str(entry.most) for _, entry in scene.entries()]
+    fed = [f"{path[-1]} {'endless' if entry.most is None else entry.most}" for path, entry in scene.entries()]
     table.add_row("scene", ": ".join(filter(None, (model.name, printable_lines(scene.description)))))
-    table.add_row("bottles", f"{len(model.plant.bottles)} at the start; fed: {', '.join(fed) or 'none'}")
+    supply = f"; fed by {', '.join(fed)}" if fed else ""
+    table.add_row("bottles", f"{len(model.plant.bottles)} at the start{supply}")
     table.add_row("belts", ", ".join(model.belts) or "none")
     if scene.plates:
         table.add_row("plates", ", ".join(scene.plates))

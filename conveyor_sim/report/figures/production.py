@@ -159,7 +159,7 @@ def stop_reasons_figure(reasons: Sequence[StopReason], name: str) -> Figure:
     share.plot(100.0 * np.cumsum(lengths) / (total or 1.0), rows, "o-", color=style.INK, markersize=4.0, gid="sum")
     share.tick_params(axis="y", length=0.0, labelleft=False)
     share.set_xlim(0.0, 104.0)
-    share.set_xlabel("of it, down to here (%)")
+    share.set_xlabel("cumulative share (%)")
     share.grid(True, axis="x")
     drawn = [category for category in CATEGORIES if any(entry.category == category for entry in shown)]
     if drawn:

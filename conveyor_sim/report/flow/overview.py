@@ -13,37 +13,32 @@ from conveyor_sim.report.flow.finding import Finding
 from conveyor_sim.report.flow.flow import LineFlow
 from conveyor_sim.report.flow.routes import TransitRoute
 from conveyor_sim.report.flow.stretches import feed_rate
+from conveyor_sim.report.labelled import MOST_LINES, labelled
 from conveyor_sim.run.speed import expected_factor
 from conveyor_sim.scene import Scene
 from conveyor_sim.scene.places import Places
 from conveyor_sim.scene.problems import dotted
-from conveyor_sim.support.printable import SENTENCE, printable
-
-MOST_LINES = 12
-"""Lines of the overview, with one about the picture that the caller adds."""
+from conveyor_sim.support.printable import printable
 
 MOST_ROUTES = 2
 """Largest number of lines about the flow."""
 
-_LABEL = 11
-"""Characters of the first column."""
-
 
 def overview(scene: Scene, model: Model, limit: StepLimit, flow: LineFlow) -> list[str]:
-    """Return the overview, without the line about the picture."""
+    """Return the overview, without the line about the picture, which the caller adds."""
     lines = [
         f"{printable(scene.name)}: valid. {_contents(scene, model)}; "
         f"{scene.duration:g} s in ticks of {1e3 * scene.tick:g} ms",
         *_flow_lines(scene, flow),
-        _row("accuracy", _accuracy(model)),
-        _row("step", _step(limit)),
-        _row("speed", expected_factor(limit)),
+        labelled("accuracy", _accuracy(model)),
+        labelled("step", _step(limit)),
+        labelled("speed", expected_factor(limit)),
     ]
     findings = [*flow.findings, *_points(model)]
     room = MOST_LINES - 1 - len(lines)
     if len(findings) > room:
         more = len(findings) - room + 1
-        return [*lines, *_finding_lines(scene, findings[: room - 1]), _row("", f"{more} more findings: --details")]
+        return [*lines, *_finding_lines(scene, findings[: room - 1]), labelled("", f"{more} more findings: --details")]
     return [*lines, *_finding_lines(scene, findings)]
 
 
@@ -55,11 +50,7 @@ def finding_lines(scene: Scene, model: Model, flow: LineFlow) -> list[str]:
 def _finding_lines(scene: Scene, findings: Sequence[Finding]) -> Iterator[str]:
     places = Places(scene)
     for finding in findings:
-        yield _row(finding.level, finding.line(places))
-
-
-def _row(label: str, text: str) -> str:
-    return f"{label:<{_LABEL}}{printable(text, SENTENCE)}"
+        yield labelled(finding.level, finding.line(places))
 
 
 def _contents(scene: Scene, model: Model) -> str:
@@ -99,16 +90,16 @@ def _count(number: int, what: str) -> str:
 
 def _flow_lines(scene: Scene, flow: LineFlow) -> list[str]:
     if not flow.routes:
-        return [_row("flow", "nothing to trace: no belts or no bottles")]
+        return [labelled("flow", "nothing to trace: no belts or no bottles")]
     groups: dict[tuple[object, ...], list[TransitRoute]] = {}
     for route in flow.routes:
         groups.setdefault((route.stops[1:], route.last.end), []).append(route)
     texts = [_group(scene, flow, routes) for routes in groups.values()]
     if len(texts) > MOST_ROUTES:
         texts[MOST_ROUTES - 1 :] = [f"{len(texts) - MOST_ROUTES + 1} more routes: --details"]
-    lines = [_row("" if index else "flow", text) for index, text in enumerate(texts)]
+    lines = [labelled("" if index else "flow", text) for index, text in enumerate(texts)]
     capacity = _capacity(scene, flow)
-    return [*lines, _row("capacity", capacity)] if capacity else lines
+    return [*lines, labelled("capacity", capacity)] if capacity else lines
 
 
 def _group(scene: Scene, flow: LineFlow, routes: Sequence[TransitRoute]) -> str:

@@ -30,7 +30,7 @@ class AlongPoint(_At):
 
 
 class _Across(_At):
-    offset: Number = quantity("How far it is shifted sideways, positive to the left.", "m", default=0.0)
+    offset: Number = quantity("Sideways shift, positive to the left.", "m", default=0.0)
     width: Positive | None = quantity(
         "Its width, half of it on either side of `offset`. Left out: the clear width between the guides, or the width "
         "of the conveyor on a side without guide.",
@@ -63,7 +63,7 @@ class _Stretch(Along):
 class AlongRegion(_Stretch):
     """A region along a conveyor. In bends, a polygon approximates the arcs."""
 
-    offset: Number = quantity("How far it is shifted sideways, positive to the left.", "m", default=0.0)
+    offset: Number = quantity("Sideways shift, positive to the left.", "m", default=0.0)
     width: Positive | None = quantity(
         "Its width, half of it on either side of `offset`. Left out: the width of the conveyor.", "m", default=None
     )
@@ -97,7 +97,7 @@ class AlongSlide(_Across):
     """A sliding gate across a conveyor. It opens to its side."""
 
     side: Side = quantity("Side to which it slides.")
-    stroke: Positive | None = quantity("How far it slides. Left out: its length.", "m", default=None)
+    stroke: Positive | None = quantity("Stroke length. Left out: its length.", "m", default=None)
 
 
 class AlongSwing(_Across):

@@ -70,21 +70,24 @@ class ConveyorLane(Part):
     """A lane of a conveyor: a surface with a width and a speed."""
 
     width: Positive = quantity("Width.", "m")
-    ratio: Positive = quantity("Speed of the lane over that of the conveyor.", "1", default=1.0)
+    ratio: Positive = quantity("Speed of the lane divided by the speed of the conveyor.", "1", default=1.0)
 
 
 class _Driven(Part):
     speed: Number | None = quantity("Speed at the start, positive along travel. Left out: 0.", "m/s", default=None)
     speed_limits: Limits | None = quantity(
-        "Least and greatest speed that a command may ask for. Left out: as for `belts`.", "m/s", default=None
+        "Smallest and largest speed that a command may set. Left out: as for `belts`.", "m/s", default=None
     )
     watchdog: Positive | None = quantity(
         "Without a speed command for this long, the conveyor stops. Left out: it keeps its speed.", "s", default=None
     )
     drive: DriveOrName | None = quantity(
-        "What moves it: its own drive, or the name of one from `drives`, which then has the speed.", default=None
+        "Drive: a mapping for a separate drive, or the name of a drive in `drives`, which then has the speed.",
+        default=None,
     )
-    ratio: Positive | None = quantity("Speed over that of the drive that it names. Left out: 1.", "1", default=None)
+    ratio: Positive | None = quantity(
+        "Speed divided by the speed of the drive that it names. Left out: 1.", "1", default=None
+    )
 
 
 class ConveyorSection(_Driven):
@@ -187,8 +190,7 @@ class Conveyor(_Driven):
     )
     after: Name | None = quantity("Conveyor at whose end it begins, with the same direction.", default=None)
     back: NotNegative | None = quantity(
-        "How far before the end of the conveyor in `after` it begins; it carries where both overlap "
-        "if it is listed later.",
+        "Overlap with the end of the conveyor in `after`. The one that is listed later carries there.",
         "m",
         default=None,
     )
@@ -203,7 +205,7 @@ class Conveyor(_Driven):
         default=None,
     )
     offset: Number | None = quantity(
-        "How far its middle is shifted from that of the conveyor in `after`, positive to the left. Left out: 0.",
+        "Sideways shift of the middle from that of the conveyor in `after`, positive to the left. Left out: 0.",
         "m",
         default=None,
     )
@@ -225,7 +227,7 @@ class SceneLayout(Part):
     """Conveyors and guides of a scene, by name."""
 
     conveyors: Annotated[dict[Name, Conveyor], Holds("a mapping of names to conveyors")] = quantity(
-        "Conveyors, which become belts. Where they overlap, the last listed carries.", default={}
+        "Conveyors, which become belts. Where they overlap, the last one in the list carries.", default={}
     )
     guides: Annotated[dict[Name, Guide], Holds("a mapping of names to guides")] = quantity(
         "Guides along conveyors, which become rails.", default={}

@@ -57,28 +57,35 @@ _Group = Annotated[
 class AlarmFields(Part):
     """Fields of all declarations of an alarm."""
 
-    text: _Short = quantity("What it says, cut after 200 characters. Left out: its id.", default="")
-    alarm_class: AlarmClass = quantity("How bad it is.", default="warning")
+    text: _Short = quantity("Text of the alarm, cut after 200 characters. Left out: its ID.", default="")
+    alarm_class: AlarmClass = quantity("Class: error, warning or message.", default="warning")
     priority: _Priority | None = quantity(
         "From 1, lowest, to 1000: OPC UA's severity. Left out: 800 of an error, 500 of a warning, 200 of a message.",
         "1",
         default=None,
     )
     tag: Text | None = quantity("Signal that it is about.", default=None)
-    high: Number | None = quantity("It comes when the signal is above this.", "that of the signal", default=None)
-    low: Number | None = quantity("It comes when the signal is below this.", "that of the signal", default=None)
+    high: Number | None = quantity(
+        "The alarm comes when the signal exceeds this value.", "that of the signal", default=None
+    )
+    low: Number | None = quantity(
+        "The alarm comes when the signal falls below this value.", "that of the signal", default=None
+    )
     deadband: NotNegative = quantity(
-        "It goes when the signal is back by so much: not above `high` less this, nor below `low` plus this.",
+        "Hysteresis: the alarm goes when the signal is at most `high` minus this value, and at least `low` plus "
+        "this value.",
         "that of the signal",
         default=0.0,
     )
     on_delay: _Delay = quantity("The alarm comes when its condition has held for this time.", "s", default=0.0)
     off_delay: _Delay = quantity("The alarm goes when its condition has been gone for this time.", "s", default=0.0)
-    latching: Flag = quantity("Whether it stands until it is acknowledged and reset.", default=False)
+    latching: Flag = quantity("True: the alarm stands until it is acknowledged and reset.", default=False)
     suppressed_by: Annotated[
         tuple[AlarmId, ...], Len(0, MOST_CAUSES), Holds(f"a list of at most {MOST_CAUSES} ids of alarms")
-    ] = quantity("Ids of alarms that it follows from: while one of them stands, it is suppressed.", default=())
-    group: _Group = quantity("Group within which the first to come is marked (first-out). Left out: none.", default="")
+    ] = quantity("IDs of alarms that cause this one. While one of them stands, this alarm is suppressed.", default=())
+    group: _Group = quantity(
+        "Group in which the first alarm to come is marked (first-out). Left out: none.", default=""
+    )
 
     @property
     def measured(self) -> bool:
@@ -106,7 +113,7 @@ class AlarmFields(Part):
 class MeasuredAlarm(AlarmFields):
     """An alarm of the scene on a measured value."""
 
-    tag: Text = quantity("Signal that it watches.")
+    tag: Text = quantity("Monitored signal.")
 
     def wrong(self) -> Iterator[tuple[str, str]]:
         """Yield fields that do not fit together, and a problem for an alarm without limits."""

@@ -17,7 +17,7 @@ class BadBottles(DevicePart):
     bad_share: Share = quantity("Share of bad bottles, drawn at random from the seed.", "1", default=0.0)
     bad_every: Count | None = quantity("Every n-th bottle is bad.", "1", default=None)
     bad_at: Annotated[tuple[Count, ...], Len(0), Holds("a list of whole numbers, 1 or greater")] = quantity(
-        "The bottles that are bad, counted from 1 as they come: `[17, 60]`.", "1", default=()
+        "Numbers of the bad bottles, counted from 1 in the order of entry: `[17, 60]`.", "1", default=()
     )
 
     def bad_problems(self, path: Path) -> Iterator[Problem]:

@@ -16,16 +16,17 @@ class Indicator(DevicePart):
 
     counter: Name = quantity("Counter over which bottles leave, forward.")
     belt: Name = quantity("Belt that brings them there.")
-    zone: Name = quantity("Zone before the exit: what is in it waits to leave.")
+    zone: Name = quantity("Zone before the exit, in which bottles wait.")
     jam_time: Positive = quantity(
-        "`jam`: nothing has passed for this time although the belt ran, bottles waited and it was not blocked.", "s"
+        "`jam`: no bottle passed for this time, although the belt ran, bottles waited and the exit was not blocked.",
+        "s",
     )
     starved_time: Positive | None = quantity(
         "`starved`: the belt has run for this time and no bottle waited. Left out: the jam_time.", "s", default=None
     )
     window: Positive = quantity("Averaging time of `flow`.", "s", default=60.0)
     downstream: Name | None = quantity(
-        "Belt that takes the bottles on. `blocked`: it stands, while bottles wait and `belt` runs or should run.",
+        "Belt after the exit. `blocked`: this belt stands, while bottles wait and `belt` runs or should run.",
         default=None,
     )
     backup: Name | None = quantity(

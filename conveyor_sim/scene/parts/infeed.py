@@ -18,24 +18,24 @@ class Infeed(SwitchedTypes, Scattered, BadBottles, Entry):
     KIND: ClassVar[str] = "infeed"
 
     bottle: Name = quantity("Bottle type.")
-    position: Point = quantity("Where a bottle's axis appears.", "m")
+    position: Point = quantity("Position of the axis of a new bottle.", "m")
     direction: Angle = quantity("Direction of its velocity.", "rad")
     speed: NotNegative = quantity(
-        "Its speed at first, along `direction`. Left out along a conveyor: that of the belt.", "m/s"
+        "Initial speed along `direction`. Left out along a conveyor: the speed of the belt.", "m/s"
     )
-    count: Count | None = quantity("How many bottles enter. Left out: without end.", "1", default=None)
+    count: Count | None = quantity("Number of bottles that enter. Left out: there is no limit.", "1", default=None)
     gap: NotNegative | None = quantity(
-        "Clear distance to the bottle before it, in a tightly packed queue. Or give `rate`.", "m", default=None
+        "Clear distance between bottles that come from a packed queue; alternatively `rate`.", "m", default=None
     )
-    rate: Positive | None = quantity("Bottles a second. Or give `gap`.", "1/s", default=None)
+    rate: Positive | None = quantity("Bottles per second; alternatively `gap`.", "1/s", default=None)
     rate_limit: Positive | None = quantity(
-        "Greatest rate that the command `rate` may ask for in a run. Left out: there is no such command.",
+        "Largest rate that the command `rate` may set in a run. Left out: there is no such command.",
         "1/s",
         default=None,
     )
-    start: NotNegative = quantity("When the first bottle enters.", "s", default=0.0)
+    start: NotNegative = quantity("Time at which the first bottle enters.", "s", default=0.0)
     timing_jitter: NotNegative = quantity(
-        "Each bottle is early or late by up to this (with `gap`: late, up to this), drawn evenly from the seed.",
+        "Largest time by which a bottle is early or late (with `gap`: late only), drawn uniformly from the seed.",
         "s",
         default=0.0,
     )

@@ -79,17 +79,17 @@ class _Sliding(_Mover):
     DRIVE = ("force_limit", "N", "moving_mass", "kg", "m/s^2")
 
     direction: Angle = quantity("Direction in which it slides, from the x-axis, counter-clockwise.", "rad")
-    stroke: Positive = quantity("How far it slides.", "m")
+    stroke: Positive = quantity("Stroke length.", "m")
     max_speed: Positive = quantity("Its greatest speed.", "m/s")
-    acceleration: Positive = quantity("Acceleration with which it starts, turns round and stops.", "m/s^2")
+    acceleration: Positive = quantity("Acceleration at starts, reversals and stops.", "m/s^2")
     force_limit: Limit = quantity(
-        "The most that its drive can push with; what takes more holds it up, or moves it back. Default: a cylinder of "
-        "20 mm bore at 6 bar (ISO 6432).",
+        "Largest force of the drive. A larger load stops the rail, or moves it back. Default: a cylinder of 20 mm "
+        "bore at 6 bar (ISO 6432).",
         "N",
         default=GATE_FORCE,
     )
     moving_mass: Positive = quantity(
-        "Mass of all that slides: rail, carriage and piston rod. It counts only beyond the limit.", "kg", default=1.0
+        "Moving mass: rail, carriage and piston rod. It has no effect below the force limit.", "kg", default=1.0
     )
 
     @property
@@ -103,16 +103,16 @@ class _Swinging(_Mover):
 
     angle: Angle = quantity("Angle through which it swings about `from`, counter-clockwise if positive.", "rad")
     max_speed: Positive = quantity("Its greatest angular speed.", "rad/s")
-    acceleration: Positive = quantity("Angular acceleration with which it starts, turns round and stops.", "rad/s^2")
+    acceleration: Positive = quantity("Angular acceleration at starts, reversals and stops.", "rad/s^2")
     torque_limit: Limit = quantity(
-        "The most that its drive can turn with; what takes more holds it up, or moves it back. Default: a cylinder of "
-        "25 mm bore at 6 bar (ISO 6432) at a crank of 50 mm.",
+        "Largest torque of the drive. A larger load stops the rail, or moves it back. Default: a cylinder of 25 "
+        "mm bore at 6 bar (ISO 6432) at a crank of 50 mm.",
         "N m",
         default=CRANK_TORQUE,
     )
     inertia: Positive | None = quantity(
-        "Moment of inertia about `from` of all that swings. It counts only beyond the limit. Left out: that of a rod "
-        "of 1 kg, length^2 / 3.",
+        "Moment of inertia about `from` of the moving parts. It has no effect below the torque limit. Left out: "
+        "that of a rod of 1 kg, length^2 / 3.",
         "kg m^2",
         default=None,
     )
@@ -140,7 +140,7 @@ class SlidingGate(_Sliding):
     kind: Literal["slide"] = quantity("The kind of gate.")
     from_: Point = quantity("One end while it is closed.", "m", alias="from")
     to: Point = quantity("The other end while it is closed.", "m")
-    open: Flag = quantity("Whether it is open at the start.", default=False)
+    open: Flag = quantity("True: open at the start.", default=False)
 
 
 class SwingingGate(_Swinging):
@@ -151,7 +151,7 @@ class SwingingGate(_Swinging):
     kind: Literal["swing"] = quantity("The kind of gate.")
     from_: Point = quantity("The end about which it swings.", "m", alias="from")
     to: Point = quantity("The other end while it is closed.", "m")
-    open: Flag = quantity("Whether it is open at the start.", default=False)
+    open: Flag = quantity("True: open at the start.", default=False)
 
 
 class Pusher(_Sliding):
@@ -162,8 +162,8 @@ class Pusher(_Sliding):
     from_: Point = quantity("One end while it is retracted.", "m", alias="from")
     to: Point = quantity("The other end while it is retracted.", "m")
     force_limit: Limit = quantity(
-        "The most that its drive can push with; what takes more holds it up, or moves it back. Default: a cylinder of "
-        "25 mm bore at 6 bar (ISO 6432).",
+        "Largest force of the drive. A larger load stops the rail, or moves it back. Default: a cylinder of 25 mm "
+        "bore at 6 bar (ISO 6432).",
         "N",
         default=PUSHER_FORCE,
     )

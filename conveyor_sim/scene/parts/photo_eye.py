@@ -14,10 +14,11 @@ class PhotoEye(DevicePart):
     KIND: ClassVar[str] = "photo_eye"
     WORD: ClassVar[str] = "eye"
 
-    from_: Point = quantity("Where the beam begins.", "m", alias="from")
-    to: Point = quantity("Where the beam ends.", "m")
+    from_: Point = quantity("Start of the beam.", "m", alias="from")
+    to: Point = quantity("End of the beam.", "m")
     debounce: NotNegative = quantity(
-        "Changes that do not last this long are not seen at all, either way; those that do are seen so much later.",
+        "Changes in either direction that last for less than this time are ignored. All others are reported later "
+        "by this time.",
         "s",
         default=0.0,
     )

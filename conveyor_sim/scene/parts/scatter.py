@@ -15,14 +15,14 @@ class Scattered(Giver):
         speed: float
 
     lateral_jitter: NotNegative = quantity(
-        "Each bottle is to the left or right by up to this, drawn evenly from the seed. Left out along a conveyor: "
-        "0.5 mm, or what the guides leave free.",
+        "Largest shift of a bottle to the left or right, drawn uniformly from the seed. Left out along a "
+        "conveyor: 0.5 mm, or the free distance to the guides if that is less.",
         "m",
         default=0.0,
     )
     angular_jitter: NotNegativeAngle = quantity(
-        "The velocity of each bottle is turned to the left or right by up to this, drawn evenly from the seed. Left "
-        "out along a conveyor: 0.5 deg, or 0 where the guides leave nothing free.",
+        "Largest angle by which the velocity of a bottle is turned, drawn uniformly from the seed. Left out along "
+        "a conveyor: 0.5 deg, or 0 if there is no free distance to the guides.",
         "rad",
         default=0.0,
     )

@@ -19,10 +19,10 @@ class Source(PackmlPart, SwitchedTypes, Scattered, BadBottles, Entry):
 
     kind: Literal["source"] = quantity("The kind of machine.")
     bottle: Name = quantity("Bottle type.")
-    position: Point = quantity("Where a bottle's axis appears.", "m")
+    position: Point = quantity("Position of the axis of a new bottle.", "m")
     direction: Angle = quantity("Direction of its velocity.", "rad")
     speed: NotNegative = quantity(
-        "Its speed at first, along `direction`. Left out along a conveyor: that of the belt.", "m/s"
+        "Initial speed along `direction`. Left out along a conveyor: the speed of the belt.", "m/s"
     )
 
     def problems(self, path: Path, others: Others) -> Iterator[Problem]:

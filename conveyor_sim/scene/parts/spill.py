@@ -12,8 +12,8 @@ class Spill(Entry):
     KIND: ClassVar[str] = "spill"
 
     bottle: Name = quantity("Bottle type.")
-    position: Point = quantity("Where its axis appears, at rest.", "m")
-    count: Count = quantity("How many can be dropped at most.", "1", default=1)
+    position: Point = quantity("Position of the axis; the bottle is at rest.", "m")
+    count: Count = quantity("Largest number of bottles.", "1", default=1)
 
     @property
     def most(self) -> int | None:

@@ -26,10 +26,10 @@ class AttributeRule(Part):
     deviation: NotNegative = quantity(
         "Standard deviation of the value, normally distributed, drawn from the seed.", "1", default=0.0
     )
-    share: Share = quantity("Share of the bottles to which it is done, drawn from the seed.", "1", default=1.0)
+    share: Share = quantity("Share of the bottles that are changed, drawn from the seed.", "1", default=1.0)
     every: Count | None = quantity("Only every n-th bottle is changed.", "1", default=None)
     at: Annotated[tuple[Count, ...], Len(0), Holds("a list of whole numbers, 1 or greater")] = quantity(
-        "It is done to these bottles alone, counted from 1 as they come.", "1", default=()
+        "Numbers of the bottles that are changed, counted from 1 in the order of arrival.", "1", default=()
     )
 
     def problems(self, path: Path, attribute: str) -> Iterator[Problem]:
@@ -48,10 +48,10 @@ class Acceptance(Part):
     low: Number | None = quantity("Least value. Left out: there is none.", "1", default=None)
     high: Number | None = quantity("Greatest value. Left out: there is none.", "1", default=None)
     false_accept: Share = quantity(
-        "Share of the bottles beyond the limits that are taken for good, drawn from the seed.", "1", default=0.0
+        "Share of the bottles beyond the limits that pass, drawn from the seed.", "1", default=0.0
     )
     false_reject: Share = quantity(
-        "Share of the bottles within the limits that are not, drawn from the seed.", "1", default=0.0
+        "Share of the bottles within the limits that fail, drawn from the seed.", "1", default=0.0
     )
 
     def problems(self, path: Path) -> Iterator[Problem]:

@@ -16,8 +16,8 @@ class SwitchedTypes(Part):
         bottle: str
 
     types: Annotated[tuple[Name, ...], Holds("a list of bottle types")] = quantity(
-        "Bottle types among which the command `cmd_bottle` chooses in a run, by their places from 0; `bottle` is one "
-        "of them. Left out: there is no such command.",
+        "Bottle types from which the command `cmd_bottle` selects in a run, numbered from 0; `bottle` is one of "
+        "them. Left out: there is no such command.",
         default=(),
     )
 

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from conveyor_msgs import srv
-from conveyor_msgs.msg import Commands, SimulationState
+from conveyor_msgs.msg import Commands
 from ctrl_c import restore_for_children
 from fuzz.invariants import Violation
 from rcl_interfaces.msg import Parameter, ParameterValue
@@ -26,6 +26,8 @@ from rcl_interfaces.srv import SetParameters
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.serialization import serialize_message
 from ros.line_client import LineClient
+from simulation_interfaces import srv as standard_srv
+from simulation_interfaces.msg import SimulationState
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
@@ -72,7 +74,7 @@ def finish() -> None:
     for _ in range(3000):
         station.publish("commands", Commands(names=["nowhere"], values=[0.0]))
     station.require_account()
-    station.ask(srv.StepSimulation, "step_simulation", wait=False, steps=99_000)  # as if it came after a reset
+    station.ask(standard_srv.StepSimulation, "step_simulation", wait=False, steps=99_000)  # as if it came after a reset
     station.settle()
 
 
@@ -206,7 +208,7 @@ class Station:
         return value
 
     def _require_alive(self) -> None:
-        self.ask(srv.GetSimulationState, "get_simulation_state")
+        self.ask(standard_srv.GetSimulationState, "get_simulation_state")
         grown = self._resident() - self._memory
         if grown > MEMORY:
             raise Violation("memory", f"{grown / 1e6:.0f} MB more than at the start")
@@ -236,7 +238,7 @@ class Station:
     def _reset(self) -> None:
         self.ask(Trigger, "pause")
         before, late = self.present().sim_run_id, not all(future.done() for future in self.futures)
-        result = self.ask(srv.ResetSimulation, "reset_simulation").result
+        result = self.ask(standard_srv.ResetSimulation, "reset_simulation").result
         if result.result != result.RESULT_OK:
             raise Violation("no reset", result.error_message)
         now = self.present()
@@ -410,19 +412,19 @@ def _go(station: Station, rng: random.Random, _: Path) -> str:
 def _step(station: Station, rng: random.Random, _: Path) -> str:
     station.ask(Trigger, "pause")
     steps = rng.choice([0, 1, 2, 20, 20, 99_000, 100_001, 2**64 - 1])
-    station.ask(srv.StepSimulation, "step_simulation", wait=steps < 99_000, steps=steps)
+    station.ask(standard_srv.StepSimulation, "step_simulation", wait=steps < 99_000, steps=steps)
     return "stepped"
 
 
 def _set_state(station: Station, rng: random.Random, _: Path) -> str:
     state = SimulationState(state=rng.choice([0, 1, 2, 4, 100, 255]))
-    station.ask(srv.SetSimulationState, "set_simulation_state", state=state)
+    station.ask(standard_srv.SetSimulationState, "set_simulation_state", state=state)
     _after_new_run(station)
     return "state"
 
 
 def _reset(station: Station, rng: random.Random, _: Path) -> str:
-    station.ask(srv.ResetSimulation, "reset_simulation", scope=rng.choice([0, 255, 3, 1, 4, 128]))
+    station.ask(standard_srv.ResetSimulation, "reset_simulation", scope=rng.choice([0, 255, 3, 1, 4, 128]))
     _after_new_run(station)
     return "reset"
 

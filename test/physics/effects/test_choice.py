@@ -36,7 +36,7 @@ def choices(**fields: Any) -> dict[str, str]:
         ({"bottles": TWO, "contacts": GLASS, **NO_FLOOR}, PAIR),
         (
             {"infeeds": {"in": ENTERING}, "contacts": GLASS},
-            {**PAIR, "bottle_contact": "infeeds.in: without end", "infeed": "infeeds.in"},
+            {**PAIR, "bottle_contact": "infeeds.in: endless", "infeed": "infeeds.in"},
         ),
         ({"infeeds": {"in": {**ENTERING, "count": 1}}, "contacts": GLASS}, {"infeed": "infeeds.in"}),
         (

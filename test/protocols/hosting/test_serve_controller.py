@@ -151,7 +151,9 @@ def test_a_reset_loads_the_program_as_it_is_then(program: str) -> None:
 
 @pytest.mark.parametrize(("statement", "name"), [("1 / 0", "ZeroDivisionError"), ("exit(3)", "SystemExit")])
 def test_a_program_that_fails_stops_the_run_with_its_place(program: str, statement: str, name: str) -> None:
-    Path(program.rpartition(":")[0]).write_text(PROGRAM.replace("speed = self.base", f"speed = {statement} + self.base"))
+    Path(program.rpartition(":")[0]).write_text(
+        PROGRAM.replace("speed = self.base", f"speed = {statement} + self.base")
+    )
     said: list[str] = []
     with line_of(program, said) as source:
         until(lambda: source.snapshot.run.state == STOPPED, "the end")

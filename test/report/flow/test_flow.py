@@ -9,7 +9,7 @@ from scenes import ROOT, SHIPPED, shipped_name
 
 from conveyor_sim.cli import main
 from conveyor_sim.report.flow.flow import flow_of
-from conveyor_sim.report.flow.overview import MOST_LINES
+from conveyor_sim.report.labelled import MOST_LINES
 from conveyor_sim.scene import load_scene
 
 STATIONS = ROOT / "config" / "scenarios" / "two_stations.yaml"

@@ -1,0 +1,138 @@
+"""Recordings in earlier formats are read, played and served in the present definitions."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from bag.editing import edited
+from facts import stating
+from protocols.waiting import until
+
+from conveyor_sim.bag.messages.encode import ALARM_STATES, FORMAT
+from conveyor_sim.bag.messages.older import upgraded
+from conveyor_sim.bag.messages.topics import TOPICS
+from conveyor_sim.bag.messages.typestore import typestore
+from conveyor_sim.bag.reader import open_bag
+from conveyor_sim.bag.recorded_scene import recorded_scene
+from conveyor_sim.bag.replay import replay
+from conveyor_sim.errors import BagError
+from conveyor_sim.line.line import image_of
+from conveyor_sim.page.head import head
+from conveyor_sim.protocols.tags.bag_provider import BagTagProvider
+from conveyor_sim.protocols.tags.line_mirror import LineMirrorError
+from conveyor_sim.report.summarize import summarize
+from conveyor_sim.run.playback import Playback
+
+OLD = Path(__file__).parent / "old"
+FIRST = OLD / "before_tags.mcap"
+"""Format 1."""
+SECOND = OLD / "before_tag_messages.mcap"
+"""Format 2, recorded with commit 7fa2643: an infeed with random bottles, alarms of the scene and of a controller,
+inputs of every operation.
+"""
+EYE = "photo_eyes/eye/blocked"
+
+
+def test_the_second_format_replays_with_its_random_streams() -> None:
+    report = replay(SECOND)
+    assert report.difference is None and report.last_tick == 400
+    assert report.compared["bottles"] == 9 and report.compared["outcomes"] == 10 and report.compared["signals"] == 41
+
+
+def test_its_tags_are_those_of_its_scene() -> None:
+    with open_bag(SECOND) as bag:
+        line = bag.line
+        assert bag.format == line.format == 2
+        expected = image_of(recorded_scene(line, "bag"))
+    assert [tag.name for tag in line.tags] == [tag.name for tag in expected.tags]
+    for recorded, tag in zip(line.tags, expected.tags, strict=True):
+        assert (recorded.kind, recorded.role, recorded.unit, recorded.unit_code) == (
+            tag.kind, tag.role, tag.unit, tag.unece.code,
+        )  # fmt: skip
+        assert (recorded.min, recorded.max, recorded.initial) == (tag.low, tag.high, tag.initial)
+        assert dict(zip(recorded.state_values.tolist(), recorded.state_texts, strict=True)) == tag.texts
+        assert (recorded.device, recorded.device_class) == (tag.device, tag.device_class)
+
+
+def test_alarms_have_the_ids_of_those_that_suppress_them() -> None:
+    with open_bag(SECOND) as bag:
+        states = [frame.data for frame in bag.read("alarm_states")][-1]
+        outcomes = [frame.data for frame in bag.outcomes()]
+    causes = dict(zip(states.id, states.suppressed_by, strict=True))
+    assert causes["crowded"] == ("full",) and causes["follows"] == ("declared", "full") and causes["full"] == ()
+    assert [outcome.bottles for outcome in outcomes] == [()] * 10
+    assert {outcome.operation for outcome in outcomes} >= {"declare", "set", "mode", "force", "inject", "shelve"}
+
+
+@pytest.mark.parametrize("path", [FIRST, SECOND], ids=["1", "2"])
+def test_they_are_played_as_the_present_definitions_have_it(path: Path) -> None:
+    """So a node of today can publish them, and Foxglove and clients of today read them."""
+    with open_bag(path) as bag:
+        playback = Playback(bag)
+        messages = [*playback.cue(playback.first_tick)]
+        for tick in range(playback.first_tick, playback.last_tick + 1):
+            messages += playback.take(tick)
+        hashes = {topic.name: topic.type_hash for topic in playback.topics}
+        recorded = {name: list(bag.messages(name)) for name in ("line", "outcomes", "signals")}
+    assert hashes["line"] is None and hashes["outcomes"] is None
+    for name, frames in recorded.items():
+        played = [typestore().deserialize_cdr(data, TOPICS[name].type) for topic, data in messages if topic == name]
+        assert [one.tick for one in played] == [frame.tick for frame in frames]
+        assert str(TOPICS[name].unpack(played[-1])) == str(TOPICS[name].unpack(frames[-1].data))
+
+
+def test_the_second_is_served_with_its_alarms() -> None:
+    with BagTagProvider(SECOND, print, paused=True) as source:
+        assert source.control("seek", 2.0, "a test") == ""
+        until(lambda: source.snapshot.tick == 200, "2 s")
+        assert source.snapshot.forced == {EYE} and source.info.where == "hall/line"
+        tags = {tag.name: tag for tag in source.info.tags}
+        assert tags["belts/line/mode"].texts == {1: "Automatic", 2: "Maintenance", 3: "Manual"}
+        alarms = source.snapshot.alarms
+        assert alarms is not None and ("full",) in alarms.suppressed_by
+        line: Any = typestore().deserialize_cdr(source.newest["line"], TOPICS["line"].type)
+        assert line.format == 2
+
+
+def test_the_first_has_no_tags_to_serve() -> None:
+    with pytest.raises(LineMirrorError, match=stating("small_line", "without tags")):
+        BagTagProvider(FIRST, print)
+
+
+def test_both_are_drawn_and_reported() -> None:
+    for path, count in ((FIRST, 1), (SECOND, 2)):
+        with open_bag(path) as bag:
+            shown = head(bag.line, recorded_scene(bag.line, "bag"))
+            assert bag.format == count
+        assert set(shown["signals"]) <= {tag["name"] for tag in shown["tags"]}
+        assert summarize(path).commands > 0
+
+
+def test_a_recording_of_a_playback_keeps_the_format(tmp_path: Path) -> None:
+    """Its messages have the present definitions, but its scene is still read as when it was recorded."""
+    with open_bag(SECOND) as bag:
+        runs = {topic: list(bag.messages(topic)) for topic in ("line", "bottles", "outcomes")}
+    assert runs["line"][0].data.format == 2
+    copy = edited(SECOND, tmp_path / "copy", lambda topic, message: None)
+    with open_bag(copy) as bag:
+        assert bag.format == 2 and not bag.older_topics
+    assert replay(copy).difference is None
+
+
+def test_a_format_of_the_future_is_refused(tmp_path: Path) -> None:
+    def later(topic: str, message: Any) -> None:
+        if topic == "line":
+            message.format = FORMAT + 1
+
+    with pytest.raises(BagError, match=stating(f"format {FORMAT + 1} given", f"expected 1 to {FORMAT}", "newer")):
+        open_bag(edited(SECOND, tmp_path / "later", later))
+
+
+@pytest.mark.parametrize("listed", ["", "{", '{"a": 1}', "[1]", '["a", null]'])
+def test_a_damaged_list_of_causes_is_refused(listed: str) -> None:
+    """Files without checksums are read, so a text may be anything. `Bag.decode` names the recording."""
+    with pytest.raises(ValueError):
+        upgraded(ALARM_STATES, SimpleNamespace(header=None, suppressed_by=[listed]), 2)
