@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # make run     sets up an environment, then runs a scene as a ROS 2 node with a controller (SCENE=..., one with belts feeder and table; DISTRO=kilted)
 # make test    sets up the same, then runs the tests (ARGS="-k bag" hands options to pytest, ARGS="-m quick" is the inner loop)
 # make bench   sets up the same, then measures speed against others, about 40 minutes (ARGS="dense plant" or ARGS=--quick)

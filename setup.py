@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Installs conveyor_sim: by pip into an environment, by colcon (ament_python) into a ROS workspace.
 
 All of the description is here, as strings and lists, because colcon reads it by running this file, with whatever

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`python -m bench [PART ...]`: measures, stores raw numbers as CSV, renews the tables of docs/performance/."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Waiting time for the accuracy of a scene: the first answer, a measured one, the end of the study."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The paper's method in NumPy: every bottle against every other at every step. Minimal effects, semi-implicit Euler."""
 
 from __future__ import annotations

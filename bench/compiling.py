@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Cost of the first run of a kind of scene: processor time to the first tick, without cached kernels."""
 
 from __future__ import annotations

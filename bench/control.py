@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Cost of control tests: ticks of a line without the step kernels, and a scenario, in CPU time of one core."""
 
 from __future__ import annotations

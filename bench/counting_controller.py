@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A controller that commands nothing and notes when it scans: what lockstep itself costs."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The dense table: our engine against LAMMPS, all pairs in NumPy and a half list in numba, from one packed state."""
 
 from __future__ import annotations

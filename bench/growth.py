@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Growth of the cost of a bottle-step: with bottles, belts, rails, and the share of bottles in contact."""
 
 from __future__ import annotations

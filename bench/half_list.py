@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Straightforward numba program: a Verlet list of pairs, a loop that scatters forces to both, a loop that integrates.
 
 It has minimal effects and semi-implicit Euler. No arithmetic is reordered (no fastmath), as in this project's engine.

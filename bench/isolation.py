@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Latency of Modbus and of the page while the OPC UA server is attacked, all on two cores.
 
 The line, its protocol servers, the attacker and the clients that measure share the cores. An

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Attackers of bench/isolation.py, as processes: `python -m bench.isolation_attacks NAME ADDRESS` attacks until killed.
 
 Each is an anonymous OPC UA client. Its requests are valid, and take the server very long.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Clients of bench/isolation.py: `python -m bench.isolation_clients ADDRESS SECONDS` prints latencies in s, as JSON."""
 
 from __future__ import annotations

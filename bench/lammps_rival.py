@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """LAMMPS, gran/hooke, on one thread: its cheapest set-up that fits the dense table.
 
 It has no regularised Coulomb friction. Its cheapest belt is a viscous pull, `fix viscous` with `fix addforce`, which

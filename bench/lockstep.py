@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Scans a second of a controller in lockstep, in a process of its own, over DDS; and how soon the first one comes."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Tables of Markdown, and their place between the markers of a page."""
 
 from __future__ import annotations

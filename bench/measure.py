@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Timing in turns: every contestant does one piece of work a round, and the rounds are many."""
 
 from __future__ import annotations

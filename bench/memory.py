@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Memory of a bottle: arrays of the simulation, and what the process grows by."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The ROS 2 node on the dense table: what it costs beside the kernels, and how soon a command acts.
 
 The node records and publishes all its topics at 50 Hz; another process subscribes to all of them. What the kernels

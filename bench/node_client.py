@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Drives a node under measurement: lets it run, reads its processor time, commands its belt."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A process that subscribes to all topics of the node and throws away what comes, until its standard input ends."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Engine of this project, as a contestant and as the source of packed states."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The dense table: N bottles pressed against the end wall of a box by the belt that runs on below, as scenes.
 
 The box is 2 : 1 and at most 8 m long; beyond that it only gets wider. Bottles, friction and stiffness are the paper's.

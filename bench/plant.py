@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The paper's plant against the clock: as shipped, without outputs, recorded, and with bottles of glass."""
 
 from __future__ import annotations

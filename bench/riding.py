@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Savings by riding: ticks of a line with and without it, in CPU time of one core, and the number of riding bottles."""
 
 from __future__ import annotations

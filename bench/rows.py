@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Measurements as rows of one CSV file per part, and queries for tables."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """SCADA servers under load: 500 tags, 50 of which change at 10 Hz, to five clients of each protocol.
 
 The clients of a protocol are a process of their own (bench/scada_clients.py). Changes are whole numbers that go up by

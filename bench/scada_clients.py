@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The clients of bench/scada.py, as a process: `python -m bench.scada_clients SECONDS ADDRESS...` prints what they saw.
 
 They begin to count when all of them are connected.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """From the start of a process to the first step of the paper's plant: kernels compiled, or found in the cache."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Programs in Structured Text: processor time of a scan, and of the way from a text to a program that runs."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Runs of a study by several processes, against one; and what comes beside the simulation of a run."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Performance targets of the engine, beside the measurements."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The page: processor time a frame in software-rendered Chromium; an hour of recording opened and gone about in."""
 
 from __future__ import annotations

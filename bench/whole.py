@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Duration of complete commands, with recording, summary and figures."""
 
 from __future__ import annotations

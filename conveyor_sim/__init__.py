@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Bottles on industrial conveyors: discrete-element simulation, recorded like a real line.
 
 A scene file (YAML) describes belts, rails, bottles, infeeds and outfeeds. `load_scene` validates it.

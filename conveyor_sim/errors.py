@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Exceptions of this package, one class per cause; every message is one sentence for the user."""
 
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`Simulation`: a scene that advances tick by tick, takes commands, is observed and saved."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The docs site: Sphinx over the Markdown pages of the checkout, README.md first (`make site`).
 
 Pages stay plain Markdown that a forge shows as well: what only the site needs, its navigation and captions, is added
@@ -57,7 +58,15 @@ NAVIGATION = {
         ],
         "A line": [
             *("docs/index", "docs/scene", "docs/layout", "docs/conveyors", "docs/placement", "docs/check", "docs/line"),
-            *("docs/alarms", "docs/report", "docs/studies", "docs/view", "docs/drawings"),
+            *(
+                "docs/cli",
+                "docs/recordings",
+                "docs/alarms",
+                "docs/report",
+                "docs/studies",
+                "docs/view",
+                "docs/drawings",
+            ),
             *("docs/effects", "docs/base", "docs/energy_and_damage", "docs/glossary"),
         ],
         "What to rely on": ["docs/accuracy", "docs/stability", "docs/reliability", "docs/performance", "docs/paper"],

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Controls a paused simulation tick by tick: commands in, process image out, one call a scan.
 
     python lockstep_controller.py BELT [SCANS]      # beside: sim_node --ros-args -p start_paused:=true

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reads a recording with rosbags alone: positions of bottles, and the forces between them.
 
     pip install rosbags

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Listens to a running simulation: positions of bottles, and the forces between them.
 
     python read_poses_and_forces.py          # ends with Ctrl-C

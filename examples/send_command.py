@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Sets the speed of a belt of a running simulation, and prints what became of it.
 
     python send_command.py BELT SPEED        # m/s, positive forward

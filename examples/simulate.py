@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The README's first steps: a scene, a command, positions and forces; without ROS."""
 
 from conveyor_sim import Simulation, load_scene

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Controller of small_packaging.yaml: a full lane stops the comb, a full table the infeeds; bad bottles are rejected.
 
 conveyor-sim run examples/small_packaging.yaml --controller examples/small_packaging.py:controller

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* A compiled PLC program as a shared library, for conveyor_sim (docs/structured_text.md, A compiled program).
  *
  * A program that any compiler of Structured Text has made is put behind these seven functions by a shim. It is loaded

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """ros2 launch conveyor_sim line.launch.py scene:=... : the simulation as a ROS node; controller and RViz on request."""
 
 from pathlib import Path

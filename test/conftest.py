@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Which tests belong to `-m quick`, which are repeated, and in which order processes take the files of tests."""
 
 import gc

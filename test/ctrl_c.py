@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """SIGINT for the processes that tests start."""
 
 from __future__ import annotations

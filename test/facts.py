@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Facts of a message: names, values, numbers, units and expectations that it must state, in any wording."""
 
 import re

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The queue M/M/1: arrivals and services at random, one server. How long one waits is known in closed form."""
 
 from __future__ import annotations

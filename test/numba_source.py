@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Names of definitions in numba's sources on which the engine's compiler relies."""
 
 import ast

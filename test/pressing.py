@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What presses on contacts: scenes of bottles that a belt presses together, and the load that friction there feels."""
 
 import math

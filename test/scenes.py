@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Scenes from Python: a test writes what it is about, the rest is left out. SI units."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Programs of docs/studies/, which are no package, as modules."""
 
 from __future__ import annotations

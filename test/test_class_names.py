@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Public class names: each belongs to one class of the package, or is shared on purpose and listed here."""
 
 import ast

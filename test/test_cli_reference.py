@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """docs/cli.md: all commands and options, as `--help` prints them."""
 
 import re

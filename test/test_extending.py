@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The worked examples of docs/extending.md work: each is applied to a copy of the package, and its last block is run.
 
 A section is a heading `## ...` with fenced blocks that have a title: `python title="conveyor_sim/..."` and
@@ -141,7 +142,8 @@ Nothing.
 
 def example() -> list[Block]:
     files = ("errors.py", "scene/drives.py")
-    first = tuple(f" {(ROOT / 'conveyor_sim' / file).read_text().splitlines()[0]}" for file in files)
+    lines = [(ROOT / "conveyor_sim" / file).read_text().splitlines()[1] for file in files]  # below the license
+    first = tuple(f" {line}" for line in lines)
     sections = sections_of(EXAMPLE % first)
     assert list(sections) == ["First", "Second"]
     assert sections["Second"] == []

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Import rules: each package imports what tools/import_rules.py allows; no cycles; few packages on few levels."""
 
 from __future__ import annotations

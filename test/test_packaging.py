@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Packaging: resources, versions and dependencies, both ways of installing, the set-up."""
 
 import ast

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The pages of docs/parts/: each has a scene that can be copied, and its picture."""
 
 from __future__ import annotations

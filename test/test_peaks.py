@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Peak force and impulse are taken at every step, whatever the outputs' rate, and start anew after each output."""
 
 import numpy as np

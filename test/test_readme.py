@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The README's snippets are the files under examples/, and they run."""
 
 import re

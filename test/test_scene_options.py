@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Choices of a version of a scene: on the command line, in tests and in studies."""
 
 from collections.abc import Callable

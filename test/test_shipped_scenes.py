@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Every scene that is shipped or shown runs without the guard's remark, within the forces its prediction rests on."""
 
 from pathlib import Path

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Simulation: the same scene and commands give the same bits, for any division of time and any observers."""
 
 import subprocess

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """docs/troubleshooting.md: its commands exist, with their options."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The hash over the sources that decide bits: what goes into it, and what does not."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Processes of this package that cost no imports: each is forked from one that has made them already.
 
 To import the package is more than half of what a short process costs. Only what is read while modules are imported,

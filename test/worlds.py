@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The engine's arrays with bottles at any positions, overlapping ones included."""
 
 from __future__ import annotations

@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
 # ament_lint.sh BIN PATH...: checks sources as ROS does, in the style that ruff checks; output only if there are errors.
 set -u
 bin=$1

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Prose check: docstrings that continue their identifier, and words that the style guide replaces.
 
     python tools/check_prose.py              # the package; exit status 1 while a count is above its limit

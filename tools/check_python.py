@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Says in one sentence why the Python that runs this file can't carry the environment; silent exit 0 if it can.
 
 Kept to syntax that any Python from 3.6 on reads. Exit 10: wrong version. Exit 20: right version, something missing.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Generate the pages of docs/ that programs write, or check that they are current.
 
     make docs-check                 # prints the pages that are not current; fails if there are any

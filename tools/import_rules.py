@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Import rules of the package, and the diagram of docs/architecture.md that is generated from them.
 
 `test/test_imports.py` compares the rules with the imports of all sources.
@@ -26,7 +27,8 @@ RULES: Mapping[str, str] = {
     "bag": "columns errors line scene simulation support | lz4 mcap numpy pandas pyarrow rosbags yaml zstandard",
     "page": "bag columns errors scene simulation support | ezdxf numpy ruamel",
     "run": "bag columns control engine errors line physics scene simulation support | click numpy",
-    "report": "bag columns errors line page physics run scene simulation support | click matplotlib numpy rich",
+    "report": "bag columns errors line page physics run scene simulation statistics support | "
+    "click matplotlib numpy rich",
     "protocols": "bag columns errors line page run scene simulation support | "
     "aiohttp asyncua cryptography foxglove google numpy paho pymodbus",
     "accuracy": "columns engine errors line physics report scene simulation statistics support | "

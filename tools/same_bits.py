@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Records a corpus of runs with a checkout of this project, and compares two corpora bit for bit.
 
     python tools/same_bits.py record FOLDER                     # with the checkout that holds this file

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Build the environment of `make run`, `make test` and others: set_up.py DISTRO [test] [bench] [docs].
 
 The result is a virtual environment with the ROS 2 wheels of that distribution, this package (editable) and

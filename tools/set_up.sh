@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
 # Finds a Python that can carry the environment and hands over to set_up.py: set_up.sh DISTRO [test] [bench] [docs]
 tools=$(dirname "$0")
 best=0

@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
 # workspace.sh DIR: links both packages of this checkout side by side into DIR/src, for `colcon build` and `rosdep` in DIR.
 set -eu
 

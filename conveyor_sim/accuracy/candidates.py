@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The settings that are compared on a scene, and the integrators that its effects forbid."""
 
 import math

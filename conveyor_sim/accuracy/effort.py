@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Budget of processor time of a study, and the progress display that shows what is left of it."""
 
 from __future__ import annotations

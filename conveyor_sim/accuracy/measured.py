@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Measurements on the short horizon, stored in the study's folder for interrupted studies."""
 
 from __future__ import annotations

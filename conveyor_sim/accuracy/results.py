@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Results of an accuracy study as plain rows, from which tables, figures, CSV and JSON are built."""
 
 from __future__ import annotations

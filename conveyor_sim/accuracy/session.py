@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Session of a study: a predicted answer, a preliminary one, the final one; on Ctrl-C the best so far."""
 
 from __future__ import annotations

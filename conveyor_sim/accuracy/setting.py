@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A setting: one way to simulate a scene, with contacts as stiff or softer, and the scene with it."""
 
 from __future__ import annotations

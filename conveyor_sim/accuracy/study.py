@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A study from the first settings that are measured to its answer: stage after stage, each with its progress."""
 
 from __future__ import annotations

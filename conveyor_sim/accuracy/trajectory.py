@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Runs from a start over a few ticks, with all compared quantities, and the scene and disturbances of such runs."""
 
 from dataclasses import dataclass

@@ -1,1 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
 """Recording and reading: columns to messages, messages to MCAP, and back. None of it needs a ROS installation."""

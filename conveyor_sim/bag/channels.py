@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Schemas and metadata of topics as recordings state them. A reader recognises recordings of this package by them."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """First difference of two messages of one tick, bit for bit or within a tolerance."""
 
 from __future__ import annotations

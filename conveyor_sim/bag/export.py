@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Export of a bag: one file per table and format in a folder."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The folder of a recording, which is checked before the simulation is compiled and run; locks on its files."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Log of a run's start and inputs, from which the run can be simulated again (`rerun.py`).
 
 A file of JSON lines. The first line holds the scene, and in base64 its sources if it is expanded. The copy of a

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """MCAP files of any writer, as the specification allows them: with or without chunks, index, schemas, in any order."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Interface between `reader.Bag` and the classes that read the files of a bag."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Messages of a simulation: each topic at its ticks, serialized once for all sinks that want it."""
 
 from __future__ import annotations

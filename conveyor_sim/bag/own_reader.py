@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Intact recordings of this package: messages by the index of the MCAP file, without rosbags or a scan of the file."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reader of bags as columns: bags recorded by this package, or by stock rosbag2 from the same topics."""
 
 from __future__ import annotations

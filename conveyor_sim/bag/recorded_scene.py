@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Scene of a recording with the integrator and steps of the recorded run, in place of the present defaults."""
 
 from dataclasses import replace
@@ -10,7 +11,7 @@ def recorded_scene(line: Any, name: str) -> Scene:
     """Return the scene of a recorded Line message. Raise SceneError, with `name` for its file, if it is refused now.
 
     The scene is not read with the present defaults, which it may not allow. Random streams have the keys of the time of
-    the recording: in format 1, places in lists.
+    the recording: in format 1, places in lists. Machines work and count as at that time.
     """
     overrides = parse_overrides(line.overrides)
     accuracy = overrides.get("accuracy")
@@ -18,5 +19,5 @@ def recorded_scene(line: Any, name: str) -> Scene:
     recorded = {"integrator": str(line.integrator), "per_tick": int(line.steps_per_tick)}
     pinned = {**others, "preset": None, "tolerance": None, "dt": None, **recorded}
     scene = parse_again(line.scene_text, name, {**overrides, "accuracy": pinned})
-    scene._source = replace(scene._source, streams_by_index=line.format == 1)
+    scene._source = replace(scene._source, streams_by_index=line.format == 1, counts_starts=line.format < 3)
     return scene

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Recorder of a rosbag2 folder: one chunked, zstd-compressed MCAP file and metadata.yaml, by simulated log time."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Repair of a bag that was interrupted or damaged: a copy of its valid parts. The damaged file stays beside it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Replay of a recorded line with the recorded commands at their ticks, and comparison of every recorded state."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Repetition of a run from its logged inputs (`input_log.py`), with a recording of it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Bags in other storages that rosbags can read: sqlite3, and MCAP that is compressed by file or by message."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Sources of a recorded scene: the files attached to a recording, written to a folder."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Tables of a bag written to Parquet and CSV files, block by block."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Topics of a bag as tables: one row per bottle, contact, event or tick, in blocks of columns; pandas data frames."""
 
 from __future__ import annotations

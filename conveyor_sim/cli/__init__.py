@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The command `conveyor-sim`, of `command.py`: Ctrl-C ends it with one line while it is imported, too."""
 
 from conveyor_sim.support.interrupt import while_importing

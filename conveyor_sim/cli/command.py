@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The command `conveyor-sim`: check, explain, run, accuracy and more. Errors are one sentence, no traceback."""
 
 from __future__ import annotations

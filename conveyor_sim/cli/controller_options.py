@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The options --controller, --parameters and --record-variables of commands that run a scene."""
 
 from __future__ import annotations

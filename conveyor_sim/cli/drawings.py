@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Commands on drawings: import, draw."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Commands on a recording: recover, replay, sources, events, alarms, report, plot."""
 
 from __future__ import annotations
@@ -172,6 +173,8 @@ def export(bag: Path, parquet: bool, as_csv: bool, tables: tuple[str, ...], out:
 @click.argument("bag", type=click.Path(path_type=Path))
 @click.option("--out", type=click.Path(path_type=Path), help="Folder for the pictures (default: BAG/report).")
 @click.option("--no-pictures", is_flag=True, help="Print only.")
+@click.option("--from", "start", type=float, help="First simulated time in s (default: the end of the warm-up).")
+@click.option("--to", "stop", type=float, help="Last simulated time in s (default: the end).")
 def report(bag: Path, **chosen: Any) -> None:
     """Report how the line in BAG produced: bottles, times, OEE, MTBF, MTTR, stop reasons and longest stops."""
     from conveyor_sim.report.production_report import report_production

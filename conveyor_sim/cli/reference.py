@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Text of docs/cli.md: all commands with arguments and options, from the definitions that `--help` prints."""
 
 from __future__ import annotations

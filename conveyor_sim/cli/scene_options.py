@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Options of all commands that read a scene: `--set`, `--variant`, `--format`, `--outside-tables`."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Commands on a scene: check, tags, explain."""
 
 from __future__ import annotations

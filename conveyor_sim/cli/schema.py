@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Command schema: the JSON Schema of scene files."""
 
 import json

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Commands on studies: sweep, study."""
 
 from __future__ import annotations

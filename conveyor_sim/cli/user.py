@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The command user: an entry in the file of those who may do more than read by OPC UA and on the page."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The command view: a recording on a page."""
 
 from __future__ import annotations

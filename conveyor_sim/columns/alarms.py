@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The alarms of a line and their states, as columns."""
 
 from collections.abc import Sequence

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Bottles, contacts and belts as columns: 1-D arrays in SI units, whose entries i belong together."""
 
 from dataclasses import dataclass

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Production counters and time categories of machines."""
 
 from collections.abc import Sequence
@@ -39,7 +40,7 @@ class CounterColumns:
     planned: NDArray[np.float64]
     idle: NDArray[np.float64]
     rate: NDArray[np.float64]
-    """Nominal rate, 1/s."""
+    """Nominal rate, 1/s: the one of the scene."""
     availability: NDArray[np.float64]
     """Ratios as defined in `line/machines/efficiency.py`; NaN before the first cycle."""
     effectiveness: NDArray[np.float64]
@@ -54,4 +55,8 @@ class CounterColumns:
     stop_reason: Sequence[str]
     """Reason of the present or the last stop; "" for a device without times."""
     bottleneck: Sequence[str]
-    """Machines whose nominal rates limit the line; several if they run in parallel."""
+    """Machines whose fastest permitted rates limit the line; several if they run in parallel."""
+    rate_limit: NDArray[np.float64]
+    """Fastest permitted rate, 1/s: the reference of effectiveness and OEE."""
+    set_effectiveness: NDArray[np.float64]
+    """Effectiveness against the set rate."""

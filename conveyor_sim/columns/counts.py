@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Numbers of bottles that entered and left."""
 
 from dataclasses import dataclass

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Damage of bottles and wear of rails as columns; events at passed limits. SI units."""
 
 from dataclasses import dataclass

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Process image as controllers read it, with the true values of forced signals."""
 
 from __future__ import annotations

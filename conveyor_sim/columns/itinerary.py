@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Entries of bottles onto belts and rounds of a closed loop, from bottle columns over time."""
 
 from __future__ import annotations

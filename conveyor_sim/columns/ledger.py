@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Energy ledger of a run (effect `energy_ledger`)."""
 
 from dataclasses import dataclass

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Command values in force and their writers, as columns."""
 
 from collections.abc import Sequence

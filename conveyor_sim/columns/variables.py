@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Recorded variables of a controller after a scan."""
 
 from collections.abc import Sequence

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Line control, structured as PLC programs are: process image in, commands out, once per tick.
 
 `scan.py` defines controllers, `alarm.py` their alarm declarations, `blocks.py` the function blocks of IEC 61131-3, and

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`Alarm`: a controller's declaration of an alarm, made before its first scan: class, priority, latching, ..."""
 
 from __future__ import annotations

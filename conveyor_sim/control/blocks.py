@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Function blocks, with the names of IEC 61131-3 where the standard has them.
 
 A block is called once per scan and returns its output Q. Timers take the present time, so they run in simulated time. A

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Cascade stop and start of belts in a row: zones stop one after the other as they fill, and start from the front.
 
 A zone is held while bottles stand at its full-eye and the next zone has no room for them. So waiting bottles stand on

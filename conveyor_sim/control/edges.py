@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`EyeEdges`: edges of a photo-eye since the last scan, from its signals blocked, rose, fell and edges."""
 
 from __future__ import annotations

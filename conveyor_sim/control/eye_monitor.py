@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Plausibility checks of a photo-eye (stuck on, stuck off, chattering): alarms, and commands that hold the line."""
 
 from __future__ import annotations

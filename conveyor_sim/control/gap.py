@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Gap control in single file: a metering belt opens a set gap between bottles that arrive nose to tail.
 
 The discharge belt behind the metering belt runs faster, so a bottle that passes on to it gains on the next one.

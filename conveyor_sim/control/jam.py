@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Jams: no passage for a time, although bottles wait and the belt runs. An alarm, and a sequence that clears jams.
 
 A queue that moves nose to tail is no jam. Neither is a queue that stands because no bottles are taken downstream. An

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Level control of an accumulation table: the feeder is held while the table is full.
 
 The level comes from a count of bottles, from counters at entry and exit, or from photo-eyes across the table.

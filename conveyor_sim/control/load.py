@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Controllers by name: "module:factory" or "file.py:factory", with parameters."""
 
 from __future__ import annotations

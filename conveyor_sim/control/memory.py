@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Memory of a controller as plain data, for checkpoints that an equal controller continues from.
 
 A controller with methods `snapshot` and `restore` does this itself. Of any other, the attributes are stored, and those

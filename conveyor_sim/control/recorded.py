@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`RecordedVariables`: variables of a controller that are recorded, with their values after a scan."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Encoder-tracked reject: bad bottles of an inspection are tracked by the belt's pulses to the rejecter.
 
 A PLC uses a shift register that every pulse shifts, with one bit per bad bottle. Here the pulse counts are stored at

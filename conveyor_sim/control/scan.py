@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`Controller`: an object with `scan`, which returns commands and alarms for the signals of a tick."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """V-curve: machines on both sides of the bottleneck run faster, the more so the further away they are.
 
 Plotted along the line, the rates form a V with the bottleneck at its tip. The surplus recovers losses of a stop:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One evaluation of all forces: a function of positions, velocities and springs, for any integrator.
 
 There are two phases with a barrier between them: `pair_phase` reads every bottle and writes pairs, `bottle_forces`

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Views of the World with fewer groups, for kernels that Python calls. One compiled kernel then serves all Worlds that
 differ only in the omitted groups.
 

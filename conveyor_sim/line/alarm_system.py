@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`AlarmSystem`: the alarms of one line, connected to its devices, scene and inputs."""
 
 from collections.abc import Callable, Mapping, Sequence

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Changeover to another format in a run: the commands that set its speeds, rates and bottle types."""
 
 from collections.abc import Iterator

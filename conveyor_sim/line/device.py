@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`Device`: part of a line that controllers read and command once per tick. Each kind is a class in a file."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Table of device classes by kind of part, and the devices of a scene."""
 
 from collections.abc import Callable, Mapping

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`Line`: the devices of a scene, and the commands and faults that reach them at ticks."""
 
 import math
@@ -184,7 +185,7 @@ class Line:
         self._moved = moved_belts(self.image.tags)
         objecting = [device for device in devices if type(device).objection is not Device.objection]
         self._objecting = {command.name: device for device in objecting for command in device.commands}
-        self._counters = ProductionCounters(devices)
+        self._counters = ProductionCounters(devices, scene.counts_starts)
         self.placement = Placement(state, lambda: self._pending, self._log.note)
         """Bottles that inputs put on the line or remove."""
         self._operations = {
@@ -348,7 +349,7 @@ class Line:
             device.take(self.now)
             if removed := self.now.state.take_removed():
                 self._log.note_removed(device, removed, self.now)
-                self._counters.note_removed(device, removed, self.now.bad)
+                self._counters.line.note_removed(device, removed, self.now.bad)
                 self.now.forget(removed)
         self.now.begin_scan()
 

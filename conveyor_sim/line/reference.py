@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Tables of tags in docs/line.md and docs/parts/, generated from a scene with one device of each kind."""
 
 from collections.abc import Iterator

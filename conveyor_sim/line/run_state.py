@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """State of a run: running, paused, ended, ...
 
 It belongs to the simulation, not to the line: no signal, state hash or comparison of a replay contains it.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`Tag`: description of one value of a line that is read, written, or injected by a test. `ProcessImage`: all of them.
 
 Units have their codes of UNECE Recommendation 20, by which OPC UA and other systems identify them.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Some seconds of a recording as bytes: bottles, contacts, belts and signals as differences of whole numbers.
 
 A block is a list of arrays (`packed`), in the order of `pack`. page/block.js reads it, and must be changed

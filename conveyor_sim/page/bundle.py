@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The page as one file: modules in one script, styles and data inside, and a policy that forbids other content."""
 
 from __future__ import annotations

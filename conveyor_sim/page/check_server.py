@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A server on this machine for the page that shows a scene's plan and problems whenever one of its files is saved."""
 
 from __future__ import annotations

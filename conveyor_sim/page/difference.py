@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """First tick at which two recordings differ, in words: which commands, signals and bottles, and by how much."""
 
 from __future__ import annotations

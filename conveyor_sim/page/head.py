@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Constant part of a recording for the page, as JSON: shapes of the plant, tags, meaning of indices."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A server on this machine for a page and its data."""
 
 # This is the standard library's server. aiohttp, which serves the page of a running line (`protocols/web`), lacks a

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A recording as one HTML file, which opens without a network."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The name by which a browser asks for a server of this machine: Host (RFC 9110, 7.2) and Origin (RFC 6454, 7)."""
 
 from __future__ import annotations

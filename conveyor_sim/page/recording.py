@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A recording as the page shows it: head, blocks of some seconds, and story, each read by the bag's index."""
 
 from __future__ import annotations

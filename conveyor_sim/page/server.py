@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A server on this machine for the page of a recording of any length. Each request is read by the recording's index."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Story of a stretch of a recording for the page, as JSON: events, alarms, read-back values, counters.
 
 Every list is in the order of time. States are listed when they change.
@@ -12,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from conveyor_sim.bag.messages.topics import TOPICS
+from conveyor_sim.columns.alarms import AlarmColumns
 
 TOPICS_READ = ("events", "alarm_states", "readback", "counters", "rail_wear", "run_state")
 """Topics from which a story is collected."""
@@ -22,6 +24,7 @@ _COUNTED = (
     "processed", "good", "defective", "rejected", "failures",
     "running", "starved", "blocked", "down", "planned", "idle",
     "rate", "availability", "effectiveness", "quality", "oee", "mtbf", "mttr", "category", "stop_reason",
+    "rate_limit", "set_effectiveness",
 )  # fmt: skip
 
 _WORN = ("scuffing_work", "impulse")
@@ -61,7 +64,7 @@ class Story:
         events["text"] += list(columns.text)
 
     def _alarm_states(self, message: Any, time: float) -> None:
-        columns = TOPICS["alarm_states"].unpack(message)
+        columns = message if isinstance(message, AlarmColumns) else TOPICS["alarm_states"].unpack(message)
         before = self._last["alarms"]
         for place, number in enumerate(columns.number.tolist()):
             self.data["alarms"][number] = {name: _plain(getattr(columns, name)[place]) for name in _DECLARED}

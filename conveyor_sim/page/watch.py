@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The last seconds of a simulation, packed for the page while it runs, at the page's rates instead of the recorded."""
 
 from __future__ import annotations

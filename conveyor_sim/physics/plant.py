@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Scene -> Plant: the scene with its geometry, built once and handed down to effects, laws, arrays and the run."""
 
 import math

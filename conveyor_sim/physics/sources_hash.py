@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Version hashes: identify the sources that decide the bits of a run."""
 
 from functools import lru_cache

@@ -1,1 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reports of recordings: summary, figures, production, explanations of effects."""

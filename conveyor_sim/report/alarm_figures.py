@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Alarm statistics of a run: number of alarms, most in ten minutes, and active alarms at the end."""
 
 from collections import Counter, deque

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Alarms of a recording: for each one its occurrences, the time that it was active, and its state at the end."""
 
 from __future__ import annotations
@@ -20,6 +21,8 @@ from conveyor_sim.scene.parts.alarm import AlarmClass
 from conveyor_sim.support.printable import SENTENCE, printable
 
 CLASSES: tuple[str, ...] = get_args(AlarmClass)
+
+STATE_NAMES = {state.value: state.name.lower().replace("_", " ") for state in AlarmState}
 
 ENDS = ("alarm_cleared", "alarm_latched", "alarm_suppressed", "alarm_shelved", "alarm_out_of_service")
 """Kinds of events that end the time in which an alarm is active."""
@@ -102,7 +105,8 @@ def _row(id: str, times: _Times, end: float, states: AlarmColumns | None, index:
     counts = (times.raised, times.first, times.last, round(times.active, 9))
     if states is None or index is None:
         return AlarmRow(id, "", None, *counts, "", "")
-    state = AlarmState(int(states.state[index])).name.lower().replace("_", " ")
+    number = int(states.state[index])
+    state = STATE_NAMES.get(number, f"state {number}")
     text = printable(states.text[index], SENTENCE)
     return AlarmRow(id, printable(states.alarm_class[index]), int(states.priority[index]), *counts, state, text)
 

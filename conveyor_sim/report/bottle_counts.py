@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Numbers of bottles of a recording at a tick: the one set of counts of summaries, figures and reports."""
 
 from __future__ import annotations
@@ -15,8 +16,9 @@ from conveyor_sim.columns.events import EventColumns
 
 @dataclass(frozen=True)
 class BottleCounts:
-    """Numbers of bottles at one tick of a recording: `initial` + `fed` = `removed` + `present` + `held`.
+    """Numbers of bottles at one tick of a recording.
 
+    `initial` + `fed` + `spawned` = `removed` + `deleted` + `present` + `held`.
     Numbers that were not recorded are None: `present` and `held` without bottles, all but `present` without events.
     """
 
@@ -27,6 +29,10 @@ class BottleCounts:
     removed: int | None
     """Removed since then, rejected bottles included."""
     rejected: int | None
+    spawned: int | None
+    """Placed by inputs."""
+    deleted: int | None
+    """Removed by inputs."""
     held: int | None
     """Held in machines, which will give them back."""
     present: int | None
@@ -39,10 +45,14 @@ class BottleCounts:
         parts = [
             f"{self.initial} at the start" if self.initial else "",
             "fed and removed not recorded" if self.fed is None else f"{self.fed} fed, {self.removed} removed{rejected}",
+            f"{self.spawned} placed and {self.deleted} removed by inputs" if self.spawned or self.deleted else "",
             "" if self.present is None else f"{self.present} on the line",
             f"{self.held} held in machines" if self.held else "",
         ]
         return ", ".join(part for part in parts if part)
+
+
+_KINDS = ("bottle_fed", "bottle_removed", "bottle_rejected", "bottle_spawned", "bottle_deleted")
 
 
 class BottleCounter:
@@ -54,7 +64,7 @@ class BottleCounter:
         has_events: True if the recording has the topic `events`, even without a message.
         """
         self._has_events = has_events
-        self._ticks: dict[str, list[int]] = {"bottle_fed": [], "bottle_removed": [], "bottle_rejected": []}
+        self._ticks: dict[str, list[int]] = {kind: [] for kind in _KINDS}
         """Ticks of bottle events, ascending, by kind."""
         self._first_fed = math.inf
         self._unfed: set[int] = set()
@@ -64,8 +74,9 @@ class BottleCounter:
         """Add the next events of the recording."""
         for at, kind, bottle in zip(events.at.tolist(), events.kind, events.bottle.tolist(), strict=True):
             if kind in self._ticks:
-                self._ticks[kind].append(at)
-                if kind == "bottle_fed":
+                # An input is applied at the start of a scan, and seen in the state at its end.
+                self._ticks[kind].append(at + (kind in ("bottle_spawned", "bottle_deleted")))
+                if kind in ("bottle_fed", "bottle_spawned"):
                     self._first_fed = min(self._first_fed, bottle)
                 elif bottle < self._first_fed:
                     self._unfed.add(bottle)
@@ -80,11 +91,11 @@ class BottleCounter:
         present: bottles on the line at that tick; None if they were not recorded.
         """
         if not self._has_events:
-            return BottleCounts(None, None, None, None, None, present)
-        fed, left, rejected = (bisect_right(ticks, tick) for ticks in self._ticks.values())
+            return BottleCounts(None, None, None, None, None, None, None, present)
+        fed, left, rejected, spawned, deleted = (bisect_right(ticks, tick) for ticks in self._ticks.values())
         removed, initial = left + rejected, self._initial
-        held = None if present is None else initial + fed - removed - present
-        return BottleCounts(initial, fed, removed, rejected, held, present)
+        held = None if present is None else initial + fed + spawned - removed - deleted - present
+        return BottleCounts(initial, fed, removed, rejected, spawned, deleted, held, present)
 
     @cached_property
     def _initial(self) -> int:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Content of the page of `conveyor-sim check --watch`: plan of a scene, and its problems with their places."""
 
 from __future__ import annotations

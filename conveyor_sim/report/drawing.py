@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The pictures of a run, drawn by processes beside this one, which writes them."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Events of a recording (topic `events`), selected by kind, name and time, as a listing or as CSV."""
 
 from __future__ import annotations

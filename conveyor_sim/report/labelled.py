@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Lines with a label in a first column, as `check`, `run` and `accuracy` print them."""
 
 from conveyor_sim.support.printable import SENTENCE, printable

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Listings of records in plain text: one line per record where it fits; names are never broken."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Outline of a run in at most twelve lines: speed, bottles, forces, alarms, warnings, files."""
 
 from __future__ import annotations
@@ -75,7 +76,7 @@ def _with_warnings(lines: list[str], warnings: Sequence[str]) -> list[str]:
 
 
 def _bottles(summary: Summary) -> str:
-    floor = f" ({summary.on_floor} of them on no belt)" if summary.on_floor else ""
+    floor = f" ({summary.on_floor} of them on no belt)" if summary.on_floor and summary.belts else ""
     return f"{summary.bottles.sentence}{floor}"
 
 

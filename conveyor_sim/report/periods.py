@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Time periods of machines by category and stop reason."""
 
 from __future__ import annotations

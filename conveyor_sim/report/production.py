@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Production of a recorded line, read from its bag."""
 
 from __future__ import annotations
@@ -15,7 +16,9 @@ from conveyor_sim.bag.reader import Bag, Frame, open_bag
 from conveyor_sim.columns.counters import CounterColumns
 from conveyor_sim.errors import BagError
 from conveyor_sim.report.alarm_figures import AlarmFigures, AlarmTally
+from conveyor_sim.report.interval import counters_within
 from conveyor_sim.report.periods import Period
+from conveyor_sim.report.span import Times, span_of
 from conveyor_sim.support.printable import printable
 
 
@@ -41,6 +44,8 @@ class Production:
     """(n,), good bottles that had left the line by then, since the start of the recording."""
     forced: Sequence[str] = ()
     """Signals that were forced at any time."""
+    remark: str = ""
+    """Reason for the start, in words."""
 
 
 CATEGORY, REASON = "category", "stop_reason"
@@ -50,8 +55,12 @@ NO_REASON = "none"
 """Stop reason of a machine that has not stopped yet."""
 
 
-def read_production(path: Path) -> Production:
-    """Read a recording. Raises BagError for one without the topics `counters` and `events`."""
+def read_production(path: Path, times: Times | None = None) -> Production:
+    """Read a recording.
+
+    times: that the figures shall cover; None: the recorded counters, since their last reset. Raise BagError for a
+    recording without the topics `counters` and `events`, ConveyorError for times outside it.
+    """
     with open_bag(path) as bag, bag.sense():
         for topic in ("counters", "events"):
             _require(bag, topic)
@@ -62,30 +71,58 @@ def read_production(path: Path) -> Production:
                 "its line counts nothing, or its scene has outputs: {counters: 0}"
             )
         counters, end = frames[-1].data, frames[-1].time
-        follower, alarms = _Follower(frames[0]), AlarmTally()
+        follower, left = _Follower(frames[0]), list[int]()
+        exits = {tag.device for tag in bag.line.tags if tag.device_class in ("sink", "outfeed")}
+        raised: list[tuple[float, str, str]] = []
         for frame in bag.read("events"):
             end = max(end, frame.time)
             columns = frame.data
             changes = zip(columns.at, columns.kind, columns.name, columns.text, strict=True)
             for at, kind, name, text in changes:
-                alarms.event(bag.time(int(at)), kind, printable(name))
+                raised.append((bag.time(int(at)), kind, printable(name)))
+                if kind == "bottle_removed" and name in exits:
+                    left.append(int(at))
                 if kind == "machine_state":
                     follower.take(bag.time(int(at)), name, printable(text))
+        tick, periods = int(bag.line.tick_ns) * 1e-9, follower.finished(end)
+        span = None
+        # Recordings before format 3 keep the figures that they hold, unless times are given.
+        if times is not None and (bag.format >= 3 or times != Times()):
+            span = span_of(times, frames[0].tick, round(end / tick), left, tick)
+            periods = {name: _clipped(of, bag.time(span.start), bag.time(span.stop)) for name, of in periods.items()}
+            counters = counters_within(bag, span, frames, periods)
+        start, end = (frames[0].time, end) if span is None else (bag.time(span.start), bag.time(span.stop))
+        alarms = AlarmTally()
+        for event in raised:
+            if start <= event[0] <= end:
+                alarms.event(*event)
         for frame in bag.read("alarm_states") if bag.types.get("alarm_states") == TOPICS["alarm_states"].type else ():
-            alarms.states = frame.data
+            if frame.time <= end + 0.5 * tick:
+                alarms.states = frame.data
         good, resets = _accumulated(frames)
+        time = np.array([frame.time for frame in frames])
+        shown = (time >= start) & (time <= end)
+        if shown.sum() > 1:  # else the complete series, because a shorter one shows nothing
+            time, good = time[shown], good[shown]
         return Production(
             printable(bag.line.scene_name),
-            frames[0].time,
+            start,
             end,
             counters,
             resets,
-            follower.finished(end),
-            alarms.figures(end - frames[0].time, int(bag.line.tick_ns) * 1e-9),
-            np.array([frame.time for frame in frames]),
+            periods,
+            alarms.figures(end - start, tick),
+            time,
             good,
             forced_signals(bag),
+            "" if span is None else span.remark,
         )
+
+
+def _clipped(periods: Sequence[Period], start: float, stop: float) -> list[Period]:
+    """Return the parts of periods between two times, s."""
+    parts = [period._replace(begin=max(period.begin, start), end=min(period.end, stop)) for period in periods]
+    return [part for part in parts if part.end > part.begin]
 
 
 def _require(bag: Bag, topic: str) -> None:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Production report: tables, and figures with their paths."""
 
 from __future__ import annotations
@@ -17,12 +18,20 @@ from conveyor_sim.report.alarm_figures import WINDOW, AlarmFigures
 from conveyor_sim.report.periods import longest_stops, stop_reasons
 from conveyor_sim.report.production import Production, read_production
 from conveyor_sim.report.report import can_draw
+from conveyor_sim.report.span import Times
 from conveyor_sim.support.printable import SENTENCE, printable
 
 MOST = 10
 """Rows of the lists of reasons and of stops."""
 
-FACTORS = ("availability", "effectiveness", "quality", "oee")
+FACTORS = {
+    "availability": "availability",
+    "effectiveness": "effectiveness",
+    "at the set rate": "set_effectiveness",
+    "quality": "quality",
+    "OEE": "oee",
+}
+"""Columns of counters, by heading."""
 
 
 def render(production: Production) -> Group:
@@ -48,14 +57,16 @@ def _headline(production: Production) -> Table:
     counters, rows = production.counters, Table.grid(padding=(0, 2))
     left, good, rejected = (int(column[-1]) for column in (counters.processed, counters.good, counters.rejected))
     rows.add_row("scene", production.scene)
-    rows.add_row("recorded", f"{production.start:.2f} s to {production.end:.2f} s")
-    rows.add_row("counters", "since their last reset" if counters.since.any() else "since the start of the run")
+    remark = f" ({production.remark})" if production.remark else ""
+    rows.add_row("reported", f"{production.start:.2f} s to {production.end:.2f} s{remark}")
     rows.add_row("bottles", f"{left} left the line, {good} of them good; {rejected} were rejected")
     if counters.bottleneck:
         slowest = " and ".join(printable(name) for name in counters.bottleneck)
-        made = f"{_percent(counters.oee[-1])} of what the bottleneck makes in its planned busy time, running all of it"
-        rows.add_row("bottleneck", f"{slowest}: {3600.0 * counters.rate[-1]:g} bottles an hour")
-        rows.add_row("efficiency", made if left else "not known: no bottle has left the line")
+        fastest = f"at most {3600.0 * counters.rate_limit[-1]:g} bottles an hour"
+        set_rate = f"effectiveness {_percent(counters.set_effectiveness[-1])} at the set rate"
+        rows.add_row("bottleneck", f"{slowest}: {fastest}")
+        made = f"{_percent(counters.oee[-1])} of the fastest permitted rate; {set_rate}"
+        rows.add_row("OEE", made if left else "not known: no bottle has left the line")
     if production.forced:
         more = f" and {len(production.forced) - MOST} more" if len(production.forced) > MOST else ""
         rows.add_row("forced", f"{', '.join(production.forced[:MOST])}{more} (all figures are of the true values)")
@@ -81,9 +92,10 @@ def _times(counters: CounterColumns) -> Table:
 
 def _efficiency(counters: CounterColumns) -> Table:
     """Return the table of ratios derived from times and bottle counts."""
-    table = _table("efficiency", *FACTORS[:-1], "OEE")
+    table = _table("efficiency", *FACTORS)
     for row in _timed(counters):
-        table.add_row(printable(counters.name[row]), *(_percent(getattr(counters, factor)[row]) for factor in FACTORS))
+        ratios = (_percent(getattr(counters, factor)[row]) for factor in FACTORS.values())
+        table.add_row(printable(counters.name[row]), *ratios)
     return table
 
 
@@ -124,8 +136,11 @@ def _alarms(alarms: AlarmFigures, length: float) -> list[RenderableType]:
 def _definitions() -> Table:
     rows = Table.grid(padding=(0, 2))
     for name, text in DEFINITIONS.items():
-        rows.add_row(name.upper() if name in ("oee", "mtbf", "mttr") else name, text)
-    rows.add_row("line", "times and failures of its bottleneck, bottles that left the line")
+        heading = {"set_effectiveness": "at the set rate"}.get(name, name)
+        rows.add_row(name.upper() if name in ("oee", "mtbf", "mttr") else heading, text)
+    rows.add_row(
+        "line", "times, failures and effectiveness of its bottleneck, quality of all that left or were rejected"
+    )
     return rows
 
 
@@ -145,12 +160,15 @@ def _table(*headings: str) -> Table:
     return table
 
 
-def report_production(bag: Path, out: Path | None, no_pictures: bool) -> None:
-    """Print how the line in a recording produced, and draw it into a folder; None: one in that of the recording.
+def report_production(
+    bag: Path, out: Path | None, no_pictures: bool, start: float | None = None, stop: float | None = None
+) -> None:
+    """Print how the line in a recording produced, and draw it into a folder.
 
-    Raises BagError as `read_production`, ConveyorError if the pictures can't be written.
+    out: None for a folder in that of the recording. start, stop: times to cover, s; None: the end of the warm-up, and
+    the end. Raise BagError and ConveyorError as `read_production`, and ConveyorError if a picture can't be written.
     """
-    production = read_production(bag)
+    production = read_production(bag, Times(start, stop))
     Console(markup=False, highlight=False).print(render(production))
     folder = out or (bag if bag.is_dir() else bag.parent) / "report"
     if not no_pictures and can_draw():

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Output at the end of a run: outline, paths of page and figures; details on request."""
 
 from __future__ import annotations

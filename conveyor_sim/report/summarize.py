@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A run summed up while its bag goes by."""
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from conveyor_sim.scene import parse_again, parse_overrides
 from conveyor_sim.support.printable import SENTENCE, printable
 
 GUARD_TEXTS = 3
-SUMMED = ("bottles", "ledger", "damage", "damage_events", "outcomes", "guard", "events", "alarm_states")
+SUMMED = ("bottles", "ledger", "damage", "damage_events", "outcomes", "guard", "events", "alarm_states", "run_state")
 TAKEN = {TOPICS[name].type: TOPICS[name] for name in SUMMED}
 """Summarised topics by message type, because topics may have been renamed."""
 
@@ -98,7 +99,7 @@ class _Tally:
                 self._alarms.event(self._bag.time(int(at)), kind, printable(name))
         elif topic == "alarm_states":
             self._alarms.states = read
-        else:
+        elif topic == "outcomes":
             self._outcomes[bool(message.accepted)] += 1
             self._occasions += message.source == ARRIVAL  # which the line knows nothing of
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Summary of a run, equal for the node and for a run without ROS."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The tags of a scene, selected by name and kind, as a listing, as CSV or for JSON."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Answers to requests: results of other threads, and those of simulation_interfaces."""
 
 from __future__ import annotations

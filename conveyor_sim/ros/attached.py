@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`AttachedNode`: a controller that is a ROS node, attached to a simulation that a test steps.
 
 To the node, it looks like `sim_node` in lockstep: the latched topic `line` and the service `~/lockstep`. To the test,

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`Child`: a node of this package as a child process."""
 
 from __future__ import annotations

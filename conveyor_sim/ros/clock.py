@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Topic /clock: simulated time for all nodes with use_sim_time; warnings of other nodes that publish it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Subscriptions that command the line: `commands`, and `cmd_speed` of each belt and named drive."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Start of ROS in a process. Errors of rcl and DDS become one sentence."""
 
 from __future__ import annotations

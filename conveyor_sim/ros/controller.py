@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`ControllerRun`: a controller (conveyor_sim/control) as a ROS node beside a simulation, in lockstep or free.
 
 In lockstep, every scan is one call of the service `lockstep`: commands in, process image out. The first scan is at the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Executable `controller_node`: runs a controller, found by its name, beside the node `conveyor_sim`.
 
     controller_node --ros-args -p controller:=my_line.py:make -p parameters:="{table: accumulation}"

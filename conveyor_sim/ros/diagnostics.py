@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Topic /diagnostics: state and counts of the simulation, once per second of wall time."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Entities of a node that a thread of ours waits for and reads, without the executor of rclpy.
 
 The executor needs half a millisecond of a core between the arrival of a message and its callback. It rebuilds its wait

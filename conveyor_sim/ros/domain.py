@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Private ROS 2 domain on this machine: no other processes communicate with those started in it."""
 
 from __future__ import annotations

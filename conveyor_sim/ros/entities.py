@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Services of simulation_interfaces for entities: the bottles of the line are listed, spawned and deleted.
 
 An entity is a bottle, `bottle_<id>` unless the client that spawned it chose a name. Spawning and deleting are inputs of

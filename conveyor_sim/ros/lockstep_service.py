@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Service `lockstep`: translates conveyor_msgs/srv/Lockstep for run/lockstep.py. `Intake` takes its requests."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Main job (`make run`): the node and its controller as two processes in lockstep, recorded and drawn."""
 
 from __future__ import annotations

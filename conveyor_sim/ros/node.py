@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Node `conveyor_sim`: connects parameters, topics and services to the stepper, which makes all decisions."""
 
 from __future__ import annotations

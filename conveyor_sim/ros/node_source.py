@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`NodeSource`: a line that a node simulates, as a tag source, by the topics of the node."""
 
 from __future__ import annotations

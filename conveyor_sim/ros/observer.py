@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`Observer`: follows a simulation in another process: its time (/clock) and wall time (/diagnostics)."""
 
 from __future__ import annotations

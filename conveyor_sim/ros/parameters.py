@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Parameters of nodes, declared from a table and checked at the start and when set; those of `conveyor_sim`."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`RosSink`: publishes outputs with the same bytes that are recorded."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Quality of service set by parameters with the names of ROS: `qos_overrides./bottles.publisher.depth`.
 
 The checks keep what other parts rely on: publishers are reliable, latched topics stay latched, histories are bounded.

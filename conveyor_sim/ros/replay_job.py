@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`conveyor-sim replay --publish`: plays a recording to its end, with a progress bar and keys on a terminal."""
 
 from __future__ import annotations

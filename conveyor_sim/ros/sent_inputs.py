@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Fields of conveyor_msgs/Commands and Lockstep requests, translated from and to inputs."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Names of services: below the node's name (`~/pause`), and for one release as in 0.1 (`pause`)."""
 
 from __future__ import annotations

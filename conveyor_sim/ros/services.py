@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Services of simulation_interfaces that control the run, plus pause and resume; services for checkpoints.
 
 The installed version of simulation_interfaces decides which features exist (`FEATURES`).

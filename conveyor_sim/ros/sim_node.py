@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Executable `sim_node`: runs the node until Ctrl-C, SIGTERM, or a request to quit."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Action `simulate_steps` of simulation_interfaces: steps with feedback after each one, which can be cancelled."""
 
 from __future__ import annotations

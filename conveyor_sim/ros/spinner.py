@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`Spinner`: a SingleThreadedExecutor in a thread, with an orderly end."""
 
 from __future__ import annotations

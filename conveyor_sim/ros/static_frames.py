@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Topic /tf_static: a frame for each belt and each device with a place, named as in the scene (`photo_eyes/exit`)."""
 
 from __future__ import annotations

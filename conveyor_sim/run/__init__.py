@@ -1,1 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
 """Running a scene: the stepping thread, wall time, controllers, lockstep and playback."""

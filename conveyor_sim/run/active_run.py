@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`ActiveRun`: current run of a stepper, its state, and the advance that a client waits for.
 
 `Reception` hands commands to the line, and counts and logs their results.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`AlarmChanges`: alarms of a controller, given to the line with its commands when they change."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Functions of other threads, called by the stepping thread between two ticks in the order of their arrival."""
 
 from __future__ import annotations

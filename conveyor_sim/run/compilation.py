@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`Compilation`: a child process compiles the kernels of a scene.
 
 The compiler can't be interrupted, and it blocks every other thread. A process can be ended at any time. Its kernels

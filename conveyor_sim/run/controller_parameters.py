@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Parameters of a controller, from YAML text or a file."""
 
 from __future__ import annotations

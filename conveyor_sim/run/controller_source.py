@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`ControllerSource`: reference, parameters and recorded variables of a controller that a run loads."""
 
 from __future__ import annotations

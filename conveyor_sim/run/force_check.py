@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Forces reached in a run, compared with the forces that its time step and predicted error assume."""
 
 from __future__ import annotations

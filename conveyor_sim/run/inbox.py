@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`Inbox`: counts of the commands sent to a run, and limits on those that wait for the next tick.
 
 While the simulation is paused, no tick takes commands from the queue. Their number and bytes are therefore bounded.

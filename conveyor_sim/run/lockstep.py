@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Lockstep protocol: one owner advances the simulation to absolute ticks, and may repeat a request safely.
 
 A request is complete: it holds its owner, target tick and commands. A repeated request therefore means that its answer

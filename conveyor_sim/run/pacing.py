@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Simulated time against wall time: when the next tick is due, and how often messages may be sent.
 
 Callers pass wall times, as seconds of any steady clock.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`Playback`: the messages of a recording by tick, and the state at the target of a seek. `Player`: its replay."""
 
 from __future__ import annotations

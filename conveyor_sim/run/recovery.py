@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Command `recover`: repairs a recording, or makes one from the inputs that a killed test left."""
 
 from __future__ import annotations

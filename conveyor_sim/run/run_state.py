@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """State of a stepped run, and the log that it writes."""
 
 from enum import IntEnum

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`run_scene`: runs a scene without ROS at full speed, and records the bag that the node would record."""
 
 from __future__ import annotations

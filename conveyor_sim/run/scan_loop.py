@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The scan loop of all attached controllers: objects of this process, ROS nodes and PLCs.
 
 A scan reads the signals of a tick. Its commands act from the beginning of the next tick on.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One run of a scene, from tick 0 or a checkpoint to its end: its simulation, publishers and recording."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Speed of a run, measured or expected: three lines with the speed, its bound, and the change that helps."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`Stepper`: a thread that steps a simulation, and the requests that other threads may make of it.
 
 Only the stepping thread accesses the run. `call` returns a future to the requesting thread. Kernels release the GIL,

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The scene: a user's description of a line, read, validated and turned into shapes."""
 
 from conveyor_sim.scene.geometry import belt_shapes, initial_bottles, rail_shapes, surface_shapes

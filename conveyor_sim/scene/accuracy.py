@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Accuracy of a simulation: a preset, a tolerance, or an integrator with its time step."""
 
 from collections.abc import Mapping

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Directions of exact quarter turns. Sine and cosine of libraries leave 6e-17 at 90 degrees."""
 
 import math

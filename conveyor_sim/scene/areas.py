@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Areas of surfaces in a scene file: rectangles, and sectors of a ring."""
 
 from typing import Literal

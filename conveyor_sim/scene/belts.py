@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Belts of a scene file: straight ones, sectors of a ring with their rails, and paths of several surfaces."""
 
 from collections.abc import Iterator, Mapping

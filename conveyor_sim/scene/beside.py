@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Files that a scene names: read from its folder, or from a copy that a recording holds."""
 
 from collections.abc import Mapping

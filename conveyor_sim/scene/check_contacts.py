@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Checks of contacts: laws that exclude each other, restitution without closed form, tables that fall."""
 
 from collections.abc import Iterable, Iterator

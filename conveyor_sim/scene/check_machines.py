@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Checks of machines that take bottles: room for waiting bottles, belts, and other machines at the same place."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Checks of geometry, and of bottles that start or enter where something else is."""
 
 import math

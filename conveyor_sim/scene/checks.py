@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Checks beyond the schema: unknown names, missing pairs of materials, times that don't fit together."""
 
 import math

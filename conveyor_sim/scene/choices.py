@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Choices of a user among the versions of a scene, as overrides: values of parameters, a variant and a format."""
 
 from collections.abc import Iterable, Mapping

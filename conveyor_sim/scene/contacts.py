@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Pairs of materials in a scene file: contacts with their laws, and friction of bottles on belts."""
 
 from collections.abc import Mapping

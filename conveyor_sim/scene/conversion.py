@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Conversion of texts such as `33 mm` in the data of a part, by the units of its fields."""
 
 from collections.abc import Iterator, Mapping

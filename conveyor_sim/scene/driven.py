@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Speeds of belts, some of which are moved by named drives."""
 
 from conveyor_sim.scene.schema import Scene

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Drives in a scene file: of one belt, or with a name and several belts."""
 
 from collections.abc import Iterator

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Names of the effects in a scene file. `conveyor_sim/physics/effects/` declares them."""
 
 from typing import Annotated, Literal, get_args

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Failures and planned stops of machines in a scene file."""
 
 from collections.abc import Iterator

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Shapes of a scene: surfaces of belts and plates, rails and initial bottles. Pure functions; m and rad."""
 
 import math

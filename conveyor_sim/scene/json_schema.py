@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """JSON Schema (draft 2020-12) of scene files, with which editors complete, document and check them."""
 
 import re

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Limits of loads in a scene file. A load beyond a limit is an event (topic `damage_events`)."""
 
 from conveyor_sim.scene.part import Part

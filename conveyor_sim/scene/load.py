@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reading a scene: YAML and overrides to a validated Scene, or an error with file, line, field and value."""
 
 from collections.abc import Mapping

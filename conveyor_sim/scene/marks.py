@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Marks of a scene's devices in pictures."""
 
 from typing import get_args

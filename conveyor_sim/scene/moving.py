@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Shapes of moving rails at a position of their stroke. Pure functions; m and rad."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Search for overlapping circles, and for points near rails: by cells and boxes, vectorised."""
 
 from collections.abc import Iterator, Sequence

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Overrides: plain data that are laid over the data of a scene file."""
 
 import io

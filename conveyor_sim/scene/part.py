@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Base class of all mappings in a scene file."""
 
 from collections.abc import Mapping

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Place of a scene's field in its file."""
 
 from conveyor_sim.scene.load import reread

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Plates of a scene file: surfaces at rest, such as a dead plate between two belts."""
 
 from typing import Annotated

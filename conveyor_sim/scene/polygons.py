@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Polygons: points inside, and simplicity: no side without length, no two sides that meet."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`ProblemCount`: problems of one validation that are put into words, and problems that are only counted."""
 
 from collections.abc import Iterator

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Provenance of a scene's data: the file and line that each field of the read scene comes from."""
 
 from collections.abc import Mapping

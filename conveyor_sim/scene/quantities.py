@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Texts of quantities in a scene file: `33 mm`, `24 000 /h`, `gap/2 + 5 mm`.
 
 A text is an expression of + - * / and parentheses over numbers, units and parameters. It is computed in exact fractions

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Rails of a scene file: segments, polylines and arcs."""
 
 from typing import Annotated, Literal

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`Reading`: the plain data of a scene after all stages, with the place of each field."""
 
 from collections.abc import Iterable

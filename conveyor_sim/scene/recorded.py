@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Scene of recordings and checkpoints: an expanded one as YAML with every value explicit, and its source files."""
 
 from pathlib import PurePath

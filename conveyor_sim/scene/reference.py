@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Tables of fields in docs/scene.md and docs/parts/, generated from the schema."""
 
 from collections import Counter

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Error for the problems of a file: one line per problem, in the order of the file."""
 
 from collections.abc import Callable, Iterable

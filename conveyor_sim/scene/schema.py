@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The scene: a user's description of a line, typed. SI units, angles in rad.
 
 A scene is read with `load_scene`; tables in `docs/scene.md` and `docs/parts/` are generated from the fields below.
@@ -172,6 +173,8 @@ class Origin:
     """Overrides and the content of other files, as YAML. With the text, it gives the scene without these files."""
     streams_by_index: bool = False
     """True if random streams are keyed by places in lists, as in old recordings, and not by names."""
+    counts_starts: bool = False
+    """True if machines count started cycles and work while they wait, as in recordings before format 3."""
     files: Mapping[str, str] = field(default_factory=dict, compare=False)
     """Texts of the files that an expanded scene was read from beside its own, by path from its folder."""
     is_expanded: bool = field(default=False, compare=False)
@@ -366,6 +369,11 @@ class Scene(Part):
     def streams_by_index(self) -> bool:
         """True if random streams are keyed by places in lists, as in old recordings, and not by names of devices."""
         return self._source.streams_by_index
+
+    @property
+    def counts_starts(self) -> bool:
+        """True if machines count started cycles and work while they wait, as in recordings before format 3."""
+        return self._source.counts_starts
 
     @property
     def layout(self) -> LayoutPlan | None:

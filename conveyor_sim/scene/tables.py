@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Tables of contacts in CSV files that a scene names."""
 
 import csv

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Regular expressions of the texts that a field takes by its unit, for the JSON Schema of a scene.
 
 A schema cannot evaluate expressions. A single number with a unit must fit the dimension of the field. An expression

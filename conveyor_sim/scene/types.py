@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Types of values in a scene, each with the words for what is expected."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Underlays of a scene file: an image or a drawing that is shown below the plan."""
 
 import base64

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Units of the texts in a scene file, and the dimensions that they measure.
 
 An angle is a separate dimension, so that degrees can't pass for a plain number. `pint` would do the same, but its

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Sentences for pydantic's errors: value, expectation, unit."""
 
 import difflib

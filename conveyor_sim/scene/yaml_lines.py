@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """YAML text to plain data, with the line of every key.
 
 libyaml parses the text, and values without quotes are read by YAML 1.2 (https://yaml.org/spec/1.2.2): `on` is a text,

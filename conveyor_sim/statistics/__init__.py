@@ -1,1 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
 """Statistics of runs: confidence intervals, paired differences, warm-up, batch means, multiple comparisons."""

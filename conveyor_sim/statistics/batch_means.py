@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Batch means: confidence interval of a mean from one long run with autocorrelated values.
 
 The run is cut into batches. Their length is doubled until von Neumann's ratio accepts the batch means as independent

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Comparisons of the points of a study by paired differences, corrected for their number.
 
 Both points of a pair run with the same seeds (common random numbers), so a machine that fails early does so in both

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Confidence intervals of means and of the ratio of two means, and the runs that a narrower interval takes."""
 
 from __future__ import annotations

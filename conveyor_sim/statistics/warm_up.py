@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Warm-up removal: length of the initial transient of a run.
 
 Rule MSER-5 (White 1997; White, Cobb and Spratt 2000): average five successive values at a time. Of these means, leave

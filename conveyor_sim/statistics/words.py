@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Sentences about means and differences, with their significance."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Studies: a scene asked many questions, over points and seeds, on one machine or on many.
 
 from pathlib import Path

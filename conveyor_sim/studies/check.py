@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A study looked over before its runs: what would fail in many of them is said once, and where."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Python code of a study: functions in files or modules, located relative to its folder, and optional packages."""
 
 from __future__ import annotations

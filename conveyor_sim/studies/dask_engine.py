@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Workers of Dask as the engine of a study: on this machine, or wherever a scheduler has them."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Experimental designs: the points of a study, each with one value per parameter."""
 
 from __future__ import annotations

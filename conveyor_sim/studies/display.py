@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Progress display of a running study: remaining time, and its table as it grows."""
 
 from __future__ import annotations

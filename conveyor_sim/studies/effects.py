@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Metrics against parameters: means over seeds and points, main effects, interactions, Sobol indices."""
 
 from __future__ import annotations

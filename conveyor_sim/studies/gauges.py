@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Gauges: observers that compute one metric each, from the end of a run's warm-up to its end."""
 
 from __future__ import annotations

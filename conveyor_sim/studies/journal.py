@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Folder of a study: one file per finished run, so that no finished run is lost."""
 
 from __future__ import annotations

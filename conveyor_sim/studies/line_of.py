@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The line of a run: a scene with the values of its parameters laid over it, and its controller."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reads a study: YAML in, all that its runs need out, or an error that names file, line, field and value."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Metrics of a run, by their names in a study."""
 
 from __future__ import annotations
@@ -73,7 +74,7 @@ def _tag(take: str) -> Callable[[Simulation, str], Gauge]:
 
 WORDS: Mapping[str, _Word] = {
     "efficiency": _Word(
-        "OEE of the line against its bottleneck, or of a device",
+        "OEE of the line, or of a device",
         "1",
         _counter("oee"),
         "[device]",
@@ -81,7 +82,7 @@ WORDS: Mapping[str, _Word] = {
     ),
     "availability": _Word("time running / planned busy time", "1", _counter("availability"), "[device]"),
     "effectiveness": _Word(
-        "processed bottles / (nominal rate x time running)", "1", _counter("effectiveness"), "[device]"
+        "completed cycles / (fastest permitted rate x time running)", "1", _counter("effectiveness"), "[device]"
     ),
     "quality": _Word("good / processed bottles", "1", _counter("quality"), "[device]"),
     "throughput": _Word(

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Origin of the runs of a folder: `study.json`, and the same fields in each file of a run."""
 
 from __future__ import annotations

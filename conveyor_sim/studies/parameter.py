@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A parameter of a study: what varies, and over which values."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The table of a study, a row a run, with units, and what it is of."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A run of a study: what is asked of it, and what came of it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One run of a study, from the scene to its metrics: the same bits wherever it is made."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Files of a study folder: one per finished run, with row, origin and checksum, and the file of units."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The runs of a study: those in its journal, and an engine that makes the others."""
 
 from __future__ import annotations

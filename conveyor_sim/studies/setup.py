@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Common part of all runs of a study, as sent to the worker processes."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A study as its YAML file says it: what varies, how often each point is run, what is asked of a run."""
 
 from __future__ import annotations

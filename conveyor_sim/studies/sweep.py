@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A study from its first run to its last: batches of runs, and between them the decision which points need more."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Table of a study so far: one line per point, with the mean and confidence interval of each metric."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Best points of a study, and those that don't differ significantly from them, in sentences."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """JSON files that a later command reads back: bounded, strict, and ended by a checksum over every byte before it.
 
 A file ends in `"sha256": "<64 digits>"}`. The digits are the SHA-256 of all bytes in front of them. The checksum finds

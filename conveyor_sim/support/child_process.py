@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Child processes, which end with their parent at the latest, even if that is killed.
 
 `start_python` runs a module of this package that talks over pipes, `Process` any command with a log file.

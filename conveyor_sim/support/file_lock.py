@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Locks between processes: flock(2) on an open file or folder. It ends with the process that holds it."""
 
 from __future__ import annotations

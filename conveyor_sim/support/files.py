@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Files with paths from users: read up to a limit, written atomically, and confined to a folder on request.
 
 A path may lead to a pipe without a writer, to a device without end, or by a link out of the folder. So a path is first

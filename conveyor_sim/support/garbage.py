@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Control of Python's garbage collection."""
 
 from __future__ import annotations

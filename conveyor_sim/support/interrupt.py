@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Ctrl-C ends a command with one line and the exit status of shells, never with a traceback.
 
 Import this before anything heavy, so that it also holds during those imports.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Start of a command that ends with the process that started it. `child_process.Process` runs it as follows.
 
     python -I -S lifeline.py DESCRIPTOR PATIENCE COMMAND...

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Description of this machine, for measurements."""
 
 from __future__ import annotations

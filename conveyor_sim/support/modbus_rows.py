@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Modbus map: table, address and type of each tag, with the CSV file that stores it and the encoding of values.
 
 Modbus has four tables, of bits and of 16-bit words, and neither names nor types nor units: a client is configured

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Foreign text (names, paths, IDs) made safe for logs, answers and tables."""
 
 MOST = 200

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Folders of the files that ship beside the code: scenes (config/), examples and message definitions (msg_defs/)."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Limits as a sender with fewer digits states them: the REAL nearest to 0.6 is 0.60000002384, and means 0.6."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Signals that request the end of a process: the first is handled, the second ends it even if it hangs."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Ctrl-C, SIGTERM and a closed terminal as a request that a thread waits for.
 
 A KeyboardInterrupt would be lost wherever Python ignores exceptions.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Pool of processes that end with this one; the death of one affects no other task."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Tests of control logic on a simulated line: `Scenario`, and the pytest fixture `line` that makes them.
 
     def test_the_table_is_emptied(line):

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Texts of conditions: as the test wrote them, and in words without Python."""
 
 from __future__ import annotations
@@ -6,10 +7,13 @@ import ast
 import inspect
 import re
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from types import CodeType
 from typing import Any
 
 _PLAIN = (str, int, float)
+_LONGEST = 200
+"""Longest text of a constant that replaces its name."""
 _SIGNS = {" <= ": " ≤ ", " >= ": " ≥ ", " != ": " ≠ ", " == ": " = "}
 _TEXTS = re.compile(r"""('(?:[^'\\]|\\.)*'|"(?:[^"\\]|\\.)*")""")
 
@@ -27,7 +31,10 @@ def words_of(condition: Callable[..., Any]) -> str:
 
     Signals are named without brackets, and names of constants are replaced by their values. A function is its name.
     """
-    texts = {_in_words(node, condition) for node in _lambdas(condition)[0]}
+    try:
+        texts = {_in_words(node, condition) for node in _lambdas(condition)[0]}
+    except RecursionError:  # of a very deep expression
+        return text_of(condition)
     return " or ".join(sorted(texts)) or _name(condition).replace("_", " ")
 
 
@@ -66,8 +73,7 @@ def _constants(node: ast.Lambda) -> set[object]:
 
 def _in_words(node: ast.Lambda, condition: Callable[..., Any]) -> str:
     arguments = [argument.arg for argument in (*node.args.posonlyargs, *node.args.args)]
-    known = inspect.getclosurevars(condition)
-    constants = {**known.globals, **known.nonlocals}
+    constants = _constants_of(condition)
     defaults = getattr(condition, "__defaults__", None) or ()
     if defaults:
         constants.update(zip(arguments[-len(defaults) :], defaults, strict=True))
@@ -79,6 +85,16 @@ def _in_words(node: ast.Lambda, condition: Callable[..., Any]) -> str:
     return "".join(parts)
 
 
+def _constants_of(condition: Callable[..., Any]) -> dict[str, Any]:
+    """Return the values of the names that a function uses, without those that are not assigned."""
+    code, scope = condition.__code__, condition.__globals__
+    constants = {name: scope[name] for name in code.co_names if name in scope}
+    for name, cell in zip(code.co_freevars, condition.__closure__ or (), strict=True):
+        with suppress(ValueError):  # the cell is empty
+            constants[name] = cell.cell_contents
+    return constants
+
+
 class _Words(ast.NodeTransformer):
     """Replaces constants by their values, and `s["name"]` by the name."""
 
@@ -87,7 +103,8 @@ class _Words(ast.NodeTransformer):
 
     def visit_Name(self, node: ast.Name) -> ast.AST:
         value = self._constants.get(node.id)
-        return ast.Constant(value) if isinstance(value, _PLAIN) and node.id != self._signals else node
+        is_short = isinstance(value, _PLAIN) and len(str(value)) <= _LONGEST
+        return ast.Constant(value) if is_short and node.id != self._signals else node
 
     def visit_JoinedStr(self, node: ast.JoinedStr) -> ast.AST:
         parts = [part.value if isinstance(part, ast.FormattedValue) else part for part in node.values]

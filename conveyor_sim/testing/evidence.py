@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Files saved from a failed scenario: its bag, a page of its last seconds, a picture of the moment of failure.
 
 The folder with the inputs of a running test stays if the test is killed.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Protocol servers of lines under test. They run in one thread until the test ends."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`ScenarioHistory`: every signal, command, fault and alarm at every tick of a scenario, as arrays."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Soft PLCs as controllers of a line under test: `AttachedPlc` is a client of the test, `ServedPlc` a server.
 
 A PLC runs in lockstep by two tags (protocols/tags/handshake.py), so its speed does not change the bits of the test.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Plugin of pytest: fixtures (`line`, `warm_start`, `modbus`, `opcua`), and files of tests that fail or are killed.
 
 pytest loads it in every run by the entry point pytest11. Modules of the simulation are therefore imported when a test

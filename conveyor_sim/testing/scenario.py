@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`Scenario`: a line with a controller, run in simulated time by a test that evaluates conditions at every tick."""
 
 from __future__ import annotations

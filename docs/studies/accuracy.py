@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The numbers behind docs/accuracy.md: runs the real command on the scenes below and renews the page's tables.
 
     make accuracy                                   # all scenes, up to 5 min of two processors each

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Effect of a ring under bottles, compared with a point, on shipped scenes: scuffing and flow.
 
     python docs/studies/base_radius.py        (about 10 minutes; writes base_radius.csv beside itself)

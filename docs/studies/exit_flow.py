@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Regularity of the exit flow of the paper's plant, over guide angles, table speeds, time steps and integrators.
 
     python docs/studies/exit_flow.py        (about 3 minutes; writes exit_flow.csv beside itself)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Cost of reading a scene of very many bottles (docs/reliability.md): core time and memory, each in a process.
 
 python docs/studies/large_scenes.py

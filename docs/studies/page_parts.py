@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The parts of a page that are made by a study: between markers, all else is written by hand."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Pictures of the pages in docs/parts/: python docs/studies/part_pictures.py [NAME ...].
 
 Each page has a scene as YAML. The scene is simulated until MOMENT, and drawn with the forces between bottles.

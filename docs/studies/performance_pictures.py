@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Pictures of docs/performance/ from its raw numbers: python docs/studies/performance_pictures.py.
 
 Needs matplotlib and Pillow, as the tests do.

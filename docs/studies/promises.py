@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Promised, predicted and measured: presets on all shipped scenes and on fifteen that nothing was fitted to.
 
     make promises                       # all scenes, two processes: 5 minutes, 25 where kernels are compiled first

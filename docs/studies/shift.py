@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A shift of eight hours on a line of a filler, two stations, accumulation and a packer: what its report says.
 
 python docs/studies/shift.py        (about 5 minutes; writes shift.csv and shift_stops.csv beside itself, and the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The numbers behind docs/stability.md: runs the table of hard cases in all settings, and renews the page.
 
     make stability                                  # all of it, about a quarter of an hour on two free cores

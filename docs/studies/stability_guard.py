@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Cost of the guard: its share of the time of ticks, on some scenes.
 
 The parts are timed within one run, so the share hardly depends on the load of the machine.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """An hour of the paper's plant: counts, energy, memory and pace once a minute; and what denormal numbers cost."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Recordings that are killed (SIGKILL), at full speed and at real time: what is lost, and whether the rest replays.
 
 python docs/studies/stability_kills.py        # the study alone, into docs/stability/kills.csv: some minutes

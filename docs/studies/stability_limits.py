@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Largest stable step over the bound by which the time step is chosen.
 
 Each scene is limited by one stability bound. If the bound is half of a limit in closed form, a method as stable as the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The matrix of docs/stability.md: every row of the table of hard cases, by set of effects, integrator and preset.
 
 A run may do so much work and no more: what would take longer ends early, and is listed with the time that it reached.

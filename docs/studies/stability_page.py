@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The tables and the picture of docs/stability.md, and the page of all cases, from the figures in docs/stability/."""
 
 from __future__ import annotations

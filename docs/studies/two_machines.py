@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Two machines that fail, and the conveyor between them: the simulated line against the closed form.
 
     python docs/studies/two_machines.py     (about 2 minutes; writes two_machines.csv beside itself)

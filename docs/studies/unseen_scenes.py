@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Scenes from a seeded generator, to hold the presets to their promise where nothing was fitted.
 
 The generator came after the bounds on the time step were settled. Layouts and effects take turns, so that all are

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The pictures of the page in docs/ and README: python docs/studies/view_pictures.py [NAME ...].
 
 Each named state of the page is shown in four sizes of the window and two themes (docs/images/page). Needs playwright,

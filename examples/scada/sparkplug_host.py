@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A host application of MQTT Sparkplug B: shows the values of a line as they change, and gives commands.
 
 python examples/scada/sparkplug_host.py zoned_line/zoned_line                              # all values

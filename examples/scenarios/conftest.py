@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Checks of every line in these scenarios: the guard reports nothing, and strong sustained forces are known."""
 
 from collections.abc import Iterator

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Two ways to combine two lanes into single file, for a machine that needs two bottles a second.
 
 With pressure: a backlog is pressed between converging rails and leaves nose to tail. Without: the lanes slide along a

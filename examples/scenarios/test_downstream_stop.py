@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The packer stops for a minute: the filler goes on, nothing is lost, nothing is pressed, and the line recovers.
 
 Run it by hand: `pytest examples/scenarios/test_downstream_stop.py`.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A photo-eye that fails is found: the right alarm, and a line that is held, within three seconds.
 
 Run it by hand: `pytest examples/scenarios/test_failing_eye.py`.

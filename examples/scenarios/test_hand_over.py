@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """An operator takes a conveyor to manual, the controller is refused there, and hands it back without a jump.
 
 Run it by hand: `pytest examples/scenarios/test_hand_over.py`.

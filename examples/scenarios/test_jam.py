@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Two bottles wedged in a mouth are alarmed within five seconds; ten minutes of bottles nose to tail raise no alarm.
 
 And what clears the wedge: the belt runs back, then jogs. Run it by hand: `pytest examples/scenarios/test_jam.py`.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A small packaging line, laid out by conveyors: throughput, rejection of bad bottles, and a stop of the packer.
 
 Run it by hand: `pytest examples/scenarios/test_small_packaging.py`.

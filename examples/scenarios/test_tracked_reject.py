@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Bad bottles are thrown out 1.2 m behind the camera while the belt's speed changes 4 : 1, and no good one is.
 
 Run it by hand: `pytest examples/scenarios/test_tracked_reject.py`.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A drive trips: one alarm comes, what follows from it does not, and when it is reset nothing is left of it.
 
 Run it by hand: `pytest examples/scenarios/test_trip.py`.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A capper that jams and misses caps: what the checkweigher finds is thrown out, and the line waits and goes on.
 
 Run it by hand: `pytest examples/scenarios/test_two_stations.py`.

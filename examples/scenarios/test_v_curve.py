@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """After a stop of the filler its buffer is short: it runs faster than the bottleneck until the level is back.
 
 How long that takes follows from the V-curve: bottles short / difference of rates. Run it by hand:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A line of two machines that fail, and a conveyor of any length between them: for the study beside it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A study as it could come out of the paper's plant, made up by rules of thumb, for what draws and writes studies."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The answer of a study: the cheapest setting that keeps the tolerance and that long runs did not refute."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A setting written into a copy of a scene."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Errors in closed forms: every law that has one, in one scene, under every integrator."""
 
 import math

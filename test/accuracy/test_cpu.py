@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Processor time is what a study counts, and compiling is counted apart."""
 
 from __future__ import annotations

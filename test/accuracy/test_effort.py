@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a study may take, and what is left of it: processor time alone, so a busy machine changes neither."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Long runs over processes: equal results from any process, and no run lost or repeated after a kill."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Acceptance by equivalence: its error rates on processes of known mean and variance, and what can't be compared.
 
 A study is one observable here: two thousand of them are the two thousand observables of the same runs.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Moving rails move in a study."""
 
 from __future__ import annotations

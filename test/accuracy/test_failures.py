@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Settings that fail: each with a scene that provokes it, and one that must not be told."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Pictures of an accuracy study show its numbers, and their texts can be read."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Files of studies: a written study is read back equal; damage is reported with the file and the expectation."""
 
 from __future__ import annotations

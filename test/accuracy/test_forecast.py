@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Predictions for settings before anything runs."""
 
 from __future__ import annotations

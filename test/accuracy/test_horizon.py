@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How long trajectories can be compared, on cases where the growth of a nudge follows from geometry."""
 
 import math

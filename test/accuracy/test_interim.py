@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Answers on the way: each says how it is known, and what is not yet known of it."""
 
 from __future__ import annotations

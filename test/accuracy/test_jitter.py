@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Seeds: small, reproducible, different from each other, and never an overlap."""
 
 from typing import Any

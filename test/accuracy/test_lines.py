@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The first three lines of an answer: what a line engineer can act on without a word about integrators."""
 
 from __future__ import annotations
@@ -85,6 +86,14 @@ def test_a_scene_that_never_settles_says_so() -> None:
     rest = replace(of.rest, setting=None, reason="the forces that last were still changing at 9 s")
     never = replace(of, rest=rest, answer=replace(of.answer, resting=None))
     assert missing(three_lines(never)[0], ["1 %", rest.reason, "predicted", "0.042 %"]) == []
+
+
+def test_a_predicted_error_is_never_zero() -> None:
+    of = study()
+    assert of.answer is not None
+    points = tuple(replace(point, predicted_resting=0.0) for point in of.points)
+    forces = three_lines(replace(of, points=points, rest=None, answer=replace(of.answer, resting=None)))[0]
+    assert missing(forces, ["Resting load", "predicted error below 0.01 %"]) == []
 
 
 def test_no_answer_is_three_lines_too() -> None:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Observables of runs that can be worked out by hand: queues, flows, an impact, a fill."""
 
 import math

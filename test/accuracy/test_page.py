@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The programs that make docs/accuracy.md; that it is up to date is checked by `make docs-check`."""
 
 from __future__ import annotations

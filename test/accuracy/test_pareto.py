@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The front holds what nothing beats, and nothing else."""
 
 from __future__ import annotations

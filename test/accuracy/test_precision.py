@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Errors on a scene against its reference, where a closed form says what they must be."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The presets keep their promise on scenes that nothing was calibrated on.
 
 docs/accuracy.md shows the same for the scenes that it is made from.

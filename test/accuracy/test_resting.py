@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The measure of resting load: closed forms, impacts left out, scenes that never settle."""
 
 from __future__ import annotations

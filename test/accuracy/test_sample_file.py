@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Finished runs on disk: read back as they were, cut where a kill cut, refused where they are of something else."""
 
 import json

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Answers that a user sees while a study runs, in order, and the answer after Ctrl-C at any moment."""
 
 from __future__ import annotations

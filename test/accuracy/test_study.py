@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A study as a whole: its parts fit, and one that was killed goes on to the same tables."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Tables say what the rows say, in numbers for people, in the terminal and in Markdown alike."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The small line, and a recording of it."""
 
 from collections.abc import Callable

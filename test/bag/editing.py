@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Bags that are another bag with some of its messages changed."""
 
 from collections.abc import Callable

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Columns made by hand, with values that are all different."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """MCAP files in any form that the specification allows: https://mcap.dev/spec.
 
 `conformance_forms` gives the forms that the MCAP project's conformance suite describes (tests/conformance/variants).

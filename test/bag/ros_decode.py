@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Decodes messages with ROS itself and compares them with rosbags' objects."""
 
 from typing import Any

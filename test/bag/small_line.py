@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The small line of these tests, and a recording of it with commands of every kind."""
 
 from pathlib import Path

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Alarms are recorded with their states, and replayed without the controller that declared and said them."""
 
 from collections.abc import Mapping

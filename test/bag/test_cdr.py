@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Serialized messages have the bytes that rosbags makes of the same values."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Loads of bottles and rails, and exceeded limits, are part of the bag, the summary and the figures."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Events of a line are recorded, read back, and replayed to the same events."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Bags as other recorders write them and as accidents leave them: without an index, in several files, still growing."""
 
 from __future__ import annotations

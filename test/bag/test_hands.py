@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Modes, owners and forces in a recording: replayed bit for bit, and forced counters do not falsify its summary."""
 
 import shutil

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Recordings of scenes in the layout language: the expanded scene, with its source files attached."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The copy of the line message after the header: damage of the chunk that holds the line costs no message."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A recorded line whose machines fail, stop by plan and hold bottles replays bit for bit, from a checkpoint too."""
 
 import shutil

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Markers that RViz2 and Foxglove can draw."""
 
 from typing import Any

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Every form of MCAP that the specification allows is read as the mcap library reads it, and is called intact."""
 
 from __future__ import annotations

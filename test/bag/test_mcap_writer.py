@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """MCAP files of recordings, read back by the `mcap` library."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Columns become messages that rosbags and ROS decode to the same values."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """metadata.yaml: readable by every parser, and not parsed if it equals the record in the recording's file."""
 
 from pathlib import Path

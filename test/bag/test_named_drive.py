@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A recorded line with a named drive replays exactly, and its commands can be played back."""
 
 from pathlib import Path

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Topics are written at their ticks, and only if a sink wants them."""
 
 from collections.abc import Callable

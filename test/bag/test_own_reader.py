@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Recordings of this package read without rosbags: every byte and every number as rosbags has them."""
 
 from __future__ import annotations

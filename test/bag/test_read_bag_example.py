@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The example that reads a bag, run as a user does: with rosbags alone."""
 
 import subprocess

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A bag comes back as the columns that were recorded."""
 
 from pathlib import Path

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The scene of a recording draws what it drew when it was recorded."""
 
 from types import SimpleNamespace

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Bags that every reader accepts, and clear refusals where nothing can be written."""
 
 import re

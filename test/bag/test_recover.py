@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Bags that end in the middle are repaired, with everything that was written."""
 
 import os

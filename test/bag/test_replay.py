@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Recorded lines run again to the same bits; where they do not, the first difference is found."""
 
 from collections.abc import Callable, Iterator

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Bags whose storage is not MCAP: read where rosbags can, else a sentence names the storage and the way to MCAP."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Recordings of lines with path belts, right-hand bends and plates."""
 
 from pathlib import Path

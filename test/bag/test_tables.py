@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Recordings as tables, read back by pandas, polars, duckdb and pyarrow."""
 
 import math

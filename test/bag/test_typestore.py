@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Message types without ROS agree with the ones ROS has built."""
 
 import json

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Damage is detected: no flipped bit is called intact or replayed; valid chunks are kept, losses are reported."""
 
 from __future__ import annotations

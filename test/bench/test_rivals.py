@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What our engine is compared with does the same work: the same forces on the same packed bottles, and it is packed."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The scenes that are timed are what the tables say of them."""
 
 from pathlib import Path

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Controllers scanned by hand, and the signals that bottles on a belt would make."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Declarations of alarms by controllers."""
 
 import json
@@ -7,6 +8,7 @@ import pytest
 from control.test_jam import alarm
 from facts import stating
 
+from conveyor_sim.bag.messages.typestore import typestore
 from conveyor_sim.control import Alarm, Constant, ControlError, priority, together
 from conveyor_sim.control.jam import JamClearing
 from conveyor_sim.control.scan import declared_alarms
@@ -35,6 +37,11 @@ def test_the_fields_and_their_defaults_are_those_of_the_line() -> None:
     assert {"id", *AlarmFields.model_fields} == set(vars(A))
     for name, field in AlarmFields.model_fields.items():
         assert getattr(A, name) == field.default, name
+
+
+def test_the_fields_are_those_of_the_message() -> None:
+    names = {name for name, _ in typestore().fielddefs["conveyor_msgs/msg/Alarm"][1]}
+    assert names - {"has_high", "has_low"} == set(vars(A))
 
 
 def test_one_that_declares_nothing() -> None:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Function blocks by the timing diagrams of IEC 61131-3, in scans of 0.1 s."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Cascade stop and start of three belts in a row."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Edges of a photo-eye between two scans."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Plausibility checks of a photo-eye: bottles on a belt by kinematics, and faults of the eye."""
 
 from __future__ import annotations

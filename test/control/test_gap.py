@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Gap control: bottles from a metering belt onto a faster one, by kinematics."""
 
 from __future__ import annotations

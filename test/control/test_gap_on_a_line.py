@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Gap control on a line: bottles that arrive nose to tail leave with the set gap."""
 
 from __future__ import annotations

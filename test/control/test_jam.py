@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Jam alarm and clearing, by tables of scans."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Level control of a table, by tables of scans."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Controllers in checkpoints: a line saved with its controller continues with the same bits."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Tracked reject, while the belt's speed changes 4 : 1."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Combined controllers."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """V-curve around a filler: one machine before it, two behind."""
 
 from __future__ import annotations

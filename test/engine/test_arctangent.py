@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Arctangent formula for vectorised loops."""
 
 import math

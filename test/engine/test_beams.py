@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Paths through a tick, and when a circle on one of them crosses a segment: against samples and closed forms."""
 
 from __future__ import annotations

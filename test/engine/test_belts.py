@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The belt that carries a bottle: the last listed one under the axis, else the floor; by search and within the skin."""
 
 import math

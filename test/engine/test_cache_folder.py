@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Folder of compiled kernels: no other user can add a file to it."""
 
 import os

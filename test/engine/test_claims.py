@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Claims: if several processes need a kernel at the same time, one compiles it."""
 
 import signal

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Compiled kernels are cached on disk, and never used for sources that have changed."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Force in one contact: each law by itself, and their sums."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The list of contacts agrees with the forces that act."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Normal force from a table."""
 
 import numpy as np

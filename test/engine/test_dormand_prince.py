@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The reference integrator: against SciPy's, against closed forms, with jumps of the force and with NaN."""
 
 from __future__ import annotations

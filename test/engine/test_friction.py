@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The regularised friction law, its two curves, and its implicit solution."""
 
 import math

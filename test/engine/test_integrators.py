@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Integrators, in one step and many, on forces with known motion."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Files of compiled kernels: a faulty file is compiled again."""
 
 import os

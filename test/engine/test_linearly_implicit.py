@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The linearly implicit method: exact energy in a lasting contact, momentum, and steps far beyond explicit limits."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Verlet lists contain all touching pairs until a bottle has moved by half the skin."""
 
 import math

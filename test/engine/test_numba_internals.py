@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Assumptions about numba's internals, one per test. Each test names the sources of numba that it is about.
 
 Other tests carry such names too, where the behaviour of kernels shows the assumption: `grep -rn relies_on test`.

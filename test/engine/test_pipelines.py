@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Extensions of numba's compiler: groups by address, pruned absent members, parts compiled for their reads."""
 
 import copy

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Rails: nearest point of the piece, end points included; joined pieces push once; no contact beyond an end."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Members of groups that functions read: by local names, through callees, and entirely in doubt."""
 
 # These functions are parsed, never run.

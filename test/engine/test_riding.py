@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Riding bottles are not stepped. Nothing else differs: no bit of any observation, and none after they wake."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Friction of a base that is a ring, against quadrature over its points."""
 
 import math

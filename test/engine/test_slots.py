@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Forces by pair, summed by bottle through slots: equal to a loop over all pairs, for any number of neighbours."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Tangential springs are state: they survive rebuilds and longer lists, and leave with their bottle."""
 
 from __future__ import annotations

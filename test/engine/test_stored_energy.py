@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Energy of contacts: closed forms of the laws, and the potential of rails that push together."""
 
 import math

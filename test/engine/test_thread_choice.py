@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Choice of threads by the durations of ticks, which are given here instead of measured."""
 
 from collections.abc import Callable

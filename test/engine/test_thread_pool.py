@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Threads give the same bits in any number."""
 
 from __future__ import annotations

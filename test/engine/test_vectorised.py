@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Loops over the laws are vectorised: several pairs per instruction, which gives most of the engine's speed.
 
 LLVM gives up silently at a branch, a call, or too many arrays. A vectorised loop has a block that LLVM names

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The long run: `make fuzz ARGS="--minutes 60"`. The targets in turn, each portion in a process of its own."""
 
 from __future__ import annotations

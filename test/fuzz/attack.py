@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One process of a long run: the cases of a target in `targets/`, seed by seed, for some time.
 
 The present seed is written down before it is played, so that a crash or a hang can be played again.

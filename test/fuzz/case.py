@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A case: a scene, commands and how many ticks; as two YAML files, so that a failure can be run again by anyone."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Scenes as they are drawn, checked as a scene file is, without writing and reading them as text."""
 
 from __future__ import annotations

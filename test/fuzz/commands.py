@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Random sequences of commands and faults: valid, refused, NaN, unknown names, bursts, and silence."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Which bottles went through a rail between two ticks."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What holds of the devices of a line at every tick: the process image against bottles, commands and the scene."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Random devices of a scene: drives, rails that move, machines, spills, sensors and indicators, as data."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What random scenes draw numbers by."""
 
 from __future__ import annotations

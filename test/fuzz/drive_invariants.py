@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What holds of belts at every tick: the speeds that they must have, and what is told of every command and fault."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Families of scenes: one mixture of effects and one integrator each, for every new mixture is compiled."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a line takes, from its scene alone: commands and faults, with their types and limits (docs/line.md)."""
 
 from __future__ import annotations

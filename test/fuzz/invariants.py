@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What holds at every tick of every run, whatever the scene: checked from outside, by what a Simulation tells."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Structured random requests of all OPC UA services: the library's own classes with odd, extreme and missing fields."""
 
 from __future__ import annotations

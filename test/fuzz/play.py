@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Plays a case in every way that must come to the same, under the eyes of the invariants."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Random scenes of a family, as data: mostly valid, small, crowded, with edges that meet exactly."""
 
 from __future__ import annotations

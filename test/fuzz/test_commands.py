@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A sample of command streams over DDS."""
 
 from __future__ import annotations

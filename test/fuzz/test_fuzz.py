@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A short run of what `make fuzz` does for as long as one likes, always of the same cases; and what once failed."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The frame of `make fuzz`: what a target does wrong is counted, kept, and can be played again."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A seeded sample of what `make fuzz` does with forms of MCAP."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A sample of structured OPC UA requests by strangers, always the same cases; what the target looks for is noticed."""
 
 from __future__ import annotations

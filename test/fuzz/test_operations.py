@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A sample of what acts on a line at random, always the same cases; and what the target looks for is noticed."""
 
 from __future__ import annotations

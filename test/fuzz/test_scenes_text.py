@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A short run of what `make fuzz` does to the text of scenes, always of the same cases."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A seeded sample of what `make fuzz` does to folders of studies."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One process of a long run: cases of one family for some time, each told before it is played, for a crash ends it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Scenes with something put wrong: a value that no field takes, an extreme one, a field too many or too few."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One row of the table of hard cases: its scene, what is done to it, and what is expected of it."""
 
 from __future__ import annotations

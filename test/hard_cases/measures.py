@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Runs a case and measures it: what every row of the table, and of the study, is held against."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the guard advises when it stops a hard case helps: applied, the same case runs to its end."""
 
 from __future__ import annotations

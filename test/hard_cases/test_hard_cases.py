@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Every row of the table once, at defaults: the paper's integrator, preset `standard`, one thread.
 
 `make stability` runs the matrix of integrators, presets, threads and sets of effects.

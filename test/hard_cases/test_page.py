@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The program that makes docs/stability.md; that it is up to date is checked by `make docs-check`."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The record of what the shipped scenes do, and how far ahead two ways of rounding agree on it.
 
     python test/keep/record.py            # writes record.json from the engine of this checkout

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The shipped scenes do what they did before the engine was rewritten, within the horizon in which that can be asked.
 
 The tolerances stand on measurements (`python test/keep/record.py horizon`, engine of the record). A nudge of 1e-12 m

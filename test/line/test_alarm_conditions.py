@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Alarms on measured values: limits and deadband."""
 
 import math

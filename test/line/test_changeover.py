@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Changeover to another format in a run, by recorded commands."""
 
 from pathlib import Path

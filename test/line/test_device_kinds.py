@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Every part of a scene has a device class, is drawn, and is counted by the roles of its signals."""
 
 from collections.abc import Iterator

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Events of a line are recorded at their ticks, in order, once."""
 
 from pathlib import Path

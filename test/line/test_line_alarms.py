@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Alarms of a line, its scene and its controllers, and operations on them."""
 
 import json

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The tables of docs/line.md and docs/parts/ contain every device."""
 
 from conveyor_sim.line.device_kinds import DEVICES

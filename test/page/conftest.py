@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A recording of the line that the page is tested with, and a real browser without a network to open it in."""
 
 from __future__ import annotations

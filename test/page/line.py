@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The line that the page is tested with, and a recording of it in which things happen."""
 
 from pathlib import Path

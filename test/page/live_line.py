@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A line that runs, served as a page for as long as tests look at it, and what a person does on that page."""
 
 from __future__ import annotations

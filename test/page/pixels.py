@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Pixels of a page's drawings."""
 
 from __future__ import annotations

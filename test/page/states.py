@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The main states of the page that docs/ shows, how each is reached by clicks and keys, and its pictures."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The page for those without a mouse, or who see little: what is clicked is reached by Tab, has a name, stands out."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Two recordings on one page, in a real browser: the same time and zoom, and their first difference said and marked."""
 
 from __future__ import annotations

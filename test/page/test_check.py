@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The page of `conveyor-sim check --watch` in a browser: it follows a scene's files as editors save them."""
 
 from __future__ import annotations

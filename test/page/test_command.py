@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The command view: one file, or a server until Ctrl-C."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Connections to the page of a line that runs: lost ones, those of strangers, and more of all than there should be."""
 
 from __future__ import annotations

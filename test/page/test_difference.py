@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """First difference of two recordings: at its tick, in words, within tolerances where bits need not agree."""
 
 from __future__ import annotations

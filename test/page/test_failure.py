@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The page of a failed test, in a real browser: its condition, signals and last action."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Heat maps of a recording and of a running line, against maps that are computed from the bag."""
 
 from __future__ import annotations

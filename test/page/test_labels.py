@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Names on the plan by geometry: on every shipped scene, in four sizes of the window, none covers another."""
 
 from __future__ import annotations

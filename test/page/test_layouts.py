@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Layouts that are saved in the browser, and the strip of key figures."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The page of a line that runs, in a real browser: what it shows, what is commanded on it, and who may."""
 
 from __future__ import annotations

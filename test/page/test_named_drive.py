@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Faceplates of a named drive and of its belts, which lead to each other."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Names by which a browser may request a server of this machine, in all their spellings."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Packed data of a page: complete, and no larger than its limit."""
 
 from __future__ import annotations

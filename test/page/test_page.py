@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The page in a real browser: its states are reached by clicks and keys, and looked at as a document and as pixels."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Requests of a page are checked at once by the rules of every protocol, and refusals are on record."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The page still looks as in the pictures of docs/, by eye: downsampled, for every machine has other fonts."""
 
 from __future__ import annotations

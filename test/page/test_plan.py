@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The plan: where it opens, selection of devices, the map of the plant, links to a moment, narrow windows."""
 
 from __future__ import annotations

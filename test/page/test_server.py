@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The page on a recording that a server reads by its index: what is read and refused, and that the same is drawn."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Plan of the page: every surface is drawn, every belt named once, plates without a device."""
 
 from physics.test_surfaces import bend, lanes, plate

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Newton's third law: a closed system (bottles only) keeps its momentum, and its angular momentum, to rounding."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Two bottles head on, or a bottle and a rail, under each contact law: against closed forms.
 
 With the reduced mass m_r and the speed of approach v, an undamped Hertz contact N = k delta^1.5 is deepest at

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Loads on bottles and rails against values computed by hand. Their evaluation changes no bit."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Longest stable step for a drag, that is for friction at rest: gamma dt = 2, 1 and 2.785 for the explicit methods,
 and any length where friction is implicit.
 

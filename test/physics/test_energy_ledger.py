@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The energy ledger: every account against a closed form, and a residual that falls as the integrator's error does."""
 
 import math

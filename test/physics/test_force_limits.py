@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Rails that push with limited force: stalled, pushed back and let go, against closed forms; and other ways to run."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Friction by the arctangent, and solved implicitly: on a belt, at a rail, and between bottles that press each other.
 
 With the slip s on a belt, explicit: ds/dt = -mu g p(s); implicit: s' + dt mu g p(s') = s in every step.

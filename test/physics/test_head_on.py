@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Two bottles head on: the closed forms of a linear spring, of a dashpot beside it, and of a clamped dashpot.
 
 With the reduced mass m_r, x the overlap, w = sqrt(k / m_r), zeta = c / (2 sqrt(k m_r)), wd = w sqrt(1 - zeta^2):

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Rails carry a standing queue (Janssen 1895): with tangential springs, not with the friction curve.
 
 The belt pulls each bottle with P = mu_b m g towards a stop. Axes of neighbours make an angle theta with the rails, so

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A thousand bounces without losses: the energy walks at random, by as much as the contacts' place in the steps tells.
 
 A step begins somewhere in a contact, not at first touch. With a linear law, w = sqrt(k / m) and the fractions phi and

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Oblique impacts by Mindlin's spring, against the curve of Maw, Barber and Fawcett (1976, 1981).
 
 With kappa the tangential over the normal stiffness (`stiffness_ratio`), psi = kappa v_t / (mu v_n) before (1) and after

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Rails that move: against closed forms, the same encounter seen from the rail, the ledger, and other ways to run."""
 
 from __future__ import annotations

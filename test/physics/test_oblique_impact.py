@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A hoop (J = m R^2) that hits a rail, or its like, at an angle.
 
 The normal impulse is J_n = m (1 + e) v_n, the tangential one -J_t with m dv_t = -J_t, m R^2 domega = -R J_t: the slip

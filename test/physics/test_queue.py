@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A single-file queue against a stop, on a belt that runs on below: the stop carries n mu m g."""
 
 import numpy as np

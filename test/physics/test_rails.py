@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Bottles that move along rails: joints are not felt beyond their own angle, and nothing acts past an end."""
 
 import math

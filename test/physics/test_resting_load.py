@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Forces at rest, by every integrator, against closed forms: the preset's promise for contacts that stay closed.
 
 On a turn-table that carries a bottle round along a smooth rim nothing slips, so the rim alone bends its way:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A bottle whose base is a ring: spin and slide share the friction (test/engine/test_ring.py has the law itself).
 
 Spin alone, u = |omega| R_b, eps = v_lim / 2, A = mu m g R_b^2 / J: du/dt = -A u / sqrt(u^2 + eps^2), so

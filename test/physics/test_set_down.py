@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A bottle set down on a running belt, in the regularised law of base friction.
 
 With the slip s, u = s / v_lim and a = mu g / v_lim:

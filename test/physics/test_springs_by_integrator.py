@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Tangential springs and implicit friction with each integrator that has them, at rails that move too.
 
 One scene for all: what a test is about happens at the origin, one of everything else is far away. Bottles are hoops of

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Static friction with memory under bottles: a spring from the base to a point of its belt, at most mu m g.
 
 A bottle on a turn-table stands still on it while Omega^2 r < mu g; the regularised curve creeps (test_turntable.py).

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Surfaces of belts and plates: bends in both senses of travel, path belts with ratios, plates at rest."""
 
 import math

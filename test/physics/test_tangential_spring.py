@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A contact with a tangential spring holds a static load, which the regularised law cannot: that one creeps.
 
 A belt pulls a bottle with P = mu_b m g against a rail, or another bottle in a corner, at an angle phi from the normal.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A bottle on a turn-table (a curved belt of a full turn): friction must hold it on its circle, Omega^2 r < mu g.
 
 The regularised law holds only with slip, so the bottle creeps outward at s with mu g p(s) = Omega^2 r:

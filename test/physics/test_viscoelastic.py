@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Viscoelastic damping on Hertz contacts: the impact integrated by another method, its series, its energy, its bits."""
 
 import math

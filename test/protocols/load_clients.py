@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Clients of test_load.py, as a process: they report each value that all of them have seen in all tags."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Helpers that wait for conditions."""
 
 from __future__ import annotations

@@ -1,11 +1,15 @@
+# SPDX-License-Identifier: Apache-2.0
 """`conveyor-sim alarms`: one row per alarm of a recording."""
 
 import json
 import re
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
+from bag.editing import edited
 from click.testing import CliRunner, Result
 from facts import missing
 
@@ -74,6 +78,15 @@ def test_they_are_chosen_by_class_and_name(alarms: Alarms) -> None:
     refused = alarms("--kind", "warn")
     assert refused.exit_code == 1
     assert missing(refused.output, ["--kind", "warn", "error", "warning", "message"]) == []
+
+
+def test_an_unknown_state_has_its_number(bag: Path, tmp_path: Path) -> None:
+    def forge(topic: str, message: Any) -> None:
+        if topic == "alarm_states":
+            message.state = np.full(len(message.state), 99, dtype=np.uint8)
+
+    rows = chosen_alarms(edited(bag, tmp_path / "forged", forge))
+    assert {row.state for row in rows} == {"state 99"}
 
 
 def test_a_recording_without_states_has_times_alone(bag: Path, tmp_path: Path) -> None:

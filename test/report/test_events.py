@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`conveyor-sim events`: what happened in a recording, chosen, as a table and as CSV."""
 
 import csv

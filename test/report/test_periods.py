@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What machines spent their time on: why they did not run, in words."""
 
 import pytest

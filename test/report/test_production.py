@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Production of a recorded line: read from its bag, printed and drawn."""
 
 from __future__ import annotations
@@ -120,13 +121,18 @@ def test_alarms_are_counted(bag: Path, tmp_path: Path) -> None:
     assert alarms.by_alarm["no caps"] == 1
     assert alarms.flood and alarms.most_in_window == alarms.raised
     assert [one.id for one in alarms.standing] == ["no caps"]
-    result = CliRunner().invoke(main, ["report", str(tmp_path / "bag"), "--no-pictures"], catch_exceptions=False)
+    result = CliRunner().invoke(
+        main, ["report", str(tmp_path / "bag"), "--no-pictures", "--from", "0"], catch_exceptions=False
+    )
     assert "a flood" in result.output and "no caps" in result.output
 
 
 def test_the_report_prints_and_draws_it(bag: Path, tmp_path: Path) -> None:
     result = CliRunner().invoke(
-        main, ["report", str(bag), "--out", str(tmp_path)], env={"COLUMNS": "200"}, catch_exceptions=False
+        main,
+        ["report", str(bag), "--out", str(tmp_path), "--from", "0"],
+        env={"COLUMNS": "200"},
+        catch_exceptions=False,
     )
     assert result.exit_code == 0
     rows = [line.split() for line in result.output.splitlines()]
@@ -145,7 +151,7 @@ def test_of_a_line_that_has_made_nothing_yet_it_says_so(tmp_path: Path) -> None:
     shown = CliRunner().invoke(main, ["report", str(record(tmp_path / "bag", ticks=200, scene=scene)), "--no-pictures"])
     rows = [line.split() for line in shown.output.splitlines()]
     assert ["machines/packer", "idle", "1", "2.00"] in [row[:4] for row in rows]
-    assert ["efficiency", "not", "known:"] in [row[:3] for row in rows]
+    assert ["OEE", "not", "known:"] in [row[:3] for row in rows]
     assert missing(shown.output, ["no bottle has left the line"]) == []
     assert ["alarms", "0"] in [row[:2] for row in rows]
 

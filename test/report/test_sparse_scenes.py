@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Every command takes scenes with nothing in them, with one bottle, one device or one tick."""
 
 from __future__ import annotations

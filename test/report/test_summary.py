@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a run amounts to, counted from its bag."""
 
 import json
@@ -26,6 +27,7 @@ from conveyor_sim.report.outline import FILES, outline
 from conveyor_sim.report.report import render
 from conveyor_sim.report.summarize import summarize
 from conveyor_sim.report.summary import LoadHistory, Loop, Summary, Worst, write_summary
+from conveyor_sim.run.runner import run_scene
 from conveyor_sim.scene import Scene, load_scene, parse_scene
 from conveyor_sim.simulation import Simulation
 
@@ -220,6 +222,13 @@ def test_what_was_not_recorded_is_not_made_up(tmp_path: Path) -> None:
     assert summary.energy is None
     assert summary.wall is None
     assert summary.real_time_factor is None
+
+
+def test_a_run_is_as_long_as_its_last_state(tmp_path: Path) -> None:
+    """A scene that outputs nothing at its end."""
+    scene = load_scene(SMALL_LINE, {"outputs": {"bottles": 0, "signals": 0, "contacts": 0, "counters": 0}})
+    done = run_scene(scene.model_copy(update={"duration": 0.37}), tmp_path / "bag")
+    assert summarize(tmp_path / "bag").simulated == pytest.approx(done.simulated) == pytest.approx(0.37)
 
 
 def test_bottles_without_events_are_those_on_the_line(tmp_path: Path) -> None:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The command `tags`: of no shipped scene anything is left empty."""
 
 import csv

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Nodes under test are processes of their own, in a ROS domain that each test module has for itself."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A ROS node for tests: asks the node under test, and listens to it, over real DDS."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A short recording with commands that came in every way, to be played back."""
 
 from pathlib import Path

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A controller for small_line.yaml, as a user writes one: a file with a factory."""
 
 from __future__ import annotations

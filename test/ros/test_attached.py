@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A ROS node attached to a scenario as its controller, over real DDS."""
 
 from __future__ import annotations

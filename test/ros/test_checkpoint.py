@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The services save_checkpoint and load_checkpoint, over DDS."""
 
 from __future__ import annotations

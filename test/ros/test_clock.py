@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """/clock and /diagnostics over DDS, and the real-time factor."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A node whose kernels are not in the cache yet: it says so, answers, and ends when asked to."""
 
 from __future__ import annotations

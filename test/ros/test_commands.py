@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Commands over DDS: what they do to the belts, and how bad ones are refused."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """ROS that can't start says why in one sentence."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Any controller as a node beside the simulation: in lockstep with it, and free."""
 
 from __future__ import annotations

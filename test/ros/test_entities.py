@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Entities of simulation_interfaces, over DDS: listed, spawned, deleted; steps by action."""
 
 from __future__ import annotations

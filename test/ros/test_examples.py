@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The examples that talk to a running node, run as a user does."""
 
 from __future__ import annotations

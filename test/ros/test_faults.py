@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The service inject_fault, over DDS: what it does is recorded, told, and replayed."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """More commands than there is room for, larger ones, and what no command is: bounded, refused, counted."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Missing messages, by the numbers of received ones."""
 
 from collections.abc import Callable, Sequence

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Others on the ROS graph that would mix with a simulation."""
 
 from __future__ import annotations

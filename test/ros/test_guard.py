@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A simulation that can't go on leaves a node that answers: paused, with the reason, until it is reset."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Operators, engineers and several controllers over DDS: who may command, who is refused, and what the log says."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Commands and lockstep requests, in the order in which they were sent."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Interface packages of ROS that are built here: the same types, constants and comments as the released packages."""
 
 import hashlib

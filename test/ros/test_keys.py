@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Keys, read from a real terminal."""
 
 from __future__ import annotations

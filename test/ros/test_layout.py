@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A node with a scene in the layout language: choices by its parameters, checkpoint, changeover, and recording."""
 
 from __future__ import annotations

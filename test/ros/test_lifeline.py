@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Processes that are started end with the process that started them, even if that is killed."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The main job: node and controller as two processes in lockstep."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Named drives over DDS: speed commands, mode and faults of a drive, and refused commands to its belts."""
 
 from __future__ import annotations

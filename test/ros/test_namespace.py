@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A node in a namespace: its topics, its recording and the playback of that keep one prefix."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A node's line as a tag source: what it shows, what comes of what is given, and a node that goes and comes back."""
 
 from __future__ import annotations

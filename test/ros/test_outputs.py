@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Published messages: equal to those of the engine, only with subscribers, in the stated quality of service."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Parameters of a running node, set over DDS as `ros2 param set` does."""
 
 from __future__ import annotations

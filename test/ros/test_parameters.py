@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The table of parameters: what is refused, and that the documented file says the same."""
 
 import math

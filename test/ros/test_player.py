@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Messages of a played recording, collected in a list: order, rate, pause, seek, and the commands in it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Parameters `qos_overrides`, over DDS: what other participants are offered, and what is refused."""
 
 from __future__ import annotations

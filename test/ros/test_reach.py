@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Access by another machine on the network (docs/ros.md, Security). Network namespaces stand for machines."""
 
 from __future__ import annotations

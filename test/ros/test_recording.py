@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Recordings of the node. Every end leaves a readable bag."""
 
 from __future__ import annotations

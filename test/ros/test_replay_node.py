@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A recording played back over real DDS: what a controller or a SCADA prototype hears of it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Names of services, over DDS: below the node's name, and the deprecated old ones."""
 
 from __future__ import annotations

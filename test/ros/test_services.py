@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The services with simulation_interfaces' names, over DDS."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Parameters at start: what they switch off, and what can't be started."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Frames of belts and devices on /tf_static: places by hand, and what a subscriber of a node and of a playback gets."""
 
 from __future__ import annotations

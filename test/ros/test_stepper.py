@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The stepping thread, and what waits for it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Files for RViz2 and Foxglove show existing topics, with the offered quality of service."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Nodes as child processes that cost no imports."""
 
 from __future__ import annotations

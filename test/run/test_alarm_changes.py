@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Alarms that the scan loop gives to the line."""
 
 from __future__ import annotations

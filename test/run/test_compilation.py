@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """All kernels that a run may need are compiled before it begins."""
 
 from __future__ import annotations

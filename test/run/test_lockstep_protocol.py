@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The lockstep protocol by itself."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Simulated against wall time, with wall times made up."""
 
 import pytest

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A run without ROS: the same bits as any other, and a whole bag however it ends."""
 
 import signal

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The three lines on speed: how fast, what bounds it, what to change, for runs with different bounds."""
 
 from __future__ import annotations

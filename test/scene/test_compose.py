@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Composition of scenes: includes, parameters, cells, variants and formats."""
 
 import itertools

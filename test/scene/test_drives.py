@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Named drives in a scene file: speeds of belts, and one error for each mistake."""
 
 import json

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Every error in a scene is reported in one line with file, line, field, value and expectation."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Shapes of belts and rails: centres from two points, sectors that wrap, outlines, distances."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The JSON Schema of scene files takes what is shipped, and refuses faults of types, fields and units."""
 
 import json

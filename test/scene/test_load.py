@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reading scenes: units, defaults, overrides, and that the same text gives the same scene."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Machines of a scene file: what can wait before them, where they stand, and what is refused in one sentence."""
 
 import math

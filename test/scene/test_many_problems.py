@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A scene of any size that is wrong is refused after bounded work: few problems are said, the others counted."""
 
 from __future__ import annotations

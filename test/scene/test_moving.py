@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Positions of moving rails, and the boxes that they sweep, against closed forms."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The search by cells and boxes finds the same as a comparison of all with all."""
 
 import numpy as np

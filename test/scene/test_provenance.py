@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Provenance: fields of expanded data are reported at the place that they were written at."""
 
 from conveyor_sim.scene.provenance import Provenance, SceneFile, Sources

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Texts of quantities: values to the last bit, dimensions, refusals."""
 
 import math

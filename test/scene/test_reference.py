@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The reference of the scene file is what the schema says, and says all that is needed."""
 
 from collections.abc import Iterator

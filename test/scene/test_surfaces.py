@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Surfaces of belts and plates: order, names, senses of travel, exact directions."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Tables of contacts in CSV files: read with the scene, and not needed to read it again."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Texts are read by YAML 1.2: as ruamel.yaml reads them, a parser of that version."""
 
 from __future__ import annotations

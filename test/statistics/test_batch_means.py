@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Batch means: coverage on single long runs of a queue, which values taken for independent miss by far."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Many comparisons: how often one errs where nothing differs, and what is found where something does."""
 
 import math

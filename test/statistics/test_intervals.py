@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Intervals: their coverage on a queue with a closed form, and their ends against SciPy's own."""
 
 import math

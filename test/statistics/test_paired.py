@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Paired differences: common random numbers tell what two means with seeds of their own do not."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Warm-up: the bias of a queue's mean wait is seen, and gone once the rule has left out its start."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A line for optimisations: an empty belt, whose speed is all that counts. A run takes milliseconds."""
 
 from __future__ import annotations

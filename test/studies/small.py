@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A line of two machines that takes a hundredth of a second to simulate, and studies of it."""
 
 from __future__ import annotations

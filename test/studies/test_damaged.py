@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Files of a study that are damaged or of another study: named and made again, or refused in one sentence."""
 
 from __future__ import annotations

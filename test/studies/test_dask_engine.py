@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Dask as the engine: a real scheduler and real workers, killed and started again while a study runs."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Points of studies: all combinations, lists, and samples that are spread as they should be."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """docs/studies.md is true: its study runs, and it leaves out no field and no metric."""
 
 from __future__ import annotations

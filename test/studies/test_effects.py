@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Results from rows: means with intervals, effects, indistinguishable points, Sobol indices, pictures."""
 
 from __future__ import annotations

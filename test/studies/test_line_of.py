@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The line of a point: values laid over the scene by path, given to the function or to the controller."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A process that is killed, a full disk, Ctrl-C: finished runs are kept, and the study goes on."""
 
 from __future__ import annotations

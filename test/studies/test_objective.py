@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Objectives: what is understood, and the sentence for what is not."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Optimisation: the best point is found, and found again on any path to it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A study from its file to its table: equal bits from any engine, in any order of completion."""
 
 from __future__ import annotations

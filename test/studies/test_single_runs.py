@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Studies with one long run a point: what batch means say of it, in the row, the table and in words."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`warm_up: mser`: pilot runs find how long a line takes to fill, equally with any engine and number of tries."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Waits for what is to happen, however slow the machine is."""
 
 from __future__ import annotations

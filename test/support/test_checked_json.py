@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """JSON with a checksum: every flipped bit is detected, and all content errors are one sentence."""
 
 from __future__ import annotations

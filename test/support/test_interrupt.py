@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Ctrl-C, as a terminal sends it to a command, at any moment of its life."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A limit rounded by a sender's type is the limit; every other value is unchanged, bit for bit."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Signals as requests that a thread waits for."""
 
 import os

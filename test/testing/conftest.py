@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The table of these tests: three lanes of bottles, a table, a packer that can be stopped."""
 
 from pathlib import Path

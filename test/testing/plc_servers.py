@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Soft PLCs that are servers, made with the protocols' own libraries: each scans once `tick` has changed.
 
 A scan that is asked to end ends by itself: one that is cancelled may go on, as `asyncio.wait_for` within the libraries

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A soft PLC in a separate process: it holds the first zone while bottles are on the second. By Modbus or OPC UA.
 
 Argument: number of scans after which it ends without output, "" for never.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """docs/build_a_line.md does what it says."""
 
 import re

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Texts of conditions."""
 
 from conveyor_sim.testing.conditions import text_of, words_of
@@ -70,3 +71,11 @@ def test_a_condition_is_put_into_words_with_names_and_values_in_place_of_python(
     assert [words for words, _ in pairs] == [expected for _, expected in pairs]
     assert words_of(nearly_full) == "nearly full"
     assert words_of(eval(compile("lambda s: s['a'] > 1", "<typed>", "eval"))) == "the lambda in line 1 of <typed>"
+
+
+def test_names_without_a_short_value_stay_names() -> None:
+    long = "x" * 1000
+    condition = lambda s: s["a"] > later or s[long]  # noqa: E731
+    assert words_of(condition) == "a > later or s[long]"
+    later = 2
+    assert words_of(condition) == "a > 2 or s[long]"

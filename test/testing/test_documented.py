@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """docs/testing_control_logic.md does what it says: its files, run in its order."""
 
 import re

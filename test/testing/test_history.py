@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The history: a value of everything at each tick."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The inputs of a scenario: the bag that is made of them is the one that would have been recorded, bit for bit."""
 
 import json

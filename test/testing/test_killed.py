@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A test that is killed leaves its inputs, of which the bag is made by `conveyor-sim recover`."""
 
 import json

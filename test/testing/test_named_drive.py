@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Named drives in scenarios: people, faults, controllers of the library, and Structured Text."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The fixture `opcua`: a client that others wrote works a line under test, and all that it did is on record."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Operations of operators and engineers in a scenario, and their report."""
 
 from pathlib import Path

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A PLC in another process scans a line under test, as a client of its server: the bits of the same program inside."""
 
 from __future__ import annotations

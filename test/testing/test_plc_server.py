@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A line as the client of a PLC: in lockstep in a test, with the bits of the same program inside; and free-running."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The pytest plugin: what a failed test leaves and tells, and that a test that passes leaves nothing."""
 
 import subprocess

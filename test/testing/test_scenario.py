@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Scenarios: a controller's scans, what is asserted over simulated time, and what a failure tells."""
 
 from collections.abc import Mapping

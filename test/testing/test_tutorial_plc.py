@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """docs/tutorial_plc.md does what it says: one test passes and one fails, and both pass with the correction."""
 
 import re

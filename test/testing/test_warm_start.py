@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The fixture `warm_start`: a line is warmed up once for many tests."""
 
 from pathlib import Path

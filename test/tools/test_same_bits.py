@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The comparison of recorded corpora: equal ones pass, and a changed bit, hash, message or entry is reported."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """pytest plugin of `same_bits.py record`: copies the input log of every scenario to the folder in SAME_BITS_INPUTS."""
 
 from __future__ import annotations

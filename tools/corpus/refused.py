@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A controller whose command is refused after half a second, which ends a run."""
 
 from collections.abc import Mapping

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Child process of `same_bits.py record`: simulates entries of the corpus with the checkout that PYTHONPATH names.
 
 Reads a JSON object from stdin: source (folder of the checkout), out (folder to write to), entries (by name, as in

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Every Python that starts while an interface package is built runs this: each IDL file is parsed once.
 
 ROS has nine generators, and each would parse all files, which takes two thirds of its time.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # For CMAKE_PROJECT_INCLUDE, when building on the ROS wheels: the targets they export name include folders of the
 # machine that built the wheels (/opt/python/...), and CMake refuses an imported target whose include folder is missing.
 # Deferred to the end of the top folder's CMakeLists.txt, so after every find_package, and without touching that file.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A scene with its bottles replaced by 64 bottles or pairs beside the plant: its own laws, in cases with closed forms.
 
 Laws and coefficients are the scene's own, and so is the compiled kernel: all that it needs is there already.

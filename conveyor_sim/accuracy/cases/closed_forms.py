@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Errors against the number of steps in the closed forms that a scene's laws have, and the orders they show."""
 
 from collections.abc import Callable, Sequence

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One impact of a bottle on another or on a rail: the closed forms of its rebound, and how long it lasts.
 
 Along the normal it is one body of the reduced mass m_r that runs onto the contact at a speed v: m_r x'' = -N(x, x').

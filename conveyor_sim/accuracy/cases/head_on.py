@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Impacts head on, and on a rail along which the bottle slides: errors of rebound, peak force and tangential speed."""
 
 import cmath

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A bottle set down on a moving belt: full friction until the slip is v_lim, from then on ds/dt = -mu g p(s).
 
 It is looked at from the belt: the bottle slides on a floor at rest that has the belt's friction.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Long runs: how far each setting is from the reference in what a line engineer sees, and what that decides."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Appearance and names of integrators and settings in figures: colour, marker and line all distinguish them."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Logarithmic axes whose ticks are plain numbers."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Notes beside points: no note on another, on a point or on a line, if there is room for it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Error against steps in the closed forms: how fast each integrator converges, and how fast it should."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Error against cost: every setting of a study a point, with the front, the recommended one and what failed."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Softer contacts at the same restitution: what they change, and what they save."""
 
 from __future__ import annotations

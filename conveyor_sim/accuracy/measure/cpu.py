@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Processor time: what a study takes does not depend on what else the machine does, and compiling is counted apart."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Many long runs, by setting and seed, over local processes; each is on disk as soon as it is finished."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Acceptance by equivalence: a cheaper setting is trusted when its difference from the reference is surely small.
 
 A candidate's observable is accepted when the confidence interval of its relative difference from the reference lies

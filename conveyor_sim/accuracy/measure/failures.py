@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Runs that fail, each reported in one sentence: unstable, or tunnelling. Chatter is looked for in chatter.py."""
 
 import numpy as np

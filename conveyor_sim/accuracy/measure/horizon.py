@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Comparison horizon of trajectories: contact systems are chaotic, so a small difference grows without bound.
 
 A nudge moves bottles and leaves their velocities. Its growth is measured by the RMS distance of bottles that are

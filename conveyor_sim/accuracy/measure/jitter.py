@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Seeds: many runs of one scene that differ as one day of a line differs from the next, by a little at its start."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Observables of a long run for a line engineer: throughput, forces in queues, impacts, time to fill, spacing."""
 
 from __future__ import annotations

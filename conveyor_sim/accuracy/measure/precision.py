@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Work-precision on a scene: errors and cost of settings over a horizon in which trajectories can be compared."""
 
 import math

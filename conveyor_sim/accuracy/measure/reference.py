@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The setting that errors are measured against."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Error in resting load: time means of the normal forces in contacts that stay closed, against a reference run.
 
 What presses for long (a queue against a stop, bottles carried along the rim of a turn-table) is a hundred times smaller

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Finished runs on disk, a line each: a study that was interrupted goes on where it was."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """States of a scene to compare settings from: shortly before the strongest contacts of its run."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Cost of settings: processor time per simulated second, from repeats in turns."""
 
 import time

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The answer: the cheapest setting that a scene can be trusted with, and what a more exact one would cost.
 
 A setting is recommended only if it did not fail, keeps the tolerance in impacts and in resting load, is within every

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Copy of a scene file with another accuracy setting; everything else stays as it is written."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A study on disk: one JSON with a checksum that holds all of it exactly, and CSV files of its rows for other programs.
 
 `conveyor-sim sweep` writes another `study.json` (`studies/origin.py`); neither command replaces the other's file.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Forecast before any run: predicted errors and cost of settings, and the cheapest that meets the tolerance.
 
 It uses closed forms and bounds only (physics/timestep/): no kernel is compiled or loaded, and it takes a second.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Interim answers: what is known so far, marked as such, and what is not known yet."""
 
 from __future__ import annotations

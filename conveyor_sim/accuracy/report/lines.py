@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The answer in three lines, in the words of a line engineer: forces, throughput, cost."""
 
 from __future__ import annotations
@@ -8,6 +9,9 @@ from conveyor_sim.accuracy.report.answer import eligible, largest_error
 from conveyor_sim.accuracy.report.apply import line
 from conveyor_sim.accuracy.report.words import digits, duration, percent
 from conveyor_sim.accuracy.results import AccuracyStudy, Answer, Comparison
+
+NEGLIGIBLE = 1e-4
+"""Relative error below which a predicted error is reported as smaller than this."""
 
 FEW = 2
 """Runs of a setting, fewer of which compare nothing."""
@@ -58,8 +62,13 @@ def _forces(study: AccuracyStudy, answer: Answer) -> str:
         return f"{impacts}, {percent(answer.resting)} in resting load (tolerance {_tolerance(study)})."
     why = "" if study.rest is None else f", because {study.rest.reason}"
     foretold = next((point.predicted_resting for point in study.points if point.setting == answer.setting), None)
-    likely = "" if foretold is None else f"; predicted error {percent(foretold)}"
+    likely = "" if foretold is None else f"; predicted error {_at_least(foretold)}"
     return f"{impacts} (tolerance {_tolerance(study)}). Resting load: not measured{why}{likely}."
+
+
+def _at_least(error: float) -> str:
+    """Return a predicted error, which is never reported as 0."""
+    return percent(error) if error >= NEGLIGIBLE else f"below {percent(NEGLIGIBLE)}"
 
 
 def _tolerance(study: AccuracyStudy) -> str:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The answer on a line on which bottles only ride: there is no error in contact force, and none is looked for."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The Pareto front of a work-precision diagram: settings that no other beats in both cost and error."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A study as tables: what each says, once, for terminals and as Markdown."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Numbers and settings as people read them: three digits, a fitting unit, no exponent where it can be helped."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Chunks of an MCAP file: search, decompression within limits, verification."""
 
 from __future__ import annotations

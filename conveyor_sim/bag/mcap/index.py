@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """End of an MCAP file: the index (summary section), and the two checksums that together cover every byte."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A copy of the line message in a metadata record directly after the header. One damaged chunk can't destroy both.
 
 Without the line message no other message can be understood. Keys: `topic`, `type`, `log_time` (ns), `data` (base64 of

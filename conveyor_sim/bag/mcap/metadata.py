@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """metadata.yaml of a rosbag2 folder, version 9 (Jazzy, Kilted): what `ros2 bag info` reads."""
 
 from __future__ import annotations

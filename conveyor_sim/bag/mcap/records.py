@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Records of an MCAP file, read from bytes that may be damaged. Each length is checked before it is used."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Verdict on an MCAP file that may be damaged anywhere: valid parts, damage, losses, and parts that are not read."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Storages of bags other than MCAP, recognised by how their files begin, and how to get MCAP from them."""
 
 from __future__ import annotations

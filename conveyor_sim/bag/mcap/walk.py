@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Walk over the records of an MCAP file that may be damaged anywhere."""
 
 from __future__ import annotations

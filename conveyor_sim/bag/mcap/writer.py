@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Writer of one MCAP file of a rosbag2 bag: topics and messages, then the index and rosbag2's metadata record."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Messages as CDR (little endian, version 1), written without building an object per field.
 
 The bytes are those of rosbags, in a fifth of the time: the layout of a type is worked out once, and arrays are copied

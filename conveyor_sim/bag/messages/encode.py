@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Serialization of columns as messages: CDR bytes that are published and recorded alike."""
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ FORMAT = 3
 change that a reader must know; `older.py` reads the earlier ones.
 """
 
+COUNTERS = "conveyor_msgs/msg/Counters"
 SIGNALS = "conveyor_msgs/msg/Signals"
 COMMANDS = "conveyor_msgs/msg/Commands"
 LINE = "conveyor_msgs/msg/Line"

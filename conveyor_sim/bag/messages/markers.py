@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """visualization_msgs/MarkerArray for RViz2 and Foxglove: the plant, drawn once, and moving parts, drawn at a rate."""
 
 from __future__ import annotations

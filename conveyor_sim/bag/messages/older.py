@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Messages of recordings in earlier formats, converted to the present definitions.
 
 Format 1: until lines had tags. Format 2: until tags were messages (`Line.tags`). Both have no number: their definitions
@@ -121,6 +122,11 @@ def _signals(message: Any, format: int) -> dict[str, Any]:
     return {}
 
 
+def _counters(message: Any, format: int) -> dict[str, Any]:
+    """Return the reference of effectiveness, which was the nominal rate; effectiveness at the set rate is unknown."""
+    return {"rate_limit": message.rate, "set_effectiveness": np.full(len(message.name), np.nan)}
+
+
 _BASE = 1  # rosbags' kind of fields with numbers and texts
 _TAG, _ALARM_IDS = "conveyor_msgs/msg/Tag", "conveyor_msgs/msg/AlarmIds"
 _CONVERTERS: Mapping[str, Callable[[Any, int], dict[str, Any]]] = {
@@ -128,6 +134,7 @@ _CONVERTERS: Mapping[str, Callable[[Any, int], dict[str, Any]]] = {
     encode.OUTCOME: _outcome,
     encode.ALARM_STATES: _alarm_states,
     encode.SIGNALS: _signals,
+    encode.COUNTERS: _counters,
 }
 """Functions of a message and the format of the recording that return the fields to replace."""
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Qualities of service as data: the node offers them, and the bag's metadata states them."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The tables of docs/ros/topics.md that list topics, from their rows."""
 
 from __future__ import annotations

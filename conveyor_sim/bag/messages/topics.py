@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The topics, one row each, for publishing, recording, reading, replaying, comparing and listing them."""
 
 from __future__ import annotations
@@ -255,7 +256,7 @@ _ROWS = (
     ),
     Topic(
         "counters",
-        "conveyor_msgs/msg/Counters",
+        encode.COUNTERS,
         "bottles, times and efficiency of each machine and of the line since their last reset",
         rate="counters",
         state=lambda now: now.sim.line.counters(),

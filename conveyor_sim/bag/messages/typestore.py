@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Message types without ROS: rosbags' types of a ROS 2 distribution, with conveyor_msgs added from msg_defs/."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """PLC programs in Structured Text (IEC 61131-3:2013), as controllers of a line.
 
 A text passes through the files in this order. `pragmas.py` selects one branch of its conditional pragmas, and

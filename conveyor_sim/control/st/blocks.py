@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The standard function blocks (IEC 61131-3:2013, tables 43 to 46). Times are whole ns of simulated time.
 
 Each is a class with a slot for every variable, and `run(now)`, one call.

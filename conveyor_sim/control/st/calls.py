@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Calls of functions and blocks: arguments by position or by name, and outputs by =>."""
 
 from __future__ import annotations

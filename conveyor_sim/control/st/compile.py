@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Compiler from a program's text to Python. The code is compiled once and used by all instances."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`StructuredText`: a program in Structured Text as a controller of a line."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """X_TO_Y, TO_Y and TRUNC: every conversion of elementary types that there is, by the standard where it says how.
 
 Whole numbers and bit strings keep their lowest bits; reals become the nearest whole number, of two the even one, and

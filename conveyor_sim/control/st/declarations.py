@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Declarations: types, and the variables of units with their initial values."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Errors of programs, at compile time and at run time, always with file, line and column."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Expressions: each is checked, and becomes a `Value`. Errors state the text found and the text expected."""
 
 from __future__ import annotations

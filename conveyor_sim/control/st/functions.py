@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The standard functions (IEC 61131-3:2013, tables 28 to 36): what each takes and gives, and its code."""
 
 from __future__ import annotations

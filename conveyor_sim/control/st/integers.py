@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Arithmetic of integers: intermediate results with the width of `register`, and their ranges.
 
 Where the range fits, no code for two's complement is needed.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`CompiledProgram`: a shared library, built from a PLC program by any compiler, as a controller."""
 
 from __future__ import annotations

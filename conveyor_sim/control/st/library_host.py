@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Process of a compiled program. Its last argument is the path of the library.
 
 Requests and answers are lines of JSON on a socket; the output of the program goes to standard error. The process ends

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Values of literals: numbers in bases, durations as whole nanoseconds, characters escaped by $."""
 
 from __future__ import annotations

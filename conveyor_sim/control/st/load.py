@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A controller by what names it: a program in Structured Text, one that is compiled, or one in Python."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Located variables (AT %MW0): shared memory, and the place of each variable in it."""
 
 from __future__ import annotations

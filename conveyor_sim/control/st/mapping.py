@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Assignment of tags to variables: by a pragma, by the caller, by an address in a Modbus map, or by name."""
 
 from __future__ import annotations

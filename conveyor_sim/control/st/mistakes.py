@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Messages for texts that can't be parsed: text found, and text expected, in words of the language."""
 
 from __future__ import annotations

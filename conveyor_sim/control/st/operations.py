@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Run-time functions of compiled programs, where Python's operators do not suffice."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A program's text to its syntax tree, by lark; and what is said where the text can't be."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Conditional pragmas: selects one branch of each {IF ...} before the text is parsed.
 
 Supported pragmas of CODESYS ("Conditional Pragmas") and TwinCAT: {define name}, {define name 'text'}, {undefine name},

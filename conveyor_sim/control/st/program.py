@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Running program: instances, tasks, the budget of a scan, restarts and snapshots."""
 
 from __future__ import annotations

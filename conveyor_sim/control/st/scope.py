@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Meaning of names in a unit: local variables, global ones, constants, values of enumerations."""
 
 from __future__ import annotations

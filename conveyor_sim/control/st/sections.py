@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Sections of variables: allowed qualifiers by kind of unit, and their meaning.
 
 Sources: IEC 61131-3:2013, table 13 and 6.5.6; CODESYS and TwinCAT for PERSISTENT and VAR_INPUT CONSTANT.

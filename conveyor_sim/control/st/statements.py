@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Statements: each is checked, and becomes lines of Python with positions in the program."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Syntax tree of a program: the text with its positions, without derived properties."""
 
 from __future__ import annotations

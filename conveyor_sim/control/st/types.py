@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Types of the standard: ranges, implicit conversions, and code that keeps values in range.
 
 Values are Python's: BOOL a bool; integers, bit strings and enumerations an int; REAL and LREAL a float, a REAL rounded

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Values of expressions: a type and Python code, and their conversion to a target type."""
 
 from __future__ import annotations

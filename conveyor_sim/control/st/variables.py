@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Variables of a running program: access by name, and conversion to and from plain data."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The work of a scan, counted in statements, so that the watchdog's budget does not depend on the machine.
 
 An executed statement, a round of a loop and a call of a function count 1 each. Operands and operators count a

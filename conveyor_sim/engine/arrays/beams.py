@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Arrays of `sensors/beams.py`: motion of bottles in a tick, beams, and when these are blocked. N slots, B beams."""
 
 from typing import NamedTuple

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Bottles: positions, velocities, and the forces on them."""
 
 from typing import NamedTuple

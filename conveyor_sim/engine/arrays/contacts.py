@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Contacts of bottles: laws, pairs, tangential springs."""
 
 from collections import namedtuple

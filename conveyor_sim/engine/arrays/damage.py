@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Arrays of loads on bottles and rails (`damage.py`); None if an effect is absent.
 
 Shapes: S bottle slots, T bottle types, G segments, A arcs, B bins of rails. SI units.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Arrays that some integrators need within a step, or from step to step; None for the others.
 
 Shapes: S bottle slots, P pairs. SI units, float64.

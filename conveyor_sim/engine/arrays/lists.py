@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Lists of neighbours, which a rebuild renews."""
 
 from typing import NamedTuple

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Arrays of moving rails (`moving.py`); None in a scene without them.
 
 Shapes: Q moving rails. SI units; columns are float64, (Q,), unless stated otherwise.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Rails at rest, and the contacts of one bottle with rails."""
 
 from typing import NamedTuple

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Arrays of riding bottles (`riding.py`); None if no bottle can ride."""
 
 from typing import NamedTuple

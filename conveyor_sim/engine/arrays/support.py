@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Arrays of belts, floor and bases."""
 
 from typing import NamedTuple

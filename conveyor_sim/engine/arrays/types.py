@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Types of columns."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The World: all arrays of a simulation, in groups."""
 
 from typing import Any, NamedTuple

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Folder of the kernel cache.
 
 Cached kernels are unpickled and run. Only a folder of this user with mode 0700 is used, so that no other user can add a

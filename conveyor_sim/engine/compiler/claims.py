@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Claims: if several processes need a kernel at the same time, one compiles it and the others wait.
 
 Each kernel has a byte of one file, which a process locks while it compiles. The system releases the lock when a process

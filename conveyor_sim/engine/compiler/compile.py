@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Decorators that compile kernels. The README of the engine says what their code may contain.
 
 Kernels are cached on disk, in a folder named by a hash over all sources of the engine. Numba keys its own cache by the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Groups of arrays: NamedTuples that kernels receive by address.
 
 The memory at the address is laid out in Python, once per group. Numba's own code unpacks about 150 arrays in every

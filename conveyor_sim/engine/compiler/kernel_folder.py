@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Files of compiled kernels: one per kernel and its types, with a checksum.
 
 A file that is damaged, or that another user could have written, is deleted, and the kernel is compiled again.

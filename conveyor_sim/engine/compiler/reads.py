@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Members of groups that a function reads, itself and through its callees: a part is compiled for these.
 
 Otherwise a part that takes a World would be compiled again for every set of effects, though it reads two members. In

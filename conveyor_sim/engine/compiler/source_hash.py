@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Hash over the syntax of sources, without comments, docstrings and layout. It is equal on all versions of Python.
 
 Parsing takes a quarter of a second at every start, so the hash is cached in a file, named by a hash over the bytes.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Arctangent without branches: LLVM vectorises it, unlike the C library's."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Force in one contact: elastic law, damping, friction (paper eqs. 22-23, 7-10, and further laws).
 
 Between a and b, with the unit normal n from a to b and the tangent t = (-n_y, n_x): the force on a is -N n + T t, on b

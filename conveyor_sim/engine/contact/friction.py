@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Coulomb friction, regularised at low slip because Coulomb's law has no direction at rest (paper eqs. 7-10).
 
 The force is -mu N p(s) v/s, s = |v|. There are two curves p, both with slope 2/v_lim at rest.

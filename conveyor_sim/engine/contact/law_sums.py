@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Sums of the laws of a contact, written out for kernels from the list of laws.
 
 The laws of a pair of materials are added up. The column of a law holds 0 (tables: -1) for a pair without it. If no

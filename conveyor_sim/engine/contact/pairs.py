@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Contact of two bottles: overlap delta = R_i + R_j - |r_i - r_j|, for all listed pairs, block by block.
 
 The fast layout, step by step. Pairs p = 0, 1, ... are sorted by (i, j); a block is up to BLOCK consecutive pairs:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Displacements of bottles since the last update of the tangential springs, from which integrators elongate springs.
 
 Semi-implicit Euler and leapfrog elongate a spring by dt times the slip at which they evaluate forces. Velocity Verlet

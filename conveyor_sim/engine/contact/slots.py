@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Sums of pair forces by bottle, through a table of WIDTH slots per bottle (drawn in `pairs.py`).
 
 A slot holds an index into the columns of pair forces. Slots are sorted by partner, and separate pairs contribute 0, so

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Time integrators, one per file, each a function ``advance(world, worker, steps, dt, phase) -> complete steps done``.
 
 ``phase`` is START for the first call in a tick. A call may return with ``neighbourhood.stale`` set, because a neighbour

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Kernels that integrators call by their addresses: calls that are rare, and the same for all laws of contact."""
 
 from conveyor_sim.engine.arrays.world import Worker, World

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Conjugate gradients for the linearly implicit method: (M + resistance) dv = h F, with 3 x 3 blocks per bottle.
 
 The preconditioner is the factorised blocks. Products are computed as forces are: by pair, then summed by bottle in a

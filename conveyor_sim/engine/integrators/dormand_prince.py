@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Embedded pair 5(4) of Dormand and Prince with error control: the reference for the other integrators.
 
 A step of dt is divided into substeps, the same for all bottles, such that the two methods of the pair differ by at most

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Linearly implicit: forces are linearised in the change of velocity, which a linear system determines.
 
     (M + theta^2 h^2 K + theta h C) dv = h F(r + theta h v, v),  r += h (v + theta dv),  v += dv     (`tangent.py`)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Parts of integrators: the kick (velocities), and the work that follows every step.
 
 Each part works on bottles first to end.

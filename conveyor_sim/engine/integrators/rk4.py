@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Classical Runge-Kutta method, with four force evaluations per step, and one more per tick.
 
 It has order 4 where forces are smooth, as in a lasting contact or in friction below v_lim, and 3 through v_lim, where

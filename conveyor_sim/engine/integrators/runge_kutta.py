@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Parts of explicit Runge-Kutta methods: slopes stored within a step, and states computed from them.
 
 Row s of a tableau gives the state of a step of h after s evaluations with accelerations a_j = F_j/m:

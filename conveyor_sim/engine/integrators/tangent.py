@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One contact in the linearly implicit method: force at the predicted state, resistance to a change of velocity.
 
 A step of h from (r, v) changes v by dv and takes forces at r + theta h (v + theta dv) and v + theta dv, linear in dv:

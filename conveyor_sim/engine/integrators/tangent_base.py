@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Friction under the bottles in the linearly implicit method: its resistance to a change of velocity (`tangent.py`)."""
 
 import math

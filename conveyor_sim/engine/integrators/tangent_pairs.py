@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Contacts of bottle pairs in the linearly implicit method (`tangent.py`)."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Contacts of bottles with rails in the linearly implicit method (`tangent.py`)."""
 
 from typing import Any

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Hashed cells: bottles sorted by square cell, so that neighbours are in nine cells."""
 
 import math

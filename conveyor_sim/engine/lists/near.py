@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Rail pieces near each bottle, within its radius and half the skin; listed at each rebuild.
 
 Tangential springs at rails are stored by piece: a bottle that passes a joint from one piece of a surface to the next

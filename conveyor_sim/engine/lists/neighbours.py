@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Verlet list of bottle pairs that may touch; it holds until a bottle has moved by half the skin.
 
 It is sorted by slot, so that sums over it, and hence the bits of a run, do not depend on the time of a rebuild.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Rebuild of all neighbour lists together, which is due once a bottle has moved by half of the skin.
 
 The time of a rebuild depends on the state alone, not on the division of a run into calls.

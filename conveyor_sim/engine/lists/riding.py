@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Riding bottles: alone on a straight belt, with a velocity that a step leaves unchanged to the bit.
 
 The forces on such a bottle depend on its velocity alone, and the next step leaves that unchanged again. So they need

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Grid over the plant, made once: rail pieces and belts within reach of a bottle whose axis is in a cell."""
 
 import math

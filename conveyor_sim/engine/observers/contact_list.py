@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """All closed contacts as columns, by the functions that compute the forces; read-only."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Loads on bottles and rails in every step: scuffing, crushing, impacts, tipping. It changes no force.
 
 The state is evaluated between two steps. Each bottle lists its closed contacts, with the forces of the laws there, and

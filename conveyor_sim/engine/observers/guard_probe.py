@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Data for the guard: bottles that are not finite, the fastest one, kinetic energy, the deepest overlaps.
 
 Overlaps are evaluated at the end of a step after which the lists were rebuilt. That is before a bottle has moved by

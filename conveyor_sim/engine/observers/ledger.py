@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Accounts of the energy ledger: the work of forces, added up in every step.
 
 An evaluation of the forces leaves their parts (`ledger_parts.py`). A part's power is that force times a velocity,

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Parts of the forces for the energy ledger (`ledger.py`): dissipation, and the work of belts, in an evaluation.
 
 Three parts are stored beside the sum of forces on a bottle: damping in its contacts, friction in them, and the force of

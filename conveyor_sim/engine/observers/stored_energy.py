@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Energy of a state: kinetic, in contacts, in tangential springs, in springs under the bottles."""
 
 from typing import Any

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Drives of moving rails, with limited force: a rail follows its profile, or is a body that bottles can hold up.
 
 While its drive can exert the force that the profile needs, M a minus the force of the bottles, the rail is on its

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A bottle and an arc rail: nearest point of the arc, end points included."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The deepest contacts of one bottle with rails of all kinds."""
 
 from conveyor_sim.engine.arrays.rails import RailContacts

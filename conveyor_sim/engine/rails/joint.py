@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Joints of rail pieces. Their common end point pushes a bottle once, and only a bottle that lies beyond the ends of
 both pieces.
 """

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Motion profiles of moving rails: a trapezoid of speed at limited acceleration, as a closed form of time.
 
 A profile is (PHASES, 4): start of each phase (s), and position, speed and acceleration then. Units: m and s, or rad and

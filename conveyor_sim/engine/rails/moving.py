@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Moving rails: their positions at every step, their contacts, and the velocity of the rail at a contact.
 
 A rail's motion profile is a closed form of time, constant accelerations one after another, so it moves within a tick,

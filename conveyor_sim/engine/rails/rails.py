@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Contact of bottles with rails: straight pieces and arcs, from lists made at each rebuild."""
 
 from typing import Any

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A bottle and a straight rail piece: nearest point of the segment, end points included."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Shared push of the pieces of one rail surface that touch a bottle together.
 
 Two pieces with normals at an angle of cosine c would push twice near a shallow joint, with up to double the force. The

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Times in a tick at which the circles of bottles block light beams.
 
 A bottle's path through a tick is the cubic through its positions and velocities at both ends (Hermite), divided into

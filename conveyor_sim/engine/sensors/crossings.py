@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Bottles whose axes cross a line within a tick, with the time of each."""
 
 from conveyor_sim.engine.arrays.types import F8, I8

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Bottles whose axes are in a region."""
 
 from conveyor_sim.engine.arrays.types import F8, I8

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Friction between a bottle's base and the belt or floor under it, N = m g (paper eqs. 7, 15).
 
 The base is a point at the axis, as in the paper, or a ring (`ring.py`). Bottles whose belt is certain go through one

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The belt that carries a bottle: the last listed one under its axis, else the floor (paper eqs. 11-15)."""
 
 import math

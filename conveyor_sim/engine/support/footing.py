@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Velocity field of the belt under each bottle, stored by bottle until it may have left the belt.
 
 At a rebuild each bottle's belt is either certain, wherever it moves within the skin, or tested at every force

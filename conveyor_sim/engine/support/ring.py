@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Friction of a base that is a ring, shared by sliding and spinning. The paper's base is a point.
 
 For a disc: Farkas, Bartels, Unger and Wolf, Phys. Rev. Lett. 90, 248302 (2003).

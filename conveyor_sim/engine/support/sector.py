@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Angular spans without angles: two unit vectors and a code. So spans can wrap, and kernels need no arctangent."""
 
 from typing import Any

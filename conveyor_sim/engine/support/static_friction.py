@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Static friction with memory: a spring from each base to a point of its belt (Cundall and Strack 1979).
 
 The point, the anchor, moves with the belt's surface, so on a turning belt the spring turns with it. The spring pulls

@@ -1,1 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
 """Threads that step together, with the bits of a single one."""

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Choice of the number of threads: the fastest one by measurement, which changes with the load on the cores.
 
 Occasionally a tick is taken with half or twice the threads. Every trial that loses doubles the wait for the next, so on

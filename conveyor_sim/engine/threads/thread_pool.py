@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Pool of threads, which wait in Python between ticks, and take the steps of a tick together (`workers.py`)."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Threads that take steps together: their shares of the work, and barriers.
 
 Every thread runs the same integrator on the same World, with its own Worker. Pairs and bottles are shared out in

@@ -1,1 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
 """Alarms by ISA-18.2: declarations, states, delays, suppression, first-out."""

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One alarm: its states by ISA-18.2, and what leads from one to another."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`Alarms`: all alarms of a line, with their conditions, suppression and first-out."""
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Declarations of alarms in inputs: an id, and a JSON object with the fields of an alarm in a scene."""
 
 import json

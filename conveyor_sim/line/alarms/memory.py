@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Alarms in checkpoints, and checks of what a checkpoint file states about them."""
 
 from graphlib import CycleError

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Operator actions on alarms: acknowledge, reset, shelve, unshelve, remove from service and return to it."""
 
 from collections.abc import Callable, Sequence

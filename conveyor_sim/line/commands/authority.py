@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Rights to act on a line: one table of operations by kind of writer, and one of control modes for commands."""
 
 from collections.abc import Collection, Iterable, Mapping, Sequence

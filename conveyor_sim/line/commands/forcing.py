@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`Forcing`: signals that controllers read with a forced value, as in a PLC's watch table."""
 
 from __future__ import annotations

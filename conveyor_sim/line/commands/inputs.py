@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`Input`: the record of every external action on a line, and its result.
 
 An input is applied at the start of one tick, or refused as a whole with a reason. One exception: from an input of a

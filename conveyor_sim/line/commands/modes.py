@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`Modes`: control mode of each device, and the controller that owns the line."""
 
 from __future__ import annotations

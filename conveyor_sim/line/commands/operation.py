@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`Operation`: row in the line's table of operations."""
 
 from collections.abc import Callable

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`Placement`: the operations that put bottles on the line and remove them.
 
 Both are applied at the start of a tick, so the check made between two ticks (`Placement.later`) is the one of the tick.

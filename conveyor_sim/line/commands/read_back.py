@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`ReadBack`: present value of each command, with its writer and the time of the last change."""
 
 from collections.abc import Sequence

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`Receipt`: checks on receipt of an input, independent of the state of the line.
 
 Protocol servers answer clients by these checks at once. The line checks again at the tick, by the same rules.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reasons for refusing commands and faults: unknown name, wrong value, outside the limits."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Belts: actual speed, bottles on the belt. A belt without a drive has a speed setpoint, which it follows at once."""
 
 from collections.abc import Sequence

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`BeltSurfaces`: velocity fields of the surfaces, set from the speeds of the belts. Plates rest."""
 
 import numpy as np

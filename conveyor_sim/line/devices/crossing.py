@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Lines that bottle axes cross within a tick: passages with their times, counters and inspections."""
 
 from collections.abc import Sequence

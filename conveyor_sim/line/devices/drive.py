@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Drives: ramps, running, reversing, trips and reset, and travel of an encoder; drives that move several belts."""
 
 import math

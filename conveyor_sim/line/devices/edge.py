@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Rising edges of switches between two scans."""
 
 from dataclasses import dataclass

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Entry of bottles: free space for them, and bad bottles among them."""
 
 import math

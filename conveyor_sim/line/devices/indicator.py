@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Indicators of an exit from its sensors: flow, jam, starved, blocked."""
 
 from collections.abc import Sequence

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Infeeds: bottles enter from a tightly packed queue (`gap`) or at a rate, always into free space.
 
 The queue is not simulated: it lies upstream of the infeed and moves with the last bottle that entered.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Photo-eyes: light beams that bottles cross within a tick, their faults, debounce and delays."""
 
 from collections.abc import Sequence

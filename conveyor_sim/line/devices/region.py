@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Regions of the plane: zones count the bottles inside, outfeeds remove them."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Rejects: machines that remove the bottle in front of them when fired."""
 
 from collections.abc import Sequence

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Devices with a speed, and those among them with a speed setpoint and a watchdog."""
 
 from collections.abc import Sequence

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`DeviceSetup`: arguments of device constructors besides their part of the scene, and random streams.
 
 Every purpose of every device has its own stream of random numbers, so two variants of a line draw equal numbers.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Spills: bottles that a test drops onto the line."""
 
 from conveyor_sim.line.device import Device, ScanContext

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Failures of a machine, drawn from the seed, and its planned stops."""
 
 import math

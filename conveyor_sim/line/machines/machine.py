@@ -1,12 +1,13 @@
+# SPDX-License-Identifier: Apache-2.0
 """`MachineDevice`: PackML states, rate, failures and planned stops of machines that feed or take bottles."""
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from types import SimpleNamespace
 
 from conveyor_sim.line.alarms.declaration import Declared, error
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.devices.setup import DeviceSetup
-from conveyor_sim.line.machines.efficiency import CATEGORIES, Category
+from conveyor_sim.line.machines.efficiency import CATEGORIES, Category, TimeAccount
 from conveyor_sim.line.machines.failures import Draws, FailureClock, PlannedTimes
 from conveyor_sim.line.machines.packml import (
     CNTRL_CMD,
@@ -43,9 +44,6 @@ ROUNDING = 1e-9
 
 EXECUTE, SUSPENDED, HELD = int(PackMLState.EXECUTE), int(PackMLState.SUSPENDED), int(PackMLState.HELD)
 
-Watcher = Callable[[int, Category, int], None]
-"""Receives the tick, the time category from then on, and the stop reason."""
-
 
 class MachineDevice(Device):
     """Machine that works in cycles of one bottle and follows the PackML state model. It runs at the start."""
@@ -65,14 +63,15 @@ class MachineDevice(Device):
         rate, most = part.rate, part.rate if part.rate_limit is None else part.rate_limit
         reasons = reason_texts(part)
         first = PackMLState.STARTING if PackMLState.STARTING in conditional else PackMLState.EXECUTE
-        time = CATEGORIES.index(category_of(first, NONE, NONE, False))
+        category = category_of(first, NONE, NONE, False)
+        shown = CATEGORIES.index(category)
         super().__init__(
             name,
             [
                 switch(f"{name}/running", "status", "Running, and not stopped.", 1.0, "state"),
                 *own,
                 choice(f"{name}/state", "status", "PackML state.", STATE_TEXTS, first, "state"),
-                choice(f"{name}/category", "status", "Time category.", dict(enumerate(CATEGORIES)), time, "state"),
+                choice(f"{name}/category", "status", "Time category.", dict(enumerate(CATEGORIES)), shown, "state"),
                 choice(f"{name}/stop_reason", "status", "Reason for the present or last stop.", reasons, NONE, "state"),
                 switch(f"{name}/fault", "status", "Failed and not repaired, or aborted."),
                 count(f"{name}/failures", "counter", "Number of failures."),
@@ -87,7 +86,9 @@ class MachineDevice(Device):
         self._suspend_ticks = setup.ticks(part.suspend_after)
         self._ramp = part.rate * tick / part.ramp_up if part.ramp_up else 0.0
         self._plans = [PlannedTimes(stop, tick) for stop in part.planned_stops.values()]
-        self._watchers: list[Watcher] = []
+        self._counts_starts = setup.scene.counts_starts
+        self._reference = part.rate if self._counts_starts else most
+        self.time = TimeAccount(category, rate)
         self.run = True
         self.rate = rate
         self.stop = False
@@ -142,9 +143,10 @@ class MachineDevice(Device):
         """Time category since the last tick."""
         return self._category
 
-    def watch(self, watcher: Watcher) -> None:
-        """Call `watcher` at the end of each tick in which the category or the stop reason has changed."""
-        self._watchers.append(watcher)
+    @property
+    def reference_rate(self) -> float:
+        """Rate to which effectiveness refers, 1/s: the fastest permitted one."""
+        return self._reference
 
     def restored(self, tick: int) -> None:
         """Derive flags, category and status from the stored attributes."""
@@ -184,6 +186,7 @@ class MachineDevice(Device):
         what = name.rpartition("/")[2]
         if what == "rate":
             self.rate = value
+            self.time.change_rate(now.tick, value)
             return
         if what == "stop":
             self.failures += value != 0.0 and not self.stop
@@ -306,8 +309,12 @@ class MachineDevice(Device):
         return self._works
 
     def turn(self, now: ScanContext) -> bool:
-        """Advance the cycle by one tick, and return True if it is complete."""
-        if self._works and now.tick > 0:
+        """Advance the cycle by one tick, and return True if it is complete.
+
+        It advances in ticks that are charged as running, and in no others.
+        """
+        ran = now.tick > 0 if self._counts_starts else self._category == "running"
+        if self._works and ran and now.tick > 0:
             self.cycle += (self.speed if self._ramp else self.rate) * now.length
         return self._works and self.cycle >= 1.0 - ROUNDING
 
@@ -338,14 +345,12 @@ class MachineDevice(Device):
             self.waited = 0
         if cause != self.cause or self._changed:
             self.cause = cause
-            shown, failed = (self._category, self._shown[2]), self._shown[3]
+            failed = self._shown[3]
             self._category = category_of(self.state, self.reason, cause, bool(self._failed))
             self._show()
             if failed != self._shown[3]:
                 now.alarm(f"{self.name}/fault", self._shown[3])
-            if shown != (self._category, self.reason):
-                for watcher in self._watchers:
-                    watcher(now.tick, self._category, self.reason)
+            self.time.change(now.tick, self._category)
 
     def _show(self) -> None:
         """Update the status."""
@@ -362,6 +367,15 @@ class MachineDevice(Device):
         """Return state, category, stop_reason, fault, failures and cur_rate (1/s)."""
         rate = (self.speed if self._ramp else self.rate) if self._works and not self._waits else 0.0
         return *self._shown, self.failures, rate
+
+    def waited_time(self, category: Category, ticks: int, now: ScanContext) -> float:
+        """Return the total time starved or blocked, s. ticks: number of ticks at whose end it waited."""
+        return (ticks if self._counts_starts else self.time.up_to(now.tick)[category]) * now.length
+
+    @property
+    def begun_part(self) -> float:
+        """Part of the present cycle that is done; 0 without a bottle."""
+        return self.cycle
 
     def _draws(self, setup: DeviceSetup, times: Times, purpose: str) -> Draws:
         return Draws(times, setup.random(self.name, purpose), self._tick)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The PackML state model: 17 states, ten commands, and the transitions.
 
 Numbers are those of StateCurrent and CntrlCmd in PackML (OPC 30050, Beckhoff Tc3_PackML_V3). As in OPC 30050, Hold is

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Sources: upstream machines that feed bottles at a rate. A source without room for a bottle is blocked."""
 
 from collections.abc import Sequence
@@ -26,6 +27,8 @@ class SourceDevice(MachineDevice, Scattering, Switching):
         super().__init__(name, source, setup, signals)
         self.quality = Quality(source, setup.random(name, BAD))
         self.scatter(source, lambda: setup.random(name, JITTER))
+        # The first bottle takes a cycle, as all others do.
+        self.cycle = 1.0 if self._counts_starts else 0.0
         self.fed = 0
         self.blocked_ticks = 0
 
@@ -66,7 +69,8 @@ class SourceDevice(MachineDevice, Scattering, Switching):
     def values(self, now: ScanContext) -> Sequence[float]:
         """Return the values in the order of the signals."""
         blocked = self.cause == BLOCKED
-        return self.works and not blocked, self.fed, blocked, self.blocked_ticks * now.length, *self.status()
+        time = self.waited_time("blocked", self.blocked_ticks, now)
+        return self.works and not blocked, self.fed, blocked, time, *self.status()
 
     def states(self, now: ScanContext) -> list[float]:
         """Return running, blocked, state, category and stop reason."""

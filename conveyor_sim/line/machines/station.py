@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Machines that take bottles from a region: their queue, the fill level at which they start, sinks and stations.
 
 Stations work on a bottle for one cycle, and give it back at another place.
@@ -83,9 +84,17 @@ class SinkDevice(TakingDevice):
             switch(f"{name}/starved", "status", "A bottle is due, and none is there.", adds_to="state"),
             seconds(f"{name}/starved_time", "counter", "Total time starved."),
         ]
+        if not setup.scene.counts_starts:
+            signals += [
+                count(f"{name}/processed", "counter", "Bottles whose cycle is complete."),
+                count(f"{name}/defective", "counter", "Bad bottles among them."),
+            ]
         super().__init__(name, sink, setup, signals)
         self.removed = 0
         self.removed_bad = 0
+        self.processed = self.defective = 0
+        self.holds = self.holds_bad = False
+        """True while it works on a bottle, and on a bad one."""
         self.starved_ticks = 0
 
     def take(self, now: ScanContext) -> None:
@@ -95,12 +104,14 @@ class SinkDevice(TakingDevice):
         slot_of = self.queue(now)
         cause = NONE
         if self.turn(now):
+            self._complete()
             if not self.waiting:
                 cause = STARVED
                 self.starved_ticks += 1
                 self.wait()
             elif self.goes_on():
                 first, *others = self.waiting
+                self.holds, self.holds_bad = True, first in now.bad
                 now.state.remove(slot_of[first])
                 self.waiting = tuple(others)
                 self.removed += 1
@@ -108,14 +119,27 @@ class SinkDevice(TakingDevice):
                 self.cycle -= 1.0
         self.conclude(cause, now)
 
+    def _complete(self) -> None:
+        """Count the bottle whose cycle is complete."""
+        self.processed += self.holds
+        self.defective += self.holds_bad
+        self.holds = self.holds_bad = False
+
+    @property
+    def begun_part(self) -> float:
+        """Part of the present cycle that is done; 0 without a bottle."""
+        return self.cycle if self.holds else self.cycle - 1.0
+
     def counts(self) -> tuple[int, int, int]:
-        """Return taken bottles, and bad ones among them."""
-        return self.removed, self.removed_bad, 0
+        """Return processed bottles, and bad ones among them."""
+        return (self.removed, self.removed_bad, 0) if self._counts_starts else (self.processed, self.defective, 0)
 
     def values(self, now: ScanContext) -> Sequence[float]:
         """Return the values in the order of the signals."""
-        starved, time = self.cause == STARVED, self.starved_ticks * now.length
-        return self.works, self.removed, self.removed_bad, starved, time, *self.status()
+        taken = self.works, self.removed, self.removed_bad
+        starved = self.cause == STARVED, self.waited_time("starved", self.starved_ticks, now)
+        completed = () if self._counts_starts else (self.processed, self.defective)
+        return *taken, *starved, *completed, *self.status()
 
     def states(self, now: ScanContext) -> list[float]:
         """Return running, starved, state, category and stop reason."""
@@ -234,6 +258,11 @@ class StationDevice(TakingDevice, Scattering):
             now.set_attribute(bottle, BAD, 1.0)
         self.good += not defective
 
+    @property
+    def begun_part(self) -> float:
+        """Part of the present cycle that is done; 0 without a bottle."""
+        return 0.0 if self.holding == EMPTY and self.cause == STARVED else self.cycle
+
     def counts(self) -> tuple[int, int, int]:
         """Return processed bottles, and defective ones among them."""
         return self.processed, self.processed - self.good, 0
@@ -251,8 +280,8 @@ class StationDevice(TakingDevice, Scattering):
             self.holding != EMPTY,
             self.cause == STARVED,
             self.cause == BLOCKED,
-            self.starved_ticks * now.length,
-            self.blocked_ticks * now.length,
+            self.waited_time("starved", self.starved_ticks, now),
+            self.waited_time("blocked", self.blocked_ticks, now),
             *self.status(),
         )
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A machine's data points of the Weihenstephan Standards, derived from its tags on request.
 
 Values of mode and program are those of OPC 40600. States are those of PackML, with Lack, Tailback and Prepared below
@@ -40,7 +41,7 @@ DATA_POINTS: Mapping[str, DataPoint] = {
     "WS_Not_Of_Fail_Code": DataPoint(
         10000, ("fault", "stop_reason"), "Stop reason while the machine has failed, else 0."
     ),
-    "WS_Tot_Containers": DataPoint(50005, ("produced", "taken", "processed"), "Bottles."),
+    "WS_Tot_Containers": DataPoint(50005, ("produced", "processed"), "Bottles whose cycle is complete."),
     "WS_Good_Containers": DataPoint(50006, ("good",), "Bottles, of stations."),
 }
 """Data points by name."""

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """DXF files opened for reading, with errors in one sentence."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Plans written as DXF files, in mm."""
 
 from __future__ import annotations

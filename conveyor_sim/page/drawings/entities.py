@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Entities of a DXF plan, with blocks taken apart: curves, symbols and texts in m, and what was skipped."""
 
 from __future__ import annotations

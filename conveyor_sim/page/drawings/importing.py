@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Parts of a scene from a plan and a map of layers."""
 
 from __future__ import annotations

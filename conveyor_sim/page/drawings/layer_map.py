@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Maps of layers: what the entities of each layer of a plan stand for."""
 
 from __future__ import annotations

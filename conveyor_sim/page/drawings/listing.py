@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Lists of skipped entities."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Numbers of a plan as a person would write them."""
 
 from __future__ import annotations

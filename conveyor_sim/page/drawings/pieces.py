@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Pieces of drawn curves: straight lines and arcs, as in a polyline of DXF. Lengths in m, angles in rad."""
 
 from __future__ import annotations

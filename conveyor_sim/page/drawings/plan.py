@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Plan of a scene: curves, regions and names by layer, for files of drawing programs."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Text of a scene with imported parts: one line per part, added to a base scene whose comments are kept."""
 
 from __future__ import annotations

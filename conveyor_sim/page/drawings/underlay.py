@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Underlay of a scene, ready to be drawn: an image, or lines."""
 
 from __future__ import annotations

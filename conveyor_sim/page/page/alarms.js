@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The alarm list: alarms that are not normal now, with the first-out marked; a click jumps to the place and time of an alarm.
 
 import { controlsOfAlarm } from "./controls.js";

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The banner: forced signals and injected faults at the displayed time, in every view.
 
 import { byId, element, refill, shown } from "./dom.js";

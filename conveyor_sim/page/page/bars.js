@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // State bars: states of machines over the whole time, one bar each.
 
 import { lastUpTo } from "./block.js";

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A second recording of a line, drawn beside the first: same time, camera and colours.
 
 import { byId, element, seconds } from "./dom.js";

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Reads a block as conveyor_sim/page/block.py packs it. Both files must be changed together.
 
 class Numbers {

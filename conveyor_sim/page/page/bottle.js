@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // One bottle: type, speed, and forces over the last seconds.
 
 import { palette } from "./colours.js";

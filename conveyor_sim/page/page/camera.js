@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Conversion between metres and pixels of the canvas: zoomed by wheel, two fingers or keys, moved by dragging.
 
 const MOST = 20000; // px per metre

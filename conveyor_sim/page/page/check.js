@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The page of a scene that is being written: its plan and its problems, which follow every save.
 
 import { Camera } from "./camera.js";

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The displayed time: playing, paused, stepped or sought.
 
 export const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 5, 10, 30];

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Comparison of two recordings, A and B: their figures, the first difference of each kind, and all differences at the displayed time.
 
 import { element, refill, seconds, shown } from "./dom.js";

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Manual inputs of tags: fields and buttons for commands, modes, faults and forces.
 
 import { element } from "./dom.js";

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Thousands of bottles: their pixels are copied into one image, which is drawn at once. Single drawings take longer.
 
 export const MANY = 2000; // least number of bottles for which it is faster

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The bar of a running line: connection, latency, run, and user.
 
 import { byId, element, seconds, warn } from "./dom.js";

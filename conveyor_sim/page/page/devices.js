@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Photo-eyes, zones, machines, counters, gates, pushers and diverters.
 
 import { short } from "./dom.js";

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Elements; their content is text, never markup.
 
 export function element(tag, properties = {}, ...children) {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The event list: events around the displayed time, by kind and words; a click jumps to an event.
 
 import { lastUpTo } from "./block.js";

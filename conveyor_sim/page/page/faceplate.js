@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Faceplates: present values of all tags of a device, of A and B if two recordings are shown; a click adds a tag to the trends.
 
 import { fillAlarms } from "./alarms.js";

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The page of a failed test: the condition with its values, and the time from the last action of the test to the failure.
 
 import { element, seconds, shown } from "./dom.js";

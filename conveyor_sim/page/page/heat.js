@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Heat maps of the bottles on a grid: density, greatest force, dwell time, over the last minute or the whole recording.
 
 import { isDark, SCALES, STEPS } from "./colours.js";

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Keyboard shortcuts, as in a video player.
 
 import { byId, element } from "./dom.js";

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The strip of key figures at the displayed time: throughput, OEE, bottles, alarms and the bottleneck. A click shows more.
 
 import { byId, element, seconds } from "./dom.js";

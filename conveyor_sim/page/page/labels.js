@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Names on the plan without overlaps. Important names are placed first. A name without room at its object stands farther
 // away with a leader line, or is left out.
 

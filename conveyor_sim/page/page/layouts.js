@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Layouts that the user saves by name in this browser: panel, trends, watched signals, colours, and the part of the plan that is shown.
 
 import { byId, element, warn } from "./dom.js";

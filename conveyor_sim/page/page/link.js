@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Links to a moment: "#t=84&bottle=31&device=machines/capper" at the end of the address.
 
 import { seconds, warn } from "./dom.js";

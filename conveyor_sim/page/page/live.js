@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A running line: frames and events come by one websocket, which reconnects. Written by
 // conveyor_sim/protocols/web/feed.py. Both files must be changed together.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The displayed time of a running line: now, unless the user looks back.
 
 import { Clock } from "./clock.js";

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Received data of a running line, as a recording that grows at its end and drops its beginning.
 
 import { emptyBlock } from "./block.js";

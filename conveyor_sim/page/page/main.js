@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The page: opens a recording, two recordings, or a running line, and starts the drawing.
 
 import { SPEEDS } from "./clock.js";

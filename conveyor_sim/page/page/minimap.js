@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The complete plant in a corner while the plan shows a part of it; a press moves the plan there.
 
 import { palette } from "./colours.js";

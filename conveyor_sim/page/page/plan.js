@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The plan: the line at a moment, drawn in one pass over the canvas.
 
 import { Surfaces, parallel } from "./surfaces.js";

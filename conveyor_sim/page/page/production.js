@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Figures of a line from its story: bottles that left it, throughput, OEE, and alarms.
 
 import { lastUpTo } from "./block.js";

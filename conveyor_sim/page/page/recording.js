@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A recording by time: frames of bottles, signals, contacts, in blocks that are loaded on request.
 
 import { emptyBlock, lastUpTo, readBlock } from "./block.js";

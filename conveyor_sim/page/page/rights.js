@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What the user may do now: the reason why a request would be refused, and controls that are disabled with that reason.
 
 const PEOPLE_NAMES = { operator: "an operator", engineer: "an engineer", controller: "a controller", test: "a test user", viewer: "a viewer" };

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The scrubber: position in time, with marks of alarms, faults, refusals and failed conditions.
 
 import { palette } from "./colours.js";

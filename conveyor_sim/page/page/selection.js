@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Shapes of devices on the plan: for clicks, for the outline of the selected device, and to zoom to it.
 
 import { deviceOf, moverEnds } from "./devices.js";

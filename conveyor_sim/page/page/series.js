@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Values by name and time, of all that has a value: signals, commands in force, and alarms (1 while they stand).
 
 import { lastUpTo } from "./block.js";

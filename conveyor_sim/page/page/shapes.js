@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Points and polygons of the plan, m.
 
 // Returns the least x and y, and the greatest, of all drawn parts of recordings.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A field for the name of a signal. An unknown name is refused beside it, with the nearest names as buttons.
 
 import { element } from "./dom.js";

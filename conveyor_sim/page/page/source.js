@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Sources of the page's data, bytes by name ("head", "fullest", "story/0", "block/0"): the page itself, or a server.
 
 import { byId, say, warn } from "./dom.js";

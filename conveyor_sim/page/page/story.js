@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The story: events, alarms, states of machines, counters at a time.
 
 import { lastUpTo } from "./block.js";

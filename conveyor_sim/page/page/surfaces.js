@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Surfaces of belts with a moving texture: slats across, chevrons along. Plates are plain.
 
 export class Surfaces {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The panels beside the plan, one at a time.
 
 import { byId, element } from "./dom.js";

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // OEE tiles: production of each machine and of the line since the last reset.
 
 import { CATEGORIES } from "./colours.js";

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Trends of chosen signals around now, with commands and faults as marks; drawn by uPlot. Switches have a lane each, below.
 
 import { COLOURED, palette } from "./colours.js";

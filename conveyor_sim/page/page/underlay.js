@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // An image or a drawing below the plan.
 
 const images = new Map(); // by data URL

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The view: displayed state of a line, selection, and the parts that draw it.
 
 import { Alarms } from "./alarms.js";

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The watch table of a running line: values of chosen signals, and forced ones.
 
 import { field } from "./controls.js";

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Wear of rails up to a time as a heat map along them: scuffing or mean pressure in each bin.
 
 import { lastUpTo } from "./block.js";

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`Accounts`: the energy ledger, the damage and the clogging of a simulation, each if the scene enables it."""
 
 from collections.abc import Callable, Mapping

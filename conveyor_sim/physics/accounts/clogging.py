@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Detection of clogged outfeeds: bottles wait on running belts, and none has left for the scene's time limit."""
 
 from collections.abc import Mapping

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Damage account: outputs, limits and events of the loads that the engine records in every step."""
 
 from collections.abc import Iterator

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Elastic energy and depth of contacts."""
 
 import numpy as np

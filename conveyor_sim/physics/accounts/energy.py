@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Energy ledger of a State: energy of fed and removed bottles, beside the engine's entries of every step."""
 
 from collections.abc import Iterator

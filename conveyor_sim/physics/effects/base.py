@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Effects of the support under bottles: friction, belts, and ring-shaped bases."""
 
 from collections.abc import Callable, Collection

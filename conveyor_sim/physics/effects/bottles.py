@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Effects on bottles as a whole: they turn, ride, enter and leave."""
 
 from collections.abc import Collection

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """All effects in order, the choice of effects for a scene, and their bounds and predictions together."""
 
 from collections.abc import Mapping, Sequence

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Effects of contact between bottles, and the elastic laws."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Effects of damping in contacts: one per law in `engine/contact/laws/`, built from the declaration of the law."""
 
 from collections.abc import Callable, Collection

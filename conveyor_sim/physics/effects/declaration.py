@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Declaration of an effect, and the decision about it."""
 
 from collections.abc import Callable, Collection

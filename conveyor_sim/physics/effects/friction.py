@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Effects of friction: in contacts, its curve, how it is solved, and the spring with history."""
 
 import math

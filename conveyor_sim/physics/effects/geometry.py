@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Effects of geometry: rails at rest, moving rails, and bottles of several sizes."""
 
 from collections.abc import Collection

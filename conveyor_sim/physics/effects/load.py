@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Largest load of belts on a contact of two bottles. Explicit friction must be stable at this load.
 
 A belt drags a bottle with at most mu m g. Only the bottles along its running length press on one contact; bottles

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Notes on the setup of a scene for readers of its results."""
 
 from collections.abc import Collection

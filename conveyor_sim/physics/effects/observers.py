@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Effects that only observe: they change no result, but cost time in every step or output."""
 
 from collections.abc import Callable, Collection

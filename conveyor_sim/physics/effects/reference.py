@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Page about all effects: `python -m conveyor_sim.physics.effects.reference > docs/effects.md` writes it."""
 
 from conveyor_sim.engine.contact.laws import DAMPING

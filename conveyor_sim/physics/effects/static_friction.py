@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Effect of static friction with memory under the bottles: a spring between base and belt."""
 
 from collections.abc import Collection

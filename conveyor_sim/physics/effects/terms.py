@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Input for bounds on the time step and for predicted errors, and functions that several effects use."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Columns of contact and friction coefficients by bottle type, from the scene's pairs of materials."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Scene -> Model: the constant arrays, the chosen effects and the time step, with their reasons."""
 
 import math

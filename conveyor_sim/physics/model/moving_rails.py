@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Initial arrays of moving rails, and their largest speed in a tick."""
 
 from collections.abc import Sequence

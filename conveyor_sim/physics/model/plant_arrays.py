@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Constant arrays of the plant for the engine: rail pieces with their joints, surfaces, the static grid."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Tightest bound on the steps of a scene, and changes of the scene that lower the number of steps.
 
 A remedy is a change of the scene file. Each candidate is tried: the steps of the changed scene are chosen, and only

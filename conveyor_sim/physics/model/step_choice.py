@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Choice of the steps per tick with its reasons; it needs no arrays of the Model."""
 
 from dataclasses import dataclass

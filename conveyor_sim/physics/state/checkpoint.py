@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The checkpoint file: a NumPy .npz with the arrays of a run, a JSON header with everything else, and a checksum.
 
 The checksum is the comment at the end of the archive (`unzip -z`), so the file is an ordinary .npz to other programs.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Empty arrays of loads on bottles and rails for a Model, and the places of the rails' bins."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Arrays of a World without bottles for a Model. Groups that the Model does not need are None."""
 
 from collections.abc import Iterator

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Hashes of a state at a tick: of its visible part, and of everything that decides how a run continues.
 
 The latter is the content of a checkpoint without observers. Its list is that of the checkpoint (`changing_arrays` and

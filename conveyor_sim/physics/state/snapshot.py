@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """State of objects (infeeds, watchdogs, accounts, ...) between ticks as plain data, and its restoration."""
 
 import json

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`State`: all of the physics that changes in a run: bottles, neighbour lists, springs, surfaces, moving rails."""
 
 import heapq

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Arrays of a World by name, the role of each, and a World with arrays put back.
 
 The roles determine what checkpoints check, state hashes cover, the guard copies, and a resize carries over. They are

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Checks of arrays from a file before they become a World: the kernels trust every index and length."""
 
 from typing import Any

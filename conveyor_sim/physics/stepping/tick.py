@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One tick of the engine: steps on a pool of threads, checked by the guard."""
 
 import os

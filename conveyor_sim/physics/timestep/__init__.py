@@ -1,1 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
 """Choice of the time step: bounds, errors of the integrators, predicted errors, presets."""

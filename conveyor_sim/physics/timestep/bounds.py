@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Bounds on the time step, and the choice of steps per tick. Bounds in s; references are to docs/paper.md."""
 
 import math

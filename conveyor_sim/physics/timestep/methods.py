@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Error of each integrator in the peak force of an impact: power laws with measured coefficients.
 
 They were measured in head-on impacts, as RMS over 64 phases at which first touch falls into a step, at 10 to 200 steps

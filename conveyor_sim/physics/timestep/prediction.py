@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Expected errors in contact forces at a time step: in the peak force of impacts, and in resting load.
 
 The relative error of a force peak is an RMS over the phases at which first touch may fall into a step. Effects

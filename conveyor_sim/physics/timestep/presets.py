@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Presets of `accuracy`: tolerances, and the numbers that follow from them."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`FreeRunningPlc`: a PLC that is a server controls a line in real time, without lockstep.
 
 Every `period` the signals are written to it, and its commands are read and given to the line. The lag between both is

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`plc_link`: the link to a PLC by the protocol of its URL."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`ModbusLink`: access to the registers of a PLC that is a Modbus TCP server."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`OpcUaLink`: access to the variables of a PLC that is an OPC UA server."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`PlcLink`: access to the tags of a PLC that is a server, by any protocol."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Map of our tags to those of a PLC: a CSV file with the columns `tag` and `theirs`.
 
     tag,theirs

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`FoxgloveServer`: a line in Foxglove and Lichtblick, by their WebSocket protocol. Messages pass unchanged.
 
 Topics have the names and definitions that recordings have, so that a layout shows both. Clients only read.

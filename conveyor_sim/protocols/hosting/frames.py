@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`Frames`: updates of a line mirror, collected in bounded memory for one process that copies it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`ServerChild`: a process for one protocol server. It imports its libraries before the line is known."""
 
 from __future__ import annotations

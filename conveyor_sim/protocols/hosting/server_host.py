@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`ServerHost`: one protocol server in a separate process, watched and restarted by this one.
 
 The line, logins and ownership stay here. One thread of the host answers the process and watches its heartbeats, one

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Table of all protocol servers: how to make each, and what it exposes."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Messages between a `ServerHost` and the process of its protocol server, and the heartbeat of the process."""
 
 from __future__ import annotations

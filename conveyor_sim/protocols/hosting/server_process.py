@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The process of one protocol server: it mirrors the line from frames of its parent, and serves it.
 
 Three threads: the main one runs the event loop of the protocol server, one applies frames, one reads answers. The

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`ServerThread`: an asyncio loop for protocol servers in a separate thread."""
 
 from __future__ import annotations

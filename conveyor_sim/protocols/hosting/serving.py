@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`Serving`: all protocol servers of one tag provider, with greeting, progress and summary."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`ServerSettings` of all protocol servers, with limits and quotas from `--limit NAME=VALUE`."""
 
 from __future__ import annotations

@@ -1,1 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
 """Modbus server of a line, and the addresses of its tags."""

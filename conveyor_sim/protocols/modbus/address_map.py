@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Modbus addresses of a line: assigned from its tags, stored as CSV, and extended without moving a stored address."""
 
 from __future__ import annotations

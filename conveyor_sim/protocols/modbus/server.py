@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`ModbusServer`: a line as a Modbus TCP server, by the addresses of a map.
 
 Modbus has no users. Every client that reaches the port can read. Writes are refused unless the server has a role for

@@ -1,1 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
 """A line as an edge node of MQTT Sparkplug B."""

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`Broker`: address of the MQTT broker of a plant, with the user and the names of the line there."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`HostCommands`: commands of Sparkplug hosts by NCMD and DCMD, checked at once and passed on as inputs.
 
 Commands do not name their users, and Sparkplug has no answers. All clients that the broker lets publish can command, in

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`EdgeNode`: a line as an edge node of MQTT Sparkplug B 3.0, with one device, at an external broker.
 
 All clients that the broker lets subscribe can read. Commands are refused unless the edge node has a role for them.

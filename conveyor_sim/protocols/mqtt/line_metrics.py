@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`LineMetrics`: tags of a line as metrics of Sparkplug B, and their changes since the last message.
 
 The payload has the field numbers of the specification (3.0, 6.4), and only the parts that a line needs. A metric of

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`BrokerConnection`: one connection to a broker, by MQTT 5, or 3.1.1 for an older broker. It does not reconnect.
 
 The library has a thread for each connection. Messages wait in a bounded queue for the event loop. `full` reports that

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`SparkplugSession`: messages of an edge node over one connection: numbered births, data and deaths."""
 
 from __future__ import annotations

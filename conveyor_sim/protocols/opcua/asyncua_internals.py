@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """All uses of private names of asyncua, and the behaviour of the library that each of them works around.
 
 The classes turn private methods and attributes into public ones for the rest of this folder.

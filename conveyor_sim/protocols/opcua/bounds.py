@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`Bounds`: the checks of one session's requests against the limits, and the work units that they cost.
 
 `Views` answers Browse, BrowseNext and TranslateBrowsePathsToNodeIds with bounded work. The library answers with all

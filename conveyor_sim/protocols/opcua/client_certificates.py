@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Checks of client certificates when a secure channel is opened or renewed (OPC 10000-4, 6.1.3)."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """OPC UA events. `Emitter` sends them to clients; `LineEvents` has the events of a line, except alarms.
 
 `AlarmStates` has each alarm of a line as an object with variables, and as a condition whose changes are events.

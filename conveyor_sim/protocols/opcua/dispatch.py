@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`Dispatcher`: messages of one connection. Each faulty one is answered with the status code of its fault.
 
 The library answers every request that it can't decode or does not expect with BadInternalError.

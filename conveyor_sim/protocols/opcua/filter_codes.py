@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Form and cost of the filters of monitored items (OPC 10000-4, 7.7, 7.22): the library evaluates filters unchecked.
 
 A null array is None after decoding, and means the same as an empty one.

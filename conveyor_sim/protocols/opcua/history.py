@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`OpcUaHistory`: latest values of selected tags, so that clients can draw a trend at once (OPC 10000-11)."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`Items`: monitored items of a subscription, with dead bands that hold back only small changes."""
 
 from __future__ import annotations

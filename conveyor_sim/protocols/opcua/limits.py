@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`OpcUaLimits`: the amount of work that one OPC UA client may cause.
 
 The server publishes them in Server/ServerCapabilities where the standard has a node (OPC 10000-5, 6.3.2 and 6.3.11) and

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Methods of a line, its alarms and its run: their nodes, and how calls are carried out."""
 
 from __future__ import annotations

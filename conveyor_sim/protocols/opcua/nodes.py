@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`Nodes`: adds the nodes of a line, whose IDs are made of names and never change."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Ownership of subscriptions: a session acts on its own subscriptions only.
 
 The library finds a subscription by its id and ignores its owner. `OwnedSession` checks the owner in every service

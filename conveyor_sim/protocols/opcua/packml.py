@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`PackMl`: each machine as a PackML object by OPC 30050, with the types of the OPC Foundation's own NodeSet.
 
 nodesets/Opc.Ua.PackML.NodeSet2.xml is version 1.01 of github.com/OPCFoundation/UA-Nodeset, under the OPC Foundation MIT

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`Admin`: counters, stop reason and alarms of a machine: the variables of OPC 30050 that have values in tags.
 
 Types and names are those of the NodeSet (R 30050, 6.3.4). Counters are never reset separately, so Count and AccCount
@@ -29,8 +30,8 @@ _TYPE = 5
 
 _COUNTS: Mapping[str, tuple[str, ...]] = {
     "ProdConsumedCount": ("taken",),
-    "ProdProcessedCount": ("produced", "taken", "processed"),
-    "ProdDefectiveCount": ("taken_bad", "defective"),
+    "ProdProcessedCount": ("produced", "processed"),
+    "ProdDefectiveCount": ("defective",),
 }
 """Counter tags of a machine by variable, in order of preference."""
 

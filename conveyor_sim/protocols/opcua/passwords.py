@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`Passwords`: passwords of clients, checked one at a time outside the event loop, before a session is activated.
 
 The library checks a password within the event loop. Other requests would wait for it, and for all checks before it.

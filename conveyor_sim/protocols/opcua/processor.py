@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`Processor`: the messages of one connection, with limits before, while and after they are decoded."""
 
 from __future__ import annotations

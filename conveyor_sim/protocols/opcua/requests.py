@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`Requests`: requests of clients, checked at once as far as possible and passed on to the tag provider.
 
 Nothing here waits for a tick. The result is in the read-back of each command, and in events.

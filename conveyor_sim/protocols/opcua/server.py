@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`OpcUaServer`: OPC UA server for a line, with permanent node IDs."""
 
 from __future__ import annotations

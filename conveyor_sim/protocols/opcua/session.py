@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Sessions of clients, limited to reading, browsing and subscribing, and to writes and calls that the user's role
 permits.
 

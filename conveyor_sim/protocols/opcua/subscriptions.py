@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`Subscriptions`: the subscriptions of all sessions, each with bounded work, answers and memory.
 
 The library answers one Publish request with everything that waits. It retains a number of such answers regardless of

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Connections of OPC UA clients, with bounded input. Malformed input ends them, with the reason."""
 
 from __future__ import annotations

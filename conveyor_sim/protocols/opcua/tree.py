@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Nodes of a line: its place in the plant, devices by their classes, and a variable for each tag."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`Updates`: writes snapshots of a line into the nodes, tick by tick, and only values that have changed."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Values of tags in OPC UA: types, units, status codes."""
 
 from __future__ import annotations

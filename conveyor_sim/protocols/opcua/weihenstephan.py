@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`Weihenstephan`: data points of each machine by their names in the Weihenstephan Standards (OPC 40600).
 
 The types of that NodeSet are not used: they depend on two other NodeSets, and on much that a line does not have.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Checks of the form of requests, with the status codes of OPC 10000-4. The library has few such checks."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Certificate and key of the servers: made on first use, in a folder that only this user can read. TLS of the page."""
 
 from __future__ import annotations

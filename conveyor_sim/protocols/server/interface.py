@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`ProtocolServer`: interface of a server, or a client of a broker, that serves the tags of a line by one protocol."""
 
 from __future__ import annotations

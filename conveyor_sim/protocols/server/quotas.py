@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`Budget`: limit on the work of a client. `ConnectionSlots`: limit on connections, and the order of displacement.
 
 A client needs a slot before it can log in, so connections without a session are the first to be dropped. When all slots

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Users of OPC UA and of the page: a file with one line per user, and checks of passwords.
 
     jo:operator:scrypt:<salt>:<hash>

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`BagTagProvider`: tags of a recording that is played back. It accepts no commands."""
 
 from __future__ import annotations

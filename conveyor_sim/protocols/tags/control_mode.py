@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Control authority of clients: checks against the latest snapshot, and ownership of the line without names.
 
 The checks are for immediate answers; the line checks again at the tick.

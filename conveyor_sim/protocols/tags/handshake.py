@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Lockstep by two tags, for a PLC that is a client of a protocol server.
 
 The client reads the inputs of tick `run/tick`, writes its outputs, and writes `run/target_tick` last. All writes since

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`LineMirror`: copy of a line made from its topics, which come from a process, a recording or a node."""
 
 from __future__ import annotations

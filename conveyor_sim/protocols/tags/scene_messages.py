@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Messages between a `SceneTagProvider` and its process."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Process that simulates a scene for a `SceneTagProvider`: it steps, records and sends copies of the messages.
 
 The stepping thread only stores copies; another thread sends the newest of each topic. So a slow receiver delays no tick

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`SceneTagProvider`: tags of a scene that a separate process simulates."""
 
 from __future__ import annotations

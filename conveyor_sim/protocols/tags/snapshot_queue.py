@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`SnapshotQueue`: snapshots of a line that wait for the asyncio loop of a protocol server."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`TagHistory`: values of the tags of a recording, read from its files on request."""
 
 from __future__ import annotations

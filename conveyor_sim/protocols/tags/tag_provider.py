@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`TagProvider`: interface between protocol servers and a line; and the provider of a simulation that a test steps."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`Feed`: messages to the pages that show a line, made once for all pages.
 
 Messages are bytes. The first byte is the type. TEXT: a JSON object, whose "kind" is begin, story, status, locked, reply

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`WebServer`: a line as a page in the browser, by HTTP and one WebSocket per page."""
 
 from __future__ import annotations

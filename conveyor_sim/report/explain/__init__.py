@@ -1,1 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
 """Effects of a scene: why each is enabled, and its cost in time."""

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Table of a scene: contents, effects, time step and expected errors."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Why a scene is simulated as it is: its effects, its time step, its expected errors, what each effect costs."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Cost of each effect of a scene: one state advanced with and without the effect, in turn, in one run."""
 
 from __future__ import annotations

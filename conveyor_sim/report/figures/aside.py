@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Figures of a recording, drawn by a child process that loads matplotlib while the line still runs.
 
 It forks further processes, which share the data that it has read from the bag.

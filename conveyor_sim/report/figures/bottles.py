@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Moving parts of a figure: bottles to scale, coloured by speed, and contact forces as lines of proportional width."""
 
 from __future__ import annotations

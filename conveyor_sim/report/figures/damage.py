@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Damage: where rails are pressed and scuffed, over the plant, and how what was borne is spread over the bottles."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Input of the drawing functions: plain arrays and shapes."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The energy ledger over time: what came, what is held, what went, and what does not close."""
 
 from __future__ import annotations

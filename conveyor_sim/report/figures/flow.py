@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Flow and force over time: how bottles pass from belt to belt, and how hard they are pressed."""
 
 from __future__ import annotations

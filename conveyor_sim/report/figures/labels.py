@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Names beside what they name, where nothing else is drawn."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Marks of devices in a drawing: they differ by their shape first, by their colour second."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A line at one moment, and how some of its signals came to be what they are: what a failed test shows."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Static parts of a figure: surfaces as areas with chevrons along their motion, rails as bold lines, devices."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Figures of a line's production: machine states over time, lost time by reason, output against the bottleneck."""
 
 from __future__ import annotations
@@ -83,7 +84,7 @@ def _bar(ax: Axes, row: int, parts: np.ndarray, edges: np.ndarray) -> None:
 
 
 def efficiency_figure(counters: CounterColumns, time: Floats, good: Floats, name: str) -> Figure:
-    """Good bottles an hour in windows of the run against the bottleneck's nominal rate; under it each machine's OEE.
+    """Draw good bottles an hour against the fastest permitted rate of the bottleneck, below the OEE of each machine.
 
     time (n,), s: of the counts `good` (n,) of bottles that had left the line.
     """
@@ -106,9 +107,9 @@ def _draw_throughput(ax: Axes, counters: CounterColumns, time: Floats, good: Flo
     colour = style.pale(np.array(to_rgba(style.SERIES[0])), 0.35)
     ax.stairs(per_hour, edges / seconds, fill=True, color=colour, gid="made")
     ax.stairs(per_hour, edges / seconds, color=style.SERIES[0], linewidth=1.2, label="good bottles out")
-    rate = float(counters.rate[-1])
+    rate = float(counters.rate_limit[-1])
     if np.isfinite(rate):
-        label = f"bottleneck, by its nominal rate: {' and '.join(map(_short, counters.bottleneck))}"
+        label = f"bottleneck, by its fastest permitted rate: {' and '.join(map(_short, counters.bottleneck))}"
         ax.axhline(3600.0 * rate, color=style.SERIES[1], linewidth=1.6, label=label, gid="bottleneck")
     ax.set_ylabel("bottles an hour")
     ax.set_xlabel(f"time ({unit})")

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Data of the figures of a bag, read in a few passes that retain only the drawn data."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Velocity of one bottle over time, as in the paper's Figs. 8 and 9."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One look for all pictures: colours that read for everybody, and files whose bytes depend on the data alone."""
 
 from __future__ import annotations

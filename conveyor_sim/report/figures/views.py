@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Pictures of the line from above: the table at several times, the whole plant at one, and a scene before it runs."""
 
 from __future__ import annotations

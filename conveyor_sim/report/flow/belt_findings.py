@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Findings about belts: belts against their neighbours, belts that run backwards, watchdogs, transfer gaps."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Clear width along the path of a bottle: guides and edges of belts on either side."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Findings about devices: on no belt, or against the direction of travel."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Findings about exits: bottles that reach none, and perfect columns where they queue."""
 
 from __future__ import annotations

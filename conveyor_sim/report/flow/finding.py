@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Findings of a check: facts about a scene that its author should know, each with its place in the file."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Flow through a scene: traces, routes, stretches and findings."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Findings about guides: gaps that a bottle fits through, and passages that it does not fit through."""
 
 from __future__ import annotations

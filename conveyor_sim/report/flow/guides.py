@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Guides: distances from a point to the rails on either side."""
 
 from __future__ import annotations

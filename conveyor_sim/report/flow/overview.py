@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Overview of a scene in at most twelve lines: contents, flow, accuracy, steps, speed, findings."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Routes: legs from an entry through stations to an exit, joined."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Stretches of a line between changes of belt and width: how many bottles they hold, and how many pass in a second."""
 
 from __future__ import annotations

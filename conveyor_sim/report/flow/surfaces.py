@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Surfaces that carry bottles: places, directions of travel and speeds."""
 
 from __future__ import annotations

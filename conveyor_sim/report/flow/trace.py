@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Traces of lone bottles: each leg leads from an entry, or from a station's return, to where the bottle ends."""
 
 from __future__ import annotations

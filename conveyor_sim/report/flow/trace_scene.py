@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Scene of a trace: belts and rails of a scene with soft contacts and without devices.
 
 All traces have the same effects, so that one set of compiled kernels serves every scene: spare parts far away enable

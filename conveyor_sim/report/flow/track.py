@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Track of one traced bottle: its places so far, and whether it has stopped, left the belts or come back."""
 
 from __future__ import annotations

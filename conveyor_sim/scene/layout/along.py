@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Places of devices along a conveyor, as given in a scene file. Each replaces coordinates of a device."""
 
 from typing import Annotated, Literal

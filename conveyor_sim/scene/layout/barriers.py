@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Moving rails and rails along a conveyor: gates, pushers, diverters, and rails at rest."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Placing of a cell: its coordinates, turned and shifted to where the cell stands in the scene."""
 
 from collections.abc import Iterator, Mapping

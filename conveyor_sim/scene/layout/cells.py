@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Cells of a scene: entries of `cells`, ports of cell files, and their joining to the scene."""
 
 import re

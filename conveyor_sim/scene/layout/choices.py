@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Choices of a scene: a variant, a format and overrides, laid over the data of its file."""
 
 from collections.abc import Mapping

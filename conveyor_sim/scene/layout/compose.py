@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Composition of a scene: its file with included files, a variant, a format, parameters and cells as one mapping."""
 
 import posixpath

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Conveyors of a layout: belts, plates, rails of their guides, and the plan."""
 
 from collections.abc import Iterator, Mapping

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Devices along conveyors: their places become coordinates."""
 
 import math

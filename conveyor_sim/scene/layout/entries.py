@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Places along a conveyor where bottles come onto the line: point, direction, speed and scatter."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Expansion of a layout: conveyors, guides and devices along them become belts, rails and coordinates."""
 
 from collections.abc import Iterator, Mapping, Sequence

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Overrides of parts that a layout or a cell expands to: refused with the path that changes them."""
 
 from collections.abc import Iterator, Mapping

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Faults of a layout while it is expanded."""
 
 from conveyor_sim.scene.problems import Path, Problem

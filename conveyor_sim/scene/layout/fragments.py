@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`Fragment`: data of a scene or a cell with the origins of its parts, and the joining of two of them."""
 
 from collections.abc import Callable

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Positions with a direction of travel; m and rad."""
 
 import math

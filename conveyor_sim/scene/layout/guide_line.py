@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Guides on both sides of a line through points: offset polylines with mitred corners."""
 
 from collections.abc import Iterator, Sequence

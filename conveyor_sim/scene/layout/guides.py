@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Guides of a layout: rails on both sides of conveyors or of a line through points."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence

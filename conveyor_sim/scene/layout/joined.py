@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Paths of conveyors that follow each other, joined to one path."""
 
 import math

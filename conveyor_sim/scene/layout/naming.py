@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Names of a cell's parts in the scene: a prefix on each part, and on each field that holds its name."""
 
 from collections.abc import Mapping

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Parameters of a scene or a cell: quantities that texts in it may refer to by name."""
 
 import re

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Parts of a layout in a scene file: conveyors by path, and guides along them."""
 
 from collections.abc import Mapping

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Path of a conveyor in the file, as moves of a route: from its pieces, or from corners with a radius."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Places of conveyors: by coordinates, at the end of another, or beside it."""
 
 from collections.abc import Iterator, Mapping

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Plan of a layout: conveyors with their paths, for placing devices, checks and drawings."""
 
 from bisect import bisect_right

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Rails of guides along a path: polylines on straight pieces, arcs in bends."""
 
 from bisect import bisect_left, bisect_right

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Paths of conveyors: straight pieces and bends, end to end. The end of a piece and the start of the next are one."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Site of a device along a conveyor: stations and widths in numbers, while the device is placed."""
 
 import re

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Surfaces of a conveyor: data of belts and plates for pieces of its path."""
 
 import math

@@ -1,1 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
 """Parts of a scene that become devices, one per file: fields, checks, and marks."""

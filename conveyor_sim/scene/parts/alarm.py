@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Alarms (ISA-18.2): declarations in a scene file, by a controller or by the line."""
 
 from collections.abc import Iterator

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Choice of bad bottles from one place."""
 
 from collections.abc import Iterator

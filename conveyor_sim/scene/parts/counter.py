@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Counters of a scene file."""
 
 from collections.abc import Iterator

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Base classes of scene parts that become devices of the line."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Indicators of a scene file: measures of an exit."""
 
 from collections.abc import Iterator

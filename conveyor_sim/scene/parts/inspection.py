@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Inspections of a scene file: machines that look at bottles."""
 
 from collections.abc import Iterator

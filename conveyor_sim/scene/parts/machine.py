@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Fields of machines that follow the PackML state model."""
 
 from collections.abc import Iterator

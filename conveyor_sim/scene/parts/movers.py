@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Rails of a scene file that move on command: gates, pushers and diverters. All are straight.
 
 Their drives are treated as pneumatic cylinders at 6 bar, of the bores of ISO 6432: 20 mm at gates that slide, 25 mm at

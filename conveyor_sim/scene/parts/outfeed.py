@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Outfeeds of a scene file."""
 
 from typing import ClassVar

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Rejects of a scene file: machines that throw bottles out."""
 
 from typing import ClassVar, Literal

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Scatter of bottles about the place where a device puts them onto the line."""
 
 import math

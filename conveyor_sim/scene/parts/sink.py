@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Sinks of a scene file: machines downstream."""
 
 from typing import ClassVar, Literal

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Sources of a scene file: machines upstream."""
 
 from collections.abc import Iterator

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Spills of a scene file: bottles that a test drops."""
 
 from typing import ClassVar

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Stations of a scene file: machines that take a bottle, work on it, and return it."""
 
 from collections.abc import Iterator, Sequence

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Fields of parts that feed bottles of several types, one after the other."""
 
 from collections.abc import Iterator

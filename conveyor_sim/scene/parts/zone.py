@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Zones of a scene file."""
 
 from collections.abc import Iterator

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Data of the figures of studies and optimisations, without matplotlib."""
 
 from __future__ import annotations

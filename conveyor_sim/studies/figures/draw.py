@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Figures of studies and optimisations, each written as PNG and SVG."""
 
 from __future__ import annotations

@@ -1,1 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
 """Values of parameters that are best by an objective, found by trying."""

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Result of an optimisation, in sentences."""
 
 from __future__ import annotations

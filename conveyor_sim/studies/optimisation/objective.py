@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Objective of an optimisation as one line: `maximise efficiency subject to peak_force < 40`.
 
     maximise|minimise METRIC [and maximise|minimise METRIC] [subject to METRIC <|<=|>|>= NUMBER [and ...]]

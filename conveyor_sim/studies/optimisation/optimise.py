@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """An optimisation from its first trial to the comparison of its best point with the start on fresh seeds."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Optuna, asked for points and told what came of them, in the order of the trials.
 
 Its tree-structured Parzen estimator (Bergstra et al. 2011) with bounds and for several goals (Watanabe 2023), seeded.

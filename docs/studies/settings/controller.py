@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A V-curve with all of its settings, for the line of ../v_curve."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Efficiency against the length of the conveyor between two machines, and the closed form: of results.parquet here.
 
 conveyor-sim sweep docs/studies/table_length/study.yaml --out runs/table_length     (two CPU minutes)

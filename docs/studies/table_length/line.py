@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The line of ../two_machines.py as studies want it, both machines with 4 s between failures and 1 s to repair."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The V-curve of the line beside it, with the two numbers that whoever runs such a line has to choose."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /* table.st as a compiler leaves it, in the manner of MATIEC, and the shim that makes a library of it:
  *
  *     cc -shared -fPIC -O2 -I include -o table.so examples/st/compiled/table.c

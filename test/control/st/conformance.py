@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The conformance table: small programs with what their variables must be, scan by scan, as data in `cases/`.
 
 A file is a list of cases. `name`; `source`: the rule that what is expected comes from, or what is decided where there

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The budget of a scan counts executed statements and the work of expressions, independent of the machine's speed."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Programs follow the standard, or the decisions where it leaves a choice (`cases/`)."""
 
 from __future__ import annotations

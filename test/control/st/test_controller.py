@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A program as the controller of a line: tags, refusals, access by tests."""
 
 from __future__ import annotations

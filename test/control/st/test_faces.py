@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Programs on the command line: `conveyor-sim run --controller`, and other places that name a controller."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Programs compiled to a shared library: the worked shim, and broken libraries."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Commands at a limit, from programs whose type has fewer digits than the limit."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Variables that share memory, as a controller sees them: tags, forces, traces, restarts and snapshots."""
 
 from __future__ import annotations

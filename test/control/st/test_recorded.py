@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Recorded variables of programs: only the selected ones, after each scan, without any other effect."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Programs of examples/st in the scenarios of their twins: they pass, and their mutants fail."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Every qualifier in every section of every kind of unit, as `sections.py` and the page state."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Programs of examples/st act bit for bit like the controllers in Python; their mutants do not."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Intermediate results of integers against a model that computes each operation as the page states.
 
 The model has no ranges and no chains: every result is wrapped at the width in docs/structured_text.md.

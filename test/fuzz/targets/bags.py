@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Recorded bags, damaged: cut, flipped, rearranged. What is read of them was recorded, else a sentence says why."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Checkpoints that were damaged, or made up with a checksum that fits: refused in a sentence, and nothing changes.
 
 A loaded state with the `full_state_hash` of the saved one has the same future.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Streams of commands and requests, good and bad, over real DDS against a `sim_node` of its own."""
 
 from __future__ import annotations

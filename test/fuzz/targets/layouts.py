@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Malformed layouts: conveyors, guides, places along them, drives, plates, cells, parameters, units and expressions.
 
 Each is refused in words that name file and line, or it is a valid scene that the JSON Schema accepts as well.

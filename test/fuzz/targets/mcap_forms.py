@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A recording's messages in random forms that the MCAP specification allows: read as the mcap library reads them,
 called intact, and replayed; then a flipped bit is found, or lies where no checksum is.
 """

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Structured requests of all OPC UA services by strangers, while an operator's screen has to stay as it is.
 
 An operator subscribes. An anonymous client, a viewer and a connection without a session send random requests, which

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """All that acts on a line, at random: commands, faults, modes, owners, forces, alarms, resets, by all kinds of writers.
 
 A line of stations is run recorded under the eyes of the invariants, again from a checkpoint half-way, and again from

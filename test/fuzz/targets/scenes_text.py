@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Scene files of any bytes, and tables of any kind: read or refused in words, in bounded time and memory.
 
 What is wrong with the values of a scene is attacked in `wrong.py`; here it is the text, its structure and the files.

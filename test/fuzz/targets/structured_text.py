@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Programs in Structured Text, changed token by token or made at random: refused, or stopped, in words."""
 
 from __future__ import annotations

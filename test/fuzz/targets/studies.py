@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Folders of studies, damaged: a study goes on to the table that it had and prints it as it was, or it says why not."""
 
 from __future__ import annotations

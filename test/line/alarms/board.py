@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Alarms without a line, driven tick by tick, and their events."""
 
 from collections.abc import Mapping

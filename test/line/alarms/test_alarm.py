@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """States of one alarm, by the diagram of ISA-18.2."""
 
 import pytest

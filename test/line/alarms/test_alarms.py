@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Several alarms: delays, shelving, suppression, first-out, and their largest number."""
 
 import re

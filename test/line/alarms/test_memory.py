@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Alarms in checkpoints, and refused data of checkpoint files."""
 
 import copy

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Forced signals: controllers read the forced value, and the line itself does not change."""
 
 import math

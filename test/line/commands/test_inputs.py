@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Inputs: one record for every external action, taken in order, each with a result."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Control mode of devices and ownership of the line: which commands are accepted."""
 
 from pathlib import Path

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Bottles that inputs put on a line and remove: the same bits as bottles of the scene, or one reason for a refusal."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Read-back: value, writer and time of each command."""
 
 from pathlib import Path

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """An input is refused on receipt exactly if the line refuses it in every state."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Commands: applied together at the next tick, or refused together with the reason."""
 
 import math

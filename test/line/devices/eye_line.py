@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Straight line for tests of sensors: a belt, then a plate that can stop, and bottles in a row. It uses one kernel."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Watchdogs: a belt without a command for its time-out stops, once, until the next command."""
 
 from scenes import base, belt, bottle, simulation

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Counters by direction, and zones."""
 
 from __future__ import annotations

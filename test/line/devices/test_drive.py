@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Drives: commands, trips and reset, and the count of the encoder."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Indicators of an exit: a jam is distinguished from a moving queue, a stop downstream, and a lack of bottles."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Infeeds: tightly packed in-line, rate, jitter from the seed, and free space for each bottle."""
 
 from typing import Any

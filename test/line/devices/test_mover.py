@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Gates, pushers and diverters as controllers see them: commands, end switches, jams, motion profiles."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Named drives: several belts at their ratios, commands and faults of the drive, refused commands to its belts."""
 
 from __future__ import annotations

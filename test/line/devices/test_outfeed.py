@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Outfeeds: bottles whose axes are in the region leave. Their slots are used again, their ids are not."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Photo-eyes: edges at the right time within a tick, delays in whole ticks, and faults."""
 
 from __future__ import annotations

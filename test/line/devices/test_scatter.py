@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Scatter of bottles at infeeds, sources and stations: its bounds, its seed, and no random numbers without it."""
 
 import json

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Memory of sensors: a run continues from a checkpoint, or in other portions, with the same bits."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Random streams keyed by seed, device and purpose."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Belt with machines at its ends, in single file."""
 
 from typing import Any

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Counters of machines and of the line: sums, resets, late readers, checkpoints."""
 
 from __future__ import annotations
@@ -65,8 +66,10 @@ def test_times_add_up_to_all_time_and_bottles_to_the_signals() -> None:
         for name in (FILLER, PACKER, LINE):
             assert sum(row(now, name)[category] for category in CATEGORIES) == pytest.approx(sim.time, abs=1e-9)
         assert row(now, FILLER)["processed"] == signals[f"{FILLER}/produced"]
-        assert row(now, FILLER)["blocked"] == pytest.approx(signals[f"{FILLER}/blocked_time"], abs=0.011)
-        assert row(now, PACKER)["processed"] == row(now, LINE)["processed"] == signals[f"{PACKER}/taken"]
+        assert row(now, FILLER)["blocked"] == signals[f"{FILLER}/blocked_time"]
+        assert row(now, PACKER)["starved"] == signals[f"{PACKER}/starved_time"]
+        assert row(now, PACKER)["processed"] == row(now, LINE)["processed"] == signals[f"{PACKER}/processed"]
+        assert 0 <= signals[f"{PACKER}/taken"] - signals[f"{PACKER}/processed"] <= 1
         assert row(now, PACKER)["failures"] == signals[f"{PACKER}/failures"]
         assert now.category[1] == CATEGORIES[int(signals[f"{PACKER}/category"])]
     assert row(now, PACKER)["planned"] == pytest.approx(4.0, abs=0.02)
@@ -85,8 +88,36 @@ def test_failures_give_mtbf_and_mttr() -> None:
     assert filler["availability"] == pytest.approx(filler["running"] / sim.time)
 
 
-def test_the_efficiency_of_a_line_is_that_against_its_bottleneck() -> None:
-    """The filler is the slower one; of the bottles that left, every fourth is bad."""
+def test_a_filler_completes_the_cycles_of_its_rate() -> None:
+    """The first bottle takes a cycle too: 60 in 30 s at two a second, and none in the first half second."""
+    sim = line()
+    sim.advance(49)
+    assert row(counters(sim), FILLER)["processed"] == sim.counts.fed == 0
+    sim.advance(2951)
+    filler = row(counters(sim), FILLER)
+    assert filler["processed"] == sim.counts.fed == 60
+    assert (filler["effectiveness"], filler["oee"]) == (pytest.approx(1.0), pytest.approx(1.0))
+
+
+def test_effectiveness_refers_to_the_fastest_permitted_rate() -> None:
+    """The filler runs for 10 s at its nominal rate of 2 a second, then for 10 s at 1, of 4 that are permitted."""
+    sim = line(filler={"rate_limit": 4.0})
+    sim.advance(1000)
+    sim.command([f"{FILLER}/rate"], [1.0])
+    sim.advance(1000)
+    filler = row(counters(sim), FILLER)
+    assert (filler["rate"], filler["rate_limit"], filler["processed"]) == (2.0, 4.0, 30)
+    assert filler["effectiveness"] == pytest.approx(30 / (4.0 * 20.0))
+    assert filler["set_effectiveness"] == pytest.approx(1.0)
+    sim.command([f"{FILLER}/rate"], [4.0])
+    sim.advance(1000)
+    filler = row(counters(sim), FILLER)
+    assert filler["effectiveness"] == pytest.approx(filler["processed"] / (4.0 * filler["running"]))
+    assert 0.95 < filler["set_effectiveness"] <= 1.0
+
+
+def test_the_efficiency_of_a_line_is_that_of_its_bottleneck_with_its_own_quality() -> None:
+    """The filler is the slower one; of the bottles that left, every fourth is bad. Those on their way are no loss."""
     sim = line(filler={"bad_every": 4})
     sim.advance(2000)
     now = counters(sim)
@@ -94,9 +125,10 @@ def test_the_efficiency_of_a_line_is_that_against_its_bottleneck() -> None:
     whole, packer = row(now, LINE), row(now, PACKER)
     assert whole["rate"] == 2.0
     assert whole["defective"] == packer["defective"] == packer["processed"] // 4
-    assert whole["oee"] == pytest.approx(whole["good"] / (2.0 * 20.0))
+    assert whole["processed"] < row(now, FILLER)["processed"] == 40
+    assert whole["oee"] == pytest.approx(whole["quality"]) == pytest.approx(whole["good"] / whole["processed"])
     assert packer["oee"] == pytest.approx(packer["good"] / (2.5 * 20.0))
-    assert row(now, FILLER)["effectiveness"] == pytest.approx(1.0, abs=0.03)
+    assert row(now, FILLER)["effectiveness"] == pytest.approx(1.0)
 
 
 def test_parallel_packers_are_one_bottleneck_together() -> None:
@@ -112,6 +144,8 @@ def test_parallel_packers_are_one_bottleneck_together() -> None:
     assert row(now, LINE)["rate"] == 1.6
     one, two = row(now, "machines/one"), row(now, "machines/two")
     assert row(now, LINE)["starved"] == pytest.approx((one["starved"] + two["starved"]) / 2)
+    cycles = one["processed"] + two["processed"]
+    assert row(now, LINE)["effectiveness"] == pytest.approx(cycles / (0.8 * (one["running"] + two["running"])))
 
 
 def test_a_reset_counts_anew_from_its_tick() -> None:

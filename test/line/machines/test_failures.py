@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Failures and planned stops: distributions against their closed forms, and the time that counts."""
 
 import math

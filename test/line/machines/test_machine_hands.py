@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Machines and people: Stop and Abort in every control mode, and states in which the mode may change."""
 
 from pathlib import Path

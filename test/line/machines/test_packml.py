@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The PackML state model: every command in every state, every acting state, and their durations."""
 
 import pytest

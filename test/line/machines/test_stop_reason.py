@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Stop reasons of machines and time categories, for every state."""
 
 import pytest

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Two failing machines with a buffer between them: theory against the simulated line."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Data points of the Weihenstephan Standards, derived from tags of machines."""
 
 import re
@@ -46,7 +47,7 @@ def test_a_machine_that_works() -> None:
     sim.advance(150)
     assert points(sim, "filler") == {
         "WS_Cur_Mode": 8, "WS_Cur_Prog": 1, "WS_Cur_State": 128, "WS_Cur_Mach_Spd": 3.0, "WS_Set_Mach_Spd": 3.0,
-        "WS_Mach_Design_Spd": 2.0, "WS_Not_Of_Fail_Code": 0, "WS_Tot_Containers": 5,
+        "WS_Mach_Design_Spd": 2.0, "WS_Not_Of_Fail_Code": 0, "WS_Tot_Containers": 4,
     }  # fmt: skip
     assert points(sim, "capper")["WS_Cur_State"] == 8, "lack"
     sim.advance(350)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Damaged and hostile DXF files: each gives one error that names the file."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Import of DXF plans: entities, blocks, units, joints and what is skipped."""
 
 from __future__ import annotations

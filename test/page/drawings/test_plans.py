@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Plans saved by FreeCAD and LibreCAD: they are imported by the command, and the scene runs."""
 
 from __future__ import annotations

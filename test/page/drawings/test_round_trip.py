@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Import after export: belts, rails and devices of every shipped scene agree within 1e-6 m."""
 
 from __future__ import annotations

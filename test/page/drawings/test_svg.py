@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Plans as SVG: well-formed, with a group for each layer and an id for each part."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Underlays: shown on pictures and pages, held by recordings, and without effect on what is simulated."""
 
 from __future__ import annotations

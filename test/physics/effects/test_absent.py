@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Effects that a scene does not call for are absent. Present but idle effects change no bit."""
 
 from typing import Any

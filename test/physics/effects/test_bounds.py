@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The bounds on the time step that effects bring, by the numbers that make them."""
 
 import math

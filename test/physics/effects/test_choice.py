@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Which effects a scene calls for, by which of its fields, and what forcing them does."""
 
 from typing import Any

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The load that belts can put on a contact: its formula, and that bottles in piles do not feel more."""
 
 import math

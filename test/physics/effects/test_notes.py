@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Bottles on points roll along rails where real ones rub: said where it can matter, and nowhere else."""
 
 from typing import Any

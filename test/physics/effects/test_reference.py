@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The list of effects in the docs is what the declarations say, and its example runs."""
 
 import re

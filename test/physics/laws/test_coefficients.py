@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The columns of coefficients: which law of the scene goes where, flat by type and by type and rail material."""
 
 import math

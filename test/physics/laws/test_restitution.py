@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Coefficients from restitution, against the impact that they are meant for, integrated."""
 
 import math

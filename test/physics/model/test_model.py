@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Scene to model: tables, bounds and the time step that follows, with its reason."""
 
 import math

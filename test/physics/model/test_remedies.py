@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Limits on the steps of a scene, and remedies. Each remedy is applied, and must help as stated."""
 
 import math

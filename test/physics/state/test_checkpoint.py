@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Checkpoints: a run goes on from a file as if it had never stopped, or the file is refused with the reason."""
 
 from __future__ import annotations

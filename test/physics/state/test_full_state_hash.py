@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`full_state_hash`: state that changes a future changes it, and observers do not."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A save replaces a checkpoint only: every other file that has its name stays as it is."""
 
 from __future__ import annotations

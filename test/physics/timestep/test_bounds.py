@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Bounds on the time step, and the resulting steps in a tick."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Predicted errors against those that the engine makes: head on, by every law, over phases of entry into a step."""
 
 import itertools

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The presets: a tolerance each, and the numbers that follow from it."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A line in Foxglove: a WebSocket client decodes messages with rosbags, by the definitions that the server states."""
 
 from __future__ import annotations

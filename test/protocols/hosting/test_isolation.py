@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Protocol servers in separate processes: one stalls or is killed, and the line and the others go on."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Ten clients on 500 tags, of which 50 change ten times a second for 20 s: none misses a change, and memory stays flat.
 
 The line waits for its clients, so that this holds on a busy machine too; `make bench ARGS=scada` measures one that does

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The command `serve` as a separate process: from its first line to its last, and killed in between."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`serve --controller`: a controller in the process of the simulation owns the line that clients see; `demo`."""
 
 from __future__ import annotations

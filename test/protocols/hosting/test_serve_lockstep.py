@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`serve --lockstep`: a PLC in a separate process steps the line, with the same bits as the same program in a test."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The zoned line, stepped by a test and served to Modbus clients."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The Modbus map: each tag has a separate address, a stored map only grows, and words match other libraries."""
 
 from __future__ import annotations

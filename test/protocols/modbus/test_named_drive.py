@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Named drives over Modbus: rows of the drive, and of its belts the two that can be read."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Packets of Modbus clients: each is answered by the standard, or ends the connection."""
 
 from __future__ import annotations

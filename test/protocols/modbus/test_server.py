@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A line over Modbus TCP, with independent clients: they read the values of the simulation, and writes act at a tick or
 are refused with an exception.
 """

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Fixtures of `kit.py`, if their requirements are installed; otherwise each module of tests says what is missing."""
 
 from contextlib import suppress

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A broker, a line that a test steps, and a host application that follows it."""
 
 from __future__ import annotations

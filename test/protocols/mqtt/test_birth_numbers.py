@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Numbers of connections: unique from process to process, and their sequence without a folder."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Messages of a line to an MQTT broker: complete births, changes, and deaths of what is gone. The host checks each
 message against the rules of Sparkplug 3.0 (`kit.py`).
 """

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Commands of hosts by MQTT: checked at once, recorded as inputs, and refused with a reason that hosts can read."""
 
 from __future__ import annotations

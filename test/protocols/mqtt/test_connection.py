@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Connection of a line to its broker: versions of MQTT, users, TLS, and reasons of failures."""
 
 from __future__ import annotations

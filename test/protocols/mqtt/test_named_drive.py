@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Named drives as Sparkplug metrics: the drive is commanded, its belts are read-only."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A host application in JavaScript, with the codec of Eclipse Tahu: an independent implementation."""
 
 from __future__ import annotations

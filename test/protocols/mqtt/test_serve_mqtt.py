@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`conveyor-sim serve --mqtt` as a separate process: messages to a host, and the recording."""
 
 from __future__ import annotations

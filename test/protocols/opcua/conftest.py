@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A line that a test steps, served to OPC UA clients."""
 
 from __future__ import annotations

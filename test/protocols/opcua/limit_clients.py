@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Clients of the tests of limits: requests by the library's client, and their answers."""
 
 from __future__ import annotations

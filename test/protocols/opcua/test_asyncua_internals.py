@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Assumptions about private names of asyncua; a new release that breaks one fails here first."""
 
 from __future__ import annotations

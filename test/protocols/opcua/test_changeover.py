@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Types of new bottles over OPC UA: an enumeration that a controller writes, and a changeover by one write."""
 
 from __future__ import annotations

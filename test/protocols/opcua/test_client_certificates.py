@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Certificates of clients that no server may accept, whether it has a list of trusted ones or not."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Messages that would cost far more memory or time than they have bytes."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Alarms as variables and conditions, and events of a line."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Subscriptions, sessions and work of one client leave enough for others."""
 
 from __future__ import annotations

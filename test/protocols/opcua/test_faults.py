@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Clients that misbehave: each is refused, others are still served, and memory is bounded."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Raw history of chosen tags."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Limits of the work that one client may cause: published, enforced, and without harm to other clients."""
 
 from __future__ import annotations

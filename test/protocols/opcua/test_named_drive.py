@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Named drives over OPC UA: nodes, writes, mode and faults of the drive; its belts can only be read."""
 
 from __future__ import annotations

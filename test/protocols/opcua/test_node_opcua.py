@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """node-opcua, an implementation of OPC UA in JavaScript, as a client."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Subscriptions belong to sessions: no service lets a client act on the subscriptions of another session."""
 
 from __future__ import annotations

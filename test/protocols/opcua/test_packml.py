@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Machines as PackML objects: the types of OPC 30050, their values, and the commands as methods."""
 
 from __future__ import annotations

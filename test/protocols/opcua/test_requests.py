@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Writes and methods: checked at once, applied at a tick, and read back."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Access and permissions: the library's defaults allow everything to everybody."""
 
 from __future__ import annotations

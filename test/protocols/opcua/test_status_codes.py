@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Malformed requests: each has a specific status code, and none is an error inside the server."""
 
 from __future__ import annotations

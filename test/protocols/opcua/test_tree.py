@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Address space: names, types, units, ranges, texts, and values of the simulation."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Updates of values: time stamps, status, steps back, and all changes for clients that keep up."""
 
 from __future__ import annotations

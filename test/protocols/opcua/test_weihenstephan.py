@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Machines by the names of the Weihenstephan Standards."""
 
 from __future__ import annotations

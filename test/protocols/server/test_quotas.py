@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Slots of connections, and the order in which connections make room."""
 
 from __future__ import annotations

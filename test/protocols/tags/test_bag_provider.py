@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A recording as a tag provider: it shows the recorded values of each time, forwards and back."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Lockstep by two tags: writes before a target act as one set at the previous target."""
 
 from __future__ import annotations

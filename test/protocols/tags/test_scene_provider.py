@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A scene in a separate process as a tag provider: snapshots, requests, and its end."""
 
 from __future__ import annotations

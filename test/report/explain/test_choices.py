@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Output of `explain`: each effect with the line that decides it, bounds of the time step, prices."""
 
 import math

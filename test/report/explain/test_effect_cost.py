@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Prices of effects: what is compared with what. Costs themselves are the machine's, and not tested."""
 
 from math import comb

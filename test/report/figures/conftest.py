@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A small plant with one of everything, and a frame of it, for the pictures."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A recording of the small plant, half a second long, in which all happens that pictures show."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Pictures drawn by processes beside this one: the same bytes, errors as sentences, and nothing left behind."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Bottles are drawn where they are and as large as they are, contact forces as wide as they are strong."""
 
 from __future__ import annotations

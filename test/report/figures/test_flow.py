@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Counts, rates and forces over time are drawn as recorded."""
 
 from __future__ import annotations

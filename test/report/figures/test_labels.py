@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Names stand beside what they name and never on each other."""
 
 from __future__ import annotations

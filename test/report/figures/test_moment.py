@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The picture of a failed test: the line at that moment, and the traces that lead to it."""
 
 from __future__ import annotations

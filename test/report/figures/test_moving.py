@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Rails that move in pictures and in the summary: where and what they were when they were recorded."""
 
 from pathlib import Path

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """All pictures of a recording say which signals were forced in it, and none says so where none was."""
 
 from pathlib import Path

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What stands still is drawn where it is, and its travel as it runs."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """From a real, small bag: what is drawn is what was recorded, and what it does not hold is a clear error."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The velocity of a bottle over time is drawn as recorded."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """State bars, stop reasons and efficiency are drawn as they were."""
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ def counters(rates: tuple[float, ...] = (2.0, 2.5), **given: Any) -> CounterColu
     names = ("machines/filler", "machines/packer", "line")
     columns: dict[str, Any] = {field: np.zeros(3) for field in CounterColumns.__dataclass_fields__}
     texts = {"name": names, "category": ("running", "starved", ""), "stop_reason": ("", "starved", "")}
-    chosen = {"rate": np.array([*rates, rates[0]]), "bottleneck": names[:1]}
+    chosen = {"rate_limit": np.array([*rates, rates[0]]), "bottleneck": names[:1]}
     return CounterColumns(**columns | texts | chosen | given)
 
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Files of pictures: both formats, the same bytes every time, a clear error where they can't be written."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Figures from above: what they show, of when, and in which units."""
 
 from __future__ import annotations

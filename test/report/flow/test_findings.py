@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Findings of a check: one fault each in a line that has none without it."""
 
 from pathlib import Path

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Routes, transit times, capacities and the bottleneck of a line."""
 
 import math

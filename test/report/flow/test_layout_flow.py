@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Flow through conveyors that are laid out by their paths: names of conveyors, and lines of what was written."""
 
 import pytest

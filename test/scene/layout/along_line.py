@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A line with a device of each kind along a conveyor."""
 
 from __future__ import annotations

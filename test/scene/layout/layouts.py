@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Random layouts for property tests, and the same layouts turned and mirrored."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Devices along conveyors: their coordinates on straight pieces and in bends, mirrored layouts, and the clear width."""
 
 from __future__ import annotations

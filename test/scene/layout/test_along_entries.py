@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Bottles that come onto the line along a conveyor: speed of the belt, and scatter that the guides leave."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Errors of devices along conveyors: one line each, with file, line, field, value and expectation."""
 
 from __future__ import annotations

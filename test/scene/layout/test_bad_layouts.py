@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Every error in a layout is one line with file, line, field, value and expectation."""
 
 from pathlib import Path

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Conveyors: places, pieces, lanes, sections, plates, names and their order."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Values of layouts beyond every double are refused in words."""
 
 from __future__ import annotations

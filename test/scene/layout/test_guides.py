@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Guides: along conveyors, in bends, with openings, around points, and the clear width that they leave."""
 
 import math

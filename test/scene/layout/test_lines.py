@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Whole layouts with parameters, drives, cells and devices, and a bottle that travels through one."""
 
 from pathlib import Path

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Shipped scenes that were written with coordinates before, in old/: the new texts give the same lines."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The examples of docs/placement.md are scenes, and its tables name every kind of device."""
 
 import re

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Paths of conveyors: exact quarter turns, joints that share their numbers, cuts, stations and offsets."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """An expansion keeps its bits: recordings and hashes of states depend on them.
 
 Its layout has quarter turns only, so that no sine or cosine of a library is in the numbers. JSON stores the shortest

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Turned and mirrored layouts give turned and mirrored simulations; pieces and points give the same belts."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Scenes around a layout, as text and from Python."""
 
 from __future__ import annotations

@@ -1,1 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
 """All contact with internals of numba and llvmlite; see the README of the engine."""

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Pass of numba's compiler that replaces absent members of groups by None, so that branches on them are pruned."""
 
 from typing import Any

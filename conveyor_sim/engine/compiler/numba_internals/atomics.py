@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Atomic access to entries of a column of int64, which numba lacks on a CPU, and the system's sched_yield.
 
 All accesses are sequentially consistent.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Calls of a kernel by the address of its machine code.
 
 A part is compiled again in every kernel that calls it; a kernel called by its address is compiled once. That suits

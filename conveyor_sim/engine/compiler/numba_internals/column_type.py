@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Numba's type of a column of a group: the address of its values, and their number.
 
 Numba describes an array by seven values, and its code for an index covers every way in which arrays can be indexed.

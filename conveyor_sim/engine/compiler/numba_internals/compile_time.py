@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Processor time that numba spends compiling."""
 
 from collections.abc import Callable

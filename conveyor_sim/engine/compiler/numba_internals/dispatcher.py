@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Numba's dispatcher of a kernel or part. Calls from other kernels compile it for the members that it reads."""
 
 from functools import cached_property

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Numba's type of a group, and the code that kernels have for it.
 
 Numba takes a NamedTuple apart for every call and puts it together again in the callee, value by value. A group, and

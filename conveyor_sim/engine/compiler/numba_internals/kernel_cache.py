@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Cache of machine code, as numba's dispatchers call it.
 
 Numba's own cache is keyed by the file of the function alone, unpickles any file, and lets two processes that compile at

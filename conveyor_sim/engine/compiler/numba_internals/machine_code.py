@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Machine code of a kernel for arguments of certain types."""
 
 import gc

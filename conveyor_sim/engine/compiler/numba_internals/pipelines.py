@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Numba's compiler for kernels and for parts.
 
 A part is lowered to LLVM's intermediate language and no further. Numba would make machine code of every function; here

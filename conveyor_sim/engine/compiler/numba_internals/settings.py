@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Settings of numba and LLVM. They act on the process: on every numba function that is compiled after this import."""
 
 from typing import Any

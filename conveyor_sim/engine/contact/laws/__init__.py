@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Laws along the normal of a contact, one file each: elastic and damping laws, and the lists of both.
 
 A law is plain functions of numbers and a declaration of them. The kernels add up the laws in the lists (`law_sums.py`);

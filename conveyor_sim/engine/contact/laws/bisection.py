@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Root of a function, to the last digits."""
 
 from collections.abc import Callable

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Declarations of laws of contact: functions, and data for columns, effects, bounds and predictions.
 
 Functions are plain Python over numbers; `law_sums.py` compiles those for kernels. Such a function must not call another

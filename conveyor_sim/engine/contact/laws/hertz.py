@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Hertz's law of two round bodies, N = k delta^1.5 (Hertz 1882); k in N/m^1.5."""
 
 import math

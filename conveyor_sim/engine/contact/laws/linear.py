@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A linear spring, N = k delta (eqs. 22-23); k in N/m."""
 
 import math

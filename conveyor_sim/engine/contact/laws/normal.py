@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A clamped dashpot along the normal, N = max(0, N_elastic + c v_n); c in kg/s."""
 
 import math

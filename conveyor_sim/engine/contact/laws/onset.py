@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Hunt and Crossley's damping in proportion to the elastic force, which starts at zero; lambda in s/m.
 
 N = max(0, N_elastic (1 + lambda v_n)) (Hunt and Crossley 1975), for any elastic law.

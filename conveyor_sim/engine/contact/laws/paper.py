@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The paper's linear dashpot against the full relative velocity of the contact points, -c v* (eq. 22); c in kg/s."""
 
 import math

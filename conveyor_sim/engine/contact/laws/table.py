@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Normal force from a table of overlap and force, for contacts whose law was measured or computed elsewhere.
 
 The force is linear between the points; the last slope continues. A table has at least two points, the first of them (0,

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Tsuji's dashpot on a Hertz contact, with the same restitution at any speed; c in kg/(s m^0.25).
 
 N = max(0, k delta^1.5 + c delta^0.25 v_n) (Tsuji, Tanaka and Ishida 1992).

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Viscoelastic spheres: a Hertz contact whose restitution falls with the speed of impact, as on glass.
 
 N = max(0, k delta^1.5 + c sqrt(delta) v_n), c in kg/(s m^0.5) (Kuwabara and Kono 1987, Brilliantov et al. 1996). With

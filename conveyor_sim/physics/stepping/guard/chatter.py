@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Chatter: with steps that are too long, explicit friction reverses the slip at every step, within +-v_lim.
 
 Numbers stay finite and averages look normal, so velocities are compared from step to step. Only chatter changes the

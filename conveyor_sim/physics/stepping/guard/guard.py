@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The guard of one simulation: what it checks, when, and with which limits.
 
 It reads `engine/observers/guard_probe.py`. `tick.py` repeats a tick that fails in shorter steps, or stops the run.

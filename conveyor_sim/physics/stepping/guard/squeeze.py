@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Gate, pusher or diverter that presses on a bottle, and the object that holds the bottle against it."""
 
 from dataclasses import dataclass

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Violations in words: bottle, place, time, cause, and remedy."""
 
 from dataclasses import dataclass

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Copy of all state that a tick changes."""
 
 from dataclasses import dataclass

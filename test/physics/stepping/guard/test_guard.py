@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The guard: a fault of each kind is injected, and is cured by shorter steps or told in one sentence."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Guard events are in the bag and the summary, and a run that the guard stops keeps its recording."""
 
 from __future__ import annotations

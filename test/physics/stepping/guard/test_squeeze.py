@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Description of a rail that presses on a bottle: rail, bottle, counterpart and force."""
 
 from __future__ import annotations

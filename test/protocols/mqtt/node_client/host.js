@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What a host in JavaScript makes of the line: prints one JSON object. Arguments: address of the broker, group, node.
 const mqtt = require("mqtt");
 const sparkplug = require("sparkplug-payload").get("spBv1.0");

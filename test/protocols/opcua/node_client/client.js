@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What node-opcua makes of the server: prints one JSON object. Arguments: address, user, password, folder for its keys.
 const path = require("path");
 const opcua = require("node-opcua-client");

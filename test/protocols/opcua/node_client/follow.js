@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Subscribes to the tick of a line and prints each value, until its input ends. Argument: address.
 const opcua = require("node-opcua-client");
 
