@@ -20,7 +20,7 @@ from conveyor_sim.line.commands.forcing import Forcing
 from conveyor_sim.line.commands.inputs import FAULT, INJECT, SET, WATCHDOG, CommandOutcome, Input, normalized
 from conveyor_sim.line.commands.modes import Modes
 from conveyor_sim.line.commands.operation import Operation
-from conveyor_sim.line.commands.placement import Placement
+from conveyor_sim.line.commands.placement import BottlePlacement
 from conveyor_sim.line.commands.read_back import ReadBack
 from conveyor_sim.line.commands.refusal import moved_belts, refusal, shown
 from conveyor_sim.line.device import Device, ScanContext
@@ -186,7 +186,7 @@ class Line:
         objecting = [device for device in devices if type(device).objection is not Device.objection]
         self._objecting = {command.name: device for device in objecting for command in device.commands}
         self._counters = ProductionCounters(devices, scene.counts_starts)
-        self.placement = Placement(state, lambda: self._pending, self._log.note)
+        self.placement = BottlePlacement(state, lambda: self._pending, self._log.note)
         """Bottles that inputs put on the line or remove."""
         self._operations = {
             SET: Operation(self._set_refusal, self._set),

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`Placement`: the operations that put bottles on the line and remove them.
+"""`BottlePlacement`: the operations that put bottles on the line and remove them.
 
-Both are applied at the start of a tick, so the check made between two ticks (`Placement.later`) is the one of the tick.
+Both are applied at the start of a tick, so the check made between two ticks (`BottlePlacement.later`) is the one of the tick.
 """
 
 from __future__ import annotations
@@ -205,7 +205,7 @@ class Occupancy:
         return ""
 
 
-class Placement:
+class BottlePlacement:
     """Operations that put bottles on the line and remove them."""
 
     feeding: Callable[[], AbstractContextManager[None]] = nullcontext
