@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The pictures of the page in docs/ and README: python docs/studies/view_pictures.py [NAME ...].
 
-Needs playwright, Pillow and Chromium, as the tests do. Without names all are made anew, in about three minutes.
+Each named state of the page is shown in four sizes of the window and two themes (docs/images/page). Needs playwright,
+Pillow and Chromium, as the tests do. Without names all are made anew, in about four minutes.
 """
 
 from __future__ import annotations
@@ -31,9 +32,11 @@ from conveyor_sim.support.resources import scene_path
 ROOT = Path(__file__).resolve().parents[2]
 IMAGES = ROOT / "docs" / "images"
 MOMENT = 80
-"""ms that a frame of a moving line stands: two frames of the page at 25 Hz."""
-QUALITY = 40
-"""Quality of WebP pictures."""
+"""ms that a step of a moving line stands: two frames of the page at 25 Hz."""
+QUALITY = 30
+"""Quality of moving pictures."""
+COMMON, RARE = 24, 48
+"""Numbers of colours of a still picture: the most common ones as they are, and others. Its texts stay sharp."""
 FAILING = """
 from test_jam import check_wedge, too_late, wedged
 
@@ -46,7 +49,7 @@ sys.path.insert(0, str(ROOT / "test"))
 from page.conftest import BROWSERS  # noqa: E402
 from page.line import LINE, record  # noqa: E402
 from page.live_line import PASSWORD, Live, clock, put_into_mode, set_speed, signed_in, soon  # noqa: E402
-from page.states import STATES, State, at  # noqa: E402
+from page.states import STATES, State, at, views  # noqa: E402
 
 
 class Studio:
@@ -84,6 +87,8 @@ class Studio:
     def state(self, state: State) -> Path:
         """Return the page of a state of the tests."""
         html = self.folder / f"{state.of}.html"
+        if state.of == "paper_plant":
+            return self.shipped(state.of)
         failures = [FailedCondition(22.0, "always: no more than 20 bottles")] if state.of == "failed" else []
         other = self.bag("stays_open") if state.of == "pair" else None
         return write_page(self.bag("closes_at_6_s"), html, failures=failures, other=other)
@@ -107,14 +112,31 @@ def still(name: str) -> Callable[[Studio], None]:
 
     def make(studio: Studio) -> None:
         state = STATES[name]
-        with studio.page(studio.state(state), state.size) as page:
+        with studio.page(studio.state(state), (1280, 720)) as page:
             if state.of == "pair":
                 page.wait_for_selector("body[data-compared]")
             state.reach(page)
-            page.wait_for_timeout(500)
-            grab(page).save(IMAGES / f"{name}.webp", lossless=True, method=6)
+            keep(page, name)
 
     return make
+
+
+def keep(page: Any, name: str) -> None:
+    """Save the pictures of a state in every size and theme."""
+    folder = IMAGES / "page"
+    folder.mkdir(exist_ok=True)
+    for view in views(page):
+        few_colours(grab(page)).save(folder / f"{name}-{view}.webp", lossless=True, method=6)
+
+
+def few_colours(picture: Image.Image) -> Image.Image:
+    """Return a picture with COMMON + RARE colours."""
+    counted = sorted(picture.getcolors(picture.width * picture.height), reverse=True)
+    common = [part for _, colour in counted[:COMMON] for part in colour]
+    rare = picture.quantize(RARE, Image.Quantize.MAXCOVERAGE).getpalette()
+    palette = Image.new("P", (1, 1))
+    palette.putpalette(common + rare)
+    return picture.quantize(palette=palette, dither=Image.Dither.NONE).convert("RGB")
 
 
 def grab(page: Any, found: str = "body") -> Image.Image:
@@ -130,7 +152,9 @@ def save(name: str, pictures: list[Image.Image], each: list[int] | int, **option
     )
 
 
-def moving(name: str, scene: str, size: tuple[int, int], start: int, count: int, step: int) -> Callable[[Studio], None]:
+def moving(
+    name: str, scene: str, size: tuple[int, int], start: int, count: int, step: int, moment: int = MOMENT
+) -> Callable[[Studio], None]:
     """Return a function that records a shipped scene from a time (s) on, every `step` frames: the plan, with forces."""
 
     def make(studio: Studio) -> None:
@@ -144,7 +168,7 @@ def moving(name: str, scene: str, size: tuple[int, int], start: int, count: int,
                 pictures.append(grab(page, "#plan"))
                 for _ in range(step):
                     page.keyboard.press(".")
-        save(name, pictures, MOMENT, quality=QUALITY)
+        save(name, pictures, moment, quality=QUALITY)
 
     return make
 
@@ -161,7 +185,7 @@ def scrubbed(studio: Studio) -> None:
             """Draw the scrubber to a share of the recording, and take a picture that stands for a time in ms."""
             x = box["x"] + 8 + share * (box["width"] - 16)
             page.mouse.move(x, y)
-            pictures.append(with_pointer(grab(page), x, y))
+            pictures.append(few_colours(with_pointer(grab(page), x, y)))
             each.append(time)
 
         page.mouse.move(box["x"] + 8, y)
@@ -197,7 +221,7 @@ def live(studio: Studio) -> None:
         put_into_mode(page, "3")
         set_speed(page, "0.2")
         soon(page, lambda: clock(page) > 18.0, "the belt is slow")
-        grab(page).save(IMAGES / "view_live.webp", lossless=True, method=6)
+        keep(page, "live")
         served.end()
 
 
@@ -210,10 +234,10 @@ def with_pointer(picture: Image.Image, x: float, y: float) -> Image.Image:
 
 PICTURES: dict[str, Callable[[Studio], None]] = {
     **{name: still(name) for name in STATES},
-    "view_plant": moving("view_plant", "paper_plant", (1050, 460), 14, 45, 2),
-    "view_table": moving("view_table", "accumulation_table", (1050, 500), 1, 36, 1),
+    "view_plant": moving("view_plant", "paper_plant", (1050, 460), 14, 30, 3, 3 * MOMENT // 2),
+    "view_table": moving("view_table", "accumulation_table", (1050, 500), 1, 18, 2, 2 * MOMENT),
     "view_scrubbed": scrubbed,
-    "view_live": live,
+    "live": live,
 }
 
 

@@ -13,12 +13,14 @@ export class Camera extends EventTarget {
     this.y = (bounds[1] + bounds[3]) / 2;
     this.width = this.height = 1;
     this.under = 36; // px at the lower edge that the legend covers
-    this.fitted = true; // true until the user moves it: then it follows the size of the window
+    this.fitted = true; // true while it shows the complete plant, in a window of any size
+    this.box = null; // part of the plant that it shows in a window of any size, until the user moves it
   }
 
   resize(width, height) {
     [this.width, this.height] = [width, height];
     if (this.fitted) this.fit();
+    else if (this.box) this.showBox(this.box);
     else this._changed();
   }
 
@@ -31,14 +33,14 @@ export class Camera extends EventTarget {
   // Shows a part of the plant. box: least x and y, greatest x and y, m.
   showBox(box) {
     this._enclose(box);
-    this._changed();
+    this._changed(false, box);
   }
 
   // px: height of what covers the lower edge.
   coverBelow(px) {
     if (px === this.under) return;
     this.under = px;
-    if (this.fitted) this.fit();
+    this.resize(this.width, this.height);
   }
 
   _enclose([x0, y0, x1, y1]) {
@@ -92,8 +94,8 @@ export class Camera extends EventTarget {
     if (px < margin || py < margin || px > this.width - margin || py > this.height - margin) this.centre(x, y);
   }
 
-  _changed(fitted = false) {
-    this.fitted = fitted;
+  _changed(fitted = false, box = null) {
+    [this.fitted, this.box] = [fitted, box];
     this.dispatchEvent(new Event("change"));
   }
 

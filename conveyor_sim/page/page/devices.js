@@ -13,6 +13,7 @@ const FOLDERS = {
 
 const LONG = 2; // regions with a larger ratio of width to height have their names above or below
 export const CHOSEN = 8; // importance of the name of the selected device
+const WIDE = 30; // px, half the width of a belt beyond which the name of a point stands on it
 const SHOWN_BAD = 0.5; // s for which an inspection is lit after a bad bottle
 
 export const deviceOf = (mark) => `${FOLDERS[mark.kind] ?? `${mark.kind}s`}/${mark.name}`;
@@ -60,25 +61,22 @@ export function drawAreas(context, camera, colours, view) {
   }
 }
 
-const across = new WeakMap(); // by mark: place beside the straight belt that it lies on, or null
+const belts = new WeakMap(); // by mark: the straight belt that it lies on, or null
 
-// Returns the place of a name beside the belt below a mark; null if there is no straight one.
-function acrossBelt({ surfaces }, mark) {
-  if (!across.has(mark)) {
-    const belt = surfaces.find(({ kind, outline }) => kind === "straight" && inside(outline, ...middle(mark.points)));
-    across.set(mark, belt ? placeAt(belt.angle + Math.PI / 2) : null);
-  }
-  return across.get(mark);
+function beltBelow({ surfaces }, mark) {
+  if (!belts.has(mark)) belts.set(mark, surfaces.find(({ kind, outline }) => kind === "straight" && inside(outline, ...middle(mark.points))) ?? null);
+  return belts.get(mark);
 }
 
 // beyond: px by which the drawing exceeds its points.
 function label(view, camera, mark, note, importance, colour, beyond = 0) {
   const [x, y] = middle(mark.points), isLine = mark.points.length === 2, [from, to] = mark.points;
   const far = (point) => (isLine ? Math.hypot(point[0] - x, point[1] - y) : Math.abs(point[1] - y));
-  const reach = Math.max(...mark.points.map(far)) * camera.scale;
+  const belt = isLine ? null : beltBelow(view.recording.head, mark), half = belt ? (belt.width / 2) * camera.scale : 0;
+  const reach = Math.max(mark.points.length === 1 && half < WIDE ? half : 0, Math.max(...mark.points.map(far)) * camera.scale);
   const width = Math.max(...mark.points.map((point) => Math.abs(point[0] - x))) * camera.scale;
   const towards = isLine ? placeAt(Math.atan2(to[1] - from[1], to[0] - from[0])) // behind the end of a beam
-    : width > LONG * reach ? [0, -1] : acrossBelt(view.recording.head, mark);
+    : width > LONG * reach ? [0, -1] : belt ? placeAt(belt.angle + Math.PI / 2) : null;
   const device = deviceOf(mark);
   view.labels.add(device, short(mark.name) + note, camera.toX(x), camera.toY(y), { importance: view.device === device ? CHOSEN : importance, reach: Math.min(reach, 80) + beyond, colour, bold: importance > 5, towards });
 }

@@ -54,7 +54,10 @@ function wire(view) {
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => view.touch());
   camera.listen(byId("plan"), (px, py) => view.clicked(px, py), () => view.setFollowing(false));
   listenToKeys(view);
-  if (matchMedia("(max-width: 600px)").matches) byId("toggle_trends").click(); // the plan needs the height
+  const narrow = matchMedia("(max-width: 600px)"); // there the plan needs the height of the trends
+  const makeRoom = () => byId("drawer").hidden !== narrow.matches && byId("toggle_trends").click();
+  narrow.addEventListener("change", makeRoom);
+  makeRoom();
   new ResizeObserver(() => view.resize()).observe(byId("stage"));
   view.setColouring("type");
 }

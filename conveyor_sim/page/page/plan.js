@@ -10,7 +10,7 @@ import { Labels, outside, placeAt } from "./labels.js";
 import { drawSelection, outlinesOf } from "./selection.js";
 import { drawUnderlay } from "./underlay.js";
 
-const UNDER_HEAT = 0.3; // opacity of bottles over a heat map
+const CLEAR = "transparent"; // bottles over a heat map are outlines, which leave its colours as they are
 const WIDTHS = 6; // widths of contact lines
 
 export class Plan {
@@ -70,9 +70,7 @@ export class Plan {
     this._rails(colours);
     if (view.device) drawSelection(context, camera, colours, outlinesOf(view, view.device));
     view.wear.draw(context, camera);
-    context.globalAlpha = view.shownHeat ? UNDER_HEAT : 1;
     if (frame) this._bottles(frame, colours);
-    context.globalAlpha = 1;
     if (frame && view.showForces) this._forces(frame, colours);
     drawMovers(context, camera, colours, view);
     drawLines(context, camera, colours, view);
@@ -103,7 +101,7 @@ export class Plan {
     for (const bottle of frame.bottles) {
       const x = camera.toX(bottle.x), y = camera.toY(bottle.y), radius = head.types[bottle.type].radius * camera.scale;
       if (x < -radius || y < -radius || x > camera.width + radius || y > camera.height + radius) continue;
-      const colour = colouring.of(bottle, view), crossed = colouring.crossed?.(bottle, view) ?? false;
+      const colour = view.shownHeat ? CLEAR : colouring.of(bottle, view), crossed = colouring.crossed?.(bottle, view) ?? false;
       if (radius < 1.5) {
         context.fillStyle = colour;
         context.fillRect(x - radius, y - radius, 2 * radius, 2 * radius);

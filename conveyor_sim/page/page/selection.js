@@ -4,7 +4,7 @@
 import { deviceOf, moverEnds } from "./devices.js";
 import { awayFrom, inside, signedArea } from "./shapes.js";
 
-const ROOM = 0.6; // m, least distance from the middle of a device to the edges of the window that shows it
+const ROOM = 0.4; // m, least distance from the middle of a device to the edges of the window that shows it
 const NEAR = 12, FINGER = 20; // px from a line or point within which a click, or a touch, selects its device
 
 const beltOf = ({ name }) => `belts/${name}`;
@@ -51,11 +51,11 @@ export function drawSelection(context, camera, colours, outlines) {
   for (const [more, colour] of [[4, colours.halo], [0, colours.select]]) {
     for (const points of outlines) {
       context.beginPath();
-      points.forEach(([x, y], k) => context[k ? "lineTo" : "moveTo"](camera.toX(x), camera.toY(y)));
+      if (points.length > 1) points.forEach(([x, y], k) => context[k ? "lineTo" : "moveTo"](camera.toX(x), camera.toY(y)));
       if (points.length > 2) context.closePath();
-      if (points.length === 1) context.arc(camera.toX(points[0][0]), camera.toY(points[0][1]), 11, 0, 2 * Math.PI);
+      if (points.length === 1) context.arc(camera.toX(points[0][0]), camera.toY(points[0][1]), 13, 0, 2 * Math.PI);
       context.lineJoin = context.lineCap = "round";
-      context.lineWidth = more + (points.length > 2 ? 3 : 9);
+      context.lineWidth = more + (points.length === 2 ? 9 : 3);
       context.strokeStyle = colour;
       context.stroke();
     }

@@ -302,8 +302,10 @@ export class View {
       bar.style.background = `linear-gradient(to right, ${colours.join(", ")})`;
       return element("span", { class: "entry" }, `${low} `, bar, ` ${high}`);
     };
-    if (colouring.ramp) entries.push(ramp(colouring.ramp, ...colouring.ends(this)));
-    else entries.push(...keyOf(colouring.legend(this)));
+    if (!heat.shown.of) {
+      if (colouring.ramp) entries.push(ramp(colouring.ramp, ...colouring.ends(this)));
+      else entries.push(...keyOf(colouring.legend(this)));
+    }
     if (shown && most > NO_WEAR) entries.push(ramp(SCALES.force, "rails 0", `${+most.toPrecision(2)} ${WEARS[shown].unit}`));
     else if (shown) entries.push(element("span", { class: "entry" }, `no ${shown} on rails`));
     if (heat.shown.of && heat.grid) {
