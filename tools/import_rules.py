@@ -36,8 +36,8 @@ RULES: Mapping[str, str] = {
     "studies": "bag columns control errors line physics report run scene simulation statistics support | "
     "SALib annotated_types distributed matplotlib numpy optuna pyarrow pydantic rich scipy",
     "ros": "bag columns control errors line protocols report run scene simulation support | "
-    "builtin_interfaces click conveyor_msgs diagnostic_msgs geometry_msgs numpy rcl_interfaces rclpy rosgraph_msgs "
-    "simulation_interfaces std_msgs std_srvs",
+    "builtin_interfaces click conveyor_msgs diagnostic_msgs geometry_msgs numpy rcl_interfaces rclpy regex "
+    "rosgraph_msgs simulation_interfaces std_msgs std_srvs",
     "testing": "bag control errors line page protocols report ros run scene simulation support | numpy pytest",
     "cli": "accuracy bag errors page physics protocols report ros run scene studies support | click rich",
 }

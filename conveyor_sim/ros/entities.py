@@ -10,9 +10,11 @@ from __future__ import annotations
 
 import math
 import re
+import time
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, TypeVar
 
+import regex  # has a time limit, which the standard library's re lacks
 from geometry_msgs.msg import Vector3
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.executors import Executor
@@ -36,6 +38,8 @@ OWN_NAME = re.compile(r"bottle_\d+")
 GIVEN_NAME = re.compile(r"[A-Za-z]\w{0,63}", re.ASCII)
 MOST_FILTER = 256
 """Longest regular expression, characters."""
+PATIENCE = 0.2
+"""Longest time for matching names, s of wall time. Expressions such as (a+)+$ would take years."""
 UPRIGHT = 1e-3
 """Largest deviation of a quaternion from a unit rotation about the vertical."""
 
@@ -312,7 +316,14 @@ def _filtered(entities: Sequence[Entity], filters: Any) -> list[Entity]:
     chosen = list(entities)
     if filters.filter:
         pattern = _pattern(filters.filter)
-        chosen = [entity for entity in chosen if pattern.search(entity.name)]
+        end = time.monotonic() + PATIENCE
+        try:
+            chosen = [
+                entity for entity in chosen if pattern.search(entity.name, timeout=max(0.0, end - time.monotonic()))
+            ]
+        except TimeoutError as error:
+            given = f"filter: {printable(filters.filter)!r} took more than {PATIENCE:g} s"
+            raise EntityError(Result.RESULT_OPERATION_FAILED, f"{given}, expected a simpler one") from error
     wanted = {category.category for category in filters.categories}
     if wanted and EntityCategory.CATEGORY_DYNAMIC_OBJECT not in wanted:
         chosen = []
@@ -326,13 +337,13 @@ def _filtered(entities: Sequence[Entity], filters: Any) -> list[Entity]:
     return chosen
 
 
-def _pattern(text: str) -> re.Pattern[str]:
+def _pattern(text: str) -> regex.Pattern[str]:
     if len(text) > MOST_FILTER:
         reason = f"filter: {len(text)} characters given, expected at most {MOST_FILTER}"
         raise EntityError(Result.RESULT_OPERATION_FAILED, reason)
     try:
-        return re.compile(text)
-    except (re.error, OverflowError, RecursionError) as error:
+        return regex.compile(text)
+    except (regex.error, OverflowError, RecursionError) as error:
         reason = f"filter: {printable(text)!r} given, which is no regular expression ({error})"
         raise EntityError(Result.RESULT_OPERATION_FAILED, reason) from error
 

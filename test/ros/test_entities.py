@@ -106,6 +106,14 @@ def test_filters_choose_entities(line: LineClient) -> None:
     assert entities(line, bounds=Bounds(type=Bounds.TYPE_SPHERE, points=at_first)) == ["bottle_0"]
 
 
+def test_a_filter_that_would_take_for_ever_is_refused(line: LineClient) -> None:
+    assert spawn(line, name="a" * 64).result.result == Result.RESULT_OK
+    refused = line.call(standard_srv.GetEntities, "get_entities", filters=EntityFilters(filter="(a|aa)+b")).result
+    assert refused.result == Result.RESULT_OPERATION_FAILED
+    assert not missing(refused.error_message, "filter", "(a|aa)+b", "0.2 s")
+    assert entities(line, filter="^a+$") == ["a" * 64]
+
+
 @pytest.mark.parametrize(
     ("filters", "code", "reason"),
     [
