@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from conveyor_sim.scene import load_scene
     from conveyor_sim.simulation import Simulation
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 """Version of this package; package.xml repeats it, and a test compares them."""
 
 __all__ = ["Simulation", "__version__", "load_scene"]

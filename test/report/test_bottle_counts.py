@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Bottles that inputs put on the line and remove are among the counts of a recording."""
 
 from pathlib import Path
