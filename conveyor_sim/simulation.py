@@ -69,7 +69,7 @@ class Simulation:
 
     def __init__(self, scene: Scene, threads: int | None = None, shorten: bool = True) -> None:
         """Place the bottles of a scene. threads: number of threads; None: the number that turns out to be fastest.
-        shorten: repeat a tick that the guard rejects in shorter steps, before the run is stopped.
+        shorten: if the guard rejects a tick, repeat the tick in shorter steps before the run is stopped.
 
         Raises ValueError for less than one thread.
         """
@@ -223,7 +223,7 @@ class Simulation:
         """Queue a bottle of a type of the scene, at (x, y) m and theta rad, moving at m/s and rad/s.
 
         The next tick puts it on the line and its command result has the ID (`bottles`), or refuses it: for an unknown
-        type, an overlap, a place on no belt, or a speed beyond the one that the time step follows from.
+        type, an overlap, a place on no belt, or a speed for which the time step is too long.
         """
         values = (x, y, theta, vx, vy, omega)
         self.give(Input(SPAWN, writer, "test", SPAWN, (bottle_type,), values))

@@ -12,7 +12,7 @@ from conveyor_sim.support.printable import printable
 def forced_signals(bag: Bag) -> tuple[str, ...]:
     """Return the names of the signals that were forced at any time, in the order of their first forcing."""
     names: dict[str, None] = {}
-    for frame in bag.messages("signals"):  # the first holds those of a checkpoint at which the run began
+    for frame in bag.messages("signals"):  # the first has signals forced before the start
         names.update((bag.line.signal_names[place], None) for place in to_image(frame.data).forced)
         break
     for outcome in bag.outcomes():

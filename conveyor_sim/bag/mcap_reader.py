@@ -85,7 +85,10 @@ class McapFilesReader:
         return min((start for start, _ in spans), default=0), max((end for _, end in spans), default=0)
 
     def messages(self, topics: Collection[str], start_ns: int | None, stop_ns: int | None) -> Iterator[Raw]:
-        """Yield the messages of some topics in time order; if given: from a log time on, before a log time."""
+        """Yield the messages of some topics in time order.
+
+        topics: absolute names. start_ns, stop_ns: interval of log times, without its end; None: no limit.
+        """
         streams = [part for file in self._files for part in (_chunked(file, topics), _loose(file, topics))]
         for raw in merge(*streams, key=itemgetter(1)):
             if stop_ns is not None and raw[1] >= stop_ns:

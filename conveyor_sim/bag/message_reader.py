@@ -37,7 +37,10 @@ class MessageReader(Protocol):
         """Log times of the first and the last message."""
 
     def messages(self, topics: Collection[str], start_ns: int | None, stop_ns: int | None) -> Iterator[Raw]:
-        """Yield messages of some topics (absolute) in time order; if given: from a log time on, before a log time."""
+        """Yield the messages of some topics in time order.
+
+        topics: absolute names. start_ns, stop_ns: interval of log times, without its end; None: no limit.
+        """
 
     def deserialize(self, data: bytes, type_name: str) -> Any:
         """Return a rosbags message object."""

@@ -49,7 +49,10 @@ class OwnReader:
         return self._statistics.message_start_time, self._statistics.message_end_time
 
     def messages(self, topics: Collection[str], start_ns: int | None, stop_ns: int | None) -> Iterator[Raw]:
-        """Yield the messages of some topics in time order; if given: from a log time on, before a log time."""
+        """Yield the messages of some topics in time order.
+
+        topics: absolute names. start_ns, stop_ns: interval of log times, without its end; None: no limit.
+        """
         for _, channel, message in self._reader.iter_messages(topics, starting_at=start_ns, ending_before=stop_ns):
             yield channel.topic, message.log_time, message.data
 

@@ -147,7 +147,7 @@ class Bag(AbstractContextManager["Bag"]):
     ) -> Iterator[tuple[str, int, bytes]]:
         """Yield topic, log time (ns) and serialized bytes of every message in time order.
 
-        If given: of some topics, from a log time on, before a log time.
+        topics: names; None: all topics. start_ns, stop_ns: interval of log times, without its end; None: no limit.
         """
         chosen = [r for r in self._source.topics if topics is None or self._relative(r.topic) in topics]
         names = {recorded.topic: self._relative(recorded.topic) for recorded in chosen}

@@ -10,8 +10,9 @@ from conveyor_sim.scene import Scene, parse_again, parse_overrides
 def recorded_scene(line: Any, name: str) -> Scene:
     """Return the scene of a recorded Line message. Raise SceneError, with `name` for its file, if it is refused now.
 
-    The scene is not read with the present defaults, which it may not allow. Random streams have the keys of the time of
-    the recording: in format 1, places in lists. Machines work and count as at that time.
+    The scene is read with its recorded integrator and steps, because present defaults may be invalid for it. Random
+    streams have the keys of the recording's format; in format 1 these are positions in lists. Machines work and count
+    as that format defines.
     """
     overrides = parse_overrides(line.overrides)
     accuracy = overrides.get("accuracy")

@@ -39,7 +39,7 @@ messages of this time, and of the delay that a loaded machine adds: less than a 
 class Recorder(contextlib.AbstractContextManager["Recorder"]):
     """A sink that records every message; use it as a context manager.
 
-    path: the folder to create, which must not exist or be empty. topics: names of OUTPUTS to record (default: all).
+    path: the folder to create; an existing folder must be empty. topics: names of OUTPUTS to record (default: all).
     start: writes the checkpoint at which the run begins to a path, because a replay begins there; None: tick 0.
     sources: files that the scene was read from, by path from its folder; they are attached to the file.
     namespace: prefix of all topics, such as "/cell_1".

@@ -76,7 +76,7 @@ class _Messages:
         return message
 
     def take(self, tick: int) -> Iterator[Any]:
-        """Yield the messages up to a tick. The caller reports a tick before the expected one as a difference."""
+        """Yield the messages up to a tick. The caller reports ticks earlier than the expected one as differences."""
         while self._next is not None and self._next.tick <= tick:
             message = self._next
             self._next = next(self._source, None)
@@ -90,8 +90,8 @@ def replay(path: str | Path, progress: Callable[[float, float], None] | None = N
     machine are those of the recording. Otherwise topics with tolerances are compared within these, and others not.
     A run that began at a checkpoint is replayed from it, if it is in the bag's folder as `start.npz`.
     The replay stops at the first difference. progress(done, total) is called with simulated times, s.
-    Raise BagError, also for a recording made before rails that move had limits; SceneError if the recorded scene is
-    refused; CheckpointError for a checkpoint that is damaged or of another version.
+    Raise BagError, also for a recording from a version in which moving rails pushed with unlimited force. Raise
+    SceneError if the recorded scene is refused, CheckpointError if a checkpoint is damaged or of another version.
     """
     with open_bag(path) as bag, bag.sense():
         start = (bag.path if bag.path.is_dir() else bag.path.parent) / START_NAME

@@ -37,7 +37,10 @@ class RosbagsReader:
         return self._reader.start_time, self._reader.end_time - 1
 
     def messages(self, topics: Collection[str], start_ns: int | None, stop_ns: int | None) -> Iterator[Raw]:
-        """Yield the messages of some topics in time order; if given: from a log time on, before a log time."""
+        """Yield the messages of some topics in time order.
+
+        topics: absolute names. start_ns, stop_ns: interval of log times, without its end; None: no limit.
+        """
         with self._own_reader() as reader:
             chosen = [connection for connection in reader.connections if connection.topic in topics]
             if chosen:  # none would mean all

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True)
 class AlarmColumns:
-    """All declared alarms, in order of declaration; the fields of conveyor_msgs/AlarmStates."""
+    """All alarms, declared or not, in the order of their numbers; the fields of conveyor_msgs/AlarmStates."""
 
     number: NDArray[np.uint64]
     """Number of the alarm, from 1; it never changes."""

@@ -9,11 +9,11 @@ class Counts:
     """Numbers of bottles since the start."""
 
     fed: int
-    """Bottles that entered through infeeds."""
+    """Bottles put onto the line by infeeds, sources and spills."""
     removed: int
-    """Bottles that left through outfeeds."""
+    """Bottles taken off the line by outfeeds, sinks and rejects."""
     present: int
     blocked_ticks: int
-    """Ticks at which an infeed had a bottle to feed but no room."""
+    """Ticks at which a device had a bottle to feed but no room; the sum over infeeds, sources and stations."""
     held: int = 0
     """Bottles inside stations. fed + number at the start = removed + present + held."""

@@ -40,7 +40,8 @@ class Event(NamedTuple):
     """Event of a line."""
 
     at: int
-    """Tick at which the event took effect: the start of the scan for inputs (command, fault, alarm), else its end."""
+    """Tick at which the event took effect. Inputs (command, fault, alarm) take effect at the start of a scan, and other
+    events at its end."""
     kind: str
     """One of `Kind`."""
     name: str

@@ -2,7 +2,8 @@
 """One evaluation of all forces: a function of positions, velocities and springs, for any integrator.
 
 There are two phases with a barrier between them: `pair_phase` reads every bottle and writes pairs, `bottle_forces`
-reads pairs and writes bottles, block by block. Sums run in a fixed order (pairs by partner, segments, arcs, base).
+reads pairs and writes bottles, block by block. Sums run in a fixed order: pairs by partner,
+segments, arcs, moving rails, base.
 """
 
 from typing import Any

@@ -256,7 +256,7 @@ class Device:
 
     @property
     def read(self) -> Callable[[ScanContext], Sequence[float]]:
-        """Function that reads all signal values, in declaration order."""
+        """Function that reads all signal values, in the order of the signals in `tags`."""
         return self._read
 
     def counts(self) -> tuple[int, int, int] | None:

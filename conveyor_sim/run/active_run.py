@@ -150,7 +150,7 @@ class Reception:
         if now < self._since + PERIOD:
             return
         if self._unlogged:
-            self._warn(f"{self._unlogged} more commands were refused; each outcome says why")
+            self._warn(f"{self._unlogged} more commands were refused; each command result has the reason")
         self._since, self._lines, self._unlogged = now, 0, 0
 
 

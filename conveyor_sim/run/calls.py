@@ -13,7 +13,7 @@ from conveyor_sim.run.lockstep import Refused
 
 T = TypeVar("T")
 MOST_CALLS = 100
-"""Requests that may wait for their answers at once. A reset of a run that is recorded takes 0.1 s."""
+"""Largest number of requests that wait at the same time: 10 s of resets of a recorded run, which take 0.1 s each."""
 
 
 class CallQueue:

@@ -64,7 +64,7 @@ class Pressed:
     """Largest lasting load on a bottle, compared with the load at which explicit contact friction is stable."""
 
     load: float
-    """Mean over WINDOW of half the sum of normal forces on a bottle, as for two contacts in a row, N."""
+    """Half the sum of the normal forces on a bottle, averaged over WINDOW, N: the force of each neighbour in a file."""
     expected: float
     """N"""
     expected_of: str

@@ -23,7 +23,7 @@ MOST_WAITING = 1000
 MOST_BYTES = 4 * 1024 * 1024
 """Largest sum of the sizes of waiting commands, as they were sent."""
 VALUE_BYTES = 16
-"""Approximate size of a value or a text, without the letters of the text and of its name."""
+"""Approximate size of a value or a text, bytes. The characters of the text and of its name are added."""
 
 FULL = (
     f"the queue was full, which holds {MOST_WAITING} commands and {MOST_BYTES} bytes until the next tick; "

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`Playback`: the messages of a recording by tick, and the state at the target of a seek. `Player`: its replay."""
+"""`Playback`: the messages of a recording by tick, and the state at the target of a seek. `Player` publishes them."""
 
 from __future__ import annotations
 
@@ -153,7 +153,7 @@ class Playback:
         return typestore().deserialize_cdr(data, self._bag.types[topic])
 
     def _played(self, topic: str, data: bytes) -> PlayedMessage:
-        """Return a recorded message as it is played: as recorded, or in the present definition if it has an older."""
+        """Return a recorded message as it is played: unchanged, or converted from an older definition."""
         if topic in self._bag.older_topics:
             data = bytes(typestore().serialize_cdr(self._bag.decode(topic, data), self._bag.types[topic]))
         return PlayedMessage(topic, data)
@@ -241,7 +241,7 @@ class Player:
         publish: Callable[[PlayedMessage], None],
         beat: Callable[[int, float], None],
     ) -> None:
-        """Publish latched messages at once, and the first tick with the first step that is not paused.
+        """Publish latched messages at once. The first call of `step` while not paused publishes the first tick.
 
         rate: recorded seconds per wall second, 0 for as fast as possible. start: simulated time, s; None for the
         beginning. beat: called after each tick and while idle, with the simulated time in ns and the wall time in s.

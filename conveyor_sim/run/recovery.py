@@ -41,7 +41,8 @@ def recover_bag(bag: Path) -> None:
 def recover_runs(folder: Path) -> bool:
     """Make the bags of all runs whose inputs are in a folder, in folders `bag` beside them. Return False if none are.
 
-    Raises BagError, also for a bag of another run, which stays; SceneError, CheckpointError.
+    Raise BagError, SceneError or CheckpointError. A bag of another run in a folder `bag` is an error as well. It
+    is not overwritten.
     """
     folders = input_folders(folder)
     for place in folders:

@@ -19,7 +19,7 @@ INTEGRATOR_NAMES: tuple[IntegratorName, ...] = get_args(IntegratorName)
 MOST_STEPS = 1_000_000
 """Largest number of steps in a tick. With 100 bottles (3 us per step) such a tick takes 3 s, a simulated second 5 min.
 
-The stiffest shipped scene at the preset `fine`, with steps shorter by another factor of ten, stays below.
+The stiffest shipped scene needs fewer, even at the preset `fine` and in steps ten times shorter still.
 """
 
 MANY_STEPS = 20_000

@@ -83,9 +83,9 @@ class BottleType(Part):
         "Height of the centre of gravity, for the index of tipping. Needs `contact_height`.", "m", default=None
     )
     base_radius: Positive | None = quantity(
-        "Radius of the ring that the bottle stands on: sliding and spinning on it are one motion, solved explicitly "
-        "with every friction_solver, with a special curve. Left out: it stands on a point, as in the paper, "
-        "beside types with a ring as well.",
+        "Radius of the ring that the bottle stands on. Friction on the ring couples sliding and spinning by a curve of "
+        "its own, and is explicit with every friction_solver. Left out: the bottle stands on a point, as in the paper, "
+        "even if other types have a ring.",
         "m",
         default=None,
     )

@@ -182,7 +182,8 @@ def test_refusals_do_not_flood_the_log(line: LineClient, shared_node: Child, com
     publish_slowly(line, commands, forged, 500)
     change(line, before, {"received": 500, "waiting": 500})
     line.step()
-    until(lambda: "490 more commands were refused; each outcome says why" in shared_node.log.read_text(), "a last line")
+    sentence = "490 more commands were refused; each command result has the reason"
+    until(lambda: sentence in shared_node.log.read_text(), "a last line")
     lines = shared_node.log.read_text()[begin:].splitlines()
     assert sum("refused at tick" in line for line in lines) == 10
     assert not any(line.startswith("[ERROR]") for line in lines)

@@ -119,8 +119,8 @@ def foreign_compression(data: Data, position: int) -> str | None:
 def next_chunk(data: Data, position: int, stop: int) -> Chunk | None:
     """Return the first chunk that begins in a span of bytes, ends within the file, and is not empty.
 
-    Zeros behind a counter look like an empty chunk. One with appended fields counts only if its content has the
-    checksum that it states: other bytes look like one, too.
+    Empty chunks are skipped, because zeros behind a counter look like one. A chunk with appended fields is accepted
+    only if its content matches its checksum, because arbitrary bytes may look like such a chunk.
     """
     while (match := BEGINNING.search(data, position, stop + RECORD_HEAD.size - 1)) is not None:
         chunk = chunk_at(data, match.start())

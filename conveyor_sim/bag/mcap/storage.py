@@ -15,7 +15,7 @@ MAGICS = {
 }
 """First bytes of a file, and its format: SQLite 3 file format, RFC 8878, LZ4 frame format, RFC 1952, ROS bag format."""
 SUFFIX = ".db3"
-"""Name of sqlite3 bags, also of one that is empty or cut."""
+"""Suffix of the files of sqlite3 bags. It identifies files that are empty or cut as well."""
 OF_BAGS = frozenset({".mcap", SUFFIX, ".bag"})
 UNPACKED_BY = {
     "zstd": "zstd -d {name} -o {unpacked}",

@@ -47,8 +47,8 @@ def topic_info(name: str, type_name: str, channel_metadata: dict[str, str], mess
 class McapFileWriter:
     """Writer of one file to a binary stream, which the caller closes. Every method may raise OSError.
 
-    Chunks of 1 MiB, each with a checksum, compressed by zstd at its level 3: `mcap.writer` has no setting for it. The
-    cost beside level 1 is stated in docs/performance.md.
+    Chunks of 1 MiB, each with a checksum, are compressed by zstd at level 3, because `mcap.writer` has no setting for
+    the level. docs/studies/performance_history.md compares the cost with that of level 1.
     """
 
     def __init__(self, stream: IO[bytes], name: str, distro: str) -> None:

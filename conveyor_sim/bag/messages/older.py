@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Messages of recordings in earlier formats, converted to the present definitions.
 
-Format 1: until lines had tags. Format 2: until tags were messages (`Line.tags`). Both have no number: their definitions
-of Line are known.
+Format 1: Line has no tags. Format 2: Line has tags as columns, in place of messages (`Line.tags`). In both, Line has no
+field `format`; the hash of its definition identifies them.
 """
 
 from __future__ import annotations

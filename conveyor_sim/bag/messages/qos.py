@@ -41,7 +41,7 @@ class Qos:
 DATA = Qos(depth=5)
 """For topics that are published at a rate."""
 LATCHED = Qos(depth=1, durability="transient_local")
-"""For topics that are published once: a subscriber that joins late still receives them."""
+"""For states that are published once, or at each change: a subscriber that joins late still receives the last one."""
 EVENTS = Qos(depth=100)
 """For commands, reports of the guard, and exceeded limits, each of which counts."""
 OUTCOMES = Qos(depth=1000)

@@ -99,7 +99,10 @@ class Topic:
 
     @property
     def each_counts(self) -> bool:
-        """True if messages are single events, and not states."""
+        """True if the QoS is EVENTS: playback then never repeats a message as a state.
+
+        Messages of other topics are treated as states, including those of `outcomes`.
+        """
         return self.qos is EVENTS
 
     def pack(self, data: Any, header: Header) -> bytes:

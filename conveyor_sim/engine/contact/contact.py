@@ -41,8 +41,9 @@ def contact_force(
 
     share: effective overlap over geometric overlap, 1 for a single contact; N and T are scaled by it. closing: m/s,
     relative velocity (a minus b) along n. slip: m/s, relative velocity of the contact points along t. atan: selects the
-    friction curve (`friction.py`). spring: m, elongation of the tangential spring, or None. implicit: (dt/m_t times
-    `EngineSettings.ahead`, s/kg, `EngineSettings.at_once`) for implicit friction, or None.
+    friction curve (`friction.py`). spring: m, elongation of the tangential spring, or None. implicit: None for explicit
+    friction; for implicit friction two numbers: dt/m_t times `EngineSettings.ahead` in s/kg, and
+    `EngineSettings.at_once`, dimensionless.
     """
     depth = 0.0 if overlap < 0.0 else overlap
     elastic = elastic_force(law, e, curves, depth)

@@ -9,11 +9,11 @@ Implicit: the force is that of the slip *after* the step, s + b v_lim p(s) = s_0
 1/m_t is the slip per unit of impulse. It never reverses the slip, at any step size.
 
 This form is used by semi-implicit Euler and leapfrog. For velocity Verlet and rk4 the same equation is solved with B =
-max(0, ahead b - at_once) in place of b (`integrators.AHEAD`). At low slip the force then removes at most 1/ahead of
-the slip in a step. Velocity Verlet, which uses the slip at the end of the step, reverses no slip for 1/ahead up to 2/3,
-rk4 for 1/ahead up to 1. For b up to at_once/ahead, force and order of convergence equal those of explicit friction.
-For larger b, a contact under a steady load f mu N (f < 1) creeps too fast by B f v_lim (semi-implicit Euler: b f v_lim,
-at any b).
+max(0, ahead b - at_once) in place of b (`integrators.AHEAD`). At low slip the force then removes at most the share
+1/ahead of the slip in one step. Velocity Verlet evaluates the slip at the end of the step: its slip does not reverse if
+this share is at most 2/3. With rk4 the slip does not reverse if the share is at most 1. For b up to at_once/ahead,
+force and order of convergence equal those of explicit friction. For larger b, a contact under a steady load f mu N (f <
+1) creeps too fast by B f v_lim (semi-implicit Euler: b f v_lim, at any b).
 
 The formulas have no branches and no division by a slip that may be 0, so that loops over them are vectorised.
 """

@@ -7,10 +7,11 @@ forces then have a relative error of mu g dt / v_lim. Leapfrog uses the belt's v
 position (`EngineSettings.lag`) and has no such error (test/physics/test_resting_load.py). On straight belts and floors
 the two agree to the bit.
 
-The order is 1 through dashpots, clamped or not, and through friction, with or without a jump at first touch. Without
-damping its errors in energy stay bounded; rebounds and peak forces then converge with order 2, rebounds with Hertz with
-order 2.5. Measured orders for a rebound: 0.93 with a dashpot, 0.99 clamped, 1.99 without, 2.46 with Hertz; 1.00 in
-friction (test/physics/test_head_on.py, test_contact_laws.py, test_set_down.py). A step takes one force evaluation.
+The order is 1 with friction and with all damping: dashpots, clamped or not, and forces without a jump at first touch.
+Without damping its errors in energy stay bounded; rebounds and peak forces then converge with order 2, rebounds with
+Hertz with order 2.5. Measured orders for a rebound: 0.93 with a dashpot, 0.99 clamped, 1.99 without, 2.46 with Hertz;
+1.00 in friction (test/physics/test_head_on.py, test_contact_laws.py, test_set_down.py). A step takes one force
+evaluation.
 """
 
 from typing import Any

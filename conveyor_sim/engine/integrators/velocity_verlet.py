@@ -10,8 +10,8 @@ force evaluation, a tick one more.
 
 Tangential springs are elongated by the displacement of the drift, dt v_half, and cut at the end of the step: order 2,
 and no cycle of sticking and slipping gains energy. A drag gamma is unstable from gamma dt = 1 on: the force then
-oscillates from step to step, velocities hardly (test/physics/test_drag_limits.py). Implicit friction limits gamma dt to
-2/3 (`friction.py`).
+oscillates from step to step, while velocities hardly do (test/physics/test_drag_limits.py). Implicit friction limits
+gamma dt to 2/3 (`friction.py`).
 """
 
 from typing import Any

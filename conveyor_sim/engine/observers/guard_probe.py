@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Data for the guard: bottles that are not finite, the fastest one, kinetic energy, the deepest overlaps.
 
-Overlaps are evaluated at the end of a step after which the lists were rebuilt. That is before a bottle has moved by
-more than a tenth of the smallest radius, so none passes through another or a rail unnoticed.
+Overlaps are evaluated at the end of a step after which the lists were rebuilt. The lists are rebuilt after the step in
+which a bottle has moved by more than a tenth of the smallest radius, so none passes through another or a rail
+unnoticed.
 """
 
 import math

@@ -67,9 +67,9 @@ def check_footing(bottles: Bottles, belts: Any, surface: Any, footing: Any, ring
 
 @kernel
 def find_carriers(bottles: Bottles, belts: Any, surface: Surface, carriers: Any, carried: Any) -> None:
-    """Write the belt under each bottle's axis, and the number of bottles on each belt, (belts,).
+    """Write the surface (belt or plate) under each bottle's axis, and the number of bottles on each, (surfaces,).
 
-    `carriers` holds one belt index per slot; -1 for the floor and free slots. The state does not change.
+    `carriers` holds one surface index per slot; -1 for the floor and free slots. The state does not change.
     """
     floor = surface.ux.size - 1
     for h in range(floor):

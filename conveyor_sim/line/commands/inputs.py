@@ -148,7 +148,7 @@ def normalized(request: Input) -> Input:
 
 def _normalized(request: Input) -> Input:
     source, writer, kind, operation, names, values, texts = request
-    # Names of alarms are chosen by the writer.
+    # Names of commands and faults stay, because unknown ones are refused. Writers choose the names of alarms.
     alarms = operation not in (SET, INJECT)
     normal = tuple([printable(name) if alarms or name.startswith(PREFIX) else name for name in names])
     numbers = tuple([float(value) for value in values])

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """`BottlePlacement`: the operations that put bottles on the line and remove them.
 
-Both are applied at the start of a tick, so the check made between two ticks (`BottlePlacement.later`) is that of the
-tick.
+Both are applied at the start of a tick. The check made between two ticks (`BottlePlacement.later`) therefore has the
+same result as the check in the tick.
 """
 
 from __future__ import annotations
@@ -163,7 +163,7 @@ class Occupancy:
         return ""
 
     def _off_belts(self, new: Sequence[Spawned]) -> str:
-        """Return which bottle is on no belt or plate; without these, which is outside of the scene. "" if none is."""
+        """Return which bottle is on no belt or plate, or outside of a scene that has neither. "": no bottle is."""
         places = np.array([(one.x, one.y) for one in new])
         surfaces = self._state.model.plant.surfaces
         if surfaces:

@@ -52,7 +52,7 @@ class Mover(Device):
                 switch(
                     f"{name}/{order}",
                     "command",
-                    f"Goes until {at_end}; off: until {at_home}.",
+                    f"On: moves until {at_end}. Off: moves until {at_home}.",
                     round(share),
                 ),
                 switch(f"{name}/jammed", "fault", "Stands still, against any load."),

@@ -73,7 +73,7 @@ class ZoneDevice(Device):
             count(f"{name}/offset", "fault", "Added to the number of bottles.", -MOST_OFFSET, MOST_OFFSET),
         ]
         if zone.full_at is not None:
-            tags.append(switch(f"{name}/full", "status", f"Back-up switch: {zone.full_at} bottles or more are there."))
+            tags.append(switch(f"{name}/full", "status", f"Back-up switch: {zone.full_at} bottles or more inside."))
         super().__init__(name, tags)
         self.offset = 0
 

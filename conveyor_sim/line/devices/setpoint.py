@@ -14,7 +14,7 @@ from conveyor_sim.scene.drives import SpeedSetpoint
 
 @dataclass
 class Watchdog:
-    """Watchdog that stops a belt or named drive without an accepted speed command within its time-out (simulated)."""
+    """Watchdog of a belt or named drive: stops it if no speed command is accepted for a time-out of simulated time."""
 
     timeout_ticks: int
     last: int = 0

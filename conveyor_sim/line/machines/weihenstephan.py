@@ -22,7 +22,7 @@ class DataPoint(NamedTuple):
 
     number: int
     tags: tuple[str, ...]
-    """Last parts of the names of the machine's tags that it is derived from, if they exist."""
+    """Tags of the machine that the value is derived from, as the last parts of their names. Some may not exist."""
     what: str
     """Description, one sentence for docs/parts/data_points.md."""
 

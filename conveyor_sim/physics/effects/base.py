@@ -36,7 +36,7 @@ def _friction_bounds(terms: Terms) -> list[Bound]:
         bounds.append(
             Bound("base friction", *drag_bound(terms, base_friction_bound(mu, g, limit), reason), stability=True)
         )
-    # On a turning belt, a resting bottle has a relative error of 1 / steps, with explicit and with implicit friction.
+    # On a turning belt, the creep of a bottle has a relative error of 1 / steps, with explicit and implicit friction.
     turning = terms.method.slip_steps(terms.tolerance) if "curved_belts" in terms.on else 0.0
     if (steps := max(0.0 if implicit else _slip_steps(terms), turning)) > 0.0:
         reason = f"{steps:.3g} steps in v_lim / (mu g) at mu = {mu:g}"
@@ -45,7 +45,10 @@ def _friction_bounds(terms: Terms) -> list[Bound]:
 
 
 def _slip_steps(terms: Terms) -> float:
-    """Return the steps per v_lim / (mu g) at which a first-order method has a relative error of 1 / `least_steps`."""
+    """Return the steps per v_lim / (mu g) at which the relative error is 1 / `terms.steps`.
+
+    First-order methods take `terms.steps`, second-order methods fewer (`Method.slip_steps`).
+    """
     return terms.method.slip_steps(1.0 / terms.steps) if terms.method.second_order else terms.steps
 
 

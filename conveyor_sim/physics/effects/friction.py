@@ -150,10 +150,10 @@ IMPLICIT_FRICTION = Effect(
     name="implicit_friction",
     law="friction at the slip at the end of a step, with the mass of a bottle split among its contacts. With "
     "velocity_verlet up to gamma dt = 2/3, and with rk4 up to gamma dt = 1, it equals explicit friction. Here gamma is "
-    "2 mu N / (m_t v_lim) times the number of closed contacts. In longer steps friction reaches mu N at a larger slip "
-    "than v_lim, and a loaded contact creeps faster. That slip is mu N dt / m_t with rk4, and 1.5 times as large with "
-    "velocity_verlet. Not available with dormand_prince, which divides its steps, and linearly_implicit, which solves "
-    "for friction itself",
+    "2 mu N / (m_t v_lim) times the number of closed contacts. In longer steps friction reaches mu N only at a slip "
+    "larger than v_lim, and a loaded contact creeps faster. In long steps, the slip at which friction reaches mu N is "
+    "about mu N dt / m_t with rk4, and 1.5 times as large with velocity_verlet. Not available with dormand_prince, "
+    "which divides its steps, and linearly_implicit, which solves for friction itself",
     source="added",
     called_for=partial(_chosen, field="friction_solver", value="implicit"),
     absent="friction_solver is explicit, or nothing has friction",

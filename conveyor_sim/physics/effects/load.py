@@ -4,14 +4,14 @@
 A belt drags a bottle with at most mu m g. Only the bottles along its running length press on one contact; bottles
 beside each other press on different ones. In a pile the load is shared unevenly, and a bottle is loaded from several
 sides. The factors below are measured. A factor is an equivalent load, divided by mu m g and by the number of bottles in
-a file along the pile. At the equivalent load, two bottles alone need the same time step as the complete pile, which
-follows from the largest eigenvalue of the friction in all its contacts at rest.
+a file along the pile. At the equivalent load, two bottles alone need the same time step as the complete pile. The time
+step of a pile follows from the largest eigenvalue of the friction in all its contacts at rest.
 
 Measured factors (test/physics/effects/test_load.py), without impacts:
 - hoppers of 400 to 1 000 bottles with walls at 20 to 90 degrees: 1.9 to 3.2
 - files between rails 1.05 to 1.2 diameters apart: 1.0 to 1.2
-- zigzags in lanes of 1.35 to 2.5 diameters: 1.7 to 3.3. Divided by the number of all bottles in place of those of a
-  file, up to 2.6.
+- zigzags in lanes of 1.35 to 2.5 diameters: 1.7 to 3.3. If the load is divided by the number of all
+  bottles instead of those of a file, the factor is at most 2.6.
 """
 
 import math

@@ -38,8 +38,8 @@ def find_joints(pieces: Sequence[Piece], inward: NDArray[np.float64]) -> Joints:
     """Join n rail pieces.
 
     inward: (n, 2, 2), unit vectors from each end into its piece. Where two ends meet, the first piece handles contacts
-    of the point. Where more meet, or an end lies on another piece, ends stay free, and the shared push of a surface
-    counts the point once.
+    of the point. Where more than two ends meet, or an end lies on another piece, ends stay free. Their pieces form one
+    surface, in which `share_overlaps` makes the point push once.
     """
     ends = np.array([piece.ends for piece in pieces])
     code = np.full((len(pieces), 2), FREE, dtype=np.int8)

@@ -52,7 +52,7 @@ BOTTLE_STEP = 3e-8
 """s per bottle and step on one core of the 2020s, rounded."""
 
 BESIDE = 10
-"""Cost of a step that does not depend on the number of bottles, in units of the cost of one bottle."""
+"""Fixed cost of a step, independent of the number of bottles, in units of the cost of one bottle."""
 
 TICK_COST = 5e-5
 """s per tick besides its steps, rounded: devices, commands and the guard."""

@@ -41,7 +41,7 @@ def full_state_hash(memory: Mapping[str, Any], arrays: Arrays, limits: Limits) -
     A future belongs to one scene, version and sequence of commands. The memory of a controller is not part of a
     Simulation. Equal futures may have unequal hashes, because lists are hashed with their unused room.
 
-    Cost: 0.2 to 0.3 ms for 9 to 95 bottles, most of it JSON of the line's memory (docs/performance.md).
+    Cost: 0.2 to 0.3 ms for 9 to 95 bottles, most of it JSON of the line's memory (docs/performance/kernels.md).
     """
     decides = any(getattr(limits, name) is not None for name in Limits.model_fields if name != "clogging_time")
     left_out = (*FIXED, *SCRATCH, *OBSERVERS, *(() if decides else LIMITED))

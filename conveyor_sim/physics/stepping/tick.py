@@ -57,7 +57,7 @@ class Integration:
 
     @property
     def deepest_overlap(self) -> float:
-        """Largest overlap over a radius so far."""
+        """Largest ratio of overlap to radius so far."""
         return self._memory.deepest
 
     @property

@@ -19,8 +19,9 @@ class Bound:
 
 
 def least_steps(tolerance: float) -> float:
-    """Return the smallest number of steps per contact, and per v_lim / (mu g), with errors of second order: 20 at 1 %.
+    """Return the smallest number of steps per contact for a method with errors of second order: 20 at 1 %.
 
+    The same number applies to the steps per v_lim / (mu g).
     tolerance: relative error in contact force. The error of a peak between two such steps is a third of it.
     """
     return 2.0 / math.sqrt(tolerance)

@@ -113,8 +113,8 @@ class Method:
 
 
 METHODS: Mapping[str, Method] = {
-    # 1/sqrt(3) = 0.58 is the ratio of RMS to maximum of an error that is uniform over phases. Forces are half a step
-    # old; implicit friction uses the slip half a step later.
+    # 1/sqrt(3) = 0.58 is the ratio of RMS to maximum of an error that is uniform over phases. Explicit forces use
+    # velocities half a step before the positions; implicit friction uses the slip half a step after them.
     "leapfrog": Method(
         peak=0.6,
         jump=0.6,

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The other way round: a line as the client of a PLC that is the server, by a map of its tags to ours."""
+"""A line as the client of a PLC, which is the server. A map assigns tags of the PLC to tags of the line."""

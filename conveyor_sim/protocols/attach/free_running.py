@@ -92,7 +92,7 @@ class FreeRunningPlc:
                     self._say(f"{self._url}: connected again")
                     reported = ""
                 await self._scan(self._link)
-            # All errors, because a PLC may be loaded with another program, and with this one again.
+            # All errors are caught: a program without the mapped tags may be loaded into the PLC, and replaced later.
             except Exception as error:
                 text = str(error) if isinstance(error, ConveyorError) else f"{type(error).__name__}: {error}"
                 # A failed attempt is reported unless its only reason is that there is no PLC.

@@ -48,7 +48,7 @@ class MappedTag(NamedTuple):
 
 
 class TagMap(NamedTuple):
-    """MappedTag tags by direction."""
+    """Mapped tags by direction."""
 
     written: tuple[MappedTag, ...]
     """Signals, written to the PLC."""

@@ -269,7 +269,10 @@ class Bounds:
         self._bound_queues(asked)
 
     def _bound_queues(self, asked: Sequence[Any]) -> None:
-        """Set queue sizes within the limits. The library treats 0 as the longest queue, or as no bound."""
+        """Set queue sizes within the limits.
+
+        The library treats 0 as its longest queue if an item is created, and as an unlimited queue if it is modified.
+        """
         subscriptions = self._service.subscriptions.values()
         most = share_of_guests(self.limits.queued) if self.is_guest else self.limits.queued
         left = most - sum(each.monitored_item_srv.queued for each in subscriptions)

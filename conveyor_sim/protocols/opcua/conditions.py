@@ -176,7 +176,7 @@ _VARIABLES: Mapping[str, _Variable] = {
     "tag": _Variable(ua.VariantType.String, "Signal of the alarm; empty: none."),
     "group": _Variable(ua.VariantType.String, "Group for first-out detection."),
     "since": _Variable(ua.VariantType.DateTime, "Simulated time of the last change of its state."),
-    "shelved_until": _Variable(ua.VariantType.DateTime, "Simulated time; 1601: not shelved for a time."),
+    "shelved_until": _Variable(ua.VariantType.DateTime, "Simulated time at which shelving ends; year 1601: none."),
     "changed_by": _Variable(
         ua.VariantType.String, "Writer of the latest operation, such as acknowledge, shelve or reset."
     ),

@@ -20,7 +20,9 @@ Codes = ua.StatusCodes
 
 
 def filter_units(wanted: Any, limits: OpcUaLimits) -> int:
-    """Return the work units per event or change. Raise ServiceError for a filter that costs too much.
+    """Return the number of fields and operands of an event filter, and 1 for other filters.
+
+    Operands are counted once per visit in one evaluation. Raise ServiceError for a filter that costs too much.
 
     wanted: the filter of one item; None: no filter. `filter_code` checks its form.
     """

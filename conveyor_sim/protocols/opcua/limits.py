@@ -56,7 +56,7 @@ class OpcUaLimits:
     select_clauses: int = 256
     """Fields that one event filter selects."""
     where_operands: int = 256
-    """Operands that one evaluation of an event filter visits."""
+    """Elements of one where-clause, and their operands. One evaluation may visit twice as many."""
     event_fields_per_session: int = 2000
     """Fields and operands of all event filters of one session."""
     notifications_per_publish: int = 2000

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """`Admin`: counters, stop reason and alarms of a machine: the variables of OPC 30050 that have values in tags.
 
-Types and names are those of the NodeSet (R 30050, 6.3.4). Counters are never reset separately, so Count and AccCount
+Types and names are those of the NodeSet (OPC 30050, 6.3.4). Counters are never reset separately, so Count and AccCount
 are the same.
 """
 

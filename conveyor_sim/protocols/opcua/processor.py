@@ -106,7 +106,7 @@ class Allowance:
     """Limits on decoding one message, and the steps used so far."""
 
     steps: int
-    """Elementary values that may be decoded, `_OBJECT` for each single byte."""
+    """Steps allowed: one per elementary value, `_OBJECT` per byte that is read alone."""
     array_length: int
     """Elements of one array of numbers or null values."""
     string_bytes: int

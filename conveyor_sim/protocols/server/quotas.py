@@ -62,8 +62,8 @@ class Quota:
     connections_per_user: int = 16
     """Connections of one user."""
     idle: float = 30.0
-    """Seconds without a request after which a guest may be dropped for another guest, or a user for the same user. A
-    Modbus client that is idle for longer loses its control of the line.
+    """Seconds without a request after which a connection may be dropped: a guest's for another guest, and a user's for
+    a new connection of the same user. A Modbus client that is idle for longer loses its control of the line.
     """
 
 

@@ -28,7 +28,8 @@ SHORTEST = 0.005
 class BagTagProvider(LineMirror, AbstractContextManager["BagTagProvider"]):
     """Playback from the start of a recording until close().
 
-    Only the played parts are read, through the index of the recording.
+    Opening the recording verifies its checksums, which reads the complete file. Messages are then read as they are
+    played, through the index of the recording.
     """
 
     takes_inputs = False

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Control authority of clients: checks against the latest snapshot, and ownership of the line without names.
+"""Control authority of clients: checks against the latest snapshot, and ownership by clients without user names.
 
 The checks are for immediate answers; the line checks again at the tick.
 """
@@ -169,7 +169,7 @@ def objection(source: TagProvider, command: Tag, value: float, kind: WriterKind,
 def refused_for_good(source: TagProvider, receipt: Receipt, request: Input) -> Refusal | None:
     """Return why the line would refuse an input in every state; None if it might accept it.
 
-    If its writer may use the operation, such an input is still passed on, and the line records the refusal.
+    A refused input is still passed on if its writer may use the operation, so that the line records the refusal.
     Commands (SET) are not passed on.
     """
     refusal = receipt.refusal(request)

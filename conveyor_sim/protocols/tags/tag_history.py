@@ -14,7 +14,10 @@ from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.bag.reader import open_bag
 
 MOST_READ = 20_000
-"""Largest number of messages read for one answer; the caller continues from the returned tick."""
+"""Number of messages after which an answer ends with the current window; the caller continues from the returned tick.
+
+Messages read to find the preceding value (`_before`) are not counted.
+"""
 
 WINDOW = 1000
 """Number of ticks that are read together."""

@@ -28,7 +28,7 @@ GROWTH = 2.0
 """Largest allowed ratio of energies after and before a tick, without the work of belts. Good steps stay below."""
 
 SOFT = 0.2
-"""Overlap, in radii, from which a contact is reported as soft. The error of positions is as large."""
+"""Overlap, in radii, from which a contact is reported as soft. Positions are wrong by the overlap."""
 
 CLOSELY = 128
 """Largest number of steps between checks of overlaps. A check costs about half a step."""
@@ -47,7 +47,7 @@ class GuardMemory:
     shortened_ticks: int = 0
     """Ticks that were repeated in shorter steps."""
     deepest: float = 0.0
-    """Largest overlap over a radius so far."""
+    """Largest ratio of overlap to radius so far."""
     put_in: bool = False
     """True after bottles were placed from outside: deep overlaps are then tolerated until they separate."""
 
@@ -190,7 +190,7 @@ class Guard:
         """
         after = None if slot < 0 else self._squeeze(slot)
         self._put_back()
-        # Once an axis has passed a rail, the rail pushes it further.
+        # After a tick in which an axis passed a rail, the contact normal is reversed. `before` has the right one.
         before = None if slot < 0 else self._squeeze(slot)
         return Words(self._model, self._state.world, before if before is not None and before.held else after or before)
 
