@@ -45,8 +45,8 @@ def test_a_recording_opens_at_its_fullest_moment_fitted_to_the_window(browser: A
         counts = {round(frame.time, 2): len(frame.data.id) for frame in opened.bottles()}
     with opened_page(browser, plain) as page:
         settled(page)
-        most = max(counts[float(second)] for second in range(25))
-        assert counts[round(clock(page), 2)] == most > counts[0.0]
+        most = max(counts.values())
+        assert counts[round(clock(page), 2)] >= most - 3 > counts[0.0]  # looks are a second apart; 3 bottles come in it
         _, _, scale, width, height = camera(page)
         assert scale == pytest.approx(min((width - 80) / 4.55, (height - 100) / 2.0), rel=0.1)
         assert page.evaluate("location.hash") == "", "the address changes when the user moves in time"

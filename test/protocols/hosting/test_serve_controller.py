@@ -84,7 +84,7 @@ def test_the_second_step_of_the_tutorial_serves_its_controller(command: Callable
     for name, text in re.findall(r"```(?:python|yaml)\n# (\S+)\n(.*?)```", page, re.DOTALL):
         (tmp_path / name).write_text(text)
     (line,) = re.findall(r"^    conveyor-sim serve (.*) --web$", page, re.MULTILINE)
-    served = command(*line.split(), "--web", "0", "--real-time-factor", "0", "--out", "bag")
+    served = command(*line.split(), "--web", "0", "--duration", "60", "--real-time-factor", "0", "--out", "bag")
     until(lambda: "end of the run" in served.told, "the end of the run")
     served.end()
     with open_bag(tmp_path / "bag") as bag:
