@@ -43,8 +43,11 @@ def span_of(times: Times, first: int, last: int, left: Sequence[int], tick: floa
     """Return the span of a report.
 
     first, last: ticks at which the recording begins and ends. left: ticks at which bottles left the line, ascending.
-    tick: s. Raise ConveyorError for times outside the recording, or in the wrong order.
+    tick: s. Raise ConveyorError for times outside the recording, or in the wrong order, and for a
+    recording of its start alone.
     """
+    if first >= last:
+        raise ConveyorError(f"the recording holds no message after its start at {first * tick:g} s, expected one")
     ends = f"{first * tick:g} to {last * tick:g} s"
     for option, time in (("--from", times.start), ("--to", times.stop)):
         if time is not None and not (math.isfinite(time) and first <= round(time / tick) <= last):
