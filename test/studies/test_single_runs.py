@@ -41,7 +41,9 @@ def test_the_interval_is_that_of_batch_means_of_the_same_series(single: tuple[Se
     setup, results = single
     row = results.rows[1]
     simulation = Simulation(scene_of(setup, row.parameters, row.seed), threads=1)
-    tag = simulation.process_image.signal_names.index(TAG)
+    names = simulation.process_image.signal_names
+    tag = names.index(TAG)
+    (processed,) = (index for index, name in enumerate(names) if name.endswith("/processed"))  # of the sink
     queue, taken = [], []
     for tick in range(1, 2001):
         simulation.advance(1)
@@ -49,7 +51,7 @@ def test_the_interval_is_that_of_batch_means_of_the_same_series(single: tuple[Se
         if tick > 200:
             queue.append(float(simulation.signals()[tag]))
         if tick >= 200 and tick % 50 == 0:
-            taken.append(float(simulation.counts.removed))
+            taken.append(float(simulation.signals()[processed]))
     assert row.metrics["queue"] == pytest.approx(np.mean(queue))
     assert row.metrics["throughput"] == pytest.approx(60.0 * np.mean(np.diff(taken)))
     of_queue, of_taken = batch_means(queue), batch_means(60.0 * np.diff(taken))

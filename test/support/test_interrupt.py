@@ -90,7 +90,7 @@ def test_a_command_that_is_reading_its_arguments_ends_with_one_line() -> None:
 def test_a_run_whose_pictures_are_being_drawn_ends_with_one_line_and_nothing_half_written(tmp_path: Path) -> None:
     folder = tmp_path / "run"
     arguments = ["-c", MAIN, "run", str(ROOT / "test/bag/small_line.yaml"), "--duration", "0.2", "--out", str(folder)]
-    status, said = interrupted(arguments, words="summary: ")
+    status, said = interrupted(arguments, words="forces ")
     assert (status, said.splitlines()[-1]) == (130, "interrupted")
     assert "Traceback" not in said
     assert {path.name for path in folder.iterdir()} <= {

@@ -42,7 +42,7 @@ STUDIES: dict[str, dict[str, Any]] = {
     "pilots": {
         "seeds": 1,
         "metrics": [{"queue": "mean belts/conveyor/bottles"}],
-        "duration": 25.0,
+        "duration": 40.0,
         "warm_up": "mser",
         "overrides": {"belts": {"conveyor": {"speed": 0.1}}, "tick": 0.02},
     },
