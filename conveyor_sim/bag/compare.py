@@ -90,15 +90,19 @@ def _unequal(then: NDArray[Any], now: NDArray[Any], tolerance: float | None) -> 
 
 
 def outcome_difference(
-    tick: int, time: float, recorded: Sequence[Outcome], replayed: Sequence[Outcome]
+    tick: int, time: float, recorded: Sequence[Outcome], replayed: Sequence[Outcome], *, exact: bool
 ) -> ReplayDifference | None:
-    """Compare the results of the commands of one tick. Return None if they are equal."""
+    """Compare the results of the commands of one tick. Return None if they are equal.
+
+    exact: also compare the reasons of refusals, which another version may word differently.
+    """
+    names = [field.name for field in fields(Outcome) if exact or field.name != "reason"]
     for then, now in zip(recorded, replayed, strict=False):
-        for field in fields(Outcome):
-            before, after = getattr(then, field.name), getattr(now, field.name)
+        for name in names:
+            before, after = getattr(then, name), getattr(now, name)
             if not _same(before, after):
                 part = f"the command {', '.join(then.names)} from {then.source}"
-                return ReplayDifference(tick, time, "outcomes", field.name, str(before), str(after), part=part)
+                return ReplayDifference(tick, time, "outcomes", name, str(before), str(after), part=part)
     if len(recorded) != len(replayed):
         counts = (str(len(recorded)), str(len(replayed)))
         return ReplayDifference(tick, time, "outcomes", "the number of outcomes", *counts)

@@ -170,7 +170,7 @@ class _Replay:
         else:
             return None
         tick = self._sim.tick - 1
-        return outcome_difference(tick, self._bag.time(tick), recorded, replayed)
+        return outcome_difference(tick, self._bag.time(tick), recorded, replayed, exact=self._exact)
 
     def _compare_states(self) -> ReplayDifference | None:
         now = Snapshot(self._sim)
