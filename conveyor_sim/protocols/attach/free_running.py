@@ -84,7 +84,7 @@ class FreeRunningPlc:
 
     async def _run(self) -> None:
         reported = ""
-        while True:
+        while self._task is not None:  # a cancellation can be lost in asyncio.wait_for before Python 3.12
             began = time.monotonic()
             try:
                 if self._link is None:
