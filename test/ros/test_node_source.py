@@ -108,7 +108,7 @@ def test_another_line_is_not_taken_for_this_one(
 
 
 def test_a_node_with_other_messages_is_named(client: LineClient) -> None:
-    """As of an older version: DDS matches types by name only, so their definitions are compared."""
+    """The definitions are compared, because DDS matches types of different versions by name alone."""
     publisher = client.node.create_publisher(Float64, "/older/line", 1)
     said: list[str] = []
     with NodeSource(said.append, "older") as source:
