@@ -96,9 +96,15 @@ def _table(rows: list[Row]) -> str:
 def text_of(value: Range) -> str:
     """Return a value with its interval in brackets, with digits that show the interval."""
     if value.low == value.high:
-        return f"{value.value:.4g}"
+        return f"{value.value:.5g}"
+    if math.isinf(value.low) != math.isinf(value.high):
+        return f"{'above' if math.isinf(value.high) else 'below'} {value.value:.4g}"
     if not math.isfinite(value.high - value.low):
         return f"{value.value:.3g} (one run)"
     scale = max(abs(value.low), abs(value.high))
-    digits = max(2, min(7, 1 + math.ceil(math.log10(scale / (value.high - value.low))) if scale else 2))
+    digits = max(
+        2,
+        math.ceil(math.log10(scale or 1.0)),
+        min(7, 1 + math.ceil(math.log10(scale / (value.high - value.low))) if scale else 2),
+    )
     return f"{value.value:.{digits}g} ({value.low:.{digits}g} to {value.high:.{digits}g})"
