@@ -69,12 +69,12 @@ def _section(source: Source) -> str:
     runs = store.read(source)
     minutes = sum(run[store.CPU] for run in runs) / 60.0
     made = f"{len(runs)} of {len(source.cases())} runs, {minutes:.1f} min of processor time"
-    file = store.table(source).name
+    link = f", [{source.name}.csv](validation/{source.name}.csv)" if runs else ""
     parts = [
         f"## {source.title}",
         f"{source.citation}",
         f"- *Read:* {source.read}\n- *Measured there:* {source.measured}\n- *Simulated here:* {source.simulated}\n"
-        f"- *Command:* `make validation ARGS={source.name}`\n- *Stored:* {made}, [{file}](validation/{file})",
+        f"- *Command:* `make validation ARGS={source.name}`\n- *Stored:* {made}{link}",
         _table(list(source.rows(runs))),
     ]
     if source.draw is not None and store.picture(source).exists():
