@@ -16,7 +16,7 @@ from conveyor_sim.scene.belts import Belt, CurvedBelt, CurvedSurface, PathBelt, 
 from conveyor_sim.scene.rails import ArcRail, PolylineRail, Rail
 from conveyor_sim.scene.schema import Grid, GridOfBottles, Scene
 from conveyor_sim.scene.types import TOUCH, XY
-from conveyor_sim.scene.vibration import Vibration
+from conveyor_sim.scene.vibration import ChainVibration
 
 Array = NDArray[np.float64]
 InitialBottle = tuple[str, float, float, float, float, float, float]
@@ -49,8 +49,8 @@ class BeltShape:
     """Speed along travel over that of the belt."""
     clockwise: bool = False
     """True if a curved surface turns clockwise at positive speed."""
-    vibration: Vibration | None = None
-    """That of the belt."""
+    vibration: ChainVibration | None = None
+    """Vibration of its belt; None for none."""
 
     @property
     def centre_radius(self) -> float:

@@ -7,7 +7,7 @@ from conveyor_sim.scene.part import Part
 from conveyor_sim.scene.types import Angle, Positive, quantity
 
 
-class Vibration(Part):
+class ChainVibration(Part):
     """A sinusoidal displacement of the surface, on top of its travel. It also acts while the belt stands."""
 
     amplitude: Positive = quantity("Amplitude of the displacement, half of its peak-to-peak value.", "m")

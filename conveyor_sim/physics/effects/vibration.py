@@ -8,7 +8,7 @@ from conveyor_sim.physics.effects.declaration import Cause, Effect
 from conveyor_sim.physics.effects.terms import Terms, tightest
 from conveyor_sim.physics.plant import Plant
 from conveyor_sim.physics.timestep.bounds import Bound
-from conveyor_sim.scene.vibration import Vibration
+from conveyor_sim.scene.vibration import ChainVibration
 
 ENOUGH = 1.6
 """Steps per period, times the tolerance, at which the mean of a force that jumps with the slip meets the tolerance."""
@@ -33,7 +33,7 @@ def _bounds(terms: Terms) -> list[Bound]:
     return [*tightest("vibration", periods), *tightest("vibration slip", crossings)]
 
 
-def _crossing(vibration: Vibration, terms: Terms) -> tuple[float, str]:
+def _crossing(vibration: ChainVibration, terms: Terms) -> tuple[float, str]:
     crossing = terms.scene.slip_limit / (2.0 * math.pi * vibration.frequency * vibration.speed)
     steps, enough = CROSSING * terms.steps, ENOUGH / terms.tolerance
     if (longest := 1.0 / (vibration.frequency * enough)) > crossing / steps:
@@ -41,7 +41,7 @@ def _crossing(vibration: Vibration, terms: Terms) -> tuple[float, str]:
     return crossing / steps, f"{steps:.3g} steps in v_lim / (4 pi^2 f^2 A) at A = {vibration.amplitude:g} m"
 
 
-def _steps_of(steps: float, vibration: Vibration) -> str:
+def _steps_of(steps: float, vibration: ChainVibration) -> str:
     return f"{steps:.3g} steps in 1 / f at f = {vibration.frequency:g} Hz"
 
 
