@@ -158,6 +158,8 @@ class Summary:
     """Check of the peak force; None if it or its prediction is unknown."""
     pressed: Pressed | None
     """Largest sustained force; None if unknown, or if no bound on the time step depends on it."""
+    warnings: list[str]
+    """Sentences on settings of the scene that make results wrong; empty if this version refuses the scene."""
     guard: dict[str, int]
     """Number of guard events by kind (`GuardEvent.kind`)."""
     guard_texts: list[str]
