@@ -90,7 +90,7 @@ def draw(runs: Sequence[Run]) -> Figure:
     return figure
 
 
-def _marks(ax: object, of: Mapping[float, list[float]], label: str, colour: str, marker: str, line: str = "-") -> None:
+def _marks(ax: Axes, of: Mapping[float, list[float]], label: str, colour: str, marker: str, line: str = "-") -> None:
     known = {x: Range.of_mean(values) for x, values in of.items() if values}
     errors = [r.value - r.low for r in known.values()]
     ax.errorbar([*known], [r.value for r in known.values()], errors, fmt=marker, ls=line, color=colour, capsize=3.0,

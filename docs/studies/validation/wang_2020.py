@@ -126,7 +126,8 @@ SOURCE = Source(
     "The simulated flow grows to a plateau, as in the abstract, but reaches it at 40 instead of 80 degrees. A part of "
     "this comes from the pressure: at small angles more of the discs stand in the channel and push, and in a channel "
     "of 20 d the simulated flow depends on their number (next source). To decide this, the width of the published "
-    "channel and the number of discs in it would have to be known, or measured: the flow at each angle with twice the discs.",
+    "channel and the number of discs in it would have to be known, or measured: the flow at each angle with twice "
+    "the discs.",
     draw=draw,
     caption="Flow against the angle of the walls, over the flow at 80 degrees: simulated marks and master curves.",
 )
