@@ -125,11 +125,12 @@ def _marks(ax: Axes, of: Mapping[float, list[float]], label: str, colour: str, m
 SOURCE = Source(
     name="aguirre_2010",
     title="Discharge against belt speed and number of discs",
-    citation="M. A. Aguirre, J. G. Grande, A. Calvo, L. A. Pugnaloni, J.-C. Géminard, Pressure independence of granular "
-    "flow through an aperture, Physical Review Letters 104, 238002 (2010), arXiv:1005.2884.",
+    citation="M. A. Aguirre, J. G. Grande, A. Calvo, L. A. Pugnaloni, J.-C. Géminard, Pressure independence "
+    "of granular flow through an aperture, Physical Review Letters 104, 238002 (2010), arXiv:1005.2884.",
     read="Abstract and first page (ar5iv). The sizes of the set-up, further down, could not be read.",
-    measured="A belt discharges a dense packing of equal discs through an aperture in a horizontal container. The flow is "
-    "proportional to the belt speed and does not depend on the number of discs, hence not on the pressure.",
+    measured="A belt discharges a dense packing of equal discs through an aperture in a horizontal "
+    "container. The flow is proportional to the belt speed and does not depend on the number of discs, hence "
+    "not on the pressure.",
     simulated=f"Discs of 11 mm before an outlet of {OUTLET:g} d in a flat wall, friction 0.3 between discs and 0.4 on "
     f"the belt, by the curve or with springs, {len(SEEDS)} runs each. They start in a dense lattice of random "
     f"orientation, or loose and disordered. The flow is taken between the 60th and the 160th disc from a lattice, "
@@ -138,15 +139,16 @@ SOURCE = Source(
     simulate=simulate,
     rows=rows,
     seconds=0.9,
-    discussion="The flow is proportional to the belt speed where discs reach that speed within a fraction of a diameter. At "
-    "0.2 m/s a disc slips for v^2 / (2 mu g) = 5 mm, half a diameter, and the flow falls a little behind.\n\n"
+    discussion="The flow is proportional to the belt speed where discs reach that speed within a fraction of a "
+    "diameter. At 0.2 m/s a disc slips for v^2 / (2 mu g) = 5 mm, half a diameter, and the flow falls a little "
+    "behind.\n\n"
     "The flow is not independent of the number of discs: it grows by about a fifth with each doubling, most in "
-    "the narrow container. A dense packing that leaves at belt speed gives 930 discs per m of belt; larger flows "
-    "mean that the pressure pushes discs out faster than the belt. Springs, more friction between discs, a "
-    "sharper slip limit and a disordered start do not remove this. Why the experiment shows no such effect is not "
-    "known: its numbers of discs and the width of its container could not be read. The velocity of discs in the "
-    "outlet over the belt speed, against the number of discs, would decide it. Until then, flows that a long "
-    "queue pushes through an outlet may be too large by this factor.",
+    "the narrow container. A dense packing that leaves at belt speed gives 930 discs per m of belt; larger "
+    "flows mean that the pressure pushes discs out faster than the belt. Springs, more friction between discs, "
+    "a sharper slip limit and a disordered start do not remove this. Why the experiment shows no such effect is "
+    "not known: its numbers of discs and the width of its container could not be read. The velocity of discs in "
+    "the outlet over the belt speed, against the number of discs, would decide it. Until then, flows that a "
+    "long queue pushes through an outlet may be too large by this factor.",
     draw=draw,
     caption="Flow over belt speed, against belt speed and against the number of discs, with 95 % intervals.",
 )

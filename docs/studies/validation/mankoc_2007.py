@@ -78,11 +78,11 @@ def draw(runs: Sequence[Run]) -> Figure:
 SOURCE = Source(
     name="mankoc_2007",
     title="Discharge of a two-dimensional silo",
-    citation="C. Mankoc, A. Janda, R. Arévalo, J. M. Pastor, I. Zuriguel, A. Garcimartín, D. Maza, The flow rate of "
-    "granular materials through an orifice, Granular Matter 9, 407 (2007), arXiv:0707.4550.",
+    citation="C. Mankoc, A. Janda, R. Arévalo, J. M. Pastor, I. Zuriguel, A. Garcimartín, D. Maza, The flow "
+    "rate of granular materials through an orifice, Granular Matter 9, 407 (2007), arXiv:0707.4550.",
     read="Abstract and first page (ar5iv, Scribd). The proposed law and its coefficients could not be read.",
-    measured="Discharge through large orifices follows a power law of the diameter, 5/2 in three dimensions. Small "
-    "openings need a correction. A new law holds for all openings, in three and in two dimensions.",
+    measured="Discharge through large orifices follows a power law of the diameter, 5/2 in three dimensions. "
+    "Small openings need a correction. A new law holds for all openings, in three and in two dimensions.",
     simulated=f"{DISCS} discs in a silo of {WIDTH:g} d with a flat bottom, on a belt at {FAST:g} m/s with friction "
     f"{PULL:g} for gravity; friction 0.5 between discs by the curve, which doesn't jam. {len(SEEDS)} lattices each; "
     f"the flow is taken between the {FIRST}th and the {LAST}th disc.",
@@ -91,9 +91,9 @@ SOURCE = Source(
     rows=rows,
     seconds=0.6,
     draw=draw,
-    discussion="By dimensional analysis a flow of discs under an acceleration a is a^(1/2) D^(3/2) in two dimensions where "
-    "the diameter of the discs does not matter; this is the two-dimensional form of the law with 5/2. The "
-    "simulation follows it at large outlets, and falls below it at small ones, as the abstract says. The "
-    "correction itself is not compared: its formula and coefficients could not be read.",
+    discussion="By dimensional analysis a flow of discs under an acceleration a is a^(1/2) D^(3/2) in two "
+    "dimensions where the diameter of the discs does not matter; this is the two-dimensional form of the law "
+    "with 5/2. The simulation follows it at large outlets, and falls below it at small ones, as the abstract "
+    "says. The correction itself is not compared: its formula and coefficients could not be read.",
     caption="Flow against the outlet, both without units, and the power law of large outlets.",
 )
