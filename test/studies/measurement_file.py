@@ -12,6 +12,7 @@ from conveyor_sim.studies.calibration.read import Measurement
 UNITS = {
     "force": "N", "normal_force": "N", "mass": "kg", "speed": "m/s", "drop_height": "m", "rebound_height": "m",
     "length": "m", "angle_before": "rad", "angle_after": "rad", "angle_struck": "rad", "overlap": "m",
+    "acceleration": "m/s^2", "frequency": "Hz", "direction": "rad",
 }  # fmt: skip
 """SI units, so that tests write the values of `Measurement`."""
 

@@ -17,11 +17,13 @@ from conveyor_sim.studies.calibration.friction import GRAVITY, friction, slip_li
 from conveyor_sim.studies.calibration.read import Measurement
 from conveyor_sim.studies.calibration.restitution import restitution
 from conveyor_sim.studies.calibration.stiffness import Elastic, elastic
+from conveyor_sim.studies.calibration.vibration import vibration
 
 SETS = 400
 LEAST, MOST = (int(binom.ppf(tail, SETS, CONFIDENCE)) for tail in (0.0005, 0.9995))
 """Range of hits with a probability of 99.9 % at the stated confidence."""
 MU, MASS, LIMIT, E = 0.15, 0.35, 0.01, 0.7
+AMPLITUDE, FREQUENCY, ACROSS = 1e-4, 25.0, 1.4
 OVERLAPS = np.linspace(0.05e-3, 0.5e-3, 10)
 SPEEDS = (1e-3, 2e-3, 3e-3, 5e-3, 8e-3, 12e-3, 20e-3, 50e-3)
 HEIGHTS = (0.05, 0.1, 0.2, 0.4)
@@ -114,6 +116,25 @@ def test_slip_limit() -> None:
 
 def test_friction_beside_the_slip_limit() -> None:
     assert LEAST <= hits(creeping, MU, lambda rows: next(iter(slip_limit(rows).friction.values()), None)) <= MOST
+
+
+def vibrating(rng: np.random.Generator) -> list[Measurement]:
+    """Readings of a vibration across travel, whose axis is read as one or the other end of a half turn."""
+    rows = []
+    for line in range(6):
+        frequency = FREQUENCY * (1.0 + 0.02 * rng.normal())
+        acceleration = AMPLITUDE * (1.0 + 0.05 * rng.normal()) * (2.0 * math.pi * frequency) ** 2
+        axis = ACROSS + 0.05 * rng.normal() + math.pi * rng.integers(-1, 2)
+        rows.append(
+            measurement(line, "vibration", acceleration=acceleration, frequency=frequency, direction=float(axis))
+        )
+    return rows
+
+
+def test_vibration() -> None:
+    assert LEAST <= hits(vibrating, AMPLITUDE, lambda rows: vibration(rows).amplitude) <= MOST
+    assert LEAST <= hits(vibrating, FREQUENCY, lambda rows: vibration(rows).frequency) <= MOST
+    assert LEAST <= hits(vibrating, ACROSS, lambda rows: vibration(rows).direction) <= MOST
 
 
 def test_the_range_of_hits_is_that_of_the_stated_confidence() -> None:

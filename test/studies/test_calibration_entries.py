@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import math
+import re
 from pathlib import Path
 
 import pytest
@@ -204,6 +206,38 @@ def test_two_chains_share_a_slip_limit(tmp_path: Path) -> None:
     scene = pasted(printed(tmp_path, *rows))
     assert scene.slip_limit == pytest.approx(0.01, rel=0.1)
     assert [base.friction for base in scene.base] == pytest.approx([0.1, 0.3], rel=0.03)
+
+
+def test_a_vibration_is_an_entry_of_a_conveyor(tmp_path: Path) -> None:
+    rows: list[dict[str, object]] = [
+        {
+            "quantity": "vibration",
+            "material": "",
+            "other": "chain",
+            "acceleration": acceleration,
+            "frequency": 25.0,
+            "direction": angle,
+        }
+        for acceleration, angle in ((2.0, 0.02), (2.1, math.pi - 0.01), (1.9, 0.01))
+    ]
+    text = printed(tmp_path, *rows)
+    assert {line[0] for line in text.splitlines()} == {"#"}
+    (entry,) = re.findall(r"^# (vibration: \{.*\})$", text, re.MULTILINE)
+    belt = (
+        f"{{start: [0, 0], heading: 0 deg, path: [{{straight: 1}}], width: 0.1, material: chain, speed: 0.1, {entry}}}"
+    )
+    (found,) = pasted(
+        f"conveyors: {{line: {belt}}}\nbase: [{{between: [glass, chain], friction: 0.1}}]\n"
+    ).belts.values()
+    assert found.vibration is not None
+    assert found.vibration.amplitude == pytest.approx(2.0 / (2.0 * math.pi * 25.0) ** 2, rel=1e-2)
+    assert found.vibration.direction == pytest.approx(0.007, abs=0.001)
+
+
+def test_a_bottle_has_no_place_in_a_row_of_vibration(tmp_path: Path) -> None:
+    row = {"quantity": "vibration", **PAIR, "acceleration": 2.0, "frequency": 25.0, "direction": 0.0}
+    result = run(write(tmp_path / "data.csv", [row]))
+    assert result.exit_code == 1 and missing(result.output, ["data.csv:2: material", "none"]) == []
 
 
 def test_options_are_checked(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from conveyor_sim.studies.calibration.friction import friction, slip_limit
 from conveyor_sim.studies.calibration.read import Measurement, read_measurements
 from conveyor_sim.studies.calibration.restitution import Restitution, impossible, restitution
 from conveyor_sim.studies.calibration.stiffness import Elastic, elastic
-from conveyor_sim.studies.calibration.vibration import Vibration, vibration
+from conveyor_sim.studies.calibration.vibration import MeasuredVibration, vibration
 
 _MOST_FRICTION = 2.0
 """Largest coefficient of friction that is plausible. Beyond, a unit in the header is probably wrong."""
@@ -45,7 +45,7 @@ class Calibration:
     contacts: list[ContactValues] = field(default_factory=list)
     slip_limit: Estimate | None = None
     """m/s"""
-    vibrations: dict[str, Vibration] = field(default_factory=dict)
+    vibrations: dict[str, MeasuredVibration] = field(default_factory=dict)
     """Vibrations by material of the chain."""
     remarks: list[str] = field(default_factory=list)
     """Sentences on values that the measurements don't determine."""

@@ -18,7 +18,7 @@ OPTIONAL_TEXTS = ("sample", "note")
 
 
 @dataclass(frozen=True)
-class Column:
+class NumberColumn:
     """A column of numbers. Its header has the unit in brackets: `force (N)`."""
 
     unit: str
@@ -34,16 +34,18 @@ class Column:
     """Largest value, SI."""
 
 
-COLUMNS: Mapping[str, Column] = {
-    "force": Column("N", "N", "Reading of the scale or the load cell.", above=False),
-    "mass": Column("kg", "g", "Mass of all bottles that are held, contents included."),
-    "normal_force": Column("N", "N", "Force that presses the surfaces together."),
-    "speed": Column("m/s", "mm/s", "Speed of the chain below the bottle that is held."),
-    "drop_height": Column("m", "mm", "Clear height between bottle and plate before the drop."),
-    "rebound_height": Column("m", "mm", "Clear height at the top of the first rebound."),
-    "length": Column("m", "mm", "Length of the pendulum, from the suspension to the axis of the bottle."),
-    "angle_before": Column("rad", "deg", "Angle to the vertical at which the bottle is released.", high=3.1415926536),
-    "angle_after": Column(
+COLUMNS: Mapping[str, NumberColumn] = {
+    "force": NumberColumn("N", "N", "Reading of the scale or the load cell.", above=False),
+    "mass": NumberColumn("kg", "g", "Mass of all bottles that are held, contents included."),
+    "normal_force": NumberColumn("N", "N", "Force that presses the surfaces together."),
+    "speed": NumberColumn("m/s", "mm/s", "Speed of the chain below the bottle that is held."),
+    "drop_height": NumberColumn("m", "mm", "Clear height between bottle and plate before the drop."),
+    "rebound_height": NumberColumn("m", "mm", "Clear height at the top of the first rebound."),
+    "length": NumberColumn("m", "mm", "Length of the pendulum, from the suspension to the axis of the bottle."),
+    "angle_before": NumberColumn(
+        "rad", "deg", "Angle to the vertical at which the bottle is released.", high=3.1415926536
+    ),
+    "angle_after": NumberColumn(
         "rad",
         "deg",
         "Largest angle of the same bottle after the impact, positive where it rebounds; negative if a bottle that "
@@ -52,12 +54,12 @@ COLUMNS: Mapping[str, Column] = {
         high=3.1415926536,
         above=False,
     ),
-    "angle_struck": Column(
+    "angle_struck": NumberColumn(
         "rad", "deg", "Largest angle of the bottle that was hit at rest.", above=False, high=3.1415926536
     ),
-    "acceleration": Column("m/s^2", "m/s^2", "Amplitude of the acceleration at the peak of the spectrum."),
-    "frequency": Column("Hz", "Hz", "Frequency of the peak."),
-    "direction": Column(
+    "acceleration": NumberColumn("m/s^2", "m/s^2", "Amplitude of the acceleration at the peak of the spectrum."),
+    "frequency": NumberColumn("Hz", "Hz", "Frequency of the peak."),
+    "direction": NumberColumn(
         "rad",
         "deg",
         "Axis of the vibration, counter-clockwise from the direction of travel.",
@@ -65,7 +67,7 @@ COLUMNS: Mapping[str, Column] = {
         high=6.2831853072,
         above=False,
     ),
-    "overlap": Column("m", "mm", "Approach of the two bodies beyond first touch.", low=-1.0, above=False),
+    "overlap": NumberColumn("m", "mm", "Approach of the two bodies beyond first touch.", low=-1.0, above=False),
 }
 """Columns of numbers by name."""
 

@@ -12,8 +12,8 @@ def tables() -> Mapping[str, Mapping[str, str]]:
     """Return the tables by page and name."""
     kinds = ["| `quantity` | measurement | columns of numbers | determines |", "|---|---|---|---|"]
     for name, kind in KINDS.items():
-        columns = ", ".join(f"`{column}`" for column in kind.columns)
-        kinds.append(f"| `{name}` | {kind.meaning} | {columns} | {kind.enters} |")
+        needed = ", ".join(f"`{column}`" for column in kind.columns)
+        kinds.append(f"| `{name}` | {kind.meaning} | {needed} | {kind.enters} |")
     columns = ["| column | unit such as | meaning |", "|---|---|---|"]
     for name, meaning in TEXT_COLUMNS.items():
         columns.append(f"| `{name}` | text | {meaning}{' May be left out.' if name in OPTIONAL_TEXTS else ''} |")

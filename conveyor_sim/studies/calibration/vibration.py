@@ -14,18 +14,18 @@ from conveyor_sim.studies.calibration.read import Measurement
 
 
 @dataclass(frozen=True)
-class Vibration:
+class MeasuredVibration:
     """Result of `vibration`."""
 
     amplitude: Estimate
-    """Of the displacement, m."""
+    """Amplitude of the displacement, m."""
     frequency: Estimate
     """Hz"""
     direction: Estimate
     """Axis of the displacement to the direction of travel, rad, from -pi/2 to pi/2."""
 
 
-def vibration(rows: Sequence[Measurement]) -> Vibration:
+def vibration(rows: Sequence[Measurement]) -> MeasuredVibration:
     """Return the vibration of a chain.
 
     A sinusoid of acceleration a at frequency f has the displacement a / (2 pi f)^2. Directions are axes: half a turn
@@ -42,7 +42,7 @@ def vibration(rows: Sequence[Measurement]) -> Vibration:
     # Moved by half a turn, no value is negative, and the estimate is not cut at 0.
     axis = mean_estimate(deviations + math.pi, samples)
     shift = middle - math.pi
-    return Vibration(
+    return MeasuredVibration(
         mean_estimate(accelerations / (2.0 * math.pi * frequencies) ** 2, samples),
         mean_estimate(frequencies, samples),
         replace(axis, value=axis.value + shift, low=axis.low + shift, high=axis.high + shift),
