@@ -7,7 +7,15 @@ from importlib import import_module
 
 from validation.source import Source
 
-MODULES = ("tipping",)
+MODULES = (
+    "chung_ooi_2011",
+    "tipping",
+    "wang_2020",
+    "aguirre_2010",
+    "aguirre_2014",
+    "to_2001",
+    "mankoc_2007",
+)
 """Modules of this folder that have a `SOURCE`."""
 
 
