@@ -14,9 +14,10 @@ import sys
 from contextlib import closing, suppress
 from typing import Any
 
+from conveyor_sim.ros.packages import needing_packages
 from conveyor_sim.support.interrupt import while_importing
 
-with while_importing():
+with while_importing(), needing_packages("controller_node"):
     from conveyor_sim.control.scan import ControlError, Controller, LineTags, bind
     from conveyor_sim.control.st.load import load
     from conveyor_sim.errors import ConveyorError
