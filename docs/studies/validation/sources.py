@@ -7,7 +7,7 @@ from importlib import import_module
 
 from validation.source import Source
 
-MODULES = ("tipping",)
+MODULES = ("tipping", "two_machine_line", "longer_line", "labellers")
 """Modules of this folder that have a `SOURCE`."""
 
 
