@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Executable `controller_node`: runs a controller, found by its name, beside the node `conveyor_sim`.
 
-    controller_node --ros-args -p controller:=my_line.py:make -p parameters:="{table: accumulation}"
+    controller_node --ros-args -p controller:=my_line.py:make -p "parameters:='{table: accumulation}'"
     controller_node --ros-args -p controller:=program.st
 
 The simulation must wait (start_paused:=true) for a controller in lockstep. For a free controller (mode:=free), it must

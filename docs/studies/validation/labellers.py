@@ -6,11 +6,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-import two_machines as theory
-from validation.source import Case, Range, Row, Run, Source
-
 from conveyor_sim import Simulation
 from conveyor_sim.scene import Scene, parse_scene
+from validation import two_machines as theory
+from validation.source import Case, Range, Row, Run, Source
 
 LABELLERS = {"labeller 111": (0.83029, 36.428), "labeller 112": (0.78302, 28.755)}
 """Shape and scale of the times to repair, the scale in minutes. A second of the simulation stands for a minute."""

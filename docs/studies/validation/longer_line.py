@@ -12,10 +12,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-import two_machines as theory
-from validation.source import Case, Range, Row, Run, Source
-
 from conveyor_sim.scene import Scene, parse_scene
+from validation import two_machines as theory
+from validation.source import Case, Range, Row, Run, Source
 
 Machine = theory.Machine
 RATE, SPEED, RADIUS, REGION = theory.RATE, theory.SPEED, theory.RADIUS, theory.REGION
@@ -173,6 +172,6 @@ SOURCE = Source(
     seconds=10.0,
     discussion=(
         "Decomposition is an approximation: for these lines it is up to 1 % above a simulation of the fluid model. "
-        "The intervals of the simulated lines are wider than that."
+        "The intervals of the simulated lines are as wide as that."
     ),
 )

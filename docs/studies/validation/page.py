@@ -69,12 +69,12 @@ def _section(source: Source) -> str:
     runs = store.read(source)
     minutes = sum(run[store.CPU] for run in runs) / 60.0
     made = f"{len(runs)} of {len(source.cases())} runs, {minutes:.1f} min of processor time"
-    file = store.table(source).name
+    link = f", [{source.name}.csv](validation/{source.name}.csv)" if runs else ""
     parts = [
         f"## {source.title}",
         f"{source.citation}",
         f"- *Read:* {source.read}\n- *Measured there:* {source.measured}\n- *Simulated here:* {source.simulated}\n"
-        f"- *Command:* `make validation ARGS={source.name}`\n- *Stored:* {made}, [{file}](validation/{file})",
+        f"- *Command:* `make validation ARGS={source.name}`\n- *Stored:* {made}{link}",
         _table(list(source.rows(runs))),
     ]
     if source.draw is not None and store.picture(source).exists():
@@ -96,9 +96,15 @@ def _table(rows: list[Row]) -> str:
 def text_of(value: Range) -> str:
     """Return a value with its interval in brackets, with digits that show the interval."""
     if value.low == value.high:
-        return f"{value.value:.4g}"
+        return f"{value.value:.5g}"
+    if math.isinf(value.low) != math.isinf(value.high):
+        return f"{'above' if math.isinf(value.high) else 'below'} {value.value:.4g}"
     if not math.isfinite(value.high - value.low):
         return f"{value.value:.3g} (one run)"
     scale = max(abs(value.low), abs(value.high))
-    digits = max(2, min(7, 1 + math.ceil(math.log10(scale / (value.high - value.low))) if scale else 2))
+    digits = max(
+        2,
+        math.ceil(math.log10(scale or 1.0)),
+        min(7, 1 + math.ceil(math.log10(scale / (value.high - value.low))) if scale else 2),
+    )
     return f"{value.value:.{digits}g} ({value.low:.{digits}g} to {value.high:.{digits}g})"

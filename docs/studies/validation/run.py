@@ -72,9 +72,9 @@ def keep(source: Source, run: Run) -> None:
 
 
 def draw(source: Source) -> None:
-    """Write the picture of a source, if it has one and any runs are stored."""
+    """Write the picture of a source, if it has one and all its runs are stored."""
     runs = store.read(source)
-    if source.draw is not None and runs:
+    if source.draw is not None and len(runs) == len(source.cases()):
         with style.look():
             write(style.rendered(source.draw(runs), (".svg",)), store.picture(source).with_suffix(""))
 

@@ -44,6 +44,16 @@ class Range(NamedTuple):
         return cls(0.5 * (low + high), low, high)
 
     @classmethod
+    def above(cls, low: float) -> Range:
+        """Return the claim that a value is larger than `low`."""
+        return cls(low, low, math.inf)
+
+    @classmethod
+    def below(cls, high: float) -> Range:
+        """Return the claim that a value is smaller than `high`."""
+        return cls(high, -math.inf, high)
+
+    @classmethod
     def of_mean(cls, values: ArrayLike) -> Range:
         """Return the mean of independent values (n,), with Student's interval; infinite for one value."""
         interval = mean_interval(np.asarray(values, dtype=float))
@@ -76,8 +86,8 @@ class Range(NamedTuple):
         return cls(math.exp(middle), math.exp(middle - half), math.exp(middle + half))
 
     def overlaps(self, other: Range) -> bool:
-        """Return True if both intervals share a value, up to rounding of the last bits."""
-        room = 1e-9 * max(abs(self.value), abs(other.value))
+        """Return True if both intervals share a value, up to the six digits that are stored."""
+        room = 1e-6 * max(abs(self.value), abs(other.value))
         return self.low <= other.high + room and other.low <= self.high + room
 
 

@@ -7,7 +7,18 @@ from importlib import import_module
 
 from validation.source import Source
 
-MODULES = ("tipping", "two_machine_line", "longer_line", "labellers")
+MODULES = (
+    "chung_ooi_2011",
+    "tipping",
+    "wang_2020",
+    "aguirre_2010",
+    "aguirre_2014",
+    "to_2001",
+    "mankoc_2007",
+    "two_machine_line",
+    "longer_line",
+    "labellers",
+)
 """Modules of this folder that have a `SOURCE`."""
 
 

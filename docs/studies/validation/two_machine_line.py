@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-import two_machines as theory
+from validation import two_machines as theory
 from validation.source import Case, Range, Row, Run, Source
 
 MACHINE = theory.Machine(between_failures=4.0, to_repair=1.0)
@@ -36,7 +36,7 @@ SOURCE = Source(
     title="Two machines and a buffer",
     citation=(
         "S. B. Gershwin and I. C. Schick, Operations Research 31, 354 (1983), and earlier work named in "
-        "[two_machines.py](studies/two_machines.py)."
+        "[two_machines.py](studies/validation/two_machines.py)."
     ),
     read=(
         "abstract. The closed form of continuous flow is derived again in the program; a test compares it with a "

@@ -4,7 +4,7 @@
 The model of continuous flow (Zimmern 1956; Wijngaard 1979; Gershwin and Schick 1980; reviewed by Dallery and Gershwin
 1992): bottles are a fluid, both machines work at the same rate when they are up, the first one is never starved, the
 last one never blocked. Times between failures and to repair are exponential. A machine fails only while it works
-(operation-dependent failures). `validation/two_machine_line.py` runs the comparison.
+(operation-dependent failures). `two_machine_line.py` runs the comparison.
 """
 
 from __future__ import annotations
