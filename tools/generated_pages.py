@@ -28,7 +28,7 @@ def pages() -> Iterator[tuple[Path, str]]:
     yield rules.PAGE, rules.page(rules.PAGE.read_text(encoding="utf-8"))
     with_parts = importlib.import_module("page_parts").with_parts
     tables: dict[str, dict[str, str]] = {}
-    for package in ("bag.messages", "line", "scene"):
+    for package in ("bag.messages", "line", "scene", "studies.calibration"):
         for name, parts in importlib.import_module(f"conveyor_sim.{package}.reference").tables().items():
             tables[name] = {**tables.get(name, {}), **parts}
     for name, parts in tables.items():
