@@ -22,6 +22,7 @@ def pages() -> Iterator[tuple[Path, str]]:
     """Each page, and its text as it should be."""
     for name, package in (("effects", "physics.effects"), ("cli", "cli")):
         yield DOCS / f"{name}.md", importlib.import_module(f"conveyor_sim.{package}.reference").reference()
+    yield DOCS / "limits.md", importlib.import_module("conveyor_sim.physics.effects.limits").limits_page()
     sys.path[:0] = [str(DOCS / "studies"), str(ROOT / "test"), str(ROOT / "tools")]
     rules = importlib.import_module("import_rules")
     yield rules.PAGE, rules.page(rules.PAGE.read_text(encoding="utf-8"))
