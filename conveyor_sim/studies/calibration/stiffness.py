@@ -31,6 +31,8 @@ _SURE = 0.999
 """Confidence with which a law is refused. A valid law is rarely replaced by a table."""
 _MOST_STEPS = 50
 """Steps of a fit."""
+_WIDEST = math.log(1000.0)
+"""Half width of an interval, in the logarithm, beyond which none is stated."""
 _EXACT = 1e-4
 """Relative deviation (rms) below which a law is taken without a test. Computed forces have no random errors."""
 _LEAST_ROWS = 3
@@ -145,11 +147,17 @@ def _estimate(curves: Sequence[_Curve], rows: int, samples: Sequence[Sequence[in
     if len(curves) > 1:
         mean = mean_interval([math.log(curve.stiffness) for curve in curves])
         words = f"t of logarithms, {len(curves)} samples"
-        return Estimate(math.exp(mean.mean), math.exp(mean.low), math.exp(mean.high), words)
+        return _estimate_about(math.exp(mean.mean), mean.half_width, words)
     (curve,) = curves
-    width = math.exp(t_quantile(rows - 2, CONFIDENCE) * curve.deviation)
     words = f"least squares, {rows} rows of one sample"
-    return Estimate(curve.stiffness, curve.stiffness / width, curve.stiffness * width, words)
+    return _estimate_about(curve.stiffness, t_quantile(rows - 2, CONFIDENCE) * curve.deviation, words)
+
+
+def _estimate_about(value: float, half_width: float, words: str) -> Estimate:
+    """Return an estimate with an interval of this half width in the logarithm; without one if it is very wide."""
+    if half_width > _WIDEST:
+        return Estimate(value, math.nan, math.nan, f"forces scatter too much; {words}")
+    return Estimate(value, value * math.exp(-half_width), value * math.exp(half_width), words)
 
 
 def _points(overlaps: F8, forces: F8) -> tuple[tuple[float, float], ...] | None:
