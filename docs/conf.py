@@ -71,6 +71,7 @@ NAVIGATION = {
         ],
         "What to rely on": [
             "docs/validation",
+            "docs/limits",
             "docs/accuracy",
             "docs/stability",
             "docs/reliability",
