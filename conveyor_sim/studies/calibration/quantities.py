@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -26,48 +27,46 @@ class NumberColumn:
     usual: str
     """Unit that instruments show, for examples and errors."""
     meaning: str
-    low: float = 0.0
-    """Smallest value, SI."""
-    above: bool = True
-    """True if values must be greater than `low`."""
-    high: float = float("inf")
+    low: float
+    """Smallest value, SI. Values beyond the range come from a wrong unit, or can't be measured."""
+    high: float
     """Largest value, SI."""
 
 
 COLUMNS: Mapping[str, NumberColumn] = {
-    "force": NumberColumn("N", "N", "Reading of the scale or the load cell.", above=False),
-    "mass": NumberColumn("kg", "g", "Mass of all bottles that are held, contents included."),
-    "normal_force": NumberColumn("N", "N", "Force that presses the surfaces together."),
-    "speed": NumberColumn("m/s", "mm/s", "Speed of the chain below the bottle that is held."),
-    "drop_height": NumberColumn("m", "mm", "Clear height between bottle and plate before the drop."),
-    "rebound_height": NumberColumn("m", "mm", "Clear height at the top of the first rebound."),
-    "length": NumberColumn("m", "mm", "Length of the pendulum, from the suspension to the axis of the bottle."),
+    "force": NumberColumn("N", "N", "Reading of the scale or the load cell.", 0.0, 1e6),
+    "mass": NumberColumn("kg", "g", "Mass of all bottles that are held, contents included.", 1e-4, 1e3),
+    "normal_force": NumberColumn("N", "N", "Force that presses the surfaces together.", 1e-4, 1e6),
+    "speed": NumberColumn("m/s", "mm/s", "Speed of the chain below the bottle that is held.", 1e-6, 10.0),
+    "drop_height": NumberColumn("m", "mm", "Clear height between bottle and plate before the drop.", 1e-4, 100.0),
+    "rebound_height": NumberColumn("m", "mm", "Clear height at the top of the first rebound.", 1e-6, 100.0),
+    "length": NumberColumn(
+        "m", "mm", "Length of the pendulum, from the suspension to the axis of the bottle.", 1e-2, 100.0
+    ),
     "angle_before": NumberColumn(
-        "rad", "deg", "Angle to the vertical at which the bottle is released.", high=3.1415926536
+        "rad", "deg", "Angle to the vertical at which the bottle is released.", math.radians(0.1), math.pi
     ),
     "angle_after": NumberColumn(
         "rad",
         "deg",
         "Largest angle of the same bottle after the impact, positive where it rebounds; negative if a bottle that "
         "hits another one follows it.",
-        low=-3.1415926536,
-        high=3.1415926536,
-        above=False,
+        -math.pi,
+        math.pi,
     ),
-    "angle_struck": NumberColumn(
-        "rad", "deg", "Largest angle of the bottle that was hit at rest.", above=False, high=3.1415926536
+    "angle_struck": NumberColumn("rad", "deg", "Largest angle of the bottle that was hit at rest.", 0.0, math.pi),
+    "overlap": NumberColumn("m", "mm", "Approach of the two bodies beyond first touch.", -0.1, 0.1),
+    "acceleration": NumberColumn(
+        "m/s^2", "m/s^2", "Amplitude of the acceleration at the peak of the spectrum.", 1e-6, 1e4
     ),
-    "acceleration": NumberColumn("m/s^2", "m/s^2", "Amplitude of the acceleration at the peak of the spectrum."),
-    "frequency": NumberColumn("Hz", "Hz", "Frequency of the peak."),
+    "frequency": NumberColumn("Hz", "Hz", "Frequency of the peak.", 0.01, 1e5),
     "direction": NumberColumn(
         "rad",
         "deg",
         "Axis of the vibration, counter-clockwise from the direction of travel.",
-        low=-6.2831853072,
-        high=6.2831853072,
-        above=False,
+        -2.0 * math.pi,
+        2.0 * math.pi,
     ),
-    "overlap": NumberColumn("m", "mm", "Approach of the two bodies beyond first touch.", low=-1.0, above=False),
 }
 """Columns of numbers by name."""
 

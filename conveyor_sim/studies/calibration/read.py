@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import csv
-import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -23,6 +22,8 @@ _MOST_BYTES = 10 * MB
 _MOST_ROWS = 100_000
 _MOST_SAID = 20
 """Largest number of problems that an error lists."""
+_ROUNDING = 1e-12
+"""Relative error of a conversion: 180 deg may be a bit more than pi."""
 _HEADER = re.compile(r"\s*([^()\[\]]*?)\s*(?:[(\[]\s*(.*?)\s*[)\]])?\s*")
 """Name of a column and the unit in brackets."""
 _NUMBER = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]{1,3})?")
@@ -250,8 +251,8 @@ class _Table:
             self._problem(header.name, f"{given}, {expected}{hint}")
             return None
         value = float(text) * header.factor
-        in_range = (value > column.low if column.above else value >= column.low) and value <= column.high
-        if not in_range or math.isinf(value):
+        low, high = column.low - _ROUNDING * abs(column.low), column.high + _ROUNDING * abs(column.high)
+        if not low <= value <= high:
             self._problem(header.name, f"{_shown(cell)} {header.unit} given, {expected}")
             return None
         return value
@@ -271,10 +272,7 @@ def _range(header: _Header) -> str:
     """Return the expectation of a number, in the unit of the header."""
     column = COLUMNS[header.name]
     low, high = (f"{limit / header.factor:g}" for limit in (column.low, column.high))
-    if math.isinf(column.low):
-        return f"a number ({header.unit})"
-    text = f"a number greater than {low}" if column.above else f"a number of at least {low}"
-    return text + (f", at most {high}" if math.isfinite(column.high) else "") + f" ({header.unit})"
+    return f"a number from {low} to {high} ({header.unit})"
 
 
 def _quoted(text: str) -> str:

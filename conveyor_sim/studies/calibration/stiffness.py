@@ -18,6 +18,7 @@ from conveyor_sim.statistics.intervals import CONFIDENCE, mean_interval, t_quant
 from conveyor_sim.statistics.least_squares import profile
 from conveyor_sim.studies.calibration.estimate import Estimate, by_sample
 from conveyor_sim.studies.calibration.read import Measurement
+from conveyor_sim.support.printable import printable
 
 F8 = NDArray[np.float64]
 
@@ -31,6 +32,8 @@ _SURE = 0.999
 """Confidence with which a law is refused. A valid law is rarely replaced by a table."""
 _MOST_STEPS = 50
 """Steps of a fit."""
+_WIDEST = math.log(1000.0)
+"""Half width of an interval, in the logarithm, beyond which none is stated."""
 _EXACT = 1e-4
 """Relative deviation (rms) below which a law is taken without a test. Computed forces have no random errors."""
 _LEAST_ROWS = 3
@@ -68,7 +71,7 @@ def elastic(rows: Sequence[Measurement]) -> Elastic | str:
     samples = by_sample(rows) if named else [list(range(len(rows)))]
     for sample in samples:
         if len(set(overlaps[sample])) < _LEAST_ROWS:
-            name = f"sample {rows[sample[0]].sample}: " if named else ""
+            name = f"sample {printable(rows[sample[0]].sample, 60)}: " if named else ""
             return f"{name}{len(set(overlaps[sample]))} overlaps don't determine it, expected {_LEAST_ROWS} or more"
         slope = float(np.polyfit(overlaps[sample], forces[sample], 1)[0])
         if slope * np.ptp(overlaps[sample]) <= 1e-9 * forces[sample].max():
@@ -145,11 +148,17 @@ def _estimate(curves: Sequence[_Curve], rows: int, samples: Sequence[Sequence[in
     if len(curves) > 1:
         mean = mean_interval([math.log(curve.stiffness) for curve in curves])
         words = f"t of logarithms, {len(curves)} samples"
-        return Estimate(math.exp(mean.mean), math.exp(mean.low), math.exp(mean.high), words)
+        return _estimate_about(math.exp(mean.mean), mean.half_width, words)
     (curve,) = curves
-    width = math.exp(t_quantile(rows - 2, CONFIDENCE) * curve.deviation)
     words = f"least squares, {rows} rows of one sample"
-    return Estimate(curve.stiffness, curve.stiffness / width, curve.stiffness * width, words)
+    return _estimate_about(curve.stiffness, t_quantile(rows - 2, CONFIDENCE) * curve.deviation, words)
+
+
+def _estimate_about(value: float, half_width: float, words: str) -> Estimate:
+    """Return an estimate with an interval of this half width in the logarithm; without one if it is very wide."""
+    if half_width > _WIDEST:
+        return Estimate(value, math.nan, math.nan, f"forces scatter too much; {words}")
+    return Estimate(value, value * math.exp(-half_width), value * math.exp(half_width), words)
 
 
 def _points(overlaps: F8, forces: F8) -> tuple[tuple[float, float], ...] | None:
