@@ -6,6 +6,7 @@ from collections.abc import Collection
 from functools import partial
 
 from conveyor_sim.engine.contact.laws.linear import contact_time
+from conveyor_sim.engine.integrators import AHEAD, WARM
 from conveyor_sim.physics.effects.contacts import contacts_in_use
 from conveyor_sim.physics.effects.declaration import Cause, Effect
 from conveyor_sim.physics.effects.terms import (
@@ -22,6 +23,12 @@ from conveyor_sim.physics.plant import Plant
 from conveyor_sim.physics.timestep.bounds import Bound, contact_friction_bound, damping_bound
 from conveyor_sim.physics.timestep.prediction import Term
 from conveyor_sim.scene.schema import BottleType
+
+CLOSED = 4.0
+"""Closed contacts of a bottle in a zigzag queue: two bottles, a rail and the base. Implicit friction splits its mass."""
+
+SETTLED = 0.01
+"""Relative change of resting forces in 1 s below which a scene counts as settled (docs/accuracy.md)."""
 
 
 def _contact_friction(plant: Plant, on: Collection[str]) -> Cause | None:
@@ -72,6 +79,40 @@ def _kick(terms: Terms, dt: float) -> list[Term]:
             )
             kicks.append((kick, reason))
     return [Term("tangential speed after an impact", *max(kicks))] if kicks else []
+
+
+def _excess(terms: Terms, dt: float) -> tuple[float, str]:
+    """Return the excess of the creep of loaded contacts over that of explicit friction, as a share of it, and its cause.
+
+    0 with a warm start. Without one, the slip at a load f mu N is too large by B f v_lim, for small f by the share 2 B
+    (`friction.py` in the engine), here at the largest load on a contact.
+    """
+    integrator, load = terms.scene.accuracy.integrator, terms.load
+    if integrator in WARM and not terms.scene.friction_anew or load.force == 0.0:
+        return 0.0, ""
+    ahead, at_once = AHEAD[integrator]
+    cases = [(0.0, "")]
+    for meeting in meetings(terms):
+        mu = _curve_friction(meeting)
+        mobility = CLOSED * (_rim_mobility(meeting.first) + _rim_mobility(meeting.second))
+        b = dt * mu * load.force * mobility / terms.scene.slip_limit
+        reason = f"{integrator} solves friction anew in each step, at mu = {mu:g} and N = {load.force:.3g} N"
+        cases.append((2.0 * max(0.0, ahead * b - at_once), reason))
+    return max(cases)
+
+
+def _implicit_resting(terms: Terms, dt: float) -> list[Term]:
+    """Return the error in resting load if contacts creep too fast: forces change faster by that share.
+
+    Forces of a settled scene change by less than SETTLED in 1 s, by half of it in the mean.
+    """
+    excess, reason = _excess(terms, dt)
+    return [Term("load of creeping queues", 0.5 * SETTLED * excess, reason)] if excess > 0.0 else []
+
+
+def _implicit_creep(terms: Terms, dt: float) -> list[Term]:
+    excess, reason = _excess(terms, dt)
+    return [Term("creep of pressed contacts", excess, reason)] if excess > 0.0 else []
 
 
 def _curve_friction(meeting: Meeting) -> float:
@@ -148,18 +189,24 @@ ATAN_FRICTION = Effect(
 )
 IMPLICIT_FRICTION = Effect(
     name="implicit_friction",
-    law="friction at the slip at the end of a step, with the mass of a bottle split among its contacts. With "
-    "velocity_verlet up to gamma dt = 2/3, and with rk4 up to gamma dt = 1, it equals explicit friction. Here gamma is "
-    "2 mu N / (m_t v_lim) times the number of closed contacts. In longer steps friction reaches mu N only at a slip "
-    "larger than v_lim, and a loaded contact creeps faster. In long steps, the slip at which friction reaches mu N is "
-    "about mu N dt / m_t with rk4, and 1.5 times as large with velocity_verlet. Not available with dormand_prince, "
-    "which divides its steps, and linearly_implicit, which solves for friction itself",
-    source="added",
+    law="friction at the slip at the end of a step, with the mass of a bottle split among its contacts. With leapfrog, "
+    "semi_implicit_euler and velocity_verlet each step starts from the friction forces of the last one. Slow creep then "
+    "equals that of explicit friction in steps of any length (docs/studies/implicit_queues.csv). A change of load "
+    "reaches its balance after some steps, about as many as there are contacts in a row. With rk4 friction is solved "
+    "anew in each step. Up to gamma dt = 1 it equals explicit friction; gamma is 2 mu N / (m_t v_lim) times the number "
+    "of closed contacts. In longer steps a loaded contact creeps too fast, by gamma dt - 1 of its creep, and the "
+    "prediction says so. Not available with dormand_prince, which divides its steps, and linearly_implicit, which "
+    "solves for friction itself",
+    source="added; the warm start as in Catto, GDC 2006",
     called_for=partial(_chosen, field="friction_solver", value="implicit"),
     absent="friction_solver is explicit, or nothing has friction",
     needs="closed contacts and 1/m + R^2/J of each bottle",
     bound="none. It removes the bounds of contact_friction and, for bases that are points, of base_friction. With "
     "semi-implicit Euler the bound of turning belts remains",
+    resting=_implicit_resting,
+    rest="with rk4 0.5 % of the excess of the creep, because forces of a settled scene change by less than 1 % in 1 s",
+    side=_implicit_creep,
+    beside="in the creep of pressed contacts with rk4: gamma dt - 1 at the largest expected load and 4 closed contacts",
 )
 TANGENTIAL_SPRING = Effect(
     name="tangential_spring",
