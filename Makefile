@@ -5,6 +5,7 @@
 # make accuracy  sets up the same, then makes the studies of docs/accuracy.md, about an hour (ARGS=funnel for one)
 # make promises  sets up the same, then holds all shipped scenes and fifteen unseen ones to the presets' promises, 5 to 25 minutes
 # make fuzz    sets up the same, then attacks with random input (ARGS="--minutes 60 --jobs 2"; --target bags for one; failures are kept)
+# make validation  sets up the same, then compares with published experiments (docs/validation.md), at most an hour (ARGS=tipping for one)
 # make stability  sets up the same, then runs the hard cases of docs/stability.md in all settings, about 15 minutes
 # make numba-next  sets up the same, then runs the engine's tests on the newest numba that pip offers, pre-releases included
 # make lint    style and types
@@ -30,7 +31,7 @@ unexport ROS_DISTRO ROS_VERSION ROS_PYTHON_VERSION RMW_IMPLEMENTATION _ROS_WHEEL
 # Without bytecode on disk every process parses 350 files of ours anew, half a second of a core each: hundreds in the tests.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help run test bench accuracy promises fuzz stability numba-next lint docs docs-check site clean set-up set-up-test set-up-bench set-up-docs set-up-ci
+.PHONY: help run test bench accuracy promises fuzz stability validation numba-next lint docs docs-check site clean set-up set-up-test set-up-bench set-up-docs set-up-ci
 
 help:
 	@sed -n 's/^# \(make .*\)/\1/p' Makefile
@@ -53,6 +54,9 @@ promises: set-up
 # Beside the tests, whose scenes and checks it uses.
 fuzz: set-up-test
 	@PYTHONPATH=.:test $(PYTHON) -m fuzz $(ARGS)
+
+validation: set-up
+	@$(PYTHON) docs/studies/validation/run.py $(ARGS)
 
 stability: set-up
 	@$(PYTHON) docs/studies/stability.py $(ARGS)

@@ -38,13 +38,57 @@ class Effort:
         """Return the processor time for long runs, s, if measuring took `measured` seconds on one processor."""
         return max(0.0, self.budget - PROCESSORS * measured)
 
+    @property
+    def limit(self) -> float:
+        """Wall time within which a study ends on PROCESSORS free processors, s; compiling left out."""
+        return self.budget / PROCESSORS + RESERVE
+
+
+RESERVE = 40.0
+"""s of wall time for work that begins within the budget and ends after it: the last setting that is measured, first
+runs, which are made in any case, and the last runs, beside which a processor is idle."""
 
 DEFAULT = Effort(budget=PROCESSORS * 260.0, measuring=120.0)
-"""Less than the 300 s that are promised of two free processors: starting, loading kernels and drawing come on top."""
+"""Its limit is the 300 s that are promised on two free processors."""
 THOROUGH = Effort(budget=6000.0)
 
 
-def bars_with_left(bars: Bars, left: Callable[[], float]) -> Bars:
+class TimeLeft:
+    """Upper bound of the time left of a study on PROCESSORS free processors. It never grows.
+
+    It is the limit of the effort less the time spent in all phases so far, so it covers the phases that follow.
+    Measuring occupies all processors, a long run occupies one.
+    """
+
+    def __init__(self, effort: Effort) -> None:
+        self._limit = self._bound = effort.limit
+        self._measured = self._runs = 0.0
+
+    def after_measuring(self, measured: float) -> float | None:
+        """Return the bound (s) after `measured` seconds of measuring; see `after_runs`."""
+        self._measured = measured
+        return self.after_runs(0.0)
+
+    def after_runs(self, spent: float) -> float | None:
+        """Return the bound (s) after long runs of `spent` seconds of processor time.
+
+        None once the limit is exceeded.
+        """
+        self._runs = spent
+        self._bound = min(self._bound, self._limit - self._spent)
+        return self._bound if self._bound > 0.0 else None
+
+    def at_most(self, bound: float) -> None:
+        """Lower the bound to `bound` seconds from now on. A greater value has no effect."""
+        self._limit = min(self._limit, self._spent + bound)
+
+    @property
+    def _spent(self) -> float:
+        """Wall time on free processors, s."""
+        return self._measured + self._runs / PROCESSORS
+
+
+def bars_with_left(bars: Bars, left: Callable[[], float | None]) -> Bars:
     """Bars that show the time left (s) of the whole study with each update."""
 
     @contextmanager
@@ -56,10 +100,9 @@ def bars_with_left(bars: Bars, left: Callable[[], float]) -> Bars:
 
 
 class _BarWithLeft:
-    def __init__(self, bar: Bar, left: Callable[[], float]) -> None:
+    def __init__(self, bar: Bar, left: Callable[[], float | None]) -> None:
         self._bar = bar
         self._left = left
 
     def update(self, done: float, total: float | None = None, left: float | None = None) -> None:
-        known = self._left()
-        self._bar.update(done, total, known if math.isfinite(known) else left)
+        self._bar.update(done, total, self._left())

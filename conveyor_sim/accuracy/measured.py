@@ -11,7 +11,7 @@ from typing import cast
 
 from conveyor_sim.accuracy.candidates import candidates, compared, forbidden, own_setting, preset_setting
 from conveyor_sim.accuracy.cases import closed_forms
-from conveyor_sim.accuracy.effort import PROCESSORS, Bars, Effort, bars_with_left
+from conveyor_sim.accuracy.effort import Bars, Effort, TimeLeft, bars_with_left
 from conveyor_sim.accuracy.measure.cpu import Meter
 from conveyor_sim.accuracy.measure.precision import COST_BUDGET, FIRST_COST_BUDGET, FIRST_WORK, MOST_WORK, WorkPrecision
 from conveyor_sim.accuracy.measure.sample_file import check_origin, fingerprint
@@ -63,24 +63,27 @@ def measured_once(
     tolerance: float,
     effort: Effort,
     bars: Bars,
+    left: TimeLeft,
     preliminary: Callable[[Measured], None],
     compiles: Callable[[], None],
 ) -> Measured:
     """Return the stored measurements of this scene; measure if there are none, or fewer than the effort allows.
 
-    tolerance: relative error that decides which settings are measured first. `preliminary` is called with their
-    results, `compiles` as soon as kernels have to be compiled. Raise ConveyorError if the folder has a study of another
-    scene or version, or can't be written or read; NoContact if nothing touches in the scene.
+    tolerance: relative error that decides which settings are measured first. left: lowered by the time spent.
+    `preliminary` is called with the first results, `compiles` as soon as kernels have to be compiled. Raise
+    ConveyorError if the folder has a study of another scene or version, or can't be written or read; NoContact if
+    nothing touches in the scene.
     """
     check_origin(folder, scene)
     file = folder / MEASURED
     if file.exists():
         kept = _read(file, scene)
         if not kept.left_out or math.isfinite(effort.measuring):
+            left.after_measuring(kept.cpu)
             return kept
     with Meter(compiles) as meter:
-        left = bars_with_left(bars, lambda: max(0.0, effort.budget / PROCESSORS - meter.cpu))
-        measured = _measure(scene, tolerance, effort, left, meter, preliminary)
+        shown = bars_with_left(bars, lambda: left.after_measuring(meter.cpu))
+        measured = _measure(scene, tolerance, effort, shown, meter, preliminary)
     measured = replace(measured, cpu=meter.cpu, compiling=meter.compiling)
     write(
         file, with_checksum({MEASURED_OF: fingerprint(scene), **cast("dict[str, object]", plain(measured))}, indent=1)

@@ -116,6 +116,11 @@ class Point:
     """dt over the tightest bound of stability, above 1 it may chatter or blow up; None: nothing bounds it."""
 
     @property
+    def stable(self) -> bool:
+        """Return True if its step is within every bound of stability, up to rounding."""
+        return self.beyond is None or self.beyond <= 1.0 + 1e-12
+
+    @property
     def worst(self) -> float:
         """The larger of its errors in impacts and in resting load, relative; inf where it failed."""
         return math.inf if self.errors is None else max(self.errors.peak_force, self.resting or 0.0)

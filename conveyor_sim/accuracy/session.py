@@ -45,7 +45,7 @@ class Session:
         if not self._known.touches:
             return
         self._show_interim(self._best)
-        minutes = effort.budget / PROCESSORS / 60.0
+        minutes = effort.limit / 60.0
         self._say(
             f"study of {self.scene.name} in {folder}: on {PROCESSORS} free processors a preliminary answer within a "
             f"minute, the answer within {math.ceil(minutes)}, compiling left out; Ctrl-C shows the best so far, and "

@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from conveyor_sim.accuracy.candidates import own_setting, softer
-from conveyor_sim.accuracy.effort import Bars, Effort
+from conveyor_sim.accuracy.effort import PROCESSORS, RESERVE, Bar, Bars, Effort, TimeLeft
+from conveyor_sim.accuracy.measure.ensemble import Progress
 from conveyor_sim.accuracy.measure.equivalence import decide, run_until_decided
 from conveyor_sim.accuracy.measure.sample_file import SampleFile, fingerprint
 from conveyor_sim.accuracy.measured import Measured, measured_once
@@ -63,10 +64,11 @@ def run_study(
     def of_first(found: Measured) -> None:
         report(preliminary(_study(scene, found, tolerance)))
 
-    found = measured_once(scene, folder, tolerance, effort, bars, of_first, compiles)
+    left = TimeLeft(effort)
+    found = measured_once(scene, folder, tolerance, effort, bars, left, of_first, compiles)
     report(after_measuring(_study(scene, found, tolerance)))
     try:
-        study = _study(scene, found, tolerance, *_long_runs(scene, found, folder, tolerance, effort, bars))
+        study = _study(scene, found, tolerance, *_long_runs(scene, found, folder, tolerance, effort, bars, left))
         write_study(study, folder)
     except (KeyboardInterrupt, Exception):  # in the midst of checking a setting, pydantic makes another error of Ctrl-C
         with suppress(ConveyorError):
@@ -112,7 +114,7 @@ def _answer(measured: Measured, comparisons: Sequence[Comparison], tolerance: fl
 
 
 def _long_runs(
-    scene: Scene, measured: Measured, folder: Path, tolerance: float, effort: Effort, bars: Bars
+    scene: Scene, measured: Measured, folder: Path, tolerance: float, effort: Effort, bars: Bars, left: TimeLeft
 ) -> tuple[list[Sample], list[Comparison], Setting | None]:
     """Run long runs over seeds: of the likely answer, the scene's setting, softer contacts, and a reference.
 
@@ -140,20 +142,33 @@ def _long_runs(
         tried.append(found.setting)
         with bars(f"{scene.name}: long runs", "runs") as bar:
             samples, comparisons = run_until_decided(
-                scene, tried, reference, tolerance, (1.0 - OTHERS_SHARE) * budget, folder, bar.update
+                scene, tried, reference, tolerance, (1.0 - OTHERS_SHARE) * budget, folder, _with_left(bar, left)
             )
         found = _answer(measured, comparisons, tolerance)
     others = [setting for setting in (own_setting(scene), *softer(scene)) if setting not in failed]
     others = affordable(others, expected, OTHERS_SHARE * budget)
     known_cost = sum(sample.cpu for sample in samples if sample.setting == reference)
+    earlier = sum(sample.cpu for sample in samples) - known_cost
+    left.at_most(OTHERS_SHARE * budget / PROCESSORS + RESERVE)
     with bars(f"{scene.name}: long runs, the scene's own setting and softer contacts", "runs") as bar:
         more, of_others = run_until_decided(
-            scene, others, reference, tolerance, OTHERS_SHARE * budget + known_cost, folder, bar.update
+            scene,
+            others,
+            reference,
+            tolerance,
+            OTHERS_SHARE * budget + known_cost,
+            folder,
+            _with_left(bar, left, earlier),
         )
     made = {(sample.setting, sample.seed): sample for sample in [*samples, *more]}
     known = {row.setting for row in comparisons}
     comparisons += [row for row in of_others if row.setting not in known]
     return list(made.values()), comparisons, reference
+
+
+def _with_left(bar: Bar, left: TimeLeft, earlier: float = 0.0) -> Progress:
+    """Return a progress of long runs that shows the time left, after `earlier` seconds of other runs."""
+    return lambda done, whole, spent: bar.update(done, whole, left.after_runs(earlier + spent))
 
 
 def affordable(

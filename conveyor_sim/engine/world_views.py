@@ -15,12 +15,12 @@ _INTEGRATORS = frozenset({"peaks", "stage", "slopes", "linear", "damage"})
 _FORCES_OF_PAIRS = frozenset(f"pairs.{name}" for name in ("fx", "fy", "moment", "normal", "touch", "tangent", "parts"))
 NOT_FOR_LISTS = _INTEGRATORS | _FORCES_OF_PAIRS | {
     "spin", "load", "path", "implicit", "riding", "curves", "pair_law", "pairs.law", "rail_law", "static_friction",
-    "ledger", "moving.actuators", "moving.springs", "settings.atan", "settings.warm",
+    "vibration", "ledger", "moving.actuators", "moving.springs", "settings.atan", "settings.warm",
 }  # fmt: skip
 NOT_FOR_CONTACTS = _INTEGRATORS | _FORCES_OF_PAIRS | {
     "load", "path", "implicit", "riding", "neighbourhood", "probe", "slots", "pairs.reach", "pairs.radius_i",
-    "pair_law", "grid", "railed", "moving.actuators", "belts", "surface", "footing", "ring", "static_friction",
-    "ledger",
+    "pair_law", "grid", "railed", "moving.actuators", "belts", "surface", "vibration", "footing", "ring",
+    "static_friction", "ledger",
 }  # fmt: skip
 _LOSSES = ("friction", "tangential_damping", *(law.column for law in DAMPING))
 NOT_FOR_ENERGY = NOT_FOR_CONTACTS - {"static_friction"} | {

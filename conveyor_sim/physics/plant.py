@@ -115,7 +115,11 @@ class Plant:
         velocities; plus the fastest moving rail.
         """
         belts = list(belt_speeds(self.scene).values())
-        speeds = [abs(belts[shape.belt]) * shape.ratio for shape in self.surfaces if shape.belt is not None]
+        speeds = [
+            abs(belts[shape.belt]) * shape.ratio + (shape.vibration.speed if shape.vibration is not None else 0.0)
+            for shape in self.surfaces
+            if shape.belt is not None
+        ]
         speeds += [giver.heading[1] for _, giver in self.scene.givers()]
         single = (entry.velocity for entry in self.scene.bottles if isinstance(entry, Single))
         speeds.append(math.hypot(*np.ptp(np.array([(0.0, 0.0), *single]), axis=0)))

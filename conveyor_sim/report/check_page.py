@@ -14,14 +14,14 @@ from conveyor_sim.page.head import plan_head
 from conveyor_sim.physics.model import build_model
 from conveyor_sim.physics.model.remedies import step_limit
 from conveyor_sim.report.flow.flow import flow_of
-from conveyor_sim.report.flow.overview import overview
+from conveyor_sim.report.flow.overview import all_findings, overview
 from conveyor_sim.report.tags import tag_rows
 from conveyor_sim.scene import Scene, load_scene
 from conveyor_sim.scene.driven import belt_speeds
 from conveyor_sim.scene.geometry import initial_bottles
 from conveyor_sim.scene.places import Places
 from conveyor_sim.scene.problems import dotted
-from conveyor_sim.support.printable import printable
+from conveyor_sim.support.printable import SENTENCE, printable
 
 _LINE: Final = re.compile(
     r"(?P<place>.*?:\d+(?: \(cell [^)]*\))?|.*? \(override\)):(?: (?P<path>[\w.\[\]]+):)? (?P<text>.*)"
@@ -61,10 +61,10 @@ class CheckPage:
                 "level": finding.level,
                 "where": printable(places.of(finding.path)),
                 "path": dotted(finding.path),
-                "text": printable(finding.text),
+                "text": printable(finding.text, SENTENCE),
                 "at": self._place(dotted(finding.path)),
             }
-            for finding in flow.findings
+            for finding in all_findings(model, flow)
         ]
         return {"valid": True, "plan": self._plan, "problems": problems, "overview": overview_[:1]}
 

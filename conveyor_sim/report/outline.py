@@ -36,13 +36,16 @@ def outline(summary: Summary) -> list[str]:
     return _with_warnings(lines, _warnings(summary))
 
 
-def outline_unrecorded(name: str, run: Run, checks: Sequence[ForceCheck | Pressed | None]) -> list[str]:
-    """Return the lines of a run that was not recorded. name: scene."""
+def outline_unrecorded(
+    name: str, run: Run, checks: Sequence[ForceCheck | Pressed | None], scene_warnings: Sequence[str]
+) -> list[str]:
+    """Return the lines of a run that was not recorded. name: scene. scene_warnings: about its settings."""
     lines = [headline(name, run.simulated, run.wall)]
     if run.peak_force:
         lines.append(labelled("forces", f"peak {run.peak_force:.3g} N"))
     warnings = [check.warning for check in checks if check is not None]
-    return _with_warnings(lines, [*filter(None, warnings), *(f"guard: {text}" for text in run.guard)])
+    guard = (f"guard: {text}" for text in run.guard)
+    return _with_warnings(lines, [*filter(None, warnings), *scene_warnings, *guard])
 
 
 def headline(name: str, simulated: float, wall: float | None) -> str:
@@ -87,6 +90,7 @@ def _warnings(summary: Summary) -> list[str]:
     return [
         *_events("guard", summary.guard, summary.guard_texts),
         *filter(None, checks),
+        *summary.warnings,
         *_events("limits passed", summary.damage_events, summary.damage_texts),
         *([f"{refused}; `conveyor-sim events BAG --kind command_refused` lists them"] if summary.refused else []),
     ]

@@ -18,7 +18,7 @@ from conveyor_sim.page.one_file import write_page
 from conveyor_sim.physics.model import Model
 from conveyor_sim.physics.model.remedies import step_limit
 from conveyor_sim.report.drawing import Drawing
-from conveyor_sim.report.explain.choices import setting_line
+from conveyor_sim.report.explain.choices import scene_warnings, setting_line
 from conveyor_sim.report.figures.files import PNG
 from conveyor_sim.report.outline import counted, file_lines, on_occasions, outline, outline_unrecorded
 from conveyor_sim.report.summarize import summarize
@@ -117,7 +117,7 @@ def report(
 def report_unrecorded(scene: Scene, model: Model, run: Run, details: bool = False) -> None:
     """Print the outline of a run that was not recorded. details: see `report`."""
     checks = (achieved(model, run.peak_force), pressed(model, run.load))
-    for line in outline_unrecorded(scene.name, run, checks):
+    for line in outline_unrecorded(scene.name, run, checks, scene_warnings(model)):
         click.echo(line)
     if not details:
         return

@@ -23,6 +23,7 @@ from conveyor_sim.physics.model.step_choice import choose_steps
 from conveyor_sim.physics.plant import Plant
 from conveyor_sim.report.alarm_figures import AlarmTally
 from conveyor_sim.report.bottle_counts import BottleCounter, BottleCounts
+from conveyor_sim.report.explain.choices import scene_warnings
 from conveyor_sim.report.summary import BeltFlow, Energy, LoadHistory, Loop, Summary
 from conveyor_sim.run.force_check import PressWatch, achieved, pressed
 from conveyor_sim.run.speed import TopicCount
@@ -125,6 +126,7 @@ class _Tally:
             limit=_step_limit(line, len(belt)),
             achieved=None if model is None else achieved(model, peak),
             pressed=None if model is None else pressed(model, self._pressing.load),
+            warnings=[] if model is None else [printable(text, SENTENCE) for text in scene_warnings(model)],
             guard=dict(Counter(kind for kind, _ in self._guard)),
             guard_texts=[text for _, text in self._guard[:GUARD_TEXTS]],
             energy=None if self._ledger is None else _energy(self._ledger, line.belts, line.rails),

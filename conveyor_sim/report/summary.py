@@ -12,6 +12,7 @@ import numpy as np
 from conveyor_sim.columns.damage import DamageColumns
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.physics.model.remedies import StepLimit
+from conveyor_sim.physics.timestep.prediction import percent
 from conveyor_sim.report.alarm_figures import AlarmFigures
 from conveyor_sim.report.bottle_counts import BottleCounts
 from conveyor_sim.run.force_check import ForceCheck, Pressed
@@ -122,7 +123,7 @@ class Energy:
         return (
             f"{sum(self.belts.values()):.4g} J from belts{rails}; {self.base_friction:.4g} J lost under bottles, "
             f"{self.contact_friction:.4g} J in friction at contacts, {self.damping:.4g} J in damping; "
-            f"residual {100.0 * share:.2g} % of a turnover of {self.turnover:.4g} J"
+            f"residual {percent(share)} of a turnover of {self.turnover:.4g} J"
         )
 
 
@@ -157,6 +158,8 @@ class Summary:
     """Check of the peak force; None if it or its prediction is unknown."""
     pressed: Pressed | None
     """Largest sustained force; None if unknown, or if no bound on the time step depends on it."""
+    warnings: list[str]
+    """Sentences on settings of the scene that make results wrong; empty if this version refuses the scene."""
     guard: dict[str, int]
     """Number of guard events by kind (`GuardEvent.kind`)."""
     guard_texts: list[str]

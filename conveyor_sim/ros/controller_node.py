@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Executable `controller_node`: runs a controller, found by its name, beside the node `conveyor_sim`.
 
-    controller_node --ros-args -p controller:=my_line.py:make -p parameters:="{table: accumulation}"
+    controller_node --ros-args -p controller:=my_line.py:make -p "parameters:='{table: accumulation}'"
     controller_node --ros-args -p controller:=program.st
 
 The simulation must wait (start_paused:=true) for a controller in lockstep. For a free controller (mode:=free), it must
@@ -14,9 +14,10 @@ import sys
 from contextlib import closing, suppress
 from typing import Any
 
+from conveyor_sim.ros.packages import needing_packages
 from conveyor_sim.support.interrupt import while_importing
 
-with while_importing():
+with while_importing(), needing_packages("controller_node"):
     from conveyor_sim.control.scan import ControlError, Controller, LineTags, bind
     from conveyor_sim.control.st.load import load
     from conveyor_sim.errors import ConveyorError

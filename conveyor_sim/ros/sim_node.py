@@ -5,9 +5,10 @@ from __future__ import annotations
 
 import sys
 
+from conveyor_sim.ros.packages import needing_packages
 from conveyor_sim.support.interrupt import while_importing
 
-with while_importing():
+with while_importing(), needing_packages("sim_node"):
     import rclpy
 
     from conveyor_sim.errors import ConveyorError

@@ -12,6 +12,7 @@ from conveyor_sim.scene.part import Part, one_of
 from conveyor_sim.scene.parts.device_part import Others, name_problems
 from conveyor_sim.scene.problems import Path, Problem
 from conveyor_sim.scene.types import Flag, Holds, Name, Positive, quantity
+from conveyor_sim.scene.vibration import ChainVibration
 from conveyor_sim.scene.words import fields_of, shown
 
 _RATIO_TEXT = "Speed of the surface divided by the speed of the belt."
@@ -43,6 +44,7 @@ class _Belt(SpeedSetpoint):
         default=None,
     )
     ratio: Positive = quantity("Speed of the belt divided by the speed of the drive that it names.", "1", default=1.0)
+    vibration: ChainVibration | None = quantity("Vibration of the chain. Left out: none.", default=None)
 
     @property
     def drive_name(self) -> str | None:

@@ -6,14 +6,14 @@ from collections.abc import Iterator
 from itertools import chain, combinations_with_replacement, islice
 
 from conveyor_sim.scene.accuracy import CHOICES
-from conveyor_sim.scene.belts import CurvedBelt
+from conveyor_sim.scene.belts import CurvedBelt, CurvedSurface, PathBelt
 from conveyor_sim.scene.check_contacts import contact_problems
 from conveyor_sim.scene.check_shapes import shape_problems
 from conveyor_sim.scene.moving import movers_of
 from conveyor_sim.scene.problem_count import MOST_SAID
 from conveyor_sim.scene.problems import Path, Problem
 from conveyor_sim.scene.schema import Grid, Scene
-from conveyor_sim.scene.types import is_whole_nanoseconds, nanoseconds
+from conveyor_sim.scene.types import TOUCH, is_whole_nanoseconds, nanoseconds
 from conveyor_sim.scene.words import listed, shown, some_of
 
 
@@ -71,6 +71,7 @@ def problems_of(scene: Scene) -> list[Problem]:
         _devices,
         _alarms,
         _moving_rails,
+        _vibrations,
         limit_problems,
         shape_problems,
     )
@@ -209,6 +210,29 @@ def _moving_rails(scene: Scene) -> Iterator[Problem]:
                 "the other integrators take rails to be at rest within a step",
             )
             return
+
+
+def _vibrations(scene: Scene) -> Iterator[Problem]:
+    """Yield problems of vibrating belts: another integrator, and turning surfaces that would vibrate across travel."""
+    for name, belt in scene.belts.items():
+        if belt.vibration is None:
+            continue
+        path: Path = ("belts", name, "vibration")
+        if scene.accuracy.integrator not in MOVE_RAILS:
+            yield Problem(
+                path,
+                f"given, expected none with integrator {scene.accuracy.integrator}, or integrator "
+                f"{listed(list(MOVE_RAILS))}",
+            )
+        turns = isinstance(belt, CurvedBelt) or (
+            isinstance(belt, PathBelt) and any(isinstance(surface, CurvedSurface) for surface in belt.surfaces)
+        )
+        if turns and abs(math.sin(belt.vibration.direction)) > TOUCH:
+            yield Problem(
+                (*path, "direction"),
+                f"{shown(belt.vibration.direction)} given, expected 0 or half a turn: a surface of the belt turns, and "
+                "vibrates along travel only (rad)",
+            )
 
 
 def _rail_names(scene: Scene) -> Iterator[Problem]:

@@ -26,6 +26,7 @@ EffectName = Literal[
     "ring_base",
     "belts",
     "curved_belts",
+    "vibration",
     "rotation",
     "infeed",
     "outfeed",

@@ -16,6 +16,7 @@ from conveyor_sim.scene.belts import Belt, CurvedBelt, CurvedSurface, PathBelt, 
 from conveyor_sim.scene.rails import ArcRail, PolylineRail, Rail
 from conveyor_sim.scene.schema import Grid, GridOfBottles, Scene
 from conveyor_sim.scene.types import TOUCH, XY
+from conveyor_sim.scene.vibration import ChainVibration
 
 Array = NDArray[np.float64]
 InitialBottle = tuple[str, float, float, float, float, float, float]
@@ -48,6 +49,8 @@ class BeltShape:
     """Speed along travel over that of the belt."""
     clockwise: bool = False
     """True if a curved surface turns clockwise at positive speed."""
+    vibration: ChainVibration | None = None
+    """Vibration of its belt; None for none."""
 
     @property
     def centre_radius(self) -> float:
@@ -65,6 +68,14 @@ class BeltShape:
         if self.belt is None:
             return 0.0
         return self.ratio * (1.0 if self.kind == "straight" else (self.inner_radius + self.width) / self.centre_radius)
+
+    @property
+    def outermost_swing(self) -> float:
+        """Amplitude of the velocity at the fastest point by the vibration of the belt, m/s."""
+        if self.vibration is None:
+            return 0.0
+        reach = 1.0 if self.kind == "straight" else (self.inner_radius + self.width) / self.centre_radius
+        return self.vibration.speed * reach
 
     def outline(self, n: int = 64) -> Array:
         """Return the corners of the area, (k, 2), counter-clockwise, first not repeated; an arc has n points.
@@ -252,6 +263,7 @@ def shapes_of_belt(name: str, belt: Belt, index: int = 0) -> tuple[BeltShape, ..
             material=belt.material,
             belt=index,
             belt_name=name,
+            vibration=belt.vibration,
             ratio=surface.ratio if isinstance(surface, StraightSurface | CurvedSurface) else 1.0,
             clockwise=isinstance(surface, CurvedBelt | CurvedSurface) and surface.turn == "right",
         )

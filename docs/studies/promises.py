@@ -33,6 +33,7 @@ with while_importing():
     from conveyor_sim.errors import ConveyorError
     from conveyor_sim.physics.model.step_choice import choose_steps
     from conveyor_sim.physics.plant import Plant
+    from conveyor_sim.physics.timestep.prediction import percent
     from conveyor_sim.physics.timestep.presets import PRESETS
     from conveyor_sim.scene import Scene, load_scene
     from conveyor_sim.scene.accuracy import Preset, explicit
@@ -268,7 +269,7 @@ def _touched(row: Mapping[str, str]) -> bool:
 
 
 def _percent(value: str) -> str:
-    return f"{100.0 * float(value):.2g} %" if value else "-"
+    return percent(float(value)) if value else "-"
 
 
 def _default(rows: Sequence[Mapping[str, str]]) -> str:

@@ -21,7 +21,7 @@ from typing import Any
 from PIL import Image, ImageDraw
 from playwright.sync_api import sync_playwright
 
-from conveyor_sim.page.one_file import FailedCondition, write_page
+from conveyor_sim.page.one_file import write_page
 from conveyor_sim.protocols.server.users import keep_user, new_user
 from conveyor_sim.protocols.tags.scene_messages import SceneTask
 from conveyor_sim.protocols.tags.scene_provider import SceneTagProvider
@@ -49,7 +49,7 @@ sys.path.insert(0, str(ROOT / "test"))
 from page.conftest import BROWSERS  # noqa: E402
 from page.line import LINE, record  # noqa: E402
 from page.live_line import PASSWORD, Live, clock, put_into_mode, set_speed, signed_in, soon  # noqa: E402
-from page.states import STATES, State, at, views  # noqa: E402
+from page.states import FAILURE, STATES, State, at, views  # noqa: E402
 
 
 class Studio:
@@ -89,9 +89,10 @@ class Studio:
         html = self.folder / f"{state.of}.html"
         if state.of == "paper_plant":
             return self.shipped(state.of)
-        failures = [FailedCondition(22.0, "always: no more than 20 bottles")] if state.of == "failed" else []
+        failures = [FAILURE] if state.of == "failed" else []
+        trends = [name for failure in failures for name in failure.values]
         other = self.bag("stays_open") if state.of == "pair" else None
-        return write_page(self.bag("closes_at_6_s"), html, failures=failures, other=other)
+        return write_page(self.bag("closes_at_6_s"), html, failures=failures, trends=trends, other=other)
 
     def shipped(self, scene: str) -> Path:
         """Return the page of a shipped scene."""

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from conveyor_sim.accuracy.effort import DEFAULT, PROCESSORS, THOROUGH, Effort, bars_with_left
+from conveyor_sim.accuracy.effort import DEFAULT, PROCESSORS, RESERVE, THOROUGH, Effort, TimeLeft, bars_with_left
 
 
 def test_what_one_process_measures_costs_the_other_processor_too() -> None:
@@ -37,9 +37,9 @@ class Shown:
         self.updates.append((done, total, left))
 
 
-@pytest.mark.parametrize(("left", "shown"), [(120.0, 120.0), (math.inf, 7.0)])
-def test_each_update_has_what_is_left_of_the_study(left: float, shown: float) -> None:
-    """Not of the stage; where that is not known, what the stage says."""
+@pytest.mark.parametrize("left", [120.0, None])
+def test_each_update_has_what_is_left_of_the_study(left: float | None) -> None:
+    """Not of the stage, whatever the stage says."""
     bar = Shown()
 
     @contextmanager
@@ -48,4 +48,36 @@ def test_each_update_has_what_is_left_of_the_study(left: float, shown: float) ->
 
     with bars_with_left(bars, lambda: left)("settings", "runs") as opened:
         opened.update(3.0, 10.0, 7.0)
-    assert bar.updates == [(3.0, 10.0, shown)]
+    assert bar.updates == [(3.0, 10.0, left)]
+
+
+def test_the_bound_counts_all_phases_and_never_grows() -> None:
+    """Measuring occupies both processors, a long run one. Of 100 s each, 40 s are measured."""
+    left = TimeLeft(Effort(budget=200.0))
+    assert left.after_measuring(0.0) == 100.0 + RESERVE
+    assert left.after_measuring(40.0) == left.after_runs(0.0) == 60.0 + RESERVE
+    assert left.after_runs(50.0) == 35.0 + RESERVE
+    # The next phase has some of these runs again, and starts to count them from 0.
+    assert left.after_runs(20.0) == 35.0 + RESERVE
+    assert left.after_runs(60.0) == 30.0 + RESERVE
+
+
+def test_a_phase_that_needs_less_lowers_the_bound_for_good() -> None:
+    left = TimeLeft(Effort(budget=200.0))
+    left.after_runs(20.0)
+    left.at_most(15.0)
+    assert left.after_runs(20.0) == 15.0
+    left.at_most(50.0)
+    assert left.after_runs(24.0) == 13.0
+
+
+def test_no_bound_is_stated_beyond_the_limit() -> None:
+    left = TimeLeft(Effort(budget=0.0))
+    assert left.after_measuring(RESERVE - 1.0) == 1.0
+    assert left.after_measuring(RESERVE + 1.0) is None
+    assert left.after_runs(0.0) is None
+
+
+def test_the_limit_is_what_is_promised() -> None:
+    assert DEFAULT.limit == 300.0
+    assert THOROUGH.limit <= 3600.0

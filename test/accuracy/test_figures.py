@@ -140,10 +140,34 @@ def test_every_setting_that_did_not_fail_is_a_point_at_its_cost_and_error(figure
     assert softened == {place(p) for p in of.points if not p.failure and p.setting.stiffness != 1.0}
 
 
-def test_resting_load_is_an_open_marker_at_its_error(figures: dict[str, Figure]) -> None:
+def test_a_step_beyond_a_bound_of_stability_is_a_hollow_mark_with_an_entry(figures: dict[str, Figure]) -> None:
+    of = study()
+    figure = figures["pareto"]
+    for name in RULES:
+        unstable = [p for p in of.points if p.setting.integrator == name and not p.stable and not p.failure]
+        hollow = line(figure, f"{name} unstable")
+        assert hollow.get_markerfacecolor() == "white"
+        assert set(points_of(hollow)) == {place(p) for p in unstable if p.setting.stiffness == 1.0} != set()
+        resting = line(figure, f"{name} resting unstable")
+        assert resting.get_markerfacecolor() == "white"
+        assert resting.get_markersize() == line(figure, f"{name} resting").get_markersize()
+        assert {x for x, _ in points_of(resting)} == {x for x, _ in points_of(hollow)}
+    assert any(label.startswith("hollow") for label in entries(figure))
+    stable = pareto_figure(replace(of, points=tuple(p for p in of.points if p.stable)))
+    assert not any("unstable" in (drawn.get_gid() or "") for ax in stable.axes for drawn in ax.lines)
+    assert not any(label.startswith("hollow") for label in entries(stable))
+
+
+def entries(figure: Figure) -> list[str]:
+    """Texts of the legend of the diagram."""
+    (legend,) = [ax.get_legend() for ax in figure.axes if ax.get_legend() is not None]
+    return [text.get_text() for text in legend.get_texts()]
+
+
+def test_resting_load_is_a_small_marker_at_its_error(figures: dict[str, Figure]) -> None:
     for name in RULES:
         drawn = line(figures["pareto"], f"{name} resting")
-        assert drawn.get_markerfacecolor() == "none"
+        assert drawn.get_markersize() < line(figures["pareto"], name).get_markersize()
         low = figures["pareto"].axes[0].get_ylim()[0]
         expected = {
             (p.cost.median, 100.0 * p.resting)

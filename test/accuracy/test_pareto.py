@@ -50,6 +50,12 @@ def test_failures_are_left_out() -> None:
     assert front([blown]) == front([]) == []
 
 
+def test_settings_beyond_a_bound_of_stability_are_left_out_and_hide_nothing() -> None:
+    good, shaky = at(2.0, 0.1), replace(at(1.0, 0.01), beyond=1.01)
+    assert front([shaky, good]) == [good]
+    assert front([replace(shaky, beyond=1.0), good]) == [replace(shaky, beyond=1.0)]
+
+
 def test_softened_settings_are_in_or_out() -> None:
     stiff, soft = at(2.0, 0.1), at(1.0, 0.4, stiffness=0.25)
     assert front([stiff, soft]) == [soft, stiff]

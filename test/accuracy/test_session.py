@@ -127,7 +127,7 @@ def test_the_command_answers_on_such_a_line_and_applies_it(tmp_path: Path, monke
     assert own_setting(load_scene(Path("out/alone.yaml"))) == draft
 
 
-@pytest.mark.parametrize(("effort", "minutes"), [(DEFAULT, 5), (THOROUGH, 50)])
+@pytest.mark.parametrize(("effort", "minutes"), [(DEFAULT, 5), (THOROUGH, 51)])
 def test_how_long_it_takes_is_said_at_first(effort: Effort, minutes: int, tmp_path: Path) -> None:
     said: list[str] = []
     Session(scene_of(SCENE), 0.01, lambda line: None, said.append).predict(tmp_path, effort)
@@ -161,7 +161,7 @@ def interrupted(folder: Path, ready: Callable[[str], bool]) -> tuple[int, list[s
 def test_ctrl_c_before_anything_is_measured_answers_what_is_predicted(tmp_path: Path, made: Made) -> None:
     status, answers, errors = interrupted(tmp_path, lambda said: PREDICTED in said)
     assert (status, errors.splitlines()[-1]) == (130, "interrupted")
-    assert missing(errors, ["answer", "50", "compiling"]) == []  # --thorough
+    assert missing(errors, ["answer", "51", "compiling"]) == []  # --thorough
     assert PRELIMINARY not in errors
     assert answers[0] == f"Interrupted; the best answer so far. {PREDICTED}"
     assert [line.partition(":")[0] for line in answers[-4:]] == ["Forces", "Throughput", "Cost", "Setting"]

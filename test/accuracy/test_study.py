@@ -10,11 +10,12 @@ import sys
 import time
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
-from conveyor_sim.accuracy.effort import Effort
+from conveyor_sim.accuracy.effort import PROCESSORS, RESERVE, Effort
 from conveyor_sim.accuracy.measure import timing
 from conveyor_sim.accuracy.measure.sample_file import SAMPLES
 from conveyor_sim.accuracy.measured import MEASURED, first_settings
@@ -24,7 +25,7 @@ from conveyor_sim.accuracy.results import AccuracyStudy
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.accuracy.study import FIRST_RUNS, affordable, run_study, study_folder
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.scene import load_scene
+from conveyor_sim.scene import load_scene, parse_scene
 
 pytestmark = pytest.mark.usefixtures("brief_costs")
 
@@ -135,6 +136,38 @@ def test_a_budget_that_is_spent_leaves_settings_out_and_names_them(interrupted: 
     assert len(whole.points) > len(short.points)
     assert whole.orders
     assert not any("within the budget" in sentence for sentence in whole.skipped)
+
+
+def test_the_time_left_holds_from_phase_to_phase(tmp_path: Path) -> None:
+    """The bounds of a whole study, in the order shown: none grows, and each covers the time that is spent after it."""
+    shown: list[tuple[str, float]] = []
+
+    class Recorded:
+        def __init__(self, stage: str) -> None:
+            self.stage = stage
+
+        def update(self, done: float, total: float | None = None, left: float | None = None) -> None:
+            assert left is not None, self.stage
+            shown.append((self.stage, left))
+
+    effort = Effort(budget=10.0)
+    study = run_study(
+        parse_scene(SCENE, "three.yaml"),
+        tmp_path,
+        0.01,
+        effort,
+        lambda what, _counted: nullcontext(Recorded(what)),
+    )
+    stages, bounds = zip(*shown, strict=True)
+    assert sum("long runs" in stage for stage in dict.fromkeys(stages)) == 2
+    assert all(later <= earlier for earlier, later in pairwise(bounds))
+    assert len({sample.seed for sample in study.samples}) > 1
+    assert study.cpu is not None
+    runs = sum(sample.cpu for sample in study.samples)
+    # A bound is the limit less the time spent, or less.
+    spent = study.cpu - runs + runs / PROCESSORS
+    assert effort.limit >= bounds[0] > bounds[-1] > 0.0
+    assert effort.limit - bounds[-1] >= spent - 0.1 * RESERVE
 
 
 def test_runs_that_do_not_fit_the_budget_are_not_begun() -> None:

@@ -75,6 +75,8 @@ def test_numbers_have_three_digits(value: float | None, text: str) -> None:
 def test_numbers_have_units_that_fit() -> None:
     assert percent(0.00812) == "0.812 %"
     assert percent(1.5) == "150 %"
+    assert percent(7.6e-17) == percent(-7.6e-17) == "0 %"
+    assert percent(1e-11) == "1e-9 %"
     assert percent(None) == "-"
     assert [duration(seconds) for seconds in (4e-5, 2.5e-3, 1.0)] == ["40 us", "2.5 ms", "1 s"]
 

@@ -9,6 +9,8 @@ from typing import Any
 
 from page.pixels import settled
 
+from conveyor_sim.page.one_file import FailedCondition, LastAction
+
 SIZES = ((1280, 720), (1920, 1080), (820, 1180), (390, 844))
 """Sizes of the window, px: laptop, control room, tablet, phone."""
 THEMES = ("light", "dark")
@@ -80,8 +82,7 @@ def heat(page: Any) -> None:
 def failed(page: Any) -> None:
     """The time of the failure, with its condition."""
     page.click("#tab_failure")
-    page.focus("#scrubber")
-    page.keyboard.press("n")
+    page.click(".failure dl button")
     page.evaluate("document.activeElement.blur()")
 
 
@@ -90,6 +91,15 @@ def two(page: Any) -> None:
     at(page, 12)
     page.select_option("#colour", "apart")
 
+
+FAILURE = FailedCondition(
+    13.0,
+    "always: zones/before_capper/bottles ≤ 20",
+    since=0.0,
+    values={"zones/before_capper/bottles": 21.0},
+    action=LastAction(10.0, "belts/line/cmd_speed = 0.3"),
+)
+"""A condition that the recorded line violates."""
 
 STATES = {
     "line": State(line),

@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 from page.conftest import opened_page
-from page.states import SIZES, STATES, THEMES, views
+from page.states import FAILURE, SIZES, STATES, THEMES, views
 from PIL import Image
 
-from conveyor_sim.page.one_file import FailedCondition, write_page
+from conveyor_sim.bag.reader import open_bag
+from conveyor_sim.page.one_file import write_page
 from conveyor_sim.run.runner import run_scene
 from conveyor_sim.scene import load_scene
 from conveyor_sim.support.resources import scene_path
@@ -48,10 +49,9 @@ def pages(bag: Path, other_bag: Path, tmp_path_factory: pytest.TempPathFactory) 
     folder = tmp_path_factory.mktemp("states")
     plant = folder / "plant"
     run_scene(load_scene(scene_path("paper_plant")), plant)
-    failure = FailedCondition(22.0, "always: no more than 20 bottles")
     return {
         "line": write_page(bag, folder / "line.html"),
-        "failed": write_page(bag, folder / "failed.html", failures=[failure]),
+        "failed": write_page(bag, folder / "failed.html", failures=[FAILURE], trends=[*FAILURE.values]),
         "pair": write_page(bag, folder / "pair.html", other=other_bag),
         "paper_plant": write_page(plant, folder / "plant.html"),
     }
@@ -72,6 +72,13 @@ def test_a_state_looks_as_in_its_pictures(browser: Any, pages: Mapping[str, Path
             assert share <= ALLOWED, (
                 f"{share:.1%} of {name}-{view} differs; `python docs/studies/view_pictures.py {name}` makes it anew"
             )
+
+
+def test_the_condition_of_the_failed_state_has_the_recorded_values(bag: Path) -> None:
+    with open_bag(bag) as recording:
+        names = recording.line.signal_names
+        image = next(frame.data for frame in recording.signals() if frame.time >= FAILURE.time)
+    assert {name: image[names.index(name)] for name in FAILURE.values} == FAILURE.values
 
 
 def test_states_are_told_apart() -> None:

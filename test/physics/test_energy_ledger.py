@@ -144,6 +144,45 @@ def test_an_undamped_impact_is_held_by_the_contact_and_given_back() -> None:
     assert (ledger.damping, ledger.contact_friction) == pytest.approx((0.0, 0.0), abs=1e-15)
 
 
+SWINGS = {
+    "leapfrog": lambda angle: 0.5 * angle / (1.0 - 0.5 * angle),
+    "velocity_verlet": lambda angle: 0.25 * angle**2 / (1.0 - 0.25 * angle**2),
+}
+"""Greatest residual in a closed contact, over the energy at first touch, by w dt.
+
+A linear contact conserves a shadow energy (v^2 + w^2 x^2 - w^2 dt x v) / 2 with semi-implicit Euler, which leapfrog is
+here, and (v^2 + w^2 x^2 (1 - (w dt)^2 / 4)) / 2 with velocity Verlet.
+"""
+
+
+@pytest.mark.parametrize("law", ["none", "normal"])
+@pytest.mark.parametrize("integrator", SWINGS)
+def test_the_energy_of_a_closed_contact_swings_as_the_shadow_energy_tells(integrator: str, law: str) -> None:
+    """At 20 steps a contact; a dashpot makes it swing less."""
+    steps, v, m, stiffness = 20.0, 0.5, 0.05, 2000.0
+    angle = 2.0 * math.sin(math.pi / (2.0 * steps))
+    dt = round(angle / math.sqrt(stiffness / (0.5 * m)), 9)
+    damping = {"law": law, "coefficient": 2.0 if law == "normal" else 0.0}
+    pets = {"between": ["pet", "pet"], "stiffness": stiffness, "damping": damping, "friction": 0.3}
+    sim = apart(
+        bottle(50.0, 0.0, v, type="small"),
+        bottle(50.06 + 1e-9, 0.0, -v, type="small"),
+        accuracy={"per_tick": 1, "integrator": integrator},
+        tick=dt,
+        contacts=[pets, *(pair for pair in line()["contacts"] if pair["between"] != ["pet", "pet"])],
+    )
+    shares = []
+    for _ in range(round(steps) - 1):
+        sim.advance()
+        ledger = ledger_of(sim)
+        assert ledger.elastic > 0.0
+        shares.append(abs(ledger.residual) / ledger.fed)
+    assert (ledger.damping > 1e-3 * ledger.fed) == (law == "normal")
+    assert max(shares) <= 1.001 * SWINGS[integrator](angle)
+    if law == "none":
+        assert max(shares) >= 0.9 * SWINGS[integrator](angle)
+
+
 def test_damping_takes_what_a_dashpot_takes() -> None:
     """The paper's dashpot on glass: m_r v^2 / 2 (1 - e^2), e = exp(-pi zeta / sqrt(1 - zeta^2))."""
     v, m_r = 0.6, 0.5 * MASS

@@ -7,16 +7,20 @@ import os
 import re
 import subprocess
 import sys
+import sysconfig
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from facts import missing
 from ros.conftest import SMALL_LINE
 from ros.line_client import LineClient, until
 from simulation_interfaces.msg import SimulationState
 from simulation_interfaces.srv import SetSimulationState
 
 from conveyor_sim.ros.child import Child
+
+ROOT = Path(__file__).parents[2]
 
 
 def test_the_clock_can_be_switched_off(start_node: Callable[..., Child], client: LineClient) -> None:
@@ -59,6 +63,30 @@ def test_a_start_that_cannot_be_ends_with_one_sentence(
     assert sentence in done.stderr
     assert "Traceback" not in done.stderr
     assert not list(tmp_path.rglob("*.kernel"))
+
+
+@pytest.mark.parametrize(
+    ("program", "package", "remedy"),
+    [
+        ("sim_node", "simulation_interfaces", "ros-jazzy-simulation-interfaces"),
+        ("sim_node", "conveyor_msgs", "colcon"),
+        ("sim_node", "rclpy", "ros-jazzy-rclpy"),
+        ("controller_node", "conveyor_msgs", "colcon"),
+    ],
+)
+def test_a_missing_package_ends_a_node_with_one_sentence(
+    program: str, package: str, remedy: str, tmp_path: Path
+) -> None:
+    """In an environment of links to all installed modules but one."""
+    for module in Path(sysconfig.get_path("purelib")).iterdir():
+        if module.name != package:
+            (tmp_path / module.name).symlink_to(module)
+    environment = {**os.environ, "PYTHONPATH": f"{tmp_path}:{ROOT}", "ROS_DISTRO": "jazzy"}
+    command = [sys.executable, "-S", "-m", f"conveyor_sim.ros.{program}"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, env=environment, check=False)
+    assert (done.returncode, len(done.stderr.splitlines())) == (1, 1), done.stderr
+    assert done.stderr.startswith(f"{program}: ")
+    assert missing(done.stderr, package, remedy, "make") == []
 
 
 def test_scene_speed_and_largest_force_are_logged(start_node: Callable[..., Child], client: LineClient) -> None:

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Error against cost: every setting of a study a point, with the front, the recommended one and what failed."""
+"""Error against cost: every setting of a study a point, with the front, the recommended one and what failed.
+
+Hollow marks have a step beyond a bound of stability. They are never recommended, however small their error.
+"""
 
 from __future__ import annotations
 
@@ -29,6 +32,9 @@ _LEAST_RESTING: Final = 1e-6  # relative; what is below it stands at the lower e
 
 _MOST_FAILURES: Final = 14
 _SOFT_MARKER: Final = "*"
+_LARGE: Final = 6.0
+_SMALL: Final = 3.5
+_SOFT_SIZE: Final = 11.0
 _FRONT: Final = "#c3ccd5"
 _OWN: Final = style.INK
 _BEST: Final = "#9b2226"
@@ -44,7 +50,7 @@ def pareto_figure(study: AccuracyStudy) -> Figure:
     ax.set_title(_subtitle(study), fontsize=9.5, fontweight="normal", pad=10.0)
     ax.set_xlabel("cost: processor time per simulated second (s/s)")
     figure.supxlabel(f"Costs on {study.machine}", x=0.01, ha="left", fontsize=8.0, color=style.MUTED, wrap=True)
-    ax.set_ylabel("error in contact force (%): impacts filled, resting load open")
+    ax.set_ylabel("error in contact force (%): impacts large, resting load small")
     _failures(side, study)
     if not placed:
         ax.text(0.5, 0.5, "no setting could be measured", transform=ax.transAxes, ha="center", color=style.MUTED)
@@ -122,6 +128,8 @@ def _points(ax: Axes, placed: Sequence[Point]) -> list[Floats]:
             own.sort(key=lambda point: (point.dt, point.setting.error or 0.0))
             if not own:
                 continue
+            gid = f"{integrator} softened" if soft else integrator
+            marker, size = (_SOFT_MARKER, _SOFT_SIZE) if soft else (look.marker, _LARGE)
             at = np.array([_xy(point, ax) for point in own])
             spread = np.array([(p.cost.median - p.cost.least, p.cost.greatest - p.cost.median) for p in own if p.cost])
             ax.errorbar(
@@ -132,40 +140,57 @@ def _points(ax: Axes, placed: Sequence[Point]) -> list[Floats]:
                 linestyle="none" if soft else look.line,
                 linewidth=1.1,
                 elinewidth=1.0,
-                marker=_SOFT_MARKER if soft else look.marker,
-                markersize=11.0 if soft else 6.0,
+                marker=marker,
+                markersize=size,
                 markeredgecolor="white",
                 markeredgewidth=0.6,
                 zorder=4.0,
-            )[0].set_gid(f"{integrator} softened" if soft else integrator)
+            )[0].set_gid(gid)
+            _hollow(ax, [_xy(point, ax) for point in own if not point.stable], marker, size, look.colour, gid)
             lines += [] if soft else [at]
             ends = np.array([(point.cost.least, point.cost.greatest) for point in own if point.cost])
             lines += [np.array([(low, y), (high, y)]) for (low, high), y in zip(ends, at[:, 1], strict=True)]
     return lines
 
 
+def _hollow(ax: Axes, at: list[tuple[float, float]], marker: str, size: float, colour: str, gid: str) -> None:
+    """Draw white markers with an edge at settings whose step is beyond a bound of stability."""
+    if at:
+        ax.plot(
+            *np.array(at).T,
+            linestyle="none",
+            marker=marker,
+            markersize=size,
+            markerfacecolor="white",
+            markeredgecolor=colour,
+            markeredgewidth=1.1,
+            zorder=4.1,
+            gid=f"{gid} unstable",
+        )
+
+
 def _resting(ax: Axes, placed: Sequence[Point]) -> list[tuple[float, float]]:
-    """Open markers at the errors in resting load, where they were measured."""
+    """Draw small markers at the errors in resting load, where they were measured."""
     drawn = []
     for integrator in dict.fromkeys(point.setting.integrator for point in placed):
-        look = look_of(integrator)
-        at = [
-            _shown(point.cost.median, point.resting, ax)
+        look, gid = look_of(integrator), f"{integrator} resting"
+        measured = [
+            (point, _shown(point.cost.median, point.resting, ax))
             for point in placed
             if point.setting.integrator == integrator and point.cost is not None and point.resting is not None
         ]
+        at = [place for _, place in measured]
         if at:
             ax.plot(
                 *np.array(at).T,
                 linestyle="none",
                 marker=look.marker,
-                markersize=6.0,
-                markerfacecolor="none",
-                markeredgecolor=look.colour,
-                markeredgewidth=1.0,
+                markersize=_SMALL,
+                color=look.colour,
                 zorder=3.5,
-                gid=f"{integrator} resting",
+                gid=gid,
             )
+        _hollow(ax, [place for point, place in measured if not point.stable], look.marker, _SMALL, look.colour, gid)
         drawn += at
     return drawn
 
@@ -262,11 +287,19 @@ def _legend(side: Axes, placed: Sequence[Point]) -> None:
         if any(p.setting.error is not None for p in placed if p.setting.integrator == integrator):
             handles[-1].set_label(f"{look.name},\nits error a step beside")
     if any(point.setting.stiffness != 1.0 for point in placed):
-        soft = Line2D([], [], color=style.MUTED, marker=_SOFT_MARKER, markersize=11.0, linestyle="")
+        soft = Line2D([], [], color=style.MUTED, marker=_SOFT_MARKER, markersize=_SOFT_SIZE, linestyle="")
         soft.set_label("softer contacts,\nk x factor beside")
         handles.append(soft)
+    if not all(point.stable for point in placed):
+        hollow = Line2D([], [], color=style.MUTED, marker="o", markerfacecolor="white", linestyle="")
+        hollow.set_label("hollow: step beyond a bound of\nstability, never recommended")
+        handles.append(hollow)
+    if any(point.resting is not None for point in placed):
+        small = Line2D([], [], color=style.MUTED, marker="o", markersize=_SMALL, linestyle="")
+        small.set_label("small: error in resting load")
+        handles.append(small)
     handles += [
-        Line2D([], [], color=_FRONT, linewidth=7.0, label="front: nothing tried is\ncheaper and as exact in both"),
+        Line2D([], [], color=_FRONT, linewidth=7.0, label="front: nothing stable is\ncheaper and as exact in both"),
         Line2D([], [], color=style.MUTED, marker="|", label="bar: least to greatest\ncost of repeats"),
     ]
     legend = side.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.0, 1.0), fontsize=9.0, borderaxespad=0.0)

@@ -9,7 +9,6 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from statistics import fmean
 
 from conveyor_sim.accuracy.measure.jitter import disturb, jittered
 from conveyor_sim.accuracy.measure.observables import measuring, observe
@@ -24,8 +23,8 @@ from conveyor_sim.support.worker_pool import DIED, DiedError, WorkerPool, free_c
 Run = tuple[Setting, int]
 """A setting and a seed."""
 
-Progress = Callable[[int, int, float | None], None]
-"""Called with the runs finished, the runs wanted, and an estimate of the time left (s; None: nothing to go by)."""
+Progress = Callable[[int, int, float], None]
+"""Called with the runs finished, the runs wanted, and the processor time of the finished runs, s."""
 
 
 @dataclass(frozen=True)
@@ -63,8 +62,6 @@ class Ensemble(AbstractContextManager["Ensemble"]):
         self._scene = scene
         self._file = SampleFile(folder, scene)
         self._samples = {(sample.setting, sample.seed): sample for sample in self._file.found}
-        self.spent = 0.0
-        """s of processor time of all runs that were asked for, those that were there already included."""
         self._pool = WorkerPool(self.processes)
 
     def run(self, wanted: Sequence[Run], progress: Progress) -> list[Sample]:
@@ -101,16 +98,7 @@ class Ensemble(AbstractContextManager["Ensemble"]):
 
     def _tell(self, wanted: Sequence[Run], progress: Progress) -> None:
         finished = [self._samples[run] for run in wanted if run in self._samples]
-        self.spent = sum(sample.cpu for sample in finished)
-        per_step = [sample.cpu / sample.setting.per_tick for sample in finished]
-        costs: dict[Setting, list[float]] = {}
-        for sample in finished:
-            costs.setdefault(sample.setting, []).append(sample.cpu)
-        left = 0.0
-        for setting, _ in (run for run in wanted if run not in self._samples):
-            known = costs.get(setting)
-            left += fmean(known) if known else fmean(per_step) * setting.per_tick if per_step else 0.0
-        progress(len(finished), len(wanted), left / self.processes if finished else None)
+        progress(len(finished), len(wanted), sum(sample.cpu for sample in finished))
 
 
 @cache

@@ -15,7 +15,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.accuracy.effort import PROCESSORS
 from conveyor_sim.accuracy.measure.ensemble import Ensemble, Progress, Run
 from conveyor_sim.accuracy.measure.observables import OBSERVABLES
 from conveyor_sim.accuracy.results import Comparison, Sample
@@ -113,6 +112,7 @@ def run_until_decided(
     are made, of the reference and of the settings that are still open; the last look is cut to the runs that the budget
     allows. Time spent is the processor time of the runs, as recorded: other work on the machine does not shorten the
     study, and one that was interrupted is taken up from its folder. Settings with a run that fails get no more.
+    Progress has the processor time of all runs of this call, s.
 
     Raises ConveyorError if the reference fails, or the folder has runs of another scene or version.
     """
@@ -132,7 +132,8 @@ def run_until_decided(
             seeds += more
             made = {(sample.setting, sample.seed) for sample in samples}
             new: list[Run] = [(setting, seed) for seed in range(seeds) for setting in active]
-            samples += _added(ensemble.run(new, _with_left(progress, ensemble, budget)), made)
+            others = sum(sample.cpu for sample in samples if (sample.setting, sample.seed) not in set(new))
+            samples += _added(ensemble.run(new, _with_others(progress, others)), made)
             comparisons = decide(samples, candidates, reference, tolerance)
             undecided = {row.setting for row in comparisons if row.verdict == "undecided"}
             active = [reference, *(setting for setting in candidates if setting in undecided)] if undecided else []
@@ -141,14 +142,9 @@ def run_until_decided(
     return samples, comparisons
 
 
-def _with_left(progress: Progress, ensemble: Ensemble, budget: float) -> Progress:
-    """Progress that has the time left (s) of all looks: for the runs wanted, or the rest of the budget."""
-
-    def reported(done: int, whole: int, left: float | None) -> None:
-        rest = (budget - ensemble.spent) / PROCESSORS
-        progress(done, whole, None if left is None else max(left, rest))
-
-    return reported
+def _with_others(progress: Progress, others: float) -> Progress:
+    """Return a progress that adds the processor time of earlier runs, s."""
+    return lambda done, whole, spent: progress(done, whole, others + spent)
 
 
 def _added(samples: Sequence[Sample], made: set[Run]) -> list[Sample]:

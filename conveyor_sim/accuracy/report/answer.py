@@ -156,8 +156,7 @@ def _doubts(
 
 
 def _trusted(point: Point, tolerance: float) -> bool:
-    stable = point.beyond is None or point.beyond <= 1.0 + 1e-12
-    return not point.failure and point.cost is not None and stable and largest_error(point) <= tolerance
+    return not point.failure and point.cost is not None and point.stable and largest_error(point) <= tolerance
 
 
 def _error(point: Point) -> float:

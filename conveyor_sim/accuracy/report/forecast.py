@@ -48,7 +48,7 @@ class Forecast:
 def forecast(scene: Scene, tolerance: float) -> Forecast:
     """Predict what settings do on a scene; the cheapest one of at most a tolerance (relative) is chosen."""
     points = [_unmeasured(scene, one) for one in candidates(scene) if one.integrator in TRUSTED and one.stiffness == 1]
-    kept = [point for point in points if point.beyond is None or point.beyond <= 1.0 + 1e-12]
+    kept = [point for point in points if point.stable]
     bottles = Plant.of(scene).most_bottles
     many = MANY if bottles is None else max(1, bottles)
     point = _cheapest(kept, tolerance)

@@ -51,8 +51,7 @@ def _own(study: AccuracyStudy) -> str:
     if point.errors is None:
         return f"Scene: its setting fails: {point.failure}."
     resting = "" if point.resting is None else f" and {percent(point.resting)} in resting load"
-    beyond = point.beyond is not None and point.beyond > 1.0
-    shaky = f"; its step is {digits(point.beyond)} x beyond a bound of stability" if beyond else ""
+    shaky = "" if point.stable else f"; its step is {digits(point.beyond)} x beyond a bound of stability"
     return f"Scene: its setting has {percent(point.errors.peak_force)} error in impacts{resting}{shaky}."
 
 

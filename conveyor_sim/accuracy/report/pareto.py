@@ -12,10 +12,12 @@ from conveyor_sim.accuracy.results import Point
 def front(points: Iterable[Point], softened: bool = True) -> list[Point]:
     """Return the non-dominated points, the cheapest first.
 
-    Cost is the median processor time, error the larger of those in impacts and in resting load. Failures are left out,
-    and so are settings of another stiffness than the scene's if `softened` is false.
+    Cost is the median processor time, error the larger of those in impacts and in resting load. Failures and settings
+    beyond a bound of stability are left out, and so are settings of another stiffness than the scene's if `softened` is
+    false.
     """
-    placed = [(place, p) for p in points if (softened or p.setting.stiffness == 1.0) and (place := place_of(p))]
+    allowed = [p for p in points if p.stable and (softened or p.setting.stiffness == 1.0)]
+    placed = [(place, p) for p in allowed if (place := place_of(p))]
     chosen: list[tuple[tuple[float, float], Point]] = []
     for place, point in sorted(placed, key=lambda pair: pair[0]):
         if not chosen or place[1] < chosen[-1][0][1] or place == chosen[-1][0]:

@@ -18,7 +18,7 @@ from rich.text import Text
 from conveyor_sim.accuracy.report.answer import foretelling
 from conveyor_sim.accuracy.report.lines import three_lines
 from conveyor_sim.accuracy.report.pareto import front, place_of
-from conveyor_sim.accuracy.report.words import digits, percent, setting_name, spread, with_unit
+from conveyor_sim.accuracy.report.words import digits, hundredths, percent, setting_name, spread, with_unit
 from conveyor_sim.accuracy.results import (
     DEEP,
     AccuracyStudy,
@@ -176,7 +176,7 @@ def _orders(orders: Sequence[Order]) -> Block:
             Column("order", lambda row: f"{row.observed:.2f}"),
             Column("expected", lambda row: digits(row.expected)),
             Column("steps", lambda row: _range(map(str, row.steps))),
-            Column("error, %", lambda row: _range(_hundredths(error) for error in row.errors)),
+            Column("error, %", lambda row: _range(digits(100.0 * error) for error in row.errors)),
         ],
         _grouped(orders, lambda row: f"{row.case}: {row.quantity}"),
         [f"Errors are RMS over {_all(row.phases for row in orders)} phases of entry into a step."],
@@ -239,22 +239,22 @@ def _work(study: AccuracyStudy) -> list[Block]:
     work = [
         Column[Placed]("cost\nms/s", lambda row: digits(1e3 * row[2].median)),
         Column("x real\ntime", lambda row: digits(1.0 / row[2].median)),
-        Column("impacts\n%", lambda row: _hundredths(row[1].peak_force)),
-        Column("resting\nload, %", lambda row: _hundredths(row[0].resting)),
+        Column("impacts\n%", lambda row: hundredths(row[1].peak_force)),
+        Column("resting\nload, %", lambda row: hundredths(row[0].resting)),
         Column("", marks, left=True),
     ]
     foretold = [
-        Column[Placed]("impacts, %\npredicted", lambda row: _hundredths(row[0].predicted)),
-        Column("impacts, %\nmeasured", lambda row: _hundredths(row[1].peak_force)),
-        Column("resting, %\npredicted", lambda row: _hundredths(row[0].predicted_resting)),
-        Column("resting, %\nmeasured", lambda row: _hundredths(row[0].resting)),
+        Column[Placed]("impacts, %\npredicted", lambda row: hundredths(row[0].predicted)),
+        Column("impacts, %\nmeasured", lambda row: hundredths(row[1].peak_force)),
+        Column("resting, %\npredicted", lambda row: hundredths(row[0].predicted_resting)),
+        Column("resting, %\nmeasured", lambda row: hundredths(row[0].resting)),
         Column("dt, x bound\nof stability", lambda row: digits(row[0].beyond)),
     ]
     other = [
         Column[Placed]("position\nRMS, um", lambda row: _millionths(row[1].position_rms)),
         Column("position\nmax, um", lambda row: _millionths(row[1].position_max)),
-        Column("impulse\n%", lambda row: _hundredths(row[1].impulse)),
-        Column("energy\n%", lambda row: _hundredths(row[1].energy)),
+        Column("impulse\n%", lambda row: hundredths(row[1].impulse)),
+        Column("energy\n%", lambda row: hundredths(row[1].energy)),
     ]
     return [
         Block.of("Work and precision, the cheapest first", [*setting, *work], rows, notes, is_recommended),
@@ -311,7 +311,7 @@ def _ensembles(study: AccuracyStudy) -> Block:
             Column("mean", lambda row: spread(row.mean, row.error)),
             Column("difference\n%", _interval),
             Column("verdict", lambda row: row.verdict, left=True),
-            Column("resolves\n%", lambda row: _hundredths(row.resolution)),
+            Column("resolves\n%", lambda row: hundredths(row.resolution)),
             Column("runs", lambda row: str(row.runs)),
         ],
         _grouped(
@@ -339,8 +339,8 @@ def _stiffness(rows: Sequence[StiffnessRow]) -> Block:
     quantities: list[Quantity] = [
         ("time step, us", lambda row: _millionths(row.dt)),
         ("cost, of factor 1", lambda row: digits(row.cost_ratio)),
-        ("overlap, % of diameter", lambda row: _hundredths(row.overlap) + (" !" if row.deep else "")),
-        ("error in peak force, %", lambda row: _hundredths(_peak(row.point))),
+        ("overlap, % of diameter", lambda row: hundredths(row.overlap) + (" !" if row.deep else "")),
+        ("error in peak force, %", lambda row: hundredths(_peak(row.point))),
     ]
     base = next((row for row in rows if row.factor == 1.0), None)
     for name in dict.fromkeys(name for row in rows for name in row.observables):
@@ -421,10 +421,6 @@ def _interval(row: Comparison) -> str:
     decimals = max(0, 1 - math.floor(math.log10(length)))
     low, high = (round(100.0 * end, decimals) + 0.0 for end in (row.low, row.high))  # + 0.0: no minus before a zero
     return f"{low:+.{decimals}f} .. {high:+.{decimals}f}"
-
-
-def _hundredths(fraction: float | None) -> str:
-    return digits(None if fraction is None else 100.0 * fraction)
 
 
 def _millionths(value: float | None) -> str:

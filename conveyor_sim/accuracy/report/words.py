@@ -7,6 +7,7 @@ import math
 
 from conveyor_sim.accuracy.measure.observables import OBSERVABLES
 from conveyor_sim.accuracy.setting import Setting
+from conveyor_sim.physics.timestep.prediction import without_rounding
 
 
 def digits(value: float | None) -> str:
@@ -22,7 +23,12 @@ def digits(value: float | None) -> str:
 
 def percent(fraction: float | None) -> str:
     """`0.812 %`."""
-    return "-" if fraction is None or not math.isfinite(fraction) else f"{digits(100.0 * fraction)} %"
+    return "-" if fraction is None or not math.isfinite(fraction) else f"{hundredths(fraction)} %"
+
+
+def hundredths(fraction: float | None) -> str:
+    """Return a relative error in percent without its unit: 0.812."""
+    return digits(None if fraction is None else 100.0 * without_rounding(fraction))
 
 
 def duration(seconds: float) -> str:

@@ -58,6 +58,29 @@ class Surface(NamedTuple):
 
 
 @group
+class Vibration(NamedTuple):
+    """Vibration of surfaces (`vibration.py`), (H + 1,)."""
+
+    ux: F8
+    """Velocity field without vibration, as in `Surface`."""
+    uy: F8
+    turn: F8 | None
+    """rad/s; absent without curved belts."""
+    swing_x: F8
+    """Amplitude of the velocity field."""
+    swing_y: F8
+    swing_turn: F8 | None
+    frequency: F8
+    """Hz; 0 for a surface that does not vibrate."""
+    phase: F8
+    """Phase at the start of the tick, rad."""
+    ahead: F8
+    """Mean of the cosine over the coming step, minus its present value."""
+    clock: F8
+    """Steps since the tick began, (1,)."""
+
+
+@group
 class Footing(NamedTuple):
     """Velocity field under each bottle, (S,): a copy of its belt's, so that the friction loop gathers nothing."""
 

@@ -12,7 +12,7 @@ from conveyor_sim.engine.arrays.moving import MovingRails
 from conveyor_sim.engine.arrays.observers import GuardProbe, LedgerArrays
 from conveyor_sim.engine.arrays.rails import Arcs, RailContacts, Segments
 from conveyor_sim.engine.arrays.riding import Riding
-from conveyor_sim.engine.arrays.support import Belts, Footing, Ring, StaticFriction, Surface
+from conveyor_sim.engine.arrays.support import Belts, Footing, Ring, StaticFriction, Surface, Vibration
 from conveyor_sim.engine.arrays.types import I8
 from conveyor_sim.engine.compiler.groups import group
 
@@ -79,6 +79,7 @@ class World(NamedTuple):
     rail_law: ContactLaw | None
     belts: Belts | None
     surface: Surface | None
+    vibration: Vibration | None
     footing: Footing | None
     ring: Ring | None
     static_friction: StaticFriction | None

@@ -36,6 +36,7 @@ from conveyor_sim.engine.observers.damage import note_damage
 from conveyor_sim.engine.observers.ledger import book_kick
 from conveyor_sim.engine.rails.moving import pass_step, place_rails
 from conveyor_sim.engine.support.static_friction import carry_anchors
+from conveyor_sim.engine.support.vibration import pass_vibration, place_vibration, vibrate_footing
 from conveyor_sim.engine.threads.workers import BLOCK, share
 
 
@@ -45,8 +46,10 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
     bottles = world.bottles
     begin, stop = share(worker, bottles.x.size)
     place_rails(world.moving, worker, dt)
+    place_vibration(world.vibration, world.surface, worker, dt)
     step_all(world.riding, bottles, worker)
     pack_all(world, worker)
+    vibrate_footing(world, worker)
     for step in range(steps):
         note_damage(world, worker, dt)
         pair_phase(world, worker, dt, dt)
@@ -63,10 +66,11 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
                 accumulate_peaks(world.load, world.peaks, dt, left, right)
             ride(bottles, world.spin, world.riding, dt, first, end)
             end_examination(world, None, first, end)
-            carry_anchors(world.footing, world.static_friction, dt, first, end)
+            carry_anchors(world.footing, world.vibration, world.static_friction, dt, first, end)
             note_moved(world, worker, first, end)
         hold = lists_hold(world, worker)
         pass_step(world.moving, world.ledger, worker, dt, False)
+        pass_vibration(world, worker, dt)
         if not hold:
             return step + 1
         probe_rebuilt(world, worker)

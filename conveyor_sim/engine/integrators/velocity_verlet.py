@@ -39,6 +39,7 @@ from conveyor_sim.engine.observers.damage import note_damage
 from conveyor_sim.engine.observers.ledger import book_kick
 from conveyor_sim.engine.rails.moving import pass_step, place_rails
 from conveyor_sim.engine.support.static_friction import carry_anchors
+from conveyor_sim.engine.support.vibration import pass_vibration, place_vibration, vibrate_footing
 from conveyor_sim.engine.threads.workers import BLOCK, share
 
 
@@ -53,6 +54,7 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
     damage = _is_there(world.damage)
     begin, stop = share(worker, world.bottles.x.size)
     place_rails(world.moving, worker, dt)
+    place_vibration(world.vibration, world.surface, worker, dt)
     # Commands and supply act between ticks, so the last forces are outdated. The first evaluation ends no step.
     fresh = phase == START
     if fresh:
@@ -60,6 +62,7 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
         _start_stage(world.bottles, stage, world.implicit, begin, stop)
     step_all(world.riding, world.bottles, worker)
     pack_all(world, worker)
+    vibrate_footing(world, worker)
     done = 0
     while True:
         drawn = 0.0 if fresh else dt
@@ -82,6 +85,7 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
                 _begin_step(world, stage, worker, dt, first, min(first + BLOCK, stop))
         hold = lists_hold(world, worker)
         pass_step(world.moving, world.ledger, worker, dt, True)
+        pass_vibration(world, worker, dt)
         if not hold:
             return done
         probe_rebuilt(world, worker)
@@ -115,7 +119,7 @@ def _begin_step(world: World, stage: Stage, worker: Worker, dt: float, first: in
         _turn(spin, stage, dt, left, right)
         note_path(world.path, stage, dt, left, right)
     ride(bottles, spin, world.riding, dt, first, end)
-    carry_anchors(world.footing, world.static_friction, dt, first, end)
+    carry_anchors(world.footing, world.vibration, world.static_friction, dt, first, end)
     note_moved(world, worker, first, end)
 
 

@@ -56,25 +56,43 @@ def add_static_friction(
 
 
 @part
-def carry_anchors(footing: Any, static: Any, dt: float, first: int, end: int) -> None:
+def carry_anchors(footing: Any, vibration: Any, static: Any, dt: float, first: int, end: int) -> None:
     """Move the anchors of bottles first to end with their belts for dt seconds."""
     if static is None:
         return
     for i in range(uint64(first), uint64(end)):
-        dx, dy = _carried(footing.ux[i], footing.uy[i], footing.turn, static, dt, i)
+        dx, dy = _carried(footing, vibration, static, dt, i)
         static.x[i] += dx
         static.y[i] += dy
 
 
 @part
-def _carried(ux: float, uy: float, turn: Any, static: Any, dt: float, i: int) -> tuple[float, float]:
-    """Return the displacement of an anchor in dt, m; on a turning belt by Cayley's rotation, which keeps its radius."""
-    if turn is None:
+def _carried(footing: Any, vibration: Any, static: Any, dt: float, i: int) -> tuple[float, float]:
+    """Return the displacement of an anchor in dt, m; on a turning belt by Cayley's rotation, which keeps its radius.
+
+    On a vibrating belt it is that of the mean velocity in dt.
+    """
+    ux, uy = footing.ux[i], footing.uy[i]
+    if vibration is not None:
+        h = footing.carrier[i]
+        ux += vibration.ahead[h] * vibration.swing_x[h]
+        uy += vibration.ahead[h] * vibration.swing_y[h]
+    if footing.turn is None:
         return dt * ux, dt * uy
-    half = 0.5 * dt * turn[i]
-    vx, vy = ux - turn[i] * static.y[i], uy + turn[i] * static.x[i]
+    turn = footing.turn[i] + _turn_ahead(vibration, footing, i)
+    half = 0.5 * dt * turn
+    vx, vy = ux - turn * static.y[i], uy + turn * static.x[i]
     scale = dt / (1.0 + half * half)
     return scale * (vx - half * vy), scale * (vy + half * vx)
+
+
+@part
+def _turn_ahead(vibration: Any, footing: Any, i: int) -> float:
+    """Return the mean angular velocity of a vibrating belt in the coming step, minus its present one, rad/s."""
+    if vibration is None:
+        return 0.0
+    h = footing.carrier[i]
+    return vibration.ahead[h] * vibration.swing_turn[h]
 
 
 @part

@@ -5,6 +5,7 @@ import numpy as np
 
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.engine.support.footing import refresh_footing
+from conveyor_sim.engine.support.vibration import hold_velocities
 from conveyor_sim.physics.state import State
 from conveyor_sim.scene.angles import unit_vector
 
@@ -25,12 +26,15 @@ class BeltSurfaces:
         self._turning = [entry for entry in moved if entry[2].kind == "curved"]
         self._moved_belt = np.array([belt for _, belt, _ in moved], dtype=np.int64)
         self._outermost = np.array([shape.outermost for *_, shape in moved])
+        vibrates = state.world.vibration is not None
+        self._swing = np.array([shape.outermost_swing if vibrates else 0.0 for *_, shape in moved])
         self.fastest = 0.0
         """Speed of the fastest point of any surface, m/s."""
 
     def note(self, speeds: F8) -> None:
         """Take over speeds that the belts already have along their centre lines, (belts,) m/s."""
-        self.fastest = float(np.max(np.abs(speeds[self._moved_belt]) * self._outermost, initial=0.0))
+        running = np.abs(speeds[self._moved_belt]) * self._outermost
+        self.fastest = float(np.max(running + self._swing, initial=0.0))
 
     def move(self, speeds: F8) -> None:
         """Set the surfaces to each belt's speed along its centre line, (belts,) m/s, and update the bottles on them."""
@@ -47,4 +51,6 @@ class BeltSurfaces:
                 turn = speeds[belt] * ratio / shape.centre_radius
                 surface.turn[index] = turn
                 surface.ux[index], surface.uy[index] = turn * shape.centre[1], -turn * shape.centre[0]
+        if world.vibration is not None:
+            hold_velocities(world.vibration, surface)
         refresh_footing(world.bottles, world.belts, surface, world.footing, world.ring)

@@ -39,7 +39,8 @@ def _prevented(plant: Plant, on: Collection[str]) -> str:
     """Return why no bottle of a plant can ride; "" if bottles can."""
     if plant.scene.accuracy.integrator not in RIDES:
         return f"{plant.scene.accuracy.integrator} can't leave bottles out of a step"
-    return "static_friction changes the force under bottles at every step" if "static_friction" in on else ""
+    changing = next((name for name in ("static_friction", "vibration") if name in on), "")
+    return f"{changing} changes the force under bottles at every step" if changing else ""
 
 
 def _infeed(plant: Plant, on: Collection[str]) -> Cause | None:
@@ -66,8 +67,8 @@ RIDING = Effect(
     "neighbour lists are rebuilt, or in the next tick",
     source="added",
     called_for=_riding,
-    absent="no straight belt has friction, bottles stand on springs (static_friction), or the integrator is rk4, "
-    "dormand_prince or linearly_implicit",
+    absent="no straight belt has friction, bottles stand on springs (static_friction), a belt vibrates, or the "
+    "integrator is rk4, dormand_prince or linearly_implicit",
     absent_here=_prevented,
     needs="velocities of the previous step; ranges of slots whose bottles are stepped",
 )

@@ -23,6 +23,7 @@ from conveyor_sim.physics.effects.observers import (
 )
 from conveyor_sim.physics.effects.static_friction import STATIC_FRICTION
 from conveyor_sim.physics.effects.terms import Meeting, Terms, deepest, duration, meetings, overlap_at
+from conveyor_sim.physics.effects.vibration import VIBRATION
 from conveyor_sim.physics.plant import Plant
 from conveyor_sim.physics.timestep.bounds import Bound
 from conveyor_sim.physics.timestep.prediction import Impact, Prediction, predict
@@ -49,6 +50,7 @@ EFFECTS: tuple[Effect, ...] = (
     RING_BASE,
     BELTS,
     CURVED_BELTS,
+    VIBRATION,
     ROTATION,
     INFEED,
     OUTFEED,

@@ -23,6 +23,7 @@ from conveyor_sim.engine.threads.workers import UNIT
 from conveyor_sim.physics.model import Model
 from conveyor_sim.physics.model.moving_rails import moving_arrays
 from conveyor_sim.physics.model.plant_arrays import belt_arrays, listed
+from conveyor_sim.physics.model.vibration import vibration_arrays
 from conveyor_sim.physics.state.empty_damage import empty_damage
 
 
@@ -116,6 +117,7 @@ def empty_world(model: Model, slots: int) -> World:
         rail_law=model.rail_law,
         belts=belt_arrays(model.plant.surfaces, slots, entries) if model.has("belts") else None,
         surface=_surface(model),
+        vibration=vibration_arrays(model.plant, model.has("curved_belts")) if model.has("vibration") else None,
         footing=_footing(model, slots),
         ring=Ring(reals()) if model.has("ring_base") else None,
         static_friction=_static_friction(model, slots),

@@ -26,6 +26,7 @@ FIXED = (
     *(f"damage.scuffing.bins.{name}" for name in ("segment_first", "arc_first", "arc_span")),
     *(f"damage.tipping.{name}" for name in ("contact_lever", "base_lever", "delay")),
     "surface.friction",
+    *(f"vibration.{name}" for name in ("swing_", "frequency")),
     *(f"static_friction.{name}" for name in ("stiffness", "damping", "friction")),
 )
 """Arrays in other groups that follow from the scene and never change."""
@@ -39,6 +40,8 @@ SCRATCH: Mapping[str, str] = {
     "slopes.": "of one step of a Runge-Kutta method",
     "linear.": "of one step of the linearly implicit method",
     "riding.": "of one call of an integrator",
+    **dict.fromkeys(("vibration.phase", "vibration.clock"), "of one tick"),
+    "vibration.ahead": "of one step",
 }
 """Arrays that are written before they are read, with their content."""
 
@@ -76,6 +79,7 @@ BETWEEN_TICKS = (
     "spin.inverse_inertia",
     "ring.",
     "surface.",
+    "vibration.",
 )
 """Arrays that change only between ticks, as bottles come and go or belts change their speed."""
 

@@ -8,6 +8,7 @@ from typing import Any
 from conveyor_sim.columns.events import GuardEvent
 from conveyor_sim.engine.arrays.rails import RailContacts
 from conveyor_sim.engine.integrators import INTEGRATORS, RESUME, START
+from conveyor_sim.engine.support.vibration import start_tick
 from conveyor_sim.engine.threads.thread_choice import ThreadChoice
 from conveyor_sim.engine.threads.thread_pool import ThreadPool
 from conveyor_sim.errors import SimulationError
@@ -92,6 +93,8 @@ class Integration:
         wrong = self._guard.begin(tick, surface_speed, fastest_rail(self._state.world.moving))
         if wrong is not None:
             raise self._stopped(tick, wrong, wrong.sentence(seconds, 1))
+        if self._state.world.vibration is not None:
+            start_tick(self._state.world.vibration, seconds)
         began = time.perf_counter()
         self._take_steps(1)
         took = time.perf_counter() - began
@@ -133,9 +136,11 @@ class Integration:
             phase = RESUME
 
     def _set_clock(self, steps: int) -> None:
-        """Put moving rails where they are after `steps` steps of the tick."""
-        if self._state.world.moving is not None:
-            self._state.world.moving.clock[0] = steps
+        """Put moving rails and vibrating belts where they are after `steps` steps of the tick."""
+        world = self._state.world
+        for group in (world.moving, world.vibration):
+            if group is not None:
+                group.clock[0] = steps
 
     def _report_once(self, tick: int) -> None:
         """Report soft contacts and chatter the first time they occur. They do not stop a run."""

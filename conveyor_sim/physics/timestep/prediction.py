@@ -21,6 +21,13 @@ WHOLE_SCENE = 1.0
 """Error in peak forces of a scene with many impacts, divided by the error of one impact."""
 
 
+ROUNDING = 1e-12
+"""Relative error below which a figure is rounding alone and reads 0.
+
+An error of 2^-53 per step grows as the root of the number of steps, which is up to a hundred million in a long run.
+"""
+
+
 @dataclass(frozen=True)
 class Impact:
     """Hardest expected impact between two bottle types, or of a bottle type on a rail material."""
@@ -130,8 +137,14 @@ def _resting(terms: Sequence[Term], pressing: float) -> tuple[float | None, str]
     return math.hypot(*(term.value for term in parts)), "; ".join(f"{term.quantity}: {term.reason}" for term in parts)
 
 
+def without_rounding(error: float) -> float:
+    """Return a relative error, 0 if it is rounding alone."""
+    return 0.0 if abs(error) < ROUNDING else error
+
+
 def percent(value: float) -> str:
     """Return a relative error as a percentage, such as `0.31 %`."""
+    value = without_rounding(value)
     return f"{100.0 * value:.2g} %" if value < 1.0 else f"{100.0 * value:.0f} %"
 
 

@@ -14,6 +14,7 @@ from conveyor_sim.physics.effects.choice import EFFECTS
 from conveyor_sim.physics.effects.notes import notes
 from conveyor_sim.physics.model import Model
 from conveyor_sim.physics.model.remedies import step_limit
+from conveyor_sim.physics.model.slow_drag import slow_drag
 from conveyor_sim.physics.timestep.bounds import fewest_steps
 from conveyor_sim.physics.timestep.prediction import percent
 from conveyor_sim.scene import Scene
@@ -35,8 +36,18 @@ def explanation(scene: Scene, model: Model) -> Group:
 
 
 def note_rows(model: Model) -> list[tuple[str, str]]:
-    """Return notes on the set-up of a scene, each with its name; empty without notes."""
-    return [("note", text) for text in notes(model.plant, {choice.name for choice in model.effects if choice.on})]
+    """Return warnings and notes on the set-up of a scene, each with its name; empty without any."""
+    on = {choice.name for choice in model.effects if choice.on}
+    return [
+        *(("warning", text) for text in scene_warnings(model)),
+        *(("note", text) for text in notes(model.plant, on)),
+    ]
+
+
+def scene_warnings(model: Model) -> list[str]:
+    """Return sentences on settings of a scene that make results wrong from the start; empty without any."""
+    slow = slow_drag(model.plant, {choice.name for choice in model.effects if choice.on})
+    return [] if slow is None else [slow.sentence]
 
 
 def accuracy_rows(model: Model) -> list[tuple[str, str]]:

@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from conveyor_sim.physics.timestep.prediction import percent
 from conveyor_sim.report.figures import style
 from conveyor_sim.report.figures.data import EnergySeries, Floats
 
@@ -54,7 +55,7 @@ def energy_figure(energy: EnergySeries, belts: Sequence[str]) -> Figure:
         ax.tick_params(labelbottom=True)
         ax.set_xlabel("time (s)")
         ax.set_xlim(energy.time[0], energy.time[-1] if len(energy.time) > 1 else energy.time[0] + 1.0)
-    end = f"{energy.residual[-1]:.2g} J of a turnover of {energy.turnover[-1]:.4g} J, {100.0 * share[-1]:.2g} %"
+    end = f"{energy.residual[-1]:.2g} J of a turnover of {energy.turnover[-1]:.4g} J, {percent(float(share[-1]))}"
     style.heading(figure, f"Energy: what does not close at the end is {end}")
     return figure
 

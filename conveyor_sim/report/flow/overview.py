@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from conveyor_sim.physics.effects.notes import bottles_on_points
 from conveyor_sim.physics.model import Model
 from conveyor_sim.physics.model.remedies import StepLimit
+from conveyor_sim.physics.model.slow_drag import slow_drag
 from conveyor_sim.physics.timestep.prediction import percent
 from conveyor_sim.report.flow.exit_findings import ending, has_exit
 from conveyor_sim.report.flow.finding import Finding
@@ -35,7 +36,7 @@ def overview(scene: Scene, model: Model, limit: StepLimit, flow: LineFlow) -> li
         labelled("step", _step(limit)),
         labelled("speed", expected_factor(limit)),
     ]
-    findings = [*flow.findings, *_points(model)]
+    findings = all_findings(model, flow)
     room = MOST_LINES - 1 - len(lines)
     if len(findings) > room:
         more = len(findings) - room + 1
@@ -45,7 +46,13 @@ def overview(scene: Scene, model: Model, limit: StepLimit, flow: LineFlow) -> li
 
 def finding_lines(scene: Scene, model: Model, flow: LineFlow) -> list[str]:
     """Return a line for each finding, with file, line and field."""
-    return list(_finding_lines(scene, [*flow.findings, *_points(model)]))
+    return list(_finding_lines(scene, all_findings(model, flow)))
+
+
+def all_findings(model: Model, flow: LineFlow) -> list[Finding]:
+    """Return all findings, warnings first."""
+    findings = [*flow.findings, *_slow_belts(model), *_points(model)]
+    return sorted(findings, key=lambda finding: finding.level != "warning")
 
 
 def _finding_lines(scene: Scene, findings: Sequence[Finding]) -> Iterator[str]:
@@ -145,6 +152,12 @@ def _step(limit: StepLimit) -> str:
     if limit.given:
         return f"{steps}, given in the scene"
     return f"{steps}, set by {limit.bounds[0].name}" if limit.bounds else f"{steps}; nothing bounds the time step"
+
+
+def _slow_belts(model: Model) -> list[Finding]:
+    """Return a warning about belts below the slip limit."""
+    slow = slow_drag(model.plant, {choice.name for choice in model.effects if choice.on})
+    return [] if slow is None else [Finding(slow.belt.path, slow.text)]
 
 
 def _points(model: Model) -> list[Finding]:

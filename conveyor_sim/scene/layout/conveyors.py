@@ -62,6 +62,7 @@ _LISTED = 20
 _OWN = ("speed", "speed_limits", "watchdog")
 """Fields of a belt that a named drive has instead."""
 _DRIVEN = (*_OWN, "drive", "ratio")
+_OF_BELT = ("material", "vibration")
 
 
 @dataclass
@@ -210,8 +211,8 @@ def _fields(raw: Mapping[str, Any], section: Mapping[str, Any]) -> dict[str, tup
     A section with a speed or a drive is not moved by the conveyor's drive, and a section with a named drive doesn't
     take the conveyor's speed.
     """
-    own = {name: section[name] for name in ("material", *_DRIVEN) if section.get(name) is not None}
-    inherited = {name: raw[name] for name in ("material", *_DRIVEN) if raw.get(name) is not None}
+    own = {name: section[name] for name in (*_OF_BELT, *_DRIVEN) if section.get(name) is not None}
+    inherited = {name: raw[name] for name in (*_OF_BELT, *_DRIVEN) if raw.get(name) is not None}
     if isinstance(own.get("drive"), str):
         inherited = {name: value for name, value in inherited.items() if name not in _DRIVEN}
     elif isinstance(inherited.get("drive"), str) and any(name in own for name in (*_OWN, "drive")):

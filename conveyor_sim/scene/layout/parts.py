@@ -25,6 +25,7 @@ from conveyor_sim.scene.types import (
     Span,
     quantity,
 )
+from conveyor_sim.scene.vibration import ChainVibration
 from conveyor_sim.scene.words import fields_of
 
 MOST_PIECES = 1000
@@ -89,6 +90,7 @@ class _Driven(Part):
     ratio: Positive | None = quantity(
         "Speed divided by the speed of the drive that it names. Left out: 1.", "1", default=None
     )
+    vibration: ChainVibration | None = quantity("Vibration of the chain. Left out: none.", default=None)
 
 
 class ConveyorSection(_Driven):

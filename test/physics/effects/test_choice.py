@@ -17,6 +17,7 @@ from conveyor_sim.scene.effect_names import EFFECT_NAMES
 TWO = [bottle(0.0, 0.0), bottle(1.0, 0.0)]
 GLASS = [contact(1000.0)]
 RAIL = {"edge": segment((0.0, 1.0), (1.0, 1.0))}
+SHAKEN = belt(0.1, vibration={"amplitude": 1e-4, "frequency": 50.0})
 CURVED = {
     "kind": "curved", "centre": [50.0, 50.0], "inner_radius": 0.3, "width": 0.2, "start_angle": 0.0, "span": 1.0,
     "material": "chain", "speed": 0.5,
@@ -149,6 +150,15 @@ def choices(**fields: Any) -> dict[str, str]:
         ),
         ({"belts": {"one": belt(0.1)}, "base": base(0.0)}, {}),
         (
+            {"belts": {"one": SHAKEN}, "base": base(0.4)},
+            {
+                "base_friction": "belts.one: friction 0.4",
+                "belts": "belts.one",
+                "vibration": "belts.one.vibration: 0.0001 m at 50 Hz",
+            },
+        ),
+        ({"belts": {"one": SHAKEN}, "base": base(0.0)}, {}),
+        (
             {"belts": {"one": belt(0.1), "bend": CURVED}, "base": base(0.4)},
             {
                 "base_friction": "belts.one: friction 0.4",
@@ -200,8 +210,8 @@ def test_every_effect_is_decided_and_says_why_not() -> None:
     assert off == [
         "moving_rails", "hertz", "table", "tsuji_damping", "onset_damping", "viscoelastic_damping",
         "atan_friction", "implicit_friction",
-        "tangential_spring", "static_friction", "ring_base", "peaks", "contact_arrays", "energy_ledger", "scuffing",
-        "crushing", "impacts", "tipping",
+        "tangential_spring", "static_friction", "ring_base", "vibration", "peaks", "contact_arrays", "energy_ledger",
+        "scuffing", "crushing", "impacts", "tipping",
     ]  # fmt: skip
 
 
@@ -211,6 +221,7 @@ def test_every_effect_is_decided_and_says_why_not() -> None:
         ({"accuracy": {"integrator": "rk4"}}, "rk4 can't leave bottles out of a step"),
         ({"accuracy": {"integrator": "linearly_implicit"}}, "linearly_implicit can't leave bottles out of a step"),
         ({"base": [{**base(0.4)[0], "tangential": {"stiffness": 900.0}}]}, "static_friction changes the force"),
+        ({"belts": {"one": SHAKEN}}, "vibration changes the force"),
         ({"belts": {"bend": CURVED}}, "no straight belt"),
     ],
 )  # fmt: skip

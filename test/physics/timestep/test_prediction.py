@@ -27,7 +27,7 @@ from scipy.integrate import solve_ivp
 
 from conveyor_sim.physics.model import build_model
 from conveyor_sim.physics.timestep.methods import METHODS
-from conveyor_sim.physics.timestep.prediction import WHOLE_SCENE
+from conveyor_sim.physics.timestep.prediction import WHOLE_SCENE, percent
 from conveyor_sim.scene import Scene
 from conveyor_sim.scene.accuracy import Accuracy
 from conveyor_sim.simulation import Simulation
@@ -348,3 +348,10 @@ def test_the_creep_on_a_turn_table(creep: float, integrator: str, steps: int) ->
         assert error <= term.value
         # Fewer than 4 of its steps are the implicit Euler method's, whose error passes through 0 on the way.
         assert steps == 8 or 0.5 * term.value < error
+
+
+@pytest.mark.parametrize(
+    ("error", "text"), [(7.6e-17, "0 %"), (-7.6e-17, "0 %"), (0.0, "0 %"), (1e-11, "1e-09 %"), (0.0031, "0.31 %")]
+)
+def test_an_error_below_rounding_reads_0(error: float, text: str) -> None:
+    assert percent(error) == text
