@@ -9,6 +9,7 @@ from conveyor_sim.engine.contact.laws.linear import contact_time
 from conveyor_sim.engine.integrators import AHEAD, WARM
 from conveyor_sim.physics.effects.contacts import contacts_in_use
 from conveyor_sim.physics.effects.declaration import Cause, Effect
+from conveyor_sim.physics.effects.load import ENDLESS_QUEUE
 from conveyor_sim.physics.effects.terms import (
     Meeting,
     Terms,
@@ -25,7 +26,11 @@ from conveyor_sim.physics.timestep.prediction import Term
 from conveyor_sim.scene.schema import BottleType
 
 CLOSED = 4.0
-"""Closed contacts of a bottle in a zigzag queue: two bottles, a rail and the base. Implicit friction splits its mass."""
+"""Closed contacts of a bottle in a zigzag: two bottles, a rail and the base. Implicit friction splits its mass."""
+
+BALANCING = 8.0
+"""1/s; times n dt of a queue of n bottles the root of the error of its creep, at most. Fitted to the first 19 scenes of
+docs/studies/implicit_queues.py, at `draft`."""
 
 SETTLED = 0.01
 """Relative change of resting forces in 1 s below which a scene counts as settled (docs/accuracy.md)."""
@@ -82,14 +87,21 @@ def _kick(terms: Terms, dt: float) -> list[Term]:
 
 
 def _excess(terms: Terms, dt: float) -> tuple[float, str]:
-    """Return the excess of the creep of loaded contacts over that of explicit friction, as a share of it, and its cause.
+    """Return the excess of the creep of loaded contacts over that of explicit friction, relative to it, and its cause.
 
-    0 with a warm start. Without one, the slip at a load f mu N is too large by B f v_lim, for small f by the share 2 B
-    (`friction.py` in the engine), here at the largest load on a contact.
+    With a warm start, n bottles in a row balance a change of load in about n steps: the error is of second order in
+    n dt. Without one, the slip at a load f mu N is too large by B f v_lim, for small f by the share 2 B (`friction.py`
+    in the engine), here at the largest load on a contact.
     """
     integrator, load = terms.scene.accuracy.integrator, terms.load
-    if integrator in WARM and not terms.scene.friction_anew or load.force == 0.0:
+    if load.force == 0.0:
         return 0.0, ""
+    if integrator in WARM and not terms.scene.friction_anew:
+        most = terms.plant.most_bottles
+        count = ENDLESS_QUEUE if most is None else most
+        return (
+            BALANCING * count * dt
+        ) ** 2, f"{count} bottles in a row balance a change of load in about {count} steps"
     ahead, at_once = AHEAD[integrator]
     cases = [(0.0, "")]
     for meeting in meetings(terms):
@@ -102,7 +114,7 @@ def _excess(terms: Terms, dt: float) -> tuple[float, str]:
 
 
 def _implicit_resting(terms: Terms, dt: float) -> list[Term]:
-    """Return the error in resting load if contacts creep too fast: forces change faster by that share.
+    """Return the error in resting load if contacts creep at another rate: forces change faster or slower by that share.
 
     Forces of a settled scene change by less than SETTLED in 1 s, by half of it in the mean.
     """
@@ -190,9 +202,9 @@ ATAN_FRICTION = Effect(
 IMPLICIT_FRICTION = Effect(
     name="implicit_friction",
     law="friction at the slip at the end of a step, with the mass of a bottle split among its contacts. With leapfrog, "
-    "semi_implicit_euler and velocity_verlet each step starts from the friction forces of the last one. Slow creep then "
-    "equals that of explicit friction in steps of any length (docs/studies/implicit_queues.csv). A change of load "
-    "reaches its balance after some steps, about as many as there are contacts in a row. With rk4 friction is solved "
+    "semi_implicit_euler and velocity_verlet each step starts from the friction forces of the last one. Steady creep "
+    "then equals that of explicit friction in steps of any length (docs/studies/implicit_queues.csv). n bottles in a "
+    "row balance a change of load in about n steps. With rk4 friction is solved "
     "anew in each step. Up to gamma dt = 1 it equals explicit friction; gamma is 2 mu N / (m_t v_lim) times the number "
     "of closed contacts. In longer steps a loaded contact creeps too fast, by gamma dt - 1 of its creep, and the "
     "prediction says so. Not available with dormand_prince, which divides its steps, and linearly_implicit, which "
@@ -204,9 +216,10 @@ IMPLICIT_FRICTION = Effect(
     bound="none. It removes the bounds of contact_friction and, for bases that are points, of base_friction. With "
     "semi-implicit Euler the bound of turning belts remains",
     resting=_implicit_resting,
-    rest="with rk4 0.5 % of the excess of the creep, because forces of a settled scene change by less than 1 % in 1 s",
+    rest="0.5 % of the error of the creep, because forces of a settled scene change by less than 1 % in 1 s",
     side=_implicit_creep,
-    beside="in the creep of pressed contacts with rk4: gamma dt - 1 at the largest expected load and 4 closed contacts",
+    beside="in the creep of pressed contacts at most (8 n dt)^2 for n bottles, dt in s; with rk4 gamma dt - 1 at the "
+    "largest expected load and 4 closed contacts",
 )
 TANGENTIAL_SPRING = Effect(
     name="tangential_spring",
