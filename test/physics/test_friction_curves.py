@@ -103,8 +103,8 @@ def test_implicit_friction_sticks_at_a_rail_in_twenty_steps(curve: str) -> None:
     sim.advance(2)
     state = sim.bottles()
     slip = state.vx[0] + RADIUS * state.omega[0]
-    # On the arctangent a residue of the slip stays: p is full only in the limit, and the last steps press little.
-    assert 0.0 <= slip < 2.0 * limit
+    # A residue of the slip stays, because the last steps press little and start from the friction of harder ones.
+    assert 0.0 <= slip < 0.02 * v_t
     assert state.vx[0] == pytest.approx((v_t + slip) / 2.0, rel=1e-9)
 
 

@@ -293,7 +293,7 @@ def _first_slip(
 
 @part
 def _slip_of_kick(
-    settings: EngineSettings, kick: Any, reach: Any, gathered: Any, row: int, nx: float, ny: float, shorter: float
+    settings: EngineSettings, kick: Any, reach: Any, gathered: Any, row: Any, nx: float, ny: float, shorter: float
 ) -> float:
     if kick is None:
         return 0.0
