@@ -94,4 +94,4 @@ def tables(rows: Rows) -> str:
         found = [rows.spread(CASE, n, effects, what) for effects, what in columns]
         body.append([f"N = {n:g}", *(spread and f"{spread.middle:.0f}" for spread in found)])
     head = ["", *(f"{effects}: {what}" for effects, what in columns)]
-    return f"{markdown(head, body)}\n\nThe process holds the scene and what NumPy and numba keep besides."
+    return f"{markdown(head, body)}\n\nThe process also holds the scene, and memory of NumPy and numba."

@@ -129,8 +129,8 @@ def tables(rows: Rows) -> str:
     columns = [(FREE, OUTSIDE), *((how, what) for how in (REAL_TIME, FREE) for what in (OVERHEAD, WHOLE, LATENCY))]
     body = [[f"{what}, {how}", *(rows.spread(CASE, n, how, what) for n in rows.ns(CASE))] for how, what in columns]
     text = (
-        "One thread. A command's outcome is published at the end of the tick in which the belt changed, and arrives in "
-        "another process: the belt had changed by then. What doesn't reach real time has no figure there. Cores beside "
-        "the kernels' are seconds of a core a simulated second."
+        "One thread. A command's outcome is published at the end of the tick in which the belt changed speed, and is "
+        "received in another process. A case that does not reach real time has no figure. Cores "
+        "beside the kernels' are seconds of a core per simulated second."
     )
     return f"{markdown(['', *(f'N = {n:g}' for n in rows.ns(CASE))], body)}\n\n{text}"

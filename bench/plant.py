@@ -133,4 +133,4 @@ def _recorded(scene: Scene) -> None:
 def tables(rows: Rows) -> str:
     """One table."""
     body = [[name, rows.spread(CASE, 0.0, name, FACTOR)] for name in rows.contestants(CASE)]
-    return f"One thread unless it is said; the recorded run chooses.\n\n{markdown(['', FACTOR], body)}"
+    return f"One thread unless stated; the recorded run chooses their number.\n\n{markdown(['', FACTOR], body)}"

@@ -18,6 +18,10 @@ class StudyError(ConveyorError):
     """Invalid study, with one line per problem of its file; or a study that can't run."""
 
 
+class CalibrationError(ConveyorError):
+    """Measurements that can't be read, with one line per problem of their file; or that determine no parameter."""
+
+
 class CommandError(ConveyorError):
     """Command with an unknown name or an invalid value."""
 

@@ -22,12 +22,13 @@ def pages() -> Iterator[tuple[Path, str]]:
     """Each page, and its text as it should be."""
     for name, package in (("effects", "physics.effects"), ("cli", "cli")):
         yield DOCS / f"{name}.md", importlib.import_module(f"conveyor_sim.{package}.reference").reference()
+    yield DOCS / "limits.md", importlib.import_module("conveyor_sim.physics.effects.limits").limits_page()
     sys.path[:0] = [str(DOCS / "studies"), str(ROOT / "test"), str(ROOT / "tools")]
     rules = importlib.import_module("import_rules")
     yield rules.PAGE, rules.page(rules.PAGE.read_text(encoding="utf-8"))
     with_parts = importlib.import_module("page_parts").with_parts
     tables: dict[str, dict[str, str]] = {}
-    for package in ("bag.messages", "line", "scene"):
+    for package in ("bag.messages", "line", "scene", "studies.calibration"):
         for name, parts in importlib.import_module(f"conveyor_sim.{package}.reference").tables().items():
             tables[name] = {**tables.get(name, {}), **parts}
     for name, parts in tables.items():

@@ -14,6 +14,7 @@ import click
 from conveyor_sim import __version__
 from conveyor_sim.cli.accuracy import accuracy
 from conveyor_sim.cli.attach import attach
+from conveyor_sim.cli.calibrate import calibrate
 from conveyor_sim.cli.demo import demo
 from conveyor_sim.cli.drawings import draw, import_
 from conveyor_sim.cli.optimise import optimise
@@ -68,5 +69,6 @@ def main(context: click.Context) -> None:
 for command in (
     demo, check, schema, tags, explain, draw, import_, run, serve, attach, user, accuracy, recover, replay, events,
     alarms, export, report, plot, sources, view, sweep, optimise, study_,
+    calibrate,
 ):  # fmt: skip
     main.add_command(command)

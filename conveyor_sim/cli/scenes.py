@@ -16,6 +16,9 @@ from conveyor_sim.support.progress import ProgressBar
 if TYPE_CHECKING:
     from conveyor_sim.support.modbus_rows import WordOrder
 
+LIMITS_WIDTH = 120
+"""Characters of a line of the list of limits without a terminal."""
+
 
 @click.command()
 @click.argument("scene")
@@ -132,7 +135,8 @@ def tags(
 
 
 @click.command()
-@click.argument("scene")
+@click.argument("scene", required=False)
+@click.option("--limits", is_flag=True, help="Print what the simulation does not model; needs no SCENE.")
 @click.option(
     "--price",
     is_flag=True,
@@ -140,11 +144,20 @@ def tags(
 )
 @click.option("--at", type=float, help="Simulated time in s at which to measure (default: half the duration).")
 @scene_options
-def explain(scene: str, price: bool, at: float | None, options: SceneOptions) -> None:
+def explain(scene: str | None, limits: bool, price: bool, at: float | None, options: SceneOptions) -> None:
     """Explain effects and time step of SCENE.
 
-    Lists why each effect is on or off, and what bounds the time step; with --price, what each effect costs.
+    Lists why each effect is on or off, and what bounds the time step; with --price, what each effect costs; with
+    --limits, what no scene models.
     """
+    if limits:
+        from conveyor_sim.physics.effects.limits import limits_text
+
+        show_lines(limits_text(line_width() or LIMITS_WIDTH))
+        if scene is None and not price and at is None:
+            return
+    if scene is None:
+        raise ConveyorError("explain: no SCENE given, expected a scene file, or --limits alone")
     from conveyor_sim.physics.model import build_model
     from conveyor_sim.report.explain.choices import explanation, price_table
 

@@ -45,6 +45,11 @@ def draw(page: Path) -> Path:
     """Simulate the scene of a page and draw it. Return the picture."""
     simulation = Simulation(parse_scene(scene_text(page)), threads=1)
     simulation.advance(round(MOMENTS.get(page.stem, MOMENT) / simulation.scene.tick))
+    return draw_state(simulation, IMAGES / f"{page.stem}.webp")
+
+
+def draw_state(simulation: Simulation, file: Path) -> Path:
+    """Draw the present state of a simulation with the forces between bottles. Return the picture."""
     bottles = simulation.bottles()
     frame = PlantFrame(
         time=simulation.time,
@@ -60,8 +65,12 @@ def draw(page: Path) -> Path:
     with style.look():
         figure = plant_figure(StaticGeometry.of(simulation.scene), frame, simulation.scene.name)
         image = Image.open(io.BytesIO(style.rendered(figure, (".png",))[".png"])).convert("RGB")
+    return save_image(image, file)
+
+
+def save_image(image: Image.Image, file: Path) -> Path:
+    """Save a picture with at most WIDTH pixels a side. Return its file."""
     image.thumbnail((WIDTH, WIDTH))
-    file = IMAGES / f"{page.stem}.webp"
     file.parent.mkdir(parents=True, exist_ok=True)
     image.save(file, quality=60, method=6)
     return file

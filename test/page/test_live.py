@@ -209,16 +209,19 @@ def test_an_operator_is_told_to_change_the_mode_and_a_refusal_goes_when_it_no_lo
     assert missing(inject, ["test", "jo", "operator"]) == []
 
 
-def test_stop_is_offered_in_automatic(page: Any, live: Live) -> None:
+def test_stop_is_offered_in_automatic_and_comes_before_a_change_of_mode(page: Any, live: Live) -> None:
     signed_in(page, "jo")
     show_device(page, "machines/packer")
     choice, button = (f"[aria-label='Set machines/packer/cntrl_cmd{now}']" for now in ("", " now"))
     options = page.locator(f"{choice} option")
     enabled = [option.inner_text() for option in options.all() if option.is_enabled()]
     assert enabled == ["Stop", "Abort"]
+    mode = "[aria-label='Set machines/packer/mode now']"
+    assert missing(reason(page, mode), "machines/packer is in", ["Stopped", "mode", "stop it first"]) == []
     page.select_option(choice, label="Stop")
     page.click(button)
     soon(page, lambda: live.source.snapshot.values["machines/packer/state"] == 2.0, "it stops")
+    soon(page, lambda: reason(page, mode) == "", "its mode may change")
 
 
 def test_the_run_has_one_pause_control(page: Any) -> None:

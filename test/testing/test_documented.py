@@ -20,6 +20,7 @@ NAMES = [
     "test_level.py",
     "level.py",
     "test_warm.py",
+    "test_node.py",
     "by_hand.py",
 ]
 PLUGIN = ("-p", "conveyor_sim.testing.plugin", "-p", "no:cacheprovider")
@@ -28,7 +29,7 @@ PLUGIN = ("-p", "conveyor_sim.testing.plugin", "-p", "no:cacheprovider")
 def write(folder: Path, *blocks: int) -> None:
     for block in blocks:
         name, text = BLOCKS[block]
-        (folder / name).write_text(text)
+        (folder / name).write_text(f"# {name}\n{text}")
 
 
 def timeless(text: str) -> str:
@@ -72,8 +73,14 @@ def test_it_starts_from_a_warm_line(pytester: pytest.Pytester) -> None:
     pytester.runpytest_inprocess(*PLUGIN).assert_outcomes(passed=2)
 
 
+def test_a_node_is_the_controller(pytester: pytest.Pytester) -> None:
+    pytest.importorskip("rclpy", reason="ROS 2 is not sourced")
+    write(pytester.path, 2, 5, 7)
+    pytester.runpytest_inprocess(*PLUGIN).assert_outcomes(passed=1)
+
+
 def test_it_goes_without_pytest(capsys: pytest.CaptureFixture[str]) -> None:
-    exec(compile(BLOCKS[7][1], "by_hand.py", "exec"), {})
+    exec(compile(BLOCKS[8][1], "by_hand.py", "exec"), {})
     assert capsys.readouterr().out == "0.1\n"
 
 

@@ -124,7 +124,8 @@ def mode_objection(state: int) -> str:
     """Return why a control mode can't change in a state, "" if it can."""
     if state in MODE_STATES:
         return ""
-    return f"is in {STATE_TEXTS[state]}, expected {_listed(MODE_STATES)} for a change of mode"
+    remedy = ": stop it first" if state in FROM[Command.STOP] else ""
+    return f"is in {STATE_TEXTS[state]}, expected {_listed(MODE_STATES)} for a change of mode{remedy}"
 
 
 def _listed(states: Collection[PackMLState]) -> str:

@@ -39,10 +39,13 @@ export class Rights {
   }
 
   _mode(device, value, role) {
-    const now = this._now(device), { texts } = this.rights;
-    if (this._may(role, now, value ?? now)) return "";
-    const reserved = this._may(role, now, now) ? value : now;
-    return `${texts[reserved]} is for ${anyOf(this._setters(reserved))}.`;
+    const now = this._now(device), { texts, mode_objections: objections } = this.rights;
+    if (!this._may(role, now, value ?? now)) {
+      const reserved = this._may(role, now, now) ? value : now;
+      return `${texts[reserved]} is for ${anyOf(this._setters(reserved))}.`;
+    }
+    const objection = objections[this.desk.view.recording.latest(`${device}/state`)];
+    return objection ? `${device} ${objection}.` : "";
   }
 
   _may(role, from, to) {

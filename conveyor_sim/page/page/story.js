@@ -147,7 +147,7 @@ export class Story {
   _marks() {
     const marks = [...this.differences];
     for (const event of this.events) {
-      if (event.kind === "alarm_raised") marks.push({ time: event.time, kind: "alarm", text: `alarm ${event.name.replace(/^alarms\//, "")}: ${event.text}` });
+      if (event.kind === "alarm_raised") marks.push({ time: event.time, kind: "alarm", text: `alarm ${event.name.replace(/^alarms\//, "")}${event.text && ": "}${event.text}` });
       if (event.kind === "fault_injected") marks.push({ time: event.time, kind: "fault", text: `fault ${event.name}` });
       if (event.kind === "command_refused") marks.push({ time: event.time, kind: "refused", text: `refused ${event.name}: ${event.text}` });
     }

@@ -9,7 +9,7 @@ const MOST = 8; // signals
 const MARKS = { alarm: "#d55e00", fault: "#cc79a7", refused: "#e69f00", failed: "#d1330d", difference: "#8250df" };
 const LONGEST = 28; // longest text of a mark
 const WINDOWS = [10, 30, 60, 120]; // s
-const GUTTER = 76, GUTTER_LETTERS = 11; // px beside the trends, and letters that fit there
+const GUTTER = 76, MARGIN = 6; // px beside the trends, and on both sides of a name there
 const LANE = 1.5; // height of a switch's lane, whose values are 0 and 1
 const LANES_SHARE = 0.17, LANES_MOST = 0.65; // share of the height: one lane, and all lanes at most
 
@@ -144,17 +144,24 @@ export class Trends {
     return { times, values: this.switches.includes(name) ? values.map((value) => value + LANE * this._lane(name)) : values };
   }
 
+  // Returns a name, shortened to a width in px of the canvas.
+  _fitting(context, name, width) {
+    let text = name;
+    for (let letters = name.length; letters > 1 && context.measureText(text).width > width; letters -= 1) text = short(name, letters);
+    return text;
+  }
+
   // Names beside the lanes, because colours alone are not accessible.
   _lanes(plot) {
-    const { ctx: context, bbox } = plot;
+    const { ctx: context, bbox } = plot, margin = MARGIN * devicePixelRatio;
     context.save();
     context.fillStyle = palette().muted;
     context.font = `${11 * devicePixelRatio}px system-ui, sans-serif`;
     context.textAlign = "right";
     context.textBaseline = "middle";
     for (const name of this.switches) {
-      const text = short(name.startsWith("alarms/") ? name.slice(7) : name.split("/").slice(-2)[0], GUTTER_LETTERS);
-      context.fillText(text, bbox.left - 6 * devicePixelRatio, plot.valToPos(LANE * this._lane(name) + 0.5, "switch", true));
+      const text = this._fitting(context, name.startsWith("alarms/") ? name.slice(7) : name.split("/").slice(-2)[0], bbox.left - 2 * margin);
+      context.fillText(text, bbox.left - margin, plot.valToPos(LANE * this._lane(name) + 0.5, "switch", true));
     }
     context.restore();
   }

@@ -182,7 +182,7 @@ SERVER_KINDS: tuple[ServerKind, ...] = (
         extra="mqtt",
         clients="clients that the broker admits",
     ),
-    ServerKind(WEB, 8080, ("aiohttp",), f"{_HERE}.web.server", _web, _users_can, by_default=False),
+    ServerKind(WEB, 8080, ("aiohttp", "cryptography"), f"{_HERE}.web.server", _web, _users_can, by_default=False),
     ServerKind(
         "foxglove",
         8765,

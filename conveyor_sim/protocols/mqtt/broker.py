@@ -77,7 +77,8 @@ class Broker:
             socket.create_connection((self.host, self.port), PATIENCE).close()
         except OSError as error:
             raise ServerError(
-                f"{self.address}: can't be reached ({_reason(error)}), expected an MQTT broker"
+                f"{self.address}: can't be reached ({_reason(error)}), expected an MQTT broker that runs there, "
+                "such as mosquitto"
             ) from error
 
 

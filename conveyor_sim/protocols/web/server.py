@@ -18,7 +18,7 @@ from aiohttp import WSCloseCode, WSMsgType, web
 from conveyor_sim.line.commands.authority import AUTOMATIC, IN_CONTROL, MAY, MAY_SET, MODES, PEOPLE, unauthorized
 from conveyor_sim.line.commands.inputs import DECLARE, SET, Input, WriterKind
 from conveyor_sim.line.commands.receipt import Receipt
-from conveyor_sim.line.machines.packml import CNTRL_CMD, Command, stops
+from conveyor_sim.line.machines.packml import CNTRL_CMD, Command, PackMLState, mode_objection, stops
 from conveyor_sim.line.run_state import STATES
 from conveyor_sim.line.tag import COMMANDS, Tag
 from conveyor_sim.page.bundle import HEADERS, PAGE, page_files
@@ -65,6 +65,7 @@ def page_rights() -> dict[str, Any]:
         "control": MAY_CONTROL,
         "commands": {role: [mode for mode in MODES if role in IN_CONTROL[mode]] for role in ROLES},
         "modes": MAY_SET,
+        "mode_objections": {int(state): reason for state in PackMLState if (reason := mode_objection(state))},
         "texts": MODES,
         "automatic": AUTOMATIC,
         "people": PEOPLE,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The line of ../two_machines.py as studies want it, both machines with 4 s between failures and 1 s to repair."""
+"""The line of validation/two_machines.py as studies want it, with 4 s between failures and 1 s to repair."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from conveyor_sim.scene import Scene
 
 sys.path.append(str(Path(__file__).parent.parent))
 
-import two_machines as theory
+from validation import two_machines as theory
 
 MACHINE = theory.Machine(between_failures=4.0, to_repair=1.0)
 

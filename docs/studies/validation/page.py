@@ -101,10 +101,5 @@ def text_of(value: Range) -> str:
         return f"{'above' if math.isinf(value.high) else 'below'} {value.value:.4g}"
     if not math.isfinite(value.high - value.low):
         return f"{value.value:.3g} (one run)"
-    scale = max(abs(value.low), abs(value.high))
-    digits = max(
-        2,
-        math.ceil(math.log10(scale or 1.0)),
-        min(7, 1 + math.ceil(math.log10(scale / (value.high - value.low))) if scale else 2),
-    )
-    return f"{value.value:.{digits}g} ({value.low:.{digits}g} to {value.high:.{digits}g})"
+    decimals = min(6, max(0, 1 - math.floor(math.log10(value.high - value.low))))
+    return f"{value.value:.{decimals}f} ({value.low:.{decimals}f} to {value.high:.{decimals}f})"

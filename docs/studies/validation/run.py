@@ -28,6 +28,7 @@ with while_importing():
     import click
 
     from conveyor_sim.accuracy.measure.cpu import Meter
+    from conveyor_sim.errors import ConveyorError
     from conveyor_sim.report.figures import style
     from conveyor_sim.report.figures.files import write
     from conveyor_sim.support.progress import ProgressBar
@@ -82,11 +83,25 @@ def draw(source: Source) -> None:
 @click.command()
 @one_line()
 @click.argument("names", nargs=-1, metavar="[SOURCE]...", type=click.Choice(sources.MODULES))
-@click.option("--jobs", default=len(os.sched_getaffinity(0)), show_default="one per core", help="Processes.")
+@click.option(
+    "--jobs",
+    type=click.IntRange(min=1),
+    default=len(os.sched_getaffinity(0)),
+    show_default="one per core",
+    help="Processes.",
+)
 @click.option("--missing", is_flag=True, help="Make only the runs that are not stored yet.")
 @click.option("--tables", "only_tables", is_flag=True, help="Make no run; renew page and pictures.")
 def main(names: tuple[str, ...], jobs: int, missing: bool, only_tables: bool) -> None:
     """Run SOURCE... (default: all) and renew docs/validation.md."""
+    try:
+        renew(names, jobs, missing, only_tables)
+    except ConveyorError as error:
+        raise click.ClickException(str(error)) from error
+
+
+def renew(names: tuple[str, ...], jobs: int, missing: bool, only_tables: bool) -> None:
+    """Run the sources named (none: all), unless only tables are wanted, and write pictures and page."""
     chosen = {}
     for source in (sources.source(name) for name in names or sources.MODULES):
         stored = {store.key(source, run) for run in store.read(source)} if missing else set()

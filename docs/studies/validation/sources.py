@@ -15,6 +15,9 @@ MODULES = (
     "aguirre_2014",
     "to_2001",
     "mankoc_2007",
+    "two_machine_line",
+    "longer_line",
+    "labellers",
 )
 """Modules of this folder that have a `SOURCE`."""
 

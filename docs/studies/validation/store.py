@@ -4,10 +4,13 @@
 from __future__ import annotations
 
 import csv
+import io
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from conveyor_sim.errors import ConveyorError
+from conveyor_sim.support.files import write_file
 from validation.source import Case, Run, Source
 
 FOLDER = Path(__file__).resolve().parents[2] / "validation"
@@ -32,11 +35,21 @@ def key(source: Source, run: Case) -> tuple[str, ...]:
 
 
 def read(source: Source) -> list[Run]:
-    """Return the stored runs of a source that its present cases include, in their order."""
+    """Return the stored runs of a source that its present cases include, in their order.
+
+    Raise ConveyorError if the file has no column for a parameter of the cases, or a row of another length.
+    """
     if not table(source).exists():
         return []
     with table(source).open(newline="", encoding="utf-8") as file:
-        rows = [{name: _value(text) for name, text in row.items()} for row in csv.DictReader(file)]
+        lines = csv.DictReader(file)
+        rows = []
+        for line in lines:
+            wanted = {*source.cases()[0], CPU}
+            if None in line or None in line.values() or not wanted <= set(line):
+                names = ", ".join(source.cases()[0])
+                raise ConveyorError(f"{table(source)}, line {lines.line_num}: expected columns {names}, results, {CPU}")
+            rows.append({name: _value(text) for name, text in line.items()})
     stored = {key(source, row): row for row in rows}
     return [stored[name] for name in (key(source, case) for case in source.cases()) if name in stored]
 
@@ -45,11 +58,12 @@ def write(source: Source, runs: Sequence[Run]) -> None:
     """Write the runs of a source in the order of its cases. Values have six significant digits."""
     FOLDER.mkdir(exist_ok=True)
     order = {key(source, case): number for number, case in enumerate(source.cases())}
-    with table(source).open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, list(runs[0]), lineterminator="\n")
-        writer.writeheader()
-        for run in sorted(runs, key=lambda run: order[key(source, run)]):
-            writer.writerow({name: _text(value) for name, value in run.items()})
+    text = io.StringIO()
+    writer = csv.DictWriter(text, list(runs[0]), lineterminator="\n")
+    writer.writeheader()
+    for run in sorted(runs, key=lambda run: order[key(source, run)]):
+        writer.writerow({name: _text(value) for name, value in run.items()})
+    write_file(table(source), text.getvalue().encode())
 
 
 def _text(value: Any) -> str:

@@ -117,7 +117,7 @@ def test_a_controller_that_holds_its_last_command_does_not_undo_it(held: Command
 
 def test_a_machine_changes_hands_only_where_it_works_on_nothing() -> None:
     sim = filling()
-    says = f"{FILLER}: is in Execute, expected Stopped, Idle, Aborted or Complete for a change of mode"
+    says = f"{FILLER}: is in Execute, expected Stopped, Idle, Aborted or Complete for a change of mode: stop it first"
     assert mode(sim, "operator", MANUAL) == says and mode(sim, "engineer", MAINTENANCE) == says
     assert mode(sim, "operator", AUTOMATIC) == "", "it is in it"
     for words in ([Command.STOP], [Command.RESET], [Command.START, Command.COMPLETE], [Command.ABORT]):

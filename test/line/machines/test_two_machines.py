@@ -26,7 +26,7 @@ Draw = Callable[[], float]
 
 @pytest.fixture(scope="module")
 def theory() -> ModuleType:
-    return load_study("two_machines")
+    return load_study("validation/two_machines")
 
 
 def half_width(values: list[float]) -> float:

@@ -3,16 +3,20 @@
 
 from __future__ import annotations
 
+import os
 import re
 import signal
 import subprocess
 import sys
 from collections.abc import Callable
+from importlib.metadata import packages_distributions, requires
 from pathlib import Path
 from urllib.request import urlopen
 
 import pytest
 from facts import missing
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 from protocols.modbus.modbus_line import speed_of
 from protocols.served import COMMAND, Served
 from protocols.waiting import PATIENCE, until
@@ -31,6 +35,7 @@ pytest.importorskip("pymodbus", reason="pymodbus is not installed: pip install c
 
 from pymodbus.client import ModbusTcpClient
 
+RUN = Path(__file__).parents[3] / "requirements" / "run.txt"
 SCENE = "scenarios/zoned_line"
 FIRST, SECOND = "belts/zone1/cmd_speed", "belts/zone2/cmd_speed"
 STATES = {"bottles", "belts", "signals", "counters"}
@@ -53,6 +58,28 @@ def program(tmp_path: Path) -> str:
     """Return the reference of a controller."""
     (tmp_path / "speeds.py").write_text(PROGRAM)
     return f"{tmp_path / 'speeds.py'}:Speeds"
+
+
+@pytest.fixture
+def without_extras(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder for PYTHONPATH that hides all packages but those which this package requires without extras."""
+    required: set[str] = set()
+    more = [line for line in RUN.read_text().splitlines() if not line.startswith("#")]
+    while more:
+        requirement = Requirement(more.pop())
+        name = canonicalize_name(requirement.name)
+        if name not in required and (requirement.marker is None or requirement.marker.evaluate({"extra": ""})):
+            required.add(name)
+            more.extend(requires(name) or ())
+    hidden = [
+        module
+        for module, names in packages_distributions().items()
+        if (required | {"conveyor-sim"}).isdisjoint(map(canonicalize_name, names))
+    ]
+    assert "asyncua" in hidden and "aiohttp" not in hidden
+    folder = tmp_path_factory.mktemp("without_extras")
+    (folder / "sitecustomize.py").write_text(f"import sys\nsys.modules.update(dict.fromkeys({hidden!r}))\n")
+    return folder
 
 
 def states(bag: Path) -> dict[tuple[str, int], bytes]:
@@ -184,10 +211,14 @@ def test_a_wrong_controller_is_one_sentence_and_leaves_nothing(
     assert not (tmp_path / "bag").exists()
 
 
-def test_the_demo_shows_a_line_that_its_controller_runs(tmp_path: Path) -> None:
+def test_the_demo_shows_a_line_that_its_controller_runs(tmp_path: Path, without_extras: Path) -> None:
     with (tmp_path / "log").open("w") as log:
         demo = subprocess.Popen(
-            [sys.executable, *COMMAND[:-1], "demo", "--no-browser"], cwd=tmp_path, stdout=log, stderr=log
+            [sys.executable, *COMMAND[:-1], "demo", "--no-browser"],
+            cwd=tmp_path,
+            stdout=log,
+            stderr=log,
+            env={**os.environ, "PYTHONPATH": str(without_extras)},
         )
     try:
         told = (tmp_path / "log").read_text

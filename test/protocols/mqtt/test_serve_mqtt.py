@@ -133,5 +133,6 @@ def test_a_broker_that_is_not_there_is_said_before_anything_is_compiled(
     served = command(SCENE, "--mqtt", f"mqtt://127.0.0.1:{port}")
     served.process.wait(timeout=PATIENCE)
     expected = f"Error: mqtt://127.0.0.1:{port}: can't be reached (Connection refused), expected an MQTT broker"
-    assert served.told.splitlines() == [expected] and served.process.returncode == 1
+    (line,) = served.told.splitlines()
+    assert line.startswith(expected) and served.process.returncode == 1
     assert {path.name for path in tmp_path.iterdir()} == {"log"}

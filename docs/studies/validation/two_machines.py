@@ -1,37 +1,25 @@
 # SPDX-License-Identifier: Apache-2.0
 """Two machines that fail, and the conveyor between them: the simulated line against the closed form.
 
-    python docs/studies/two_machines.py     (about 2 minutes; writes two_machines.csv beside itself)
-
 The model of continuous flow (Zimmern 1956; Wijngaard 1979; Gershwin and Schick 1980; reviewed by Dallery and Gershwin
 1992): bottles are a fluid, both machines work at the same rate when they are up, the first one is never starved, the
 last one never blocked. Times between failures and to repair are exponential. A machine fails only while it works
-(operation-dependent failures).
+(operation-dependent failures). `two_machine_line.py` runs the comparison.
 """
 
 from __future__ import annotations
 
-import csv
 import math
-from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from conveyor_sim.support.interrupt import one_line, while_importing
-
-with while_importing():
-    import numpy as np
-    from rich.progress import track
-
-    from conveyor_sim import Simulation
-    from conveyor_sim.scene import Scene, parse_scene
-    from conveyor_sim.statistics.intervals import mean_interval
+from conveyor_sim import Simulation
+from conveyor_sim.scene import Scene, parse_scene
 
 RATE = 4.0  # 1/s, of both machines
 SPEED = 0.5  # m/s
 RADIUS = 0.03  # m
 REGION = 0.05  # m before the end of the conveyor, from which the second machine takes bottles
 LENGTHS = (0.7, 1.0, 1.6, 2.4)  # m, from the first machine to the end
-SEEDS = range(10)
 DURATION = 500.0  # s, after WARM_UP
 WARM_UP = 20.0  # s
 
@@ -91,8 +79,19 @@ class Machine(NamedTuple):
         return self.between_failures / (self.between_failures + self.to_repair)
 
 
-def efficiency(first: Machine, second: Machine, rate: float, buffer: float) -> float:
-    """Throughput over `rate` (1/s, of both machines) with room for `buffer` bottles between them.
+class Balance(NamedTuple):
+    """Steady state of two machines with a buffer between them, as shares of time."""
+
+    efficiency: float
+    """Throughput over the rate of the machines: the share in which the second machine works."""
+    starved: float
+    """Share in which the second machine is up and the buffer empty."""
+    blocked: float
+    """Share in which the first machine is up and the buffer full."""
+
+
+def balance(first: Machine, second: Machine, rate: float, buffer: float) -> Balance:
+    """Return the steady state with room for `buffer` bottles between machines of a rate (1/s, of both).
 
     Derived from the balance of flows in the steady state. l1, l2 are the rates of failure, r1, r2 of repair, l and r
     their sums, u the rate of bottles. While both work or none does, the level x stands. So nothing but "first up,
@@ -114,16 +113,22 @@ def efficiency(first: Machine, second: Machine, rate: float, buffer: float) -> f
     empty_up, full_up = rate / l2, rate * full / l1
     starved, blocked = empty_up * fails / r1, full_up * fails / r2
     second_works = inside * (1.0 + repairs / fails) + empty_up + full_up
-    return second_works / (inside * (2.0 + repairs / fails + fails / repairs) + empty_up + full_up + starved + blocked)
+    whole = inside * (2.0 + repairs / fails + fails / repairs) + empty_up + full_up + starved + blocked
+    return Balance(second_works / whole, starved / whole, blocked / whole)
+
+
+def efficiency(first: Machine, second: Machine, rate: float, buffer: float) -> float:
+    """Return throughput over `rate` (1/s, of both machines) with room for `buffer` bottles between them."""
+    return balance(first, second, rate, buffer).efficiency
 
 
 def conveyor_efficiency(first: Machine, second: Machine, rate: float, holds: float, transport: float) -> float:
     """Return the efficiency for a conveyor as buffer, which holds `holds` bottles and needs `transport` s end to end.
 
-    rate x transport bottles are in transit while the line flows. They buffer nothing: the free room counts. Seen in a
-    rate x transport bottles are in transit while the line flows. They buffer nothing: only free room counts. Seen in a
-    the second one took `transport` earlier. In that time the second one takes at most rate x transport bottles, so the
-    value is a lower bound. It deviates only if both machines fail within one such time.
+    rate x transport bottles are in transit while the line flows. They buffer nothing: only free room counts. A bottle
+    that the second machine takes frees room for the first one only `transport` later. In that time the second one
+    takes at most rate x transport bottles, so the value is a lower bound. It deviates only if both machines fail
+    within one such time.
     """
     return efficiency(first, second, rate, holds - rate * transport)
 
@@ -135,12 +140,13 @@ def transport(length: float) -> float:
 
 def line(length: float, first: Machine, second: Machine, seed: int) -> Scene:
     """Build a conveyor of a length (m) between two machines."""
-    ways = {name: _breakdown(machine) for name, machine in (("first", first), ("second", second))}
+    ways = {name: breakdown(machine) for name, machine in (("first", first), ("second", second))}
     places = {"length": length, "whole": length + 0.2, "reach": length - REGION, "radius": RADIUS}
     return parse_scene(LINE.format(rate=RATE, speed=SPEED, seed=seed, **places, **ways))
 
 
-def _breakdown(machine: Machine) -> str:
+def breakdown(machine: Machine) -> str:
+    """Return the times of a failure of a scene file."""
     between, repair = (f"{{kind: exponential, mean: {mean}}}" for mean in machine)
     return f"{{between: {between}, repair: {repair}}}"
 
@@ -160,29 +166,3 @@ def taken(scene: Scene, duration: float) -> int:
     before = simulation.counts.removed
     simulation.advance(round(duration / scene.tick))
     return simulation.counts.removed - before
-
-
-def main() -> None:
-    """Compare conveyors of some lengths, each over some seeds."""
-    machine = Machine(4.0, 1.0)
-    with (Path(__file__).with_suffix(".csv")).open("w", newline="") as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(
-            ["length, m", "holds", "transport, s", "closed form", "simulated", "95 % +-", "no buffer", "infinite"]
-        )
-        for length in track(LENGTHS, "two_machines"):
-            scenes = (line(length, machine, machine, seed) for seed in SEEDS)
-            runs = [taken(scene, DURATION) / (RATE * DURATION) for scene in scenes]
-            held, way = holds(length), transport(length)
-            expected: list[Any] = [
-                conveyor_efficiency(machine, machine, RATE, held, way),
-                np.mean(runs),
-                mean_interval(runs).half_width,
-            ]
-            limits = efficiency(machine, machine, RATE, 0.0), machine.alone
-            table.writerow([length, held, f"{way:.2f}", *(f"{value:.4f}" for value in (*expected, *limits))])
-
-
-if __name__ == "__main__":
-    with one_line():
-        main()

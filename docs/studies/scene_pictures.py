@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Pictures of docs/layout.md, docs/check.md and docs/build_a_line.md: python docs/studies/scene_pictures.py.
+
+Needs matplotlib and Pillow, as the tests do.
+"""
+
+from __future__ import annotations
+
+import re
+import tempfile
+from pathlib import Path
+
+from part_pictures import draw_state, save_image
+from PIL import Image
+
+from conveyor_sim.report.figures.draw import plot_scene
+from conveyor_sim.scene import Scene, load_scene
+from conveyor_sim.simulation import Simulation
+from conveyor_sim.support.resources import scene_path
+
+DOCS = Path(__file__).resolve().parents[1]
+LAYOUT = DOCS / "layout.md"
+CHECKED = {"check": "scenarios/two_stations", "build_a_line": DOCS.parent / "examples" / "my_line.yaml"}
+"""Scenes that pages show as `check` draws them, by page."""
+MOMENT = 22.0
+"""Simulated time of the picture of the layout, s."""
+
+
+def example(folder: Path) -> Scene:
+    """Write the files of docs/layout.md into a folder. Return the scene that uses them."""
+    for name, text in re.findall(r"^```yaml\n# (\S+\.yaml)\n(.*?)^```", LAYOUT.read_text(), re.DOTALL | re.MULTILINE):
+        (folder / name).parent.mkdir(exist_ok=True)
+        (folder / name).write_text(text)
+    return load_scene(folder / "line.yaml")
+
+
+def main() -> None:
+    """Draw all pictures."""
+    with tempfile.TemporaryDirectory() as folder:
+        simulation = Simulation(example(Path(folder)), threads=1)
+        simulation.advance(round(MOMENT / simulation.scene.tick))
+        print(draw_state(simulation, DOCS / "images" / "layout.webp"))
+        for page, scene in CHECKED.items():
+            drawn = plot_scene(load_scene(scene_path(scene)), Path(folder) / page)
+            print(save_image(Image.open(drawn).convert("RGB"), DOCS / "images" / f"{page}.webp"))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Rows with an exact symmetry: equal bits on any number of threads, and a warning where a scatter is missing."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from facts import missing
+from hard_cases.case import Case, read_table
+from hard_cases.measures import run
+
+from conveyor_sim.report.flow.flow import flow_of
+from conveyor_sim.scene import parse_scene
+from conveyor_sim.scene.layout.entries import LATERAL_SCATTER
+from conveyor_sim.scene.places import Places
+
+ROWS = {case.name: case for case in read_table() if case.family == "symmetry"}
+
+
+@pytest.mark.parametrize("name", ROWS)
+def test_the_bits_are_equal_on_two_threads(name: str) -> None:
+    """A tick near the end of the run, when the columns have buckled; forces of many bottles are summed then."""
+    case = ROWS[name]
+    scene = case.scene()
+    last = scene.duration_ticks - 1
+    first, second = (run(case, scene, threads=threads, hash_at=last) for threads in (1, 2))
+    assert first.hash == second.hash != 0
+    assert first.measures == second.measures
+
+
+def findings(case: Case) -> list[str]:
+    """Findings of `check` on the scene of a row as it is written, without the annex."""
+    text = json.dumps({"name": case.name, "duration": case.duration, **case.given})
+    scene = parse_scene(text, f"{case.name}.yaml")
+    places = Places(scene)
+    return [f"{finding.level} {finding.line(places)}" for finding in flow_of(scene).findings]
+
+
+@pytest.mark.parametrize("name", ["exact_column", "scattered_column", "nearly_exact_column"])
+def test_only_a_feed_without_scatter_is_warned_of(name: str) -> None:
+    warnings = [text for text in findings(ROWS[name]) if "no scatter" in text]
+    assert len(warnings) == (name == "exact_column")
+    assert all(missing(text, ["infeeds.feed", "table", "lateral_jitter", "0.5 mm"]) == [] for text in warnings)
+
+
+def test_the_scatter_of_the_row_is_the_default_along_conveyors() -> None:
+    assert ROWS["scattered_column"].given["infeeds"]["feed"]["lateral_jitter"] == LATERAL_SCATTER
