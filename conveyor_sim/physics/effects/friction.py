@@ -228,7 +228,9 @@ TANGENTIAL_SPRING = Effect(
     "and its elongation when it falls. At moving rails the slip is relative to the rail. Available with leapfrog, "
     "semi-implicit Euler, velocity Verlet (order 2) and rk4 (order 4 while sticking, 2 at the onset of sliding), which "
     "limit the force once per step. Not available with dormand_prince, which rejects steps, and linearly_implicit, "
-    "which solves for all velocities at once",
+    "which solves for all velocities at once. At straight rails along a belt, springs carry a part of a queue, "
+    "where Karim and Corwin (2014) measured that walls carry nothing: loads on bottles come out too small there, which "
+    "is unsafe for crushing",
     source="Cundall and Strack 1979; Mindlin 1949, Thornton, Cummins and Cleary 2013",
     called_for=_spring,
     absent="no contact with tangential, or no friction in contacts",

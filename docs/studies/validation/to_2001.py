@@ -16,7 +16,7 @@ MODELS = ("springs", "curve")
 OUTLETS = (2.0, 2.5, 3.0, 3.5, 4.0, 5.0)
 ANGLE, STEEP = 30.0, 60.0
 STEEP_OUTLETS = (2.5, 3.0)
-SEEDS = range(1, 13)
+SEEDS = range(1, 11)
 DISCS, WIDTH = 200, 20.0
 STILL = 1.0
 """s without a disc: a jam. In free fall over a diameter a disc takes 0.07 s."""
@@ -40,7 +40,7 @@ def hopper(model: str, angle: float, outlet: float, seed: int) -> Hopper:
     """Return a hopper whose belt pulls every disc with half its weight, throughout."""
     return Hopper(
         outlet, angle, DISCS, WIDTH, FAST, seed, friction=0.5, base_friction=0.5, springs=model == "springs",
-        flat=False, steps=500,
+        flat=False, steps=500, pitch=1.35, jitter=0.11,
     )  # fmt: skip
 
 
@@ -126,7 +126,7 @@ SOURCE = Source(
     "sharply with the outlet, and falls with the hopper angle (700 discs in the paper on angles).",
     simulated=f"{DISCS} discs, on a belt at {FAST:g} m/s with friction 0.5: every disc slips and is pulled with "
     f"0.5 m g, which stands for gravity. Friction 0.5 between discs and walls; walls at {ANGLE:g} degrees from a flat "
-    f"bottom; a jam if none leaves for {STILL:g} s before 80 % have left. {len(SEEDS)} lattices per point, with "
+    f"bottom; a jam if none leaves for {STILL:g} s before 80 % have left. {len(SEEDS)} loose packings per point, with "
     "tangential springs and with the friction curve.",
     cases=cases,
     simulate=simulate,
