@@ -55,9 +55,10 @@ effects: {contact_arrays: off, peaks: off}                          # without a 
   measured curve.
 - `restitution` in place of `coefficient`: the speed after an impact divided by the speed before it. The coefficient is
   computed from it.
-- `tangential`: a spring along the contact stores how far a sticking contact was displaced. Use it for bottles at rest:
-  in queues, on accumulation tables, in funnels that may clog ([below](#tangential-springs)). With the friction curve,
-  which has no memory, they creep.
+- `tangential`: a spring along the contact stores how far a sticking contact was displaced. Use it between bottles where
+  arches may lock: in funnels and at outlets that may clog. With the friction curve, which has no memory, they creep. Do
+  not use it at straight rails where loads on bottles matter, as in queues and on accumulation tables
+  ([below](#tangential-springs)).
 - `base_radius`: the base is a ring. A bottle that straddles two belts turns, and its base brakes its spin. A type
   without `base_radius` stands on a point, as in the paper. [base.md](base.md) states the differences, and when to set
   `tangential` in `base`.
@@ -70,6 +71,20 @@ n mu m g, the complete drag of the belt on n bottles. With tangential springs th
 the stop no longer grows with the length of the queue. This requires that bottles can't roll along the rails. A zigzag
 file rolls like a train of gears, and its stop bears the complete load. A file in which one bottle and two bottles
 alternate can't roll: with 49 bottles, the stop bears the load of 7 (`test/physics/test_janssen.py`).
+
+**That relief is a property of the model, and it is unsafe for crushing.** Karim and Corwin (2014) measured the force of
+discs on a running belt against a stop: between straight walls, even of high friction, the walls carried nothing. The
+sliding belt makes the discs vibrate, and this relaxes friction at the walls. The friction curve agrees, springs don't
+([validation](validation.md#force-on-a-stop-between-straight-and-sawtooth-walls)):
+
+| question | contacts of bottles | contacts with straight rails |
+| --- | --- | --- |
+| loads in queues, crushing, force on stops and gates | either | friction curve (no `tangential`) |
+| jams at outlets and in funnels, arches | springs | springs at funnel walls |
+
+`check`, `explain` and `run` warn of springs at straight rails along a belt if `limits` or `outputs.damage` ask for
+loads. `vibration` of the chain does not replace the choice: it moves all bottles alike, and relaxes springs at rails
+only in part.
 
 `stiffness` is the same at every overlap. With `stiffness_ratio`, for Hertz contacts, the stiffness grows with the
 overlap as in Mindlin's theory: `tangential: {stiffness_ratio: 0.88}` for glass. A contact sticks or slides as one

@@ -12,6 +12,7 @@ from rich.table import Table
 
 from conveyor_sim.physics.effects.choice import EFFECTS
 from conveyor_sim.physics.effects.notes import notes
+from conveyor_sim.physics.effects.sprung_walls import sprung_walls
 from conveyor_sim.physics.model import Model
 from conveyor_sim.physics.model.remedies import step_limit
 from conveyor_sim.physics.model.slow_drag import slow_drag
@@ -46,8 +47,10 @@ def note_rows(model: Model) -> list[tuple[str, str]]:
 
 def scene_warnings(model: Model) -> list[str]:
     """Return sentences on settings of a scene that make results wrong from the start; empty without any."""
-    slow = slow_drag(model.plant, {choice.name for choice in model.effects if choice.on})
-    return [] if slow is None else [slow.sentence]
+    on = {choice.name for choice in model.effects if choice.on}
+    return [
+        found.sentence for found in (slow_drag(model.plant, on), sprung_walls(model.plant, on)) if found is not None
+    ]
 
 
 def accuracy_rows(model: Model) -> list[tuple[str, str]]:

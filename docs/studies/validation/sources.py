@@ -14,6 +14,7 @@ MODULES = (
     "aguirre_2010",
     "aguirre_2014",
     "to_2001",
+    "karim_corwin_2014",
     "mankoc_2007",
     "two_machine_line",
     "longer_line",
