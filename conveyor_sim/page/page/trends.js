@@ -160,7 +160,7 @@ export class Trends {
     context.textAlign = "right";
     context.textBaseline = "middle";
     for (const name of this.switches) {
-      const text = this._fitting(context, name.startsWith("alarms/") ? name.slice(7) : name.split("/").slice(-2)[0], bbox.left - 2 * margin);
+      const text = this._fitting(context, name.startsWith("alarms/") ? name.slice(7).split("/").slice(-2).join("/") : name.split("/").slice(-2)[0], bbox.left - 2 * margin);
       context.fillText(text, bbox.left - margin, plot.valToPos(LANE * this._lane(name) + 0.5, "switch", true));
     }
     context.restore();
