@@ -67,10 +67,11 @@ NAVIGATION = {
                 "docs/view",
                 "docs/drawings",
             ),
-            *("docs/effects", "docs/base", "docs/energy_and_damage", "docs/glossary"),
+            *("docs/effects", "docs/calibration", "docs/base", "docs/energy_and_damage", "docs/glossary"),
         ],
         "What to rely on": [
             "docs/validation",
+            "docs/limits",
             "docs/accuracy",
             "docs/stability",
             "docs/reliability",

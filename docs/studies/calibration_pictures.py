@@ -134,7 +134,6 @@ def vibration(ax: Axes) -> None:
     x0, y0 = 4.7, -0.2
     arrow(ax, (x0, y0), (x0 + 2.5, y0), color=style.INK, linewidth=FINE)
     arrow(ax, (x0, y0), (x0, y0 + 2.4), color=style.INK, linewidth=FINE)
-    words(ax, x0 + 1.4, y0 - 0.7, "(Hz)")
     words(ax, x0 + 0.1, y0 + 2.6, "acceleration (m/s^2)", align="left")
     places = [n / 50 for n in range(116)]
     ax.plot(
@@ -144,7 +143,7 @@ def vibration(ax: Axes) -> None:
     )
     ax.plot([x0, x0 + 1.2], [y0 + 1.8] * 2, color=MEASURED, linestyle=":", linewidth=1.6)
     ax.plot([x0 + 1.2] * 2, [y0, y0 + 1.8], color=MEASURED, linestyle=":", linewidth=1.6)
-    words(ax, x0 + 1.2, y0 - 0.3, "frequency", MEASURED)
+    words(ax, x0 + 1.2, y0 - 0.3, "frequency (Hz)", MEASURED)
 
 
 SKETCHES: dict[str, Callable[[Axes], None]] = {

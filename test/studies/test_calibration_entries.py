@@ -147,6 +147,19 @@ def test_forces_that_determine_no_stiffness(
     assert missing(result.output, ["glass and steel", "stiffness", *facts]) == []
 
 
+def test_samples_of_different_stiffness_give_the_interval_of_their_mean() -> None:
+    rows = [
+        measurement(10 * place + n, "compression", str(place), overlap=1e-5 * n, force=stiffness * 1e-5 * n)
+        for place, stiffness in enumerate((1.8e5, 2e5, 2.2e5))
+        for n in range(1, 6)
+    ]
+    law = elastic(rows)
+    assert isinstance(law, Elastic) and law.field == "stiffness" and law.value is not None
+    assert law.value.value == pytest.approx((1.8 * 2.0 * 2.2) ** (1 / 3) * 1e5, rel=1e-4)
+    assert law.value.low < 1.8e5 and law.value.high > 2.2e5
+    assert missing(law.value.words, ["3 samples"]) == []
+
+
 def test_exact_forces_give_the_exact_stiffness() -> None:
     for field, stiffness, exponent in (("stiffness", 2e5, 1.0), ("hertz_stiffness", 3e7, 1.5)):
         overlaps = (1e-5, 3e-5, 6e-5, 1e-4, 2e-4)
@@ -238,6 +251,15 @@ def test_a_bottle_has_no_place_in_a_row_of_vibration(tmp_path: Path) -> None:
     row = {"quantity": "vibration", **PAIR, "acceleration": 2.0, "frequency": 25.0, "direction": 0.0}
     result = run(write(tmp_path / "data.csv", [row]))
     assert result.exit_code == 1 and missing(result.output, ["data.csv:2: material", "none"]) == []
+
+
+def test_texts_of_a_file_stay_in_comments(tmp_path: Path) -> None:
+    lines = "a\nslip_limit: 99"
+    path = write(tmp_path / f"{lines}.csv", [{**press(1e-4, 10.0), "sample": lines}, drop(0.1, 0.05), hold(0.5)])
+    result = run(path)
+    assert result.exit_code == 0, result.output
+    assert missing(result.stdout, ["a\\nslip_limit: 99"]) == []
+    assert pasted(result.stdout).slip_limit == pasted("").slip_limit
 
 
 def test_options_are_checked(tmp_path: Path) -> None:

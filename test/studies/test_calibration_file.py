@@ -40,6 +40,7 @@ def saved(folder: Path, content: str | bytes) -> Path:
         f"{HEADER},drop height (mm),note\n{ROW},,any; text\n",
         "quantity;material;other;force (N);mass (g)\r\nbase_friction;glass;chain;0,52;350\r\n",
         "quantity;material;other;force (N);mass (g)\nbase_friction;glass;chain;0.52;3.5e2\n",
+        "\ufeffquantity;material;other;force (N);mass (g);\r\nbase_friction;glass;chain;0,52;350;\r\n;;;;;\r\n",
         "quantity\tmaterial\tother\tforce (N)\tmass (g)\nbase_friction\tglass\tchain\t0,52\t350\n",
         f'"{HEADER.replace(",", chr(34) + "," + chr(34))}"\n{ROW}\n',
         f"{HEADER}\n{ROW}\n".encode("utf-16"),

@@ -26,7 +26,7 @@ def block(language: str) -> str:
 
 def test_the_example_prints_the_entries_that_are_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    Path("measurements.csv").write_text(block("csv"))
+    Path("measurements.csv").write_text(block("text"))
     result = CliRunner().invoke(main, ["calibrate", "measurements.csv"])
     assert result.exit_code == 0, result.output
     assert result.stdout == block("yaml")

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from conveyor_sim.studies.calibration.calibrate import Calibration, ContactValues
 from conveyor_sim.studies.calibration.estimate import Estimate
 from conveyor_sim.studies.calibration.restitution import Restitution
+from conveyor_sim.support.printable import printable
 
 
 def entries(calibration: Calibration, source: str) -> str:
@@ -16,7 +17,7 @@ def entries(calibration: Calibration, source: str) -> str:
     A contact without stiffness is a comment, because a scene would refuse it. A vibration is one, too, because it
     belongs into an entry that the scene has.
     """
-    return "\n".join([f"# from {source}, by conveyor-sim calibrate", *_lines(calibration)]) + "\n"
+    return "\n".join([f"# from {printable(source)}, by conveyor-sim calibrate", *_lines(calibration)]) + "\n"
 
 
 def _lines(calibration: Calibration) -> Iterator[str]:

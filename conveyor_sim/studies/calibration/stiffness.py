@@ -18,6 +18,7 @@ from conveyor_sim.statistics.intervals import CONFIDENCE, mean_interval, t_quant
 from conveyor_sim.statistics.least_squares import profile
 from conveyor_sim.studies.calibration.estimate import Estimate, by_sample
 from conveyor_sim.studies.calibration.read import Measurement
+from conveyor_sim.support.printable import printable
 
 F8 = NDArray[np.float64]
 
@@ -70,7 +71,7 @@ def elastic(rows: Sequence[Measurement]) -> Elastic | str:
     samples = by_sample(rows) if named else [list(range(len(rows)))]
     for sample in samples:
         if len(set(overlaps[sample])) < _LEAST_ROWS:
-            name = f"sample {rows[sample[0]].sample}: " if named else ""
+            name = f"sample {printable(rows[sample[0]].sample, 60)}: " if named else ""
             return f"{name}{len(set(overlaps[sample]))} overlaps don't determine it, expected {_LEAST_ROWS} or more"
         slope = float(np.polyfit(overlaps[sample], forces[sample], 1)[0])
         if slope * np.ptp(overlaps[sample]) <= 1e-9 * forces[sample].max():

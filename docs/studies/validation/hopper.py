@@ -55,6 +55,8 @@ class Hopper:
     """m/s."""
     pitch: float = 1.06
     """Spacing of the lattice that the discs start from."""
+    jitter: float = 0.02
+    """Largest displacement of a disc from its place in the lattice, along each axis."""
     steps: int = 250
     """Steps per tick of 10 ms. The preset would assume that all discs press on one contact, and take 40 times more."""
 
@@ -67,7 +69,8 @@ class Hopper:
 def places(hopper: Hopper) -> NDArray[np.float64]:
     """Return the positions of the discs (discs, 2), m: a triangular lattice of random orientation and offset.
 
-    Each disc is moved a little. The packing closes as it moves. Discs nearest to the outlet come first.
+    Each disc is moved at random by up to `jitter`. The packing closes as it moves. Discs nearest to the outlet come
+    first.
     """
     random = np.random.default_rng(hopper.seed)
     turn = random.uniform(0.0, math.pi / 3.0)
@@ -77,9 +80,9 @@ def places(hopper: Hopper) -> NDArray[np.float64]:
     lattice = hopper.pitch * np.stack([i + 0.5 * j, 0.5 * math.sqrt(3.0) * j], axis=-1).reshape(-1, 2)
     c, s = math.cos(turn), math.sin(turn)
     lattice = (lattice + random.uniform(0.0, 1.0, 2)) @ np.array([[c, s], [-s, c]])
-    inside = lattice[_room(hopper, lattice) > 0.53]
+    inside = lattice[_room(hopper, lattice) > 0.51 + hopper.jitter]
     nearest = inside[np.argsort(-inside[:, 0], kind="stable")][: hopper.discs]
-    return (nearest + random.uniform(-0.02, 0.02, nearest.shape)) * DIAMETER
+    return (nearest + random.uniform(-hopper.jitter, hopper.jitter, nearest.shape)) * DIAMETER
 
 
 def _room(hopper: Hopper, points: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -66,7 +66,7 @@ class Range(NamedTuple):
         share = hits / runs
         middle = (share + z * z / (2.0 * runs)) / (1.0 + z * z / runs)
         half = z * math.sqrt(share * (1.0 - share) / runs + z * z / (4.0 * runs * runs)) / (1.0 + z * z / runs)
-        return cls(share, max(0.0, middle - half), min(1.0, middle + half))
+        return cls(share, min(share, max(0.0, middle - half)), max(share, min(1.0, middle + half)))
 
     @classmethod
     def of_slope(cls, x: ArrayLike, y: ArrayLike) -> Range:

@@ -15,8 +15,8 @@ from validation.source import Case, Range, Row, Run, Source
 MODELS = ("springs", "curve")
 OUTLETS = (2.0, 2.5, 3.0, 3.5, 4.0, 5.0)
 ANGLE, STEEP = 30.0, 60.0
-STEEP_OUTLETS = (2.5, 3.0)
-SEEDS = range(1, 13)
+STEEP_OUTLETS = (3.5,)
+SEEDS = range(1, 11)
 DISCS, WIDTH = 200, 20.0
 STILL = 1.0
 """s without a disc: a jam. In free fall over a diameter a disc takes 0.07 s."""
@@ -40,7 +40,7 @@ def hopper(model: str, angle: float, outlet: float, seed: int) -> Hopper:
     """Return a hopper whose belt pulls every disc with half its weight, throughout."""
     return Hopper(
         outlet, angle, DISCS, WIDTH, FAST, seed, friction=0.5, base_friction=0.5, springs=model == "springs",
-        flat=False, steps=500,
+        flat=False, steps=500, pitch=1.35, jitter=0.11,
     )  # fmt: skip
 
 
@@ -117,21 +117,26 @@ def draw(runs: Sequence[Run]) -> Figure:
 SOURCE = Source(
     name="to_2001",
     title="Jamming probability of a hopper",
-    citation="K. To, P.-Y. Lai, H. K. Pak, Jamming of granular flow in a two-dimensional hopper, Physical Review "
-    "Letters 86, 71 (2001); Physica A 315, 174 (2002); K. To, Effect of hopper angles on jamming probability in "
-    "2-dimensional hoppers, Chinese Journal of Physics 40, 379 (2002).",
-    read="Abstracts of the papers of 2002. The values at D = 2 d and 5 d are from the validation notes; without an "
-    "error, 'about' is taken as within 0.1.",
-    measured="Metal discs fall through a two-dimensional hopper. The probability that an arch stops the flow falls "
-    "sharply with the outlet, and falls with the hopper angle (700 discs in the paper on angles).",
+    citation="K. To, P.-Y. Lai, H. K. Pak, Jamming of granular flow in a two-dimensional hopper, Physical "
+    "Review Letters 86, 71 (2001); Physica A 315, 174 (2002); K. To, Effect of hopper angles on jamming "
+    "probability in 2-dimensional hoppers, Chinese Journal of Physics 40, 379 (2002).",
+    read="Abstracts of the papers of 2002. The values at D = 2 d and 5 d are from the validation notes; "
+    "without an error, 'about' is taken as within 0.1.",
+    measured="Metal discs fall through a two-dimensional hopper. The probability that an arch stops the flow "
+    "falls sharply with the outlet, and falls with the hopper angle (700 discs in the paper on angles).",
     simulated=f"{DISCS} discs, on a belt at {FAST:g} m/s with friction 0.5: every disc slips and is pulled with "
     f"0.5 m g, which stands for gravity. Friction 0.5 between discs and walls; walls at {ANGLE:g} degrees from a flat "
-    f"bottom; a jam if none leaves for {STILL:g} s before 80 % have left. {len(SEEDS)} lattices per point, with "
+    f"bottom; a jam if none leaves for {STILL:g} s before 80 % have left. {len(SEEDS)} loose packings per point, with "
     "tangential springs and with the friction curve.",
     cases=cases,
     simulate=simulate,
     rows=rows,
     seconds=0.5,
+    discussion="With springs the probability falls from 1 to 0 between 3 and 5 diameters. With the friction "
+    "curve it falls earlier: arches hold for a while, but creep and give way. The two published figures that "
+    "could be read do not tell the models apart; the published curve between them would. Only springs hold an "
+    "arch for ever, so they are the choice for questions about clogging. The number of discs in the experiment "
+    "could not be read; more discs have more chances to jam.",
     draw=draw,
     caption="Probability of a jam against the outlet: springs lock arches, the friction curve does not.",
 )
