@@ -4,6 +4,7 @@
 # make bench   sets up the same, then measures speed against others, about 40 minutes (ARGS="dense plant" or ARGS=--quick)
 # make accuracy  sets up the same, then makes the studies of docs/accuracy.md, about an hour (ARGS=funnel for one)
 # make promises  sets up the same, then holds all shipped scenes and fifteen unseen ones to the presets' promises, 5 to 25 minutes
+# make defaults  sets up the same, then compares integrators, friction solvers and friction laws, a quarter of an hour (ARGS=push for one)
 # make fuzz    sets up the same, then attacks with random input (ARGS="--minutes 60 --jobs 2"; --target bags for one; failures are kept)
 # make validation  sets up the same, then compares with published experiments (docs/validation.md), at most an hour (ARGS=tipping for one)
 # make stability  sets up the same, then runs the hard cases of docs/stability.md in all settings, about 15 minutes
@@ -31,7 +32,7 @@ unexport ROS_DISTRO ROS_VERSION ROS_PYTHON_VERSION RMW_IMPLEMENTATION _ROS_WHEEL
 # Without bytecode on disk every process parses 350 files of ours anew, half a second of a core each: hundreds in the tests.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help run test bench accuracy promises fuzz stability validation numba-next lint docs docs-check site clean set-up set-up-test set-up-bench set-up-docs set-up-ci
+.PHONY: help run test bench accuracy promises defaults fuzz stability validation numba-next lint docs docs-check site clean set-up set-up-test set-up-bench set-up-docs set-up-ci
 
 help:
 	@sed -n 's/^# \(make .*\)/\1/p' Makefile
@@ -50,6 +51,9 @@ accuracy: set-up
 
 promises: set-up
 	@$(PYTHON) docs/studies/promises.py $(ARGS)
+
+defaults: set-up
+	@$(PYTHON) docs/studies/defaults.py $(ARGS)
 
 # Beside the tests, whose scenes and checks it uses.
 fuzz: set-up-test

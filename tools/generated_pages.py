@@ -35,6 +35,8 @@ def pages() -> Iterator[tuple[Path, str]]:
         page = DOCS / f"{name}.md"
         yield page, with_parts(page, page.read_text(encoding="utf-8"), parts)
     accuracy, promises, stability = (importlib.import_module(name) for name in ("accuracy", "promises", "stability"))
+    defaults = importlib.import_module("defaults")
+    yield defaults.PAGE, defaults.page()
     text = (DOCS / "accuracy.md").read_text(encoding="utf-8")
     yield DOCS / "accuracy.md", accuracy.page(text)
     yield promises.PAGE, promises.page()

@@ -12,7 +12,7 @@ def recorded_scene(line: Any, name: str) -> Scene:
 
     The scene is read with its recorded integrator and steps, because present defaults may be invalid for it. Random
     streams have the keys of the recording's format; in format 1 these are positions in lists. Machines work and count
-    as that format defines.
+    as that format defines, and so does implicit friction.
     """
     overrides = parse_overrides(line.overrides)
     accuracy = overrides.get("accuracy")
@@ -20,5 +20,10 @@ def recorded_scene(line: Any, name: str) -> Scene:
     recorded = {"integrator": str(line.integrator), "per_tick": int(line.steps_per_tick)}
     pinned = {**others, "preset": None, "tolerance": None, "dt": None, **recorded}
     scene = parse_again(line.scene_text, name, {**overrides, "accuracy": pinned})
-    scene._source = replace(scene._source, streams_by_index=line.format == 1, counts_starts=line.format < 3)
+    scene._source = replace(
+        scene._source,
+        streams_by_index=line.format == 1,
+        counts_starts=line.format < 3,
+        friction_anew=line.format < 4,
+    )
     return scene

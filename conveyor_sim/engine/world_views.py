@@ -15,7 +15,7 @@ _INTEGRATORS = frozenset({"peaks", "stage", "slopes", "linear", "damage"})
 _FORCES_OF_PAIRS = frozenset(f"pairs.{name}" for name in ("fx", "fy", "moment", "normal", "touch", "tangent", "parts"))
 NOT_FOR_LISTS = _INTEGRATORS | _FORCES_OF_PAIRS | {
     "spin", "load", "path", "implicit", "riding", "curves", "pair_law", "pairs.law", "rail_law", "static_friction",
-    "vibration",    "ledger", "moving.actuators", "moving.springs", "settings.atan",
+    "vibration", "ledger", "moving.actuators", "moving.springs", "settings.atan", "settings.warm",
 }  # fmt: skip
 NOT_FOR_CONTACTS = _INTEGRATORS | _FORCES_OF_PAIRS | {
     "load", "path", "implicit", "riding", "neighbourhood", "probe", "slots", "pairs.reach", "pairs.radius_i",

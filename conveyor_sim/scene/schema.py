@@ -175,6 +175,8 @@ class Origin:
     """True if random streams are keyed by places in lists, as in old recordings, and not by names."""
     counts_starts: bool = False
     """True if machines count started cycles and work while they wait, as in recordings before format 3."""
+    friction_anew: bool = False
+    """True if implicit friction is solved anew in each step, as in recordings before format 4."""
     files: Mapping[str, str] = field(default_factory=dict, compare=False)
     """Texts of the files that an expanded scene was read from beside its own, by path from its folder."""
     is_expanded: bool = field(default=False, compare=False)
@@ -374,6 +376,11 @@ class Scene(Part):
     def counts_starts(self) -> bool:
         """True if machines count started cycles and work while they wait, as in recordings before format 3."""
         return self._source.counts_starts
+
+    @property
+    def friction_anew(self) -> bool:
+        """True if implicit friction is solved anew in each step, as in recordings before format 4."""
+        return self._source.friction_anew
 
     @property
     def layout(self) -> LayoutPlan | None:

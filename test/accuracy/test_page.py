@@ -3,11 +3,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from types import ModuleType
 
 import pytest
 from ruamel.yaml import YAML
 from study_page import load_study
+
+from conveyor_sim.scene import load_scene
 
 
 @pytest.fixture(scope="module")
@@ -53,3 +56,49 @@ def test_the_unseen_scenes_are_those_of_the_generator(folder: str, numbers: str,
     read = {file.stem: YAML(typ="safe").load(file) for file in sorted(getattr(promises, folder).glob("*.yaml"))}
     assert read == generator.unseen_scenes(getattr(generator, numbers))
     assert len(read) == count
+
+
+@pytest.fixture(scope="module")
+def defaults() -> ModuleType:
+    return load_study("defaults")
+
+
+def test_the_first_variant_of_the_comparison_is_the_default(defaults: ModuleType) -> None:
+    law, solver = defaults.VARIANTS[0]
+    for name in defaults.SCENES:
+        shipped = load_scene(defaults.scene_files()[name])
+        compared = defaults.variant(name, law, solver)
+        assert compared.contacts == shipped.contacts
+        assert compared.friction_solver == shipped.friction_solver
+        assert shipped.friction_solver == "explicit"
+
+
+def test_each_variant_changes_the_law_or_the_solver_alone(defaults: ModuleType) -> None:
+    for name in defaults.SCENES:
+        for law, solver in defaults.VARIANTS:
+            scene = defaults.variant(name, law, solver)
+            shipped = load_scene(defaults.scene_files()[name])
+            assert scene.friction_solver == solver
+            for contact, before in zip(scene.contacts, shipped.contacts, strict=True):
+                assert (contact.tangential is not None) == (law == "springs")
+                assert contact.model_copy(update={"tangential": before.tangential}) == before
+
+
+def test_the_page_of_the_comparison_states_costs_over_the_default(
+    defaults: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(defaults, "TABLE", tmp_path / "defaults.csv")
+    assert "Not measured yet" in defaults.page()
+    common = {**dict.fromkeys(defaults.COLUMNS, ""), "scene": "push", "steps": "10"}
+    curve = {**common, "law": "curve", "solver": "explicit"}
+    defaults.keep(
+        [
+            {**common, "law": "springs", "solver": "explicit", "failure": "unstable: bottle 3"},
+            {**curve, "integrator": "leapfrog", "cost": "0.2", "impacts": "0.004", "resting": "7e-17", "load": "16.4"},
+            {**curve, "integrator": "rk4", "cost": "0.5", "impacts": "0.02"},
+        ]
+    )
+    rows = [line for line in defaults.page().splitlines() if line.startswith("| ")][2:]
+    assert rows[0] == "| curve | explicit | leapfrog | 10 | 1 | 0.4 % | 0 % | 16.4 | kept |"
+    assert "| 2.5 | 2 % | - | - | **not kept** |" in rows[1]
+    assert "unstable: bottle 3" in rows[2]

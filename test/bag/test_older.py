@@ -27,6 +27,7 @@ from conveyor_sim.protocols.tags.bag_provider import BagTagProvider
 from conveyor_sim.protocols.tags.line_mirror import LineMirrorError
 from conveyor_sim.report.summarize import summarize
 from conveyor_sim.run.playback import Playback
+from conveyor_sim.scene import parse_scene
 from conveyor_sim.simulation import Simulation
 
 OLD = Path(__file__).parent / "old"
@@ -38,6 +39,8 @@ inputs of every operation.
 """
 CYCLES = OLD / "before_cycles.mcap"
 """Format 2: a filler, a capper and two packers with failures, a reset, and rates above the nominal ones."""
+FRICTION = OLD / "before_warm_friction.mcap"
+"""Format 3, recorded with commit cab9d27: a zigzag queue of four bottles with implicit friction in few steps."""
 EYE = "photo_eyes/eye/blocked"
 
 
@@ -67,6 +70,24 @@ def test_machines_of_the_second_format_count_as_recorded() -> None:
     first, last = recorded[0].data, recorded[-1].data
     assert first.processed[0] == 1 and last.effectiveness.max() > 1.2 and last.since.max() == 417
     assert last.rate_limit.tolist() == last.rate.tolist() and np.isnan(last.set_effectiveness).all()
+
+
+def test_implicit_friction_of_the_third_format_is_solved_as_recorded() -> None:
+    """Replayed bit for bit, with friction that is solved anew in each step; the present solver gives another run."""
+    report = replay(FRICTION)
+    assert (report.difference, report.last_tick) == (None, 30)
+    with open_bag(FRICTION) as bag:
+        assert bag.format == 3
+        line = bag.line
+        recorded = list(bag.read("bottles"))[-1].data
+        scene = recorded_scene(line, "bag")
+    again, present = Simulation(scene), Simulation(parse_scene(line.scene_text))
+    for sim in (again, present):
+        sim.advance(30)
+    assert scene.friction_anew and again.model.settings.warm is None and present.model.settings.warm is not None
+    for name in ("x", "y", "vx", "vy", "omega"):
+        assert np.array_equal(getattr(again.bottles(), name), getattr(recorded, name))
+    assert not np.array_equal(present.bottles().x, recorded.x)
 
 
 def test_its_tags_are_those_of_its_scene() -> None:

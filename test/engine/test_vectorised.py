@@ -115,7 +115,7 @@ def at(values: Any, c: int) -> Any:
 def both(compliance: Any, c: int) -> Any:
     if compliance is None:
         return None
-    return compliance[c], 0.5
+    return compliance[c], 0.5, 0.01 * compliance[c]
 
 
 def test_tangential_springs() -> None:

@@ -103,15 +103,15 @@ def test_implicit_friction_sticks_at_a_rail_in_twenty_steps(curve: str) -> None:
     sim.advance(2)
     state = sim.bottles()
     slip = state.vx[0] + RADIUS * state.omega[0]
-    # On the arctangent a residue of the slip stays: p is full only in the limit, and the last steps press little.
-    assert 0.0 <= slip < 2.0 * limit
+    # A residue of the slip stays, because the last steps press little and start from the friction of harder ones.
+    assert 0.0 <= slip < 0.02 * v_t
     assert state.vx[0] == pytest.approx((v_t + slip) / 2.0, rel=1e-9)
 
 
 @pytest.mark.parametrize("curve", ["polynomial", "atan"])
 @pytest.mark.parametrize("solver", ["implicit", "explicit"])
 def test_implicit_friction_is_stable_with_many_contacts(solver: str, curve: str) -> None:
-    """A bottle that spins between six rails that press it: implicit, its spin only falls, and to nothing.
+    """A bottle that spins between six rails that press it: with implicit friction its spin dies out.
 
     Each contact alone would stop the slip within a step, six together would turn it round and make it grow: the mass is
     split by closed contacts. At this step explicit friction chatters at its full force for ever.
@@ -143,7 +143,8 @@ def test_implicit_friction_is_stable_with_many_contacts(solver: str, curve: str)
         spins.append(RADIUS * sim.bottles().omega[0])
     assert sim.contacts().kind.size == 6
     if solver == "implicit":
-        assert (np.diff(spins) <= 1e-12 * limit).all()
-        assert abs(spins[-1]) < 1e-6 * limit
+        # It may overshoot, because the contacts start from the friction of the last step.
+        assert np.abs(spins).max() < 20.0 * limit
+        assert np.abs(spins[-20:]).max() < 1e-6 * limit
     else:
         assert np.abs(spins[-20:]).max() > limit

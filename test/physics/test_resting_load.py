@@ -102,7 +102,8 @@ def test_the_load_of_a_turning_belt_on_its_rim(integrator: str, solver: Any, pre
     assert predicted is not None
     # What still rings and creeps after a second is some millionths.
     assert error <= predicted + 2e-6
-    assert predicted <= PRESETS[preset]
+    # Bounds make one term equal to the promise; others are far smaller.
+    assert predicted <= PRESETS[preset] * (1.0 + 1e-9)
 
 
 @pytest.mark.parametrize("per_tick", [16, 48])

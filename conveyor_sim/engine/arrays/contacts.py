@@ -48,7 +48,8 @@ class PairSprings(NamedTuple):
     """Tangential springs of the pairs, (P,), and a copy by pair that survives a rebuild of the list."""
 
     elongation: F8
-    """Elongation along the tangent, m; positive slip lengthens it."""
+    """Elongation along the tangent, m; positive slip lengthens it. A pair without a spring has its friction of the last
+    evaluation here, N, if implicit friction starts from it (`EngineSettings.warm`)."""
     kept_i: U4
     kept_j: U4
     kept: F8
@@ -104,6 +105,8 @@ class Gathered(NamedTuple):
     """R omega of i plus that of j, m/s, for different radii, (BLOCK,)."""
     compliance: F8
     """Sum of `Implicit.compliance` of both bottles, s/kg, (BLOCK,)."""
+    kick: F8
+    """`Implicit.kick` of j minus that of i, laid out as `displacement`, (4 * BLOCK,)."""
     displacement: F8
     """Displacements of j minus those of i: x, y (m); sums of rotations (rad) and rim displacements (m), (4 * BLOCK,).
     """
@@ -133,3 +136,5 @@ class Implicit(NamedTuple):
     """Number of closed contacts, including the base."""
     compliance: F8
     """dt times mobility times closed contacts, s/kg, times `EngineSettings.ahead`."""
+    kick: Triple | None
+    """Change of velocity in the last step, m/s, m/s, rad/s. None: forces are evaluated at predicted velocities."""

@@ -20,6 +20,7 @@ class NearSprings(NamedTuple):
     """Tangential springs by entry of a Near list, and a copy by bottle and piece that survives a rebuild."""
 
     elongation: F8
+    """Elongation in m, or friction in N (`PairSprings.elongation`)."""
     kept_bottle: U4
     kept_piece: U4
     kept: F8

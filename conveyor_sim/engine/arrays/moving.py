@@ -50,7 +50,7 @@ class MovingSprings(NamedTuple):
     """Tangential springs at moving rails, by bottle slot and rail, so that they need no list."""
 
     elongation: F8
-    """Elongation, m, (S, Q)."""
+    """Elongation in m, or friction in N (`PairSprings.elongation`), (S, Q)."""
     path: F8
     """Displacement of the rail since springs were last updated, m or rad, (Q,)."""
 

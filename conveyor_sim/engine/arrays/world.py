@@ -40,6 +40,8 @@ class EngineSettings(NamedTuple):
     """Factor of b in implicit friction: B = max(0, ahead b - at_once) (`friction.py`)."""
     at_once: float
     """Part of ahead times b that stays explicit in implicit friction (`friction.py`)."""
+    warm: Any
+    """None: implicit friction is solved anew in each step; 1: it starts from that of the last step (`friction.py`)."""
     lag: float
     """Steps by which velocities are older than positions, in the slip on belts: 1/2 for leapfrog, else 0."""
 

@@ -42,8 +42,32 @@ def contact_force(
     share: effective overlap over geometric overlap, 1 for a single contact; N and T are scaled by it. closing: m/s,
     relative velocity (a minus b) along n. slip: m/s, relative velocity of the contact points along t. atan: selects the
     friction curve (`friction.py`). spring: m, elongation of the tangential spring, or None. implicit: None for explicit
-    friction; for implicit friction two numbers: dt/m_t times `EngineSettings.ahead` in s/kg, and
-    `EngineSettings.at_once`, dimensionless.
+    friction, else as in `contact_parts`.
+    """
+    normal, tangential, _ = contact_parts(
+        law, e, curves, slip_limit, atan, overlap, share, closing, slip, spring, implicit
+    )
+    return normal, tangential
+
+
+@part
+def contact_parts(
+    law: ContactLaw,
+    e: int,
+    curves: Any,
+    slip_limit: float,
+    atan: Any,
+    overlap: float,
+    share: float,
+    closing: float,
+    slip: float,
+    spring: Any,
+    implicit: Any,
+) -> tuple[float, float, float]:
+    """Return N and T as `contact_force`, and the part of T in N that is friction by the curve, all in N.
+
+    implicit: None, or dt/m_t times `EngineSettings.ahead` in s/kg, `EngineSettings.at_once`, and the slip (m/s) minus
+    the first one times the friction (N) from which the solver starts (`friction.py`).
     """
     depth = 0.0 if overlap < 0.0 else overlap
     elastic = elastic_force(law, e, curves, depth)
@@ -51,8 +75,9 @@ def contact_force(
     normal = share * add_drag(law, e, damped, elastic, depth, closing)
     # Coulomb's law needs a pressing contact; paper damping may pull at the end of a rebound.
     pressing = 0.0 if normal < 0.0 else normal
-    tangential = _tangential(law, e, slip_limit, atan, depth, share, pressing, slip, spring, implicit)
-    return normal, add_drag(law, e, tangential, elastic, depth, -slip * share)
+    sliding = _sliding(law, e, slip_limit, atan, pressing, slip, implicit)
+    tangential = _tangential(law, e, depth, share, pressing, slip, spring, sliding)
+    return normal, add_drag(law, e, tangential, elastic, depth, -slip * share), sliding
 
 
 @part
@@ -74,25 +99,28 @@ def drag_force(law: ContactLaw, e: int, elastic: float, depth: float, velocity: 
 
 
 @part
-def _tangential(
-    law: ContactLaw,
-    e: int,
-    slip_limit: float,
-    atan: Any,
-    depth: float,
-    share: float,
-    pressing: float,
-    slip: float,
-    spring: Any,
-    implicit: Any,
+def _sliding(
+    law: ContactLaw, e: int, slip_limit: float, atan: Any, pressing: float, slip: float, implicit: Any
 ) -> float:
-    """Return Coulomb friction in N: by its regularised curve or, if the pair has one, by its tangential spring."""
+    """Return Coulomb friction in N by its regularised curve."""
     if law.friction is None:
         return 0.0
     most = law.friction[e] * pressing
-    sliding = -most * _curve_share(most, slip, slip_limit, atan, implicit)
+    return -most * _curve_share(most, slip, slip_limit, atan, implicit)
+
+
+@part
+def _tangential(
+    law: ContactLaw, e: int, depth: float, share: float, pressing: float, slip: float, spring: Any, sliding: float
+) -> float:
+    """Return friction in N: by its curve or, if the pair has one, by its tangential spring."""
+    if law.friction is None:
+        return 0.0
     if spring is None:
         return sliding
+    if law.tangential_stiffness is None:
+        return sliding
+    most = law.friction[e] * pressing
     stiff = _tangential_stiffness(law, e, depth)
     held = -share * _add_damping(stiff * spring, law.tangential_damping, e, slip)
     held = -most if -most > held else held
@@ -103,6 +131,8 @@ def _tangential(
 @part
 def _tangential_stiffness(law: ContactLaw, e: int, depth: float) -> float:
     """Return the tangential spring's stiffness at an overlap, N/m: constant, or 8 G* sqrt(R* delta) (Mindlin 1949)."""
+    if law.tangential_stiffness is None:
+        return 0.0
     if law.tangential_mindlin is None:
         return law.tangential_stiffness[e]
     return law.tangential_stiffness[e] + law.tangential_mindlin[e] * math.sqrt(depth)
@@ -112,9 +142,9 @@ def _tangential_stiffness(law: ContactLaw, e: int, depth: float) -> float:
 def _curve_share(most: float, slip: float, slip_limit: float, atan: Any, implicit: Any) -> float:
     if implicit is None:
         return friction_share(slip, slip_limit, atan)
-    compliance, at_once = implicit
+    compliance, at_once, start = implicit
     b = most * compliance * (1.0 / slip_limit) - at_once
-    return implicit_share(slip, 0.0 if b < 0.0 else b, slip_limit, atan)
+    return implicit_share(start, 0.0 if b < 0.0 else b, slip_limit, atan)
 
 
 @part
@@ -167,6 +197,32 @@ def stretched(spring: Any, slip: float, dt: float) -> Any:
     if spring is None:
         return None
     return spring + dt * slip
+
+
+@part
+def history_after(
+    law: ContactLaw,
+    e: int,
+    spring: float,
+    kept: float,
+    overlap: float,
+    slip: float,
+    dt: float,
+    spring_dt: float,
+    normal: float,
+    share: float,
+    friction: float,
+) -> float:
+    """Return the elongation (m) of a spring after dt (s) of slip; for a contact without one, its friction (N).
+
+    kept: the elongation before, which stays if spring_dt is 0. Other arguments as in `spring_after`.
+    """
+    if law.tangential_stiffness is None:
+        return friction
+    after = spring_after(law, e, spring, overlap, slip, dt, normal, share)
+    after = after if spring_dt > 0.0 else kept
+    has_spring = _tangential_stiffness(law, e, 1.0) > 0.0
+    return after if has_spring else friction
 
 
 @part

@@ -6,14 +6,21 @@ One is the paper's polynomial 2 s/v_lim - (s/v_lim)^2, which is 1 from v_lim on;
 `atan`: None selects the polynomial, anything else the arctangent.
 
 Implicit: the force is that of the slip *after* the step, s + b v_lim p(s) = s_0 with b = dt mu N/(m_t v_lim), where
-1/m_t is the slip per unit of impulse. It never reverses the slip, at any step size.
+1/m_t is the slip per unit of impulse, with the mass of a bottle split among its closed contacts.
 
-This form is used by semi-implicit Euler and leapfrog. For velocity Verlet and rk4 the same equation is solved with B =
-max(0, ahead b - at_once) in place of b (`integrators.AHEAD`). At low slip the force then removes at most the share
-1/ahead of the slip in one step. Velocity Verlet evaluates the slip at the end of the step: its slip does not reverse if
-this share is at most 2/3. With rk4 the slip does not reverse if the share is at most 1. For b up to at_once/ahead,
-force and order of convergence equal those of explicit friction. For larger b, a contact under a steady load f mu N (f <
-1) creeps too fast by B f v_lim (semi-implicit Euler: b f v_lim, at any b).
+s_0 is the slip at the end of the step if all other forces of the last evaluation stay, and this contact has no friction
+(`EngineSettings.warm`). So one sweep over the contacts per step suffices: in slow creep the last solution starts the
+next one, as in the sequential impulses of rigid-body solvers (Catto, Fast and simple physics using sequential impulses,
+GDC 2006). Where velocities are steady, s = s_0 + dt T/m_t for the T of the last step, so T = -mu N p(s): the creep is
+that of explicit friction in steps of any length. A mode of the contacts with the share r of the split mobility
+is damped by sqrt(1 - r) per step, also beyond the limit of explicit friction. It may overshoot. Friction of the base is
+solved last, with all other forces of the step, so it needs no memory.
+
+Without a warm start (rk4, and recordings before format 4), s_0 is the slip at which forces are evaluated, and
+B = max(0, ahead b - at_once) takes the place of b (`integrators.AHEAD`). At low slip the force then removes at most the
+share 1/ahead of the slip in one step. With rk4 the slip does not reverse. For b up to at_once/ahead, force and order of
+convergence equal those of explicit friction. For larger b, a contact under a steady load f mu N (f < 1) creeps too fast
+by B f v_lim: at low slip by the share 2 B.
 
 The formulas have no branches and no division by a slip that may be 0, so that loops over them are vectorised.
 """

@@ -25,7 +25,7 @@ from conveyor_sim.engine.arrays.bodies import Bottles
 from conveyor_sim.engine.arrays.contacts import Gathered, Pairs
 from conveyor_sim.engine.arrays.world import EngineSettings, Worker, World
 from conveyor_sim.engine.compiler.compile import part
-from conveyor_sim.engine.contact.contact import carried, contact_force, spring_after, stretched
+from conveyor_sim.engine.contact.contact import carried, contact_parts, history_after, spring_after, stretched
 from conveyor_sim.engine.contact.path import displacement_in_touch, slip_time_of
 from conveyor_sim.engine.threads.workers import BLOCK, share
 
@@ -65,6 +65,7 @@ def pair_forces(world: World, worker: Worker, spring_dt: float) -> None:
         count: Any = uint64(min(BLOCK, stop - start))
         _gather(world.bottles.packed, world.spin, pairs, pairs.reach, first, count, gathered)
         _gather_compliance(world.implicit, pairs, first, count, gathered.compliance)
+        _gather_kicks(world.implicit, pairs, first, count, gathered.kick)
         _gather_displacements(world.path, pairs, pairs.reach, first, count, gathered.displacement)
         _law(world, gathered, first, count, spring_dt)
 
@@ -106,6 +107,12 @@ def _gather_compliance(implicit: Any, pairs: Pairs, first: int, count: int, comp
         return
     for c in range(count):
         compliance[c] = implicit.compliance[pairs.i[first + c]] + implicit.compliance[pairs.j[first + c]]
+
+
+@part
+def _gather_kicks(implicit: Any, pairs: Pairs, first: int, count: int, kick: Any) -> None:
+    if implicit is not None:
+        _gather_displacements(implicit.kick, pairs, pairs.reach, first, count, kick)
 
 
 @part
@@ -154,7 +161,8 @@ def _law(world: World, gathered: Gathered, first: int, count: int, spring_dt: fl
         else:
             spring = _drawn_out(world, gathered, c, p, overlap, nx, ny)
         slip_time = slip_time_of(path, spring_dt)
-        normal, tangential = contact_force(
+        start = _first_slip(world, gathered, c, p, slip, nx, ny, half * overlap)
+        normal, tangential, friction = contact_parts(
             pairs.law,
             p,
             world.curves,
@@ -165,7 +173,7 @@ def _law(world: World, gathered: Gathered, first: int, count: int, spring_dt: fl
             closing,
             slip,
             stretched(spring, slip, slip_time),
-            _compliance(settings, world.implicit, gathered, c),
+            _compliance(settings, world.implicit, gathered, c, start),
         )
         fx = -normal * nx - tangential * ny
         fy = tangential * nx - normal * ny
@@ -181,8 +189,9 @@ def _law(world: World, gathered: Gathered, first: int, count: int, spring_dt: fl
             pairs.normal[p] = normal
             pairs.normal[q] = normal
         if springs is not None:
-            after = spring_after(pairs.law, p, spring, overlap, slip, slip_time, normal, 1.0)
-            springs.elongation[p] = after if spring_dt > 0.0 else springs.elongation[p]
+            springs.elongation[p] = _history_after(
+                world, p, spring, overlap, slip, slip_time, normal, friction, spring_dt
+            )
 
 
 @part
@@ -245,10 +254,58 @@ def _rims_displacement(settings: EngineSettings, reach: Any, displacement: Any, 
 
 
 @part
-def _compliance(settings: EngineSettings, implicit: Any, gathered: Any, c: int) -> Any:
+def _history_after(
+    world: World,
+    p: int,
+    spring: float,
+    overlap: float,
+    slip: float,
+    slip_time: float,
+    normal: float,
+    friction: float,
+    spring_dt: float,
+) -> float:
+    """Return the new history of pair p: elongation (m) or friction (N), see `PairSprings.elongation`."""
+    pairs = world.pairs
+    kept = pairs.spring.elongation[p]
+    if world.settings.warm is not None:
+        return history_after(pairs.law, p, spring, kept, overlap, slip, slip_time, spring_dt, normal, 1.0, friction)
+    after = spring_after(pairs.law, p, spring, overlap, slip, slip_time, normal, 1.0)
+    return after if spring_dt > 0.0 else kept
+
+
+@part
+def _first_slip(
+    world: World, gathered: Gathered, c: int, p: int, slip: float, nx: float, ny: float, shorter: float
+) -> float:
+    """Return the slip (m/s) from which the implicit solver starts, without the friction of the last evaluation."""
+    settings, implicit, pairs = world.settings, world.implicit, world.pairs
+    if implicit is None:
+        return slip
+    if settings.warm is None:
+        return slip
+    return (
+        slip
+        + _slip_of_kick(settings, implicit.kick, pairs.reach, gathered.kick, c * _4, nx, ny, shorter)
+        - gathered.compliance[c] * pairs.spring.elongation[p]
+    )
+
+
+@part
+def _slip_of_kick(
+    settings: EngineSettings, kick: Any, reach: Any, gathered: Any, row: Any, nx: float, ny: float, shorter: float
+) -> float:
+    if kick is None:
+        return 0.0
+    along = gathered[row] * ny - gathered[row + _1] * nx
+    return along + _rims_displacement(settings, reach, gathered, row, shorter)
+
+
+@part
+def _compliance(settings: EngineSettings, implicit: Any, gathered: Any, c: int, start: float) -> Any:
     if implicit is None:
         return None
-    return gathered.compliance[c], settings.at_once
+    return gathered.compliance[c], settings.at_once, start
 
 
 @part

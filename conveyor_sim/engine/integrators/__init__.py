@@ -28,7 +28,13 @@ INTEGRATORS: dict[str, Advance] = {
 }
 
 AHEAD = {"leapfrog": (1.0, 0.0), "semi_implicit_euler": (1.0, 0.0), "velocity_verlet": (1.5, 0.5), "rk4": (1.0, 0.5)}
-"""Integrators with implicit friction: `EngineSettings.ahead` and `at_once` (`friction.py`)."""
+"""Implicit friction that is solved anew in each step: `EngineSettings.ahead` and `at_once` (`friction.py`).
+
+In a warm start they are 1 and 0. Recordings before format 4 hold steps without a warm start.
+"""
+
+WARM = frozenset({"leapfrog", "semi_implicit_euler", "velocity_verlet"})
+"""Integrators whose implicit friction starts from the forces of the last step (`EngineSettings.warm`)."""
 
 LAG = {"leapfrog": 0.5}
 """Integrators that use the belt's velocity at the bottle's mid-step position (`EngineSettings.lag`)."""

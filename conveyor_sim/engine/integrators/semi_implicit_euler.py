@@ -62,6 +62,7 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
                 left, right = stepped_run(world.riding, first, end, run)
                 _move(bottles, world.load, dt, left, right)
                 _turn(world.spin, dt, left, right)
+                _note_kick(world, world.implicit, dt, left, right)
                 accumulate_peaks(world.load, world.peaks, dt, left, right)
             ride(bottles, world.spin, world.riding, dt, first, end)
             end_examination(world, None, first, end)
@@ -89,6 +90,22 @@ def _move(bottles: Bottles, load: ForceSums, dt: float, first: int, end: int) ->
         bottles.x[i] = x
         bottles.y[i] = y
         pack_row(bottles.packed, i, x, y, vx, vy)
+
+
+@part
+def _note_kick(world: World, implicit: Any, dt: float, first: int, end: int) -> None:
+    """Store the changes of velocity, from which implicit friction predicts the slip of the next step."""
+    if implicit is None:
+        return
+    if implicit.kick is None:
+        return
+    bottles, spin, load, kick = world.bottles, world.spin, world.load, implicit.kick
+    for i in range(uint64(first), uint64(end)):
+        kick.x[i] = dt * (load.fx[i] * bottles.inverse_mass[i])
+        kick.y[i] = dt * (load.fy[i] * bottles.inverse_mass[i])
+    if spin is not None:
+        for i in range(uint64(first), uint64(end)):
+            kick.turn[i] = dt * (spin.moment[i] * spin.inverse_inertia[i])
 
 
 @part

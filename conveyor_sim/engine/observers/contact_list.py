@@ -81,7 +81,7 @@ def _rail_contacts(
             if contacts.share[c] > 0.0:
                 if count < kind.size:
                     spring = rail_elongation(world, i, contacts.entry[c])
-                    normal, tangential, _, _ = rail_contact(c, i, world, contacts, spring, 0.0, None)
+                    normal, tangential, _, _, _ = rail_contact(c, i, world, contacts, spring, 0.0, None, None)
                     nx, ny, overlap = contacts.nx[c], contacts.ny[c], contacts.overlap[c]
                     kind[count] = BOTTLE_RAIL
                     a[count] = i

@@ -102,7 +102,7 @@ def _list_rails(i: int, world: World, damage: Any, worker: Worker, count: int) -
         if contacts.share[c] > 0.0 and count < MOST_BORNE:
             entry = contacts.entry[c]
             spring = rail_elongation(world, i, entry)
-            normal, tangential, slip, _ = rail_contact(c, i, world, contacts, spring, 0.0, None)
+            normal, tangential, slip, _, _ = rail_contact(c, i, world, contacts, spring, 0.0, None, None)
             nx, ny = contacts.nx[c], contacts.ny[c]
             arm = bottles.radius[i] - contacts.overlap[c]
             x, y = bottles.x[i] + arm * nx, bottles.y[i] + arm * ny

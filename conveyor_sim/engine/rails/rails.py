@@ -4,11 +4,10 @@
 from typing import Any
 
 from conveyor_sim.engine.arrays.bodies import Bottles
-from conveyor_sim.engine.arrays.contacts import ContactLaw
 from conveyor_sim.engine.arrays.rails import RailContacts
-from conveyor_sim.engine.arrays.world import EngineSettings, World
+from conveyor_sim.engine.arrays.world import World
 from conveyor_sim.engine.compiler.compile import part
-from conveyor_sim.engine.contact.contact import carried, contact_force, spring_after, stretched
+from conveyor_sim.engine.contact.contact import carried, contact_parts, history_after, spring_after, stretched
 from conveyor_sim.engine.contact.path import displacement_in_touch, slip_time_of
 from conveyor_sim.engine.observers.ledger_parts import add_rail_parts
 from conveyor_sim.engine.rails.arc import arc_contact
@@ -71,11 +70,13 @@ def find_rail_contacts(i: int, world: World, contacts: RailContacts) -> int:
 
 @part
 def rail_contact(
-    c: int, i: int, world: World, contacts: RailContacts, spring: Any, spring_dt: float, implicit: Any
-) -> tuple[float, float, float, Any]:
+    c: int, i: int, world: World, contacts: RailContacts, spring: Any, spring_dt: float, implicit: Any, held: Any
+) -> tuple[float, float, float, Any, float]:
     """Return N and T (N) on bottle i in its contact c with a rail, its slip (m/s), and its spring before that slip.
 
-    spring: m, or None, to be elongated by spring_dt (s) of slip; implicit: as in `contact_force`.
+    The last number is the part of T that is friction by the curve, N.
+    spring: m, or None, to be elongated by spring_dt (s) of slip. implicit: `World.implicit`, or None for explicit
+    friction. held: friction of the last evaluation, N, if implicit friction starts from it.
     """
     bottles, spin, settings, law = world.bottles, world.spin, world.settings, world.rail_law
     nx, ny = contacts.nx[c], contacts.ny[c]
@@ -87,7 +88,7 @@ def rail_contact(
         slip += spin.omega[i] * rail_arm(contacts.overlap[c], bottles.radius[i], settings.lever)
     entry = law_entry(world, contacts, c, i)
     kept = carried(law, entry, spring, contacts.overlap[c], closing * spring_dt, slip * spring_dt)
-    normal, tangential = contact_force(
+    normal, tangential, friction = contact_parts(
         law,
         entry,
         world.curves,
@@ -98,9 +99,9 @@ def rail_contact(
         closing,
         slip,
         stretched(kept, slip, spring_dt),
-        implicit,
+        _compliance(world, implicit, contacts, c, i, slip, held),
     )
-    return normal, tangential, slip, kept
+    return normal, tangential, slip, kept, friction
 
 
 @part
@@ -124,7 +125,7 @@ def add_rail_forces(world: World, contacts: RailContacts, first: int, end: int, 
     railed = world.railed
     if railed is None:
         return
-    bottles, spin, load, law = world.bottles, world.spin, world.load, world.rail_law
+    bottles, spin, load = world.bottles, world.spin, world.load
     clear_rail_power(world.ledger, world.moving, first, end)
     clear_rail_push(world.moving, first, end)
     begin, stop = units(first, end)
@@ -135,9 +136,11 @@ def add_rail_forces(world: World, contacts: RailContacts, first: int, end: int, 
         for c in range(count):
             contacts.solution[c] = 0.0
             if contacts.share[c] > 0.0:
-                spring = _drawn_out(world, contacts, c, i, rail_elongation(world, i, contacts.entry[c]))
-                compliance = _compliance(world.settings, world.implicit, i)
-                normal, tangential, slip, spring = rail_contact(c, i, world, contacts, spring, slip_time, compliance)
+                held = rail_elongation(world, i, contacts.entry[c])
+                spring = _drawn_out(world, contacts, c, i, held)
+                normal, tangential, slip, spring, friction = rail_contact(
+                    c, i, world, contacts, spring, slip_time, world.implicit, held
+                )
                 load.fx[i] += -normal * contacts.nx[c] - tangential * contacts.ny[c]
                 load.fy[i] += -normal * contacts.ny[c] + tangential * contacts.nx[c]
                 add_rail_push(world.moving, contacts, c, bottles, i, normal, tangential)
@@ -148,10 +151,10 @@ def add_rail_forces(world: World, contacts: RailContacts, first: int, end: int, 
                         rail_arm(contacts.overlap[c], bottles.radius[i], world.settings.lever) * tangential
                     )
                 entry = law_entry(world, contacts, c, i)
-                contacts.solution[c] = _spring_after(
-                    law, entry, spring, contacts.overlap[c], slip, slip_time, normal, contacts.share[c]
+                contacts.solution[c] = _history_after(
+                    world, entry, spring, held, contacts, c, slip, slip_time, spring_dt, normal, friction
                 )
-        if spring_dt > 0.0:
+        if _stores(world, spring_dt):
             _store_springs(world, contacts, count, i)
 
 
@@ -181,12 +184,34 @@ def _drawn_out(world: World, contacts: RailContacts, c: int, i: int, spring: Any
 
 
 @part
-def _spring_after(
-    law: ContactLaw, entry: int, spring: Any, overlap: float, slip: float, dt: float, normal: float, share: float
+def _history_after(
+    world: World,
+    entry: int,
+    spring: Any,
+    held: Any,
+    contacts: RailContacts,
+    c: int,
+    slip: float,
+    dt: float,
+    spring_dt: float,
+    normal: float,
+    friction: float,
 ) -> float:
+    """Return the new history of contact c: elongation (m) or friction (N), see `PairSprings.elongation`."""
+    law, overlap, share = world.rail_law, contacts.overlap[c], contacts.share[c]
     if spring is None:
         return 0.0
+    if world.settings.warm is not None:
+        return history_after(law, entry, spring, held, overlap, slip, dt, spring_dt, normal, share, friction)
     return spring_after(law, entry, spring, overlap, slip, dt, normal, share)
+
+
+@part
+def _stores(world: World, spring_dt: float) -> bool:
+    """Return True if an evaluation stores the history of contacts: for warm starts, every one does."""
+    if world.settings.warm is not None:
+        return True
+    return spring_dt > 0.0
 
 
 @part
@@ -197,17 +222,47 @@ def _note_normal(sums: Any, largest: Any, i: int, normal: float) -> None:
 
 
 @part
-def _compliance(settings: EngineSettings, implicit: Any, i: int) -> Any:
+def _compliance(world: World, implicit: Any, contacts: RailContacts, c: int, i: int, slip: float, held: Any) -> Any:
     if implicit is None:
         return None
-    return implicit.compliance[i], settings.at_once
+    return implicit.compliance[i], world.settings.at_once, _first_slip(world, implicit, contacts, c, i, slip, held)
+
+
+@part
+def _first_slip(world: World, implicit: Any, contacts: RailContacts, c: int, i: int, slip: float, held: Any) -> float:
+    """Return the slip (m/s) from which the implicit solver starts, without the friction of the last evaluation."""
+    if world.settings.warm is None:
+        return slip
+    return slip + _slip_of_kick(world, implicit.kick, contacts, c, i) - implicit.compliance[i] * held
+
+
+@part
+def _slip_of_kick(world: World, kick: Any, contacts: RailContacts, c: int, i: int) -> float:
+    if kick is None:
+        return 0.0
+    along = kick.y[i] * contacts.nx[c] - kick.x[i] * contacts.ny[c]
+    if world.spin is not None:
+        along += kick.turn[i] * rail_arm(contacts.overlap[c], world.bottles.radius[i], world.settings.lever)
+    return along
 
 
 @part
 def rail_elongation(world: World, i: int, entry: int) -> Any:
-    """Return the elongation of the spring of a contact of bottle i, by its entry (`RailContacts.entry`), or None."""
+    """Return the history of a contact of bottle i (`PairSprings.elongation`) by its entry, or None."""
     if world.rail_law.tangential_stiffness is None:
+        return _friction_before(world, i, entry)
+    return _history(world, i, entry)
+
+
+@part
+def _friction_before(world: World, i: int, entry: int) -> Any:
+    if world.settings.warm is None:
         return None
+    return _history(world, i, entry)
+
+
+@part
+def _history(world: World, i: int, entry: int) -> float:
     if moves(world.moving, entry):
         return moving_spring(world.moving, i, entry)
     if entry >= 0:
@@ -226,7 +281,8 @@ def _spring_at(near: Any, entry: int) -> float:
 def _store_springs(world: World, contacts: RailContacts, count: int, i: int) -> None:
     """Store the springs of the closed contacts of bottle i; reset those of all its other rails."""
     if world.rail_law.tangential_stiffness is None:
-        return
+        if world.settings.warm is None:
+            return
     _reset_springs(world.near_segments, i)
     _reset_springs(world.near_arcs, i)
     reset_moving_springs(world.moving, i)

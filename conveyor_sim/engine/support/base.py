@@ -11,7 +11,7 @@ from typing import Any
 from numba import uint64
 
 from conveyor_sim.engine.arrays.bodies import Bottles, ForceSums
-from conveyor_sim.engine.arrays.world import World
+from conveyor_sim.engine.arrays.world import EngineSettings, World
 from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.contact.friction import implicit_regularisation, regularisation
 from conveyor_sim.engine.support.ring import ring_means, ring_share, straddling_ring
@@ -46,12 +46,56 @@ def relative_velocity(bottles: Bottles, footing: Any, turn: Any, lag: float, i: 
 
 @part
 def _point_friction(world: World, load: ForceSums, implicit: Any, dt: float, first: int, end: int) -> None:
-    bottles, footing, lag = world.bottles, world.footing, world.settings.lag * dt
+    bottles, footing, lag = world.bottles, world.footing, _point_lag(world.settings, implicit) * dt
     for i in range(uint64(first), uint64(end)):
         vx, vy = relative_velocity(bottles, footing, footing.turn, lag, i)
+        vx, vy = _kicked(world, load, implicit, dt, i, vx, vy)
         pull = footing.friction_limit[i] * _quotient(world, implicit, dt, i, math.sqrt(vx * vx + vy * vy))
         load.fx[i] -= pull * vx
         load.fy[i] -= pull * vy
+
+
+@part
+def _point_lag(settings: EngineSettings, implicit: Any) -> float:
+    """Return steps by which the slip on a belt is older than positions (`EngineSettings.lag`), negative if it is newer.
+
+    Implicit friction that starts from all other forces uses the velocity at the end of the step.
+    """
+    if implicit is None:
+        return settings.lag
+    if settings.warm is None:
+        return settings.lag
+    return -settings.lag
+
+
+@part
+def _kicked(
+    world: World, load: ForceSums, implicit: Any, dt: float, i: int, vx: float, vy: float
+) -> tuple[float, float]:
+    """Return the velocity (m/s) after the other forces have acted for dt (s), from which implicit friction starts."""
+    if implicit is None:
+        return vx, vy
+    if world.settings.warm is None:
+        return vx, vy
+    vx, vy = _unpredicted(world.bottles, world.stage, i, vx, vy)
+    ahead = dt * world.bottles.inverse_mass[i]
+    return vx + ahead * load.fx[i], vy + ahead * load.fy[i]
+
+
+@part
+def _unpredicted(bottles: Bottles, stage: Any, i: int, vx: float, vy: float) -> tuple[float, float]:
+    """Return the velocity at the start of a step of velocity Verlet, from those predicted for its middle and end."""
+    if stage is None:
+        return vx, vy
+    return vx + 2.0 * (stage.vx[i] - bottles.vx[i]), vy + 2.0 * (stage.vy[i] - bottles.vy[i])
+
+
+@part
+def _split(warm: Any, implicit: Any, i: int) -> float:
+    """Return the number of contacts among which the mass is split: the base alone if it is solved after all others."""
+    if warm is None:
+        return float(implicit.closed[i])
+    return 1.0
 
 
 @part
@@ -59,7 +103,7 @@ def _quotient(world: World, implicit: Any, dt: float, i: int, speed: float) -> f
     settings = world.settings
     if implicit is None:
         return regularisation(speed, settings.slip_limit, settings.atan)
-    limit, closed = world.footing.friction_limit[i], implicit.closed[i]
+    limit, closed = world.footing.friction_limit[i], _split(settings.warm, implicit, i)
     b = settings.ahead * dt * limit * world.bottles.inverse_mass[i] * closed / settings.slip_limit - settings.at_once
     return implicit_regularisation(speed, 0.0 if b < 0.0 else b, settings.slip_limit, settings.atan)
 
@@ -74,7 +118,9 @@ def _ring_friction(world: World, spin: Any, load: ForceSums, implicit: Any, dt: 
         rim = abs(turning) * ring.radius[i]
         slide = math.sqrt(vx * vx + vy * vy)
         limit, first, rest = ring_means(slide, rim, settings.slip_limit)
-        point = _quotient(world, implicit, dt, i, slide)
+        point_x, point_y = _kicked(world, load, implicit, dt, i, vx, vy)
+        point = _quotient(world, implicit, dt, i, math.sqrt(point_x * point_x + point_y * point_y))
+        vx, vy = (vx, vy) if ring.radius[i] > 0.0 else (point_x, point_y)
         pull = footing.friction_limit[i] * (
             ring_share(slide, rim, limit, first, rest) if ring.radius[i] > 0.0 else point
         )

@@ -43,7 +43,9 @@ def workers(size: int) -> tuple[Worker, ...]:
 
 
 def _gathered() -> Gathered:
-    return Gathered(np.zeros(4 * BLOCK), np.zeros(BLOCK), np.zeros(BLOCK), np.zeros(BLOCK), np.zeros(4 * BLOCK))
+    return Gathered(
+        np.zeros(4 * BLOCK), np.zeros(BLOCK), np.zeros(BLOCK), np.zeros(BLOCK), np.zeros(4 * BLOCK), np.zeros(4 * BLOCK)
+    )
 
 
 def _rail_contacts() -> RailContacts:

@@ -6,8 +6,10 @@ from collections.abc import Collection
 from functools import partial
 
 from conveyor_sim.engine.contact.laws.linear import contact_time
+from conveyor_sim.engine.integrators import AHEAD, WARM
 from conveyor_sim.physics.effects.contacts import contacts_in_use
 from conveyor_sim.physics.effects.declaration import Cause, Effect
+from conveyor_sim.physics.effects.load import ENDLESS_QUEUE
 from conveyor_sim.physics.effects.terms import (
     Meeting,
     Terms,
@@ -22,6 +24,16 @@ from conveyor_sim.physics.plant import Plant
 from conveyor_sim.physics.timestep.bounds import Bound, contact_friction_bound, damping_bound
 from conveyor_sim.physics.timestep.prediction import Term
 from conveyor_sim.scene.schema import BottleType
+
+CLOSED = 4.0
+"""Closed contacts of a bottle in a zigzag: two bottles, a rail and the base. Implicit friction splits its mass."""
+
+BALANCING = 8.0
+"""1/s; times n dt of a queue of n bottles the root of the error of its creep, at most. Fitted to the first 19 scenes of
+docs/studies/implicit_queues.py, at `draft`."""
+
+CHANGE = 0.1
+"""Largest relative change of resting forces in 1 s while a queue creeps; 0.06 in docs/studies/implicit_queues.csv."""
 
 
 def _contact_friction(plant: Plant, on: Collection[str]) -> Cause | None:
@@ -72,6 +84,47 @@ def _kick(terms: Terms, dt: float) -> list[Term]:
             )
             kicks.append((kick, reason))
     return [Term("tangential speed after an impact", *max(kicks))] if kicks else []
+
+
+def _excess(terms: Terms, dt: float) -> tuple[float, str]:
+    """Return the excess of the creep of loaded contacts over that of explicit friction, relative to it, and its cause.
+
+    With a warm start, n bottles in a row balance a change of load in about n steps: the error is of second order in
+    n dt. Without one, the slip at a load f mu N is too large by B f v_lim, for small f by the share 2 B (`friction.py`
+    in the engine), here at the largest load on a contact.
+    """
+    integrator, load = terms.scene.accuracy.integrator, terms.load
+    if load.force == 0.0 or all(_curve_friction(meeting) == 0.0 for meeting in meetings(terms)):
+        return 0.0, ""
+    if integrator in WARM and not terms.scene.friction_anew:
+        most = terms.plant.most_bottles
+        count = ENDLESS_QUEUE if most is None else most
+        return (
+            BALANCING * count * dt
+        ) ** 2, f"{count} bottles in a row balance a change of load in about {count} steps"
+    ahead, at_once = AHEAD[integrator]
+    cases = [(0.0, "")]
+    for meeting in meetings(terms):
+        mu = _curve_friction(meeting)
+        mobility = CLOSED * (_rim_mobility(meeting.first) + _rim_mobility(meeting.second))
+        b = dt * mu * load.force * mobility / terms.scene.slip_limit
+        reason = f"{integrator} solves friction anew in each step, at mu = {mu:g} and N = {load.force:.3g} N"
+        cases.append((2.0 * max(0.0, ahead * b - at_once), reason))
+    return max(cases)
+
+
+def _implicit_resting(terms: Terms, dt: float) -> list[Term]:
+    """Return the error in resting load if contacts creep at another rate: forces change faster or slower by that share.
+
+    Forces change by less than CHANGE in 1 s, by half of it in the mean.
+    """
+    excess, reason = _excess(terms, dt)
+    return [Term("load of creeping queues", min(1.0, 0.5 * CHANGE * excess), reason)] if excess > 0.0 else []
+
+
+def _implicit_creep(terms: Terms, dt: float) -> list[Term]:
+    excess, reason = _excess(terms, dt)
+    return [Term("creep of pressed contacts", excess, reason)] if excess > 0.0 else []
 
 
 def _curve_friction(meeting: Meeting) -> float:
@@ -148,18 +201,25 @@ ATAN_FRICTION = Effect(
 )
 IMPLICIT_FRICTION = Effect(
     name="implicit_friction",
-    law="friction at the slip at the end of a step, with the mass of a bottle split among its contacts. With "
-    "velocity_verlet up to gamma dt = 2/3, and with rk4 up to gamma dt = 1, it equals explicit friction. Here gamma is "
-    "2 mu N / (m_t v_lim) times the number of closed contacts. In longer steps friction reaches mu N only at a slip "
-    "larger than v_lim, and a loaded contact creeps faster. In long steps, the slip at which friction reaches mu N is "
-    "about mu N dt / m_t with rk4, and 1.5 times as large with velocity_verlet. Not available with dormand_prince, "
-    "which divides its steps, and linearly_implicit, which solves for friction itself",
-    source="added",
+    law="friction at the slip at the end of a step, with the mass of a bottle split among its contacts. With leapfrog, "
+    "semi_implicit_euler and velocity_verlet each step starts from the friction forces of the last one. Steady creep "
+    "then equals that of explicit friction in steps of any length (docs/studies/implicit_queues.csv). n bottles in a "
+    "row balance a change of load in about n steps. With rk4 friction is solved "
+    "anew in each step. Up to gamma dt = 1 it equals explicit friction; gamma is 2 mu N / (m_t v_lim) times the number "
+    "of closed contacts. In longer steps a loaded contact creeps too fast, by gamma dt - 1 of its creep, and the "
+    "prediction says so. Not available with dormand_prince, which divides its steps, and linearly_implicit, which "
+    "solves for friction itself",
+    source="added; the warm start as in Catto, GDC 2006",
     called_for=partial(_chosen, field="friction_solver", value="implicit"),
     absent="friction_solver is explicit, or nothing has friction",
     needs="closed contacts and 1/m + R^2/J of each bottle",
     bound="none. It removes the bounds of contact_friction and, for bases that are points, of base_friction. With "
     "semi-implicit Euler the bound of turning belts remains",
+    resting=_implicit_resting,
+    rest="5 % of the error of the creep, because forces change by less than 10 % in 1 s",
+    side=_implicit_creep,
+    beside="in the creep of pressed contacts at most (8 n dt)^2 for n bottles, dt in s; with rk4 gamma dt - 1 at the "
+    "largest expected load and 4 closed contacts",
 )
 TANGENTIAL_SPRING = Effect(
     name="tangential_spring",

@@ -17,7 +17,7 @@ from conveyor_sim.engine.arrays.rails import Arcs, Segments
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.engine.arrays.world import EngineSettings
 from conveyor_sim.engine.compiler.compile import ENGINE_HASH
-from conveyor_sim.engine.integrators import AHEAD, LAG
+from conveyor_sim.engine.integrators import AHEAD, LAG, WARM
 from conveyor_sim.errors import SceneError
 from conveyor_sim.physics.effects.choice import prediction_of
 from conveyor_sim.physics.effects.declaration import EffectChoice
@@ -116,7 +116,8 @@ def build_model(scene: Scene) -> Model:
     skin = SKIN * float(radius.min())
     segments, arcs = rail_arrays(plant.rails_at_rest, plant.rail_materials)
     dt = scene.tick_ns * 1e-9 / steps
-    ahead, at_once = AHEAD.get(scene.accuracy.integrator, (1.0, 0.0))
+    warm = "implicit_friction" in on and scene.accuracy.integrator in WARM and not scene.friction_anew
+    ahead, at_once = (1.0, 0.0) if warm else AHEAD.get(scene.accuracy.integrator, (1.0, 0.0))
     return Model(
         name=scene.name,
         dt=dt,
@@ -150,6 +151,7 @@ def build_model(scene: Scene) -> Model:
             error=choice.terms.step_error,
             ahead=ahead,
             at_once=at_once,
+            warm=1 if warm else None,
             lag=LAG.get(scene.accuracy.integrator, 0.0),
         ),
         pair_law=laws.pair,

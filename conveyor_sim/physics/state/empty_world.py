@@ -49,7 +49,7 @@ def empty_pairs(model: Model, entries: int) -> Pairs | None:
         moment=forces(model.has("rotation")),
         normal=forces(model.has("peaks")),
         touch=forces(model.has("implicit_friction")),
-        spring=_pair_springs(entries) if law.tangential_stiffness is not None else None,
+        spring=_pair_springs(entries) if _has_history(model, law) else None,
         tangent=_pair_tangent(entries) if model.integrator in LINEAR else None,
         parts=PairParts(_triple(2 * entries + 1), _triple(2 * entries + 1)) if model.has("energy_ledger") else None,
     )
@@ -58,7 +58,7 @@ def empty_pairs(model: Model, entries: int) -> Pairs | None:
 def empty_near(model: Model, slots: int, entries: int) -> Near:
     """Return an empty list for `entries` rail pieces near bottles."""
     law = model.rail_law
-    springs = _near_springs(entries) if law is not None and law.tangential_stiffness is not None else None
+    springs = _near_springs(entries) if _has_history(model, law) else None
     return Near(np.zeros(slots + 1, np.uint32), np.zeros(entries, np.uint32), springs)
 
 
@@ -92,7 +92,7 @@ def empty_world(model: Model, slots: int) -> World:
         path=_triple(slots) if model.integrator in ON_PATHS and _has_springs(model) else None,
         slopes=_slopes(SLOPES[model.integrator], slots, peaks) if model.integrator in SLOPES else None,
         linear=_linear(slots) if model.integrator in LINEAR else None,
-        implicit=Implicit(reals(), reals(), reals()) if model.has("implicit_friction") else None,
+        implicit=_implicit(model, slots) if model.has("implicit_friction") else None,
         riding=_riding(model, slots) if model.has("riding") else None,
         neighbourhood=Neighbourhood(
             x=reals(),
@@ -132,14 +132,24 @@ def _moving(model: Model, slots: int) -> MovingRails | None:
     pieces = sum(len(rail.pieces) for rail in model.plant.rails_at_rest)
     rails, ledger = len(model.plant.rails_at_rest), model.has("energy_ledger")
     moving = moving_arrays(model.plant.moving, model.plant.rail_materials, rails, pieces, slots, ledger)
-    if model.rail_law is None or model.rail_law.tangential_stiffness is None:
+    if not _has_history(model, model.rail_law):
         return moving
     count = len(model.plant.moving)
     return moving._replace(springs=MovingSprings(np.zeros((slots, count)), np.zeros(count)))
 
 
+def _has_history(model: Model, law: ContactLaw | None) -> bool:
+    """Return True if contacts have springs, or friction of the last step that implicit friction starts from."""
+    return law is not None and (law.tangential_stiffness is not None or model.settings.warm is not None)
+
+
 def _has_springs(model: Model) -> bool:
     return any(law is not None and law.tangential_stiffness is not None for law in (model.pair_law, model.rail_law))
+
+
+def _implicit(model: Model, slots: int) -> Implicit:
+    predicts = model.settings.warm is not None and model.integrator not in STAGED
+    return Implicit(np.zeros(slots), np.zeros(slots), np.zeros(slots), _triple(slots) if predicts else None)
 
 
 def _surface(model: Model) -> Surface | None:

@@ -102,8 +102,11 @@ class State:
         world = self.world
         for group in (world.bottles, world.spin, world.peaks, world.ring, world.implicit):
             for name, column in zip(group._fields, group, strict=True) if group is not None else ():
-                if name != "packed":
+                if name not in ("packed", "kick"):
                     np.asarray(column)[slot] = 0
+        if world.implicit is not None and world.implicit.kick is not None:
+            for column in world.implicit.kick:
+                column[slot] = 0.0
         for column in slot_columns(world.damage) if world.damage is not None else ():
             column[slot] = 0
         world.bottles.id[slot] = -1

@@ -48,7 +48,7 @@ SCRATCH: Mapping[str, str] = {
 UNCHECKED = (
     *SCRATCH,
     "moving.springs.path",
-    "implicit.",
+    *(f"implicit.{name}" for name in ("mobility", "closed", "compliance")),
     "probe.depth",
     *(f"pairs.{name}" for name in ("fx", "fy", "moment", "normal", "touch", "tangent.", "parts.", "law.")),
     *(f"pairs.{name}" for name in ("reach", "radius_i")),
