@@ -81,7 +81,8 @@ def test_run_records_sums_up_and_draws(command: Command, tmp_path: Path) -> None
     assert list((folder / "pictures").glob("*.png"))
     lines = outline_of(result)
     assert missing(lines[0], ["small_line", "0.4 s", "x real time"]) == []
-    assert [line.split()[0] for line in lines[1:]] == ["bottles", "forces", "recorded", "next"]
+    assert [line.split()[0] for line in lines[1:]] == ["bottles", "forces", "warning", "recorded", "next"]
+    assert missing(lines[3], ["overlap", "of the diameter"]) == []
     assert missing(lines[-2], [str(folder.relative_to(tmp_path)), "page.html", "summary.json", "pictures"]) == []
 
 

@@ -7,9 +7,7 @@ import math
 from dataclasses import dataclass
 
 from conveyor_sim.accuracy.setting import Setting
-
-DEEP = 0.01
-"""Overlap over diameter above which a stiffness is marked."""
+from conveyor_sim.physics.timestep.prediction import DEEP
 
 
 @dataclass(frozen=True)
@@ -193,7 +191,7 @@ class StiffnessRow:
 
     @property
     def deep(self) -> bool:
-        """Return True if overlaps are large enough to falsify spacing, counts and sensor edges by a similar amount."""
+        """Return True if overlaps are so large that the flow may not be that of stiff bottles."""
         return self.overlap is not None and self.overlap > DEEP
 
 

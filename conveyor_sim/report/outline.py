@@ -43,9 +43,9 @@ def outline_unrecorded(
     lines = [headline(name, run.simulated, run.wall)]
     if run.peak_force:
         lines.append(labelled("forces", f"peak {run.peak_force:.3g} N"))
-    warnings = [check.warning for check in checks if check is not None]
+    warnings = _check_warnings(checks)
     guard = (f"guard: {text}" for text in run.guard)
-    return _with_warnings(lines, [*filter(None, warnings), *scene_warnings, *guard])
+    return _with_warnings(lines, [*warnings, *scene_warnings, *guard])
 
 
 def headline(name: str, simulated: float, wall: float | None) -> str:
@@ -85,15 +85,21 @@ def _bottles(summary: Summary) -> str:
 
 def _warnings(summary: Summary) -> list[str]:
     """Return what may make results of the run wrong or the line damage bottles, the most important first."""
-    checks = [check.warning for check in (summary.achieved, summary.pressed) if check is not None]
     refused = f"{summary.refused} command{'s' * (summary.refused != 1)} refused{on_occasions(summary)}"
     return [
         *_events("guard", summary.guard, summary.guard_texts),
-        *filter(None, checks),
+        *_check_warnings((summary.achieved, summary.pressed)),
         *summary.warnings,
         *_events("limits passed", summary.damage_events, summary.damage_texts),
         *([f"{refused}; `conveyor-sim events BAG --kind command_refused` lists them"] if summary.refused else []),
     ]
+
+
+def _check_warnings(checks: Sequence[ForceCheck | Pressed | None]) -> list[str]:
+    """Return the warnings of checks of forces, then of overlaps."""
+    known = [check for check in checks if check is not None]
+    deep = [check.deep_warning for check in known if isinstance(check, ForceCheck)]
+    return list(filter(None, [*(check.warning for check in known), *deep]))
 
 
 def on_occasions(summary: Summary) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conveyor_sim.physics.model import Model
-from conveyor_sim.physics.timestep.prediction import percent
+from conveyor_sim.physics.timestep.prediction import deep_warning, deepest, percent
 from conveyor_sim.simulation import Simulation
 
 WINDOW = 1.0
@@ -47,6 +47,11 @@ class ForceCheck:
             f"peak force {self.peak_force:.3g} N, above the {self.expected_force:.3g} N of the predicted error: "
             "forces may be less accurate than predicted"
         )
+
+    @property
+    def deep_warning(self) -> str:
+        """Sentence on an overlap at which the flow is not that of stiff bottles; empty up to it."""
+        return deep_warning(self.overlap, f"overlap at the peak force, {self.peak_force:.3g} N")
 
     @property
     def sentence(self) -> str:
@@ -154,7 +159,7 @@ def achieved(model: Model, peak_force: float | None) -> ForceCheck | None:
     """Return the check of the largest normal contact force (N); None if it is unknown, or no contact can occur."""
     if peak_force is None or not model.impacts:
         return None
-    overlap = max(impact.overlap(peak_force) / impact.diameter for impact in model.impacts)
+    overlap = deepest(model.impacts, peak_force)
     return ForceCheck(peak_force, model.prediction.force, model.prediction.force_reason, overlap)
 
 

@@ -54,7 +54,7 @@ def test_where_nothing_is_predicted_to_do_the_best_is_named() -> None:
 
 
 def test_each_line_says_that_nothing_has_run() -> None:
-    forces, throughput, cost, setting = predicted(forecast(line(), 0.01)).lines
+    forces, throughput, cost, setting, *_ = predicted(forecast(line(), 0.01)).lines
     assert forces.startswith("Forces: ")
     assert missing(forces, ["predicted", "1 %"]) == []
     assert throughput.startswith("Throughput: not known")
@@ -77,3 +77,12 @@ def test_one_bottle_and_no_rail_touch_nothing() -> None:
     assert not known.touches
     assert forecast(line(), 0.01).touches
     assert math.isfinite(known.best)
+
+
+@pytest.mark.parametrize("stiffness", [500.0, 5e6])
+def test_a_soft_scene_is_warned_of_before_it_runs(stiffness: float) -> None:
+    """Two bottles of 0.2 kg that meet at 0.5 m/s overlap by 5 % of the diameter at 500 N/m."""
+    soft = scene(contacts=[contact(stiffness)], bottles=[bottle(0.0, 0.0, 0.5), bottle(0.5, 0.0)], **NO_FLOOR)
+    lines = predicted(forecast(soft, 0.01)).lines
+    warnings = [line for line in lines if line.startswith("Warning")]
+    assert [missing(line, ["5.4 %", "throughput"]) for line in warnings] == [[]] * (stiffness == 500.0)

@@ -12,6 +12,7 @@ from facts import missing
 
 from conveyor_sim.accuracy.report.lines import summary, three_lines
 from conveyor_sim.accuracy.results import AccuracyStudy, Comparison
+from conveyor_sim.physics.timestep.prediction import DEEP, percent
 
 FORCES_ONLY = ("impacts and resting forces only",)
 JARGON = ("integrator", "euler", "verlet", "rk4", "step", "rms", "dt", "order", "convergence")
@@ -112,3 +113,15 @@ def test_below_them_the_setting_and_what_the_study_took() -> None:
     assert missing(lines[6], ["412 s", "processor time", "75 s", "compiling"]) == []
     shaky = tuple(replace(point, beyond=1.99) if point.setting == of.own else point for point in of.points)
     assert missing(summary(replace(of, points=shaky))[4], ["step", "1.99 x", "bound of stability"]) == []
+
+
+@pytest.mark.parametrize(("share", "warned"), [(None, False), (1.0, False), (1.5, True)])
+def test_deep_overlaps_are_warned_of_at_the_scene_s_own_stiffness(share: float | None, warned: bool) -> None:
+    own, *softer = sorted(study().stiffness, key=lambda one: -one.factor)
+    assert own.factor == 1.0
+    rows = (
+        replace(own, overlap=None if share is None else share * DEEP),
+        *(replace(one, overlap=0.5) for one in softer),
+    )
+    lines = [line for line in summary(replace(study(), stiffness=rows)) if line.startswith("Warning")]
+    assert [missing(line, [percent(1.5 * DEEP), percent(DEEP), "throughput"]) for line in lines] == [[]] * warned

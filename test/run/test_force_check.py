@@ -2,13 +2,17 @@
 """Forces of a run compared with the expected forces."""
 
 import math
+from pathlib import Path
 from typing import Any
 
 import pytest
+from click.testing import CliRunner
 from facts import missing
 from scenes import MASS, NO_FLOOR, PEAKS, RADIUS, base, belt, bottle, contact, kind, scene, segment, simulation
 
+from conveyor_sim.cli import main
 from conveyor_sim.physics.model import build_model
+from conveyor_sim.physics.timestep.prediction import DEEP, percent
 from conveyor_sim.run.force_check import ForceCheck, PeakWatch, achieved, pressed
 
 K = 5e3
@@ -109,3 +113,33 @@ def test_what_presses_for_long_is_half_of_the_forces_on_a_bottle() -> None:
 
 def test_where_no_bound_rests_on_it_no_load_is_told() -> None:
     assert pressed(build_model(scene(**TWO)), 1.0) is None
+
+
+@pytest.mark.parametrize(("share", "warned"), [(0.5, False), (1.0, False), (1.01, True), (10.0, True)])
+def test_an_overlap_beyond_the_studied_limit_is_warned_of(share: float, warned: bool) -> None:
+    force = share * DEEP * 2.0 * RADIUS * K
+    check = reached(force * (1.0 - 1e-9))
+    assert check.overlap == pytest.approx(share * DEEP)
+    assert bool(check.deep_warning) == warned
+    if warned:
+        facts = [f"{force:.3g} N", percent(check.overlap), percent(DEEP), "throughput", "docs/accuracy.md"]
+        assert missing(check.deep_warning, facts) == []
+
+
+@pytest.mark.parametrize("stiffness", [K, 1e7])
+def test_run_and_check_warn_of_deep_overlaps(stiffness: float, tmp_path: Path) -> None:
+    """At 1 m/s two bottles of 0.2 kg overlap by 3.4 % of their diameter at 5 kN/m, by 0.08 % at 10 MN/m."""
+    near = [bottle(0.0, 0.0, 1.0), bottle(2.0 * RADIUS + 0.01, 0.0)]
+    fields = {**TWO, **PEAKS, "contacts": [contact(stiffness)], "bottles": near, "duration": 0.1}
+    file = tmp_path / "two.yaml"
+    file.write_text(scene(**fields, outputs={"bottles": 100}).source_text)
+    arguments = (
+        ["check", "--out", tmp_path],
+        ["run", "--no-record"],
+        ["run", "--no-pictures", "--out", tmp_path / "bag"],
+    )
+    for command, *options in arguments:
+        result = CliRunner().invoke(main, [str(command), str(file), *map(str, options)])
+        assert result.exit_code == 0, result.output
+        warnings = [line for line in result.output.splitlines() if line.startswith("warning") and "overlap" in line]
+        assert [missing(line, ["3.4 %", percent(DEEP)]) for line in warnings] == ([[]] if stiffness == K else [])

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from conveyor_sim.accuracy.figures.logarithmic import logarithmic_x, logarithmic_y
 from conveyor_sim.accuracy.measure.observables import OBSERVABLES
 from conveyor_sim.accuracy.report.words import percent, unit_of
-from conveyor_sim.accuracy.results import DEEP, StiffnessRow
+from conveyor_sim.accuracy.results import StiffnessRow
+from conveyor_sim.physics.timestep.prediction import DEEP
 from conveyor_sim.report.figures import style
 
 _COLUMNS: Final = 3
@@ -25,7 +26,7 @@ _IMPACT: Final = "peak force"
 
 
 def stiffness_figure(rows: Sequence[StiffnessRow], scene: str) -> Figure:
-    """Draw one panel per quantity against the stiffness factor; hollow where overlaps exceed 1 % of the diameter."""
+    """Draw one panel per quantity against the stiffness factor; hollow where overlaps exceed DEEP."""
     rows = sorted(rows, key=lambda row: row.factor)
     unjudged = {known.name for known in OBSERVABLES if not known.judged}
     names = [name for name in dict.fromkeys(n for row in rows for n in row.observables) if name not in unjudged]
@@ -49,7 +50,7 @@ def stiffness_figure(rows: Sequence[StiffnessRow], scene: str) -> Figure:
         Line2D([], [], color=style.SERIES[0], marker="|", markersize=9.0, label="bars: standard error over seeds")
     ]
     if any(row.deep for row in rows):
-        words = f"overlap above {percent(DEEP)} of the diameter: spacing, counts and sensor edges are wrong by as much"
+        words = f"overlap above {percent(DEEP)} of the diameter: the flow may not be that of stiff bottles"
         handles.append(_marker(True, label=words))
     figure.legend(handles=handles, loc="outside lower center", ncols=2, fontsize=9.0)
     return figure

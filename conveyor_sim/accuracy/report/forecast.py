@@ -16,6 +16,7 @@ from conveyor_sim.accuracy.setting import Setting, with_setting
 from conveyor_sim.physics.model import build_model
 from conveyor_sim.physics.model.remedies import MANY, STEP_COST, step_cost, tick_seconds
 from conveyor_sim.physics.plant import Plant
+from conveyor_sim.physics.timestep.prediction import expected_deep_warning
 from conveyor_sim.scene import Scene
 
 TRUSTED = ("leapfrog", "velocity_verlet")
@@ -41,12 +42,15 @@ class Forecast:
     """s of one processor for a simulated second, by a rule of thumb; 0 without a setting."""
     bottles: int
     """Number of bottles for which the cost is stated."""
+    deep: str
+    """Warning if overlaps at the largest expected force are too large; empty otherwise."""
     better: float | None
     """Cost of a setting that is BETTER times as exact over that of this one; None if nothing tried is."""
 
 
 def forecast(scene: Scene, tolerance: float) -> Forecast:
     """Predict what settings do on a scene; the cheapest one of at most a tolerance (relative) is chosen."""
+    model = build_model(scene)
     points = [_unmeasured(scene, one) for one in candidates(scene) if one.integrator in TRUSTED and one.stiffness == 1]
     kept = [point for point in points if point.stable]
     bottles = Plant.of(scene).most_bottles
@@ -60,6 +64,7 @@ def forecast(scene: Scene, tolerance: float) -> Forecast:
         touches=any(one.predicted is not None for one in points),
         seconds=0.0 if point is None else seconds(scene, point.setting, many),
         bottles=many,
+        deep=expected_deep_warning(model.impacts, model.prediction.force),
         better=None
         if point is None or better is None
         else seconds(scene, better.setting, many) / seconds(scene, point.setting, many),

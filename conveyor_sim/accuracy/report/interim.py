@@ -54,6 +54,7 @@ def predicted(known: Forecast) -> Interim:
             f"Cost: about {digits(known.seconds)} s of one processor per simulated second with "
             f"{known.bottles} bottle{'s' * (known.bottles != 1)}, an estimate; {better}.",
             f"Setting: {line(point.setting)} (not measured yet)",
+            *([f"Warning: {known.deep}."] if known.deep else []),
         ),
     )
 

@@ -9,6 +9,7 @@ from conveyor_sim.accuracy.report.answer import eligible, largest_error
 from conveyor_sim.accuracy.report.apply import line
 from conveyor_sim.accuracy.report.words import digits, duration, percent
 from conveyor_sim.accuracy.results import AccuracyStudy, Answer, Comparison
+from conveyor_sim.physics.timestep.prediction import deep_warning
 
 NEGLIGIBLE = 1e-4
 """Relative error below which a predicted error is reported as smaller than this."""
@@ -34,6 +35,7 @@ def summary(study: AccuracyStudy) -> list[str]:
     if study.answer is not None:
         lines.append(f"Setting: {line(study.answer.setting)} (--apply writes it into a copy of the scene)")
     lines += [own] if (own := _own(study)) else []
+    lines += [deep] if (deep := deep_line(study)) else []
     lines += [study.moving] if study.moving else []
     if study.cpu is not None and study.compiling is not None:
         lines.append(
@@ -41,6 +43,13 @@ def summary(study: AccuracyStudy) -> list[str]:
             "--details prints its tables."
         )
     return lines
+
+
+def deep_line(study: AccuracyStudy) -> str:
+    """Return a warning if overlaps of the long runs at the scene's stiffness are too large; empty otherwise."""
+    overlap = next((row.overlap for row in study.stiffness if row.factor == 1.0), None)
+    warning = deep_warning(overlap or 0.0, "overlap in long runs")
+    return f"Warning: {warning}." if warning else ""
 
 
 def _own(study: AccuracyStudy) -> str:

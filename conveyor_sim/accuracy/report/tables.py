@@ -20,7 +20,6 @@ from conveyor_sim.accuracy.report.lines import three_lines
 from conveyor_sim.accuracy.report.pareto import front, place_of
 from conveyor_sim.accuracy.report.words import digits, hundredths, percent, setting_name, spread, with_unit
 from conveyor_sim.accuracy.results import (
-    DEEP,
     AccuracyStudy,
     Comparison,
     Cost,
@@ -32,6 +31,7 @@ from conveyor_sim.accuracy.results import (
     StiffnessRow,
 )
 from conveyor_sim.accuracy.setting import Setting
+from conveyor_sim.physics.timestep.prediction import DEEP
 
 Row = TypeVar("Row")
 
@@ -351,7 +351,7 @@ def _stiffness(rows: Sequence[StiffnessRow]) -> Block:
         "Softer contacts at the same restitution: what changes",
         [Column[Quantity]("stiffness x", lambda quantity: quantity[0], left=True), *map(_factor, rows)],
         {"": quantities if rows else []},
-        [f"! Overlap above {percent(DEEP)} of the diameter: spacing, counts and sensor edges are wrong by as much."]
+        [f"! Overlap above {percent(DEEP)} of the diameter: the flow may not be that of stiff bottles."]
         if any(row.deep for row in rows)
         else [],
     )

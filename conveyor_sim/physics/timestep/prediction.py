@@ -17,6 +17,12 @@ from dataclasses import dataclass
 from conveyor_sim.physics.timestep.bounds import Bound, least_steps
 from conveyor_sim.physics.timestep.methods import Share
 
+DEEP = 0.004
+"""Largest ratio of overlap to diameter up to which flow was that of stiff contacts (docs/studies/stiffness_throughput).
+
+Beyond it, throughput rises and jams become rarer, because bottles squeeze through narrow places.
+"""
+
 WHOLE_SCENE = 1.0
 """Error in peak forces of a scene with many impacts, divided by the error of one impact."""
 
@@ -135,6 +141,29 @@ def _resting(terms: Sequence[Term], pressing: float) -> tuple[float | None, str]
         return 0.0, "resting load does not depend on the time step"
     parts = sorted(terms, key=lambda term: -term.value)
     return math.hypot(*(term.value for term in parts)), "; ".join(f"{term.quantity}: {term.reason}" for term in parts)
+
+
+def deepest(impacts: Sequence[Impact], force: float) -> float:
+    """Return the largest overlap over the smaller diameter at a force (N), by the elastic laws; 0 without impacts."""
+    return max((impact.overlap(force) / impact.diameter for impact in impacts), default=0.0)
+
+
+def deep_warning(overlap: float, of: str) -> str:
+    """Return a sentence on an overlap (relative to the diameter) above DEEP; empty up to it.
+
+    of: the overlap in words, such as `expected overlap at 120 N`.
+    """
+    if not overlap > DEEP:
+        return ""
+    return (
+        f"{of}: {percent(overlap)} of the diameter, above {percent(DEEP)}: throughput, jams and dwell times may differ "
+        "from those of stiff bottles (docs/accuracy.md)"
+    )
+
+
+def expected_deep_warning(impacts: Sequence[Impact], force: float) -> str:
+    """Return the warning about the overlap at the largest expected force (N); empty up to DEEP."""
+    return deep_warning(deepest(impacts, force), f"expected overlap at {force:.3g} N")
 
 
 def without_rounding(error: float) -> float:

@@ -10,7 +10,7 @@ from conveyor_sim.physics.effects.sprung_walls import sprung_walls
 from conveyor_sim.physics.model import Model
 from conveyor_sim.physics.model.remedies import StepLimit
 from conveyor_sim.physics.model.slow_drag import slow_drag
-from conveyor_sim.physics.timestep.prediction import percent
+from conveyor_sim.physics.timestep.prediction import expected_deep_warning, percent
 from conveyor_sim.report.flow.exit_findings import ending, has_exit
 from conveyor_sim.report.flow.finding import Finding
 from conveyor_sim.report.flow.flow import LineFlow
@@ -52,7 +52,7 @@ def finding_lines(scene: Scene, model: Model, flow: LineFlow) -> list[str]:
 
 def all_findings(model: Model, flow: LineFlow) -> list[Finding]:
     """Return all findings, warnings first."""
-    findings = [*flow.findings, *_slow_belts(model), *_sprung_walls(model), *_points(model)]
+    findings = [*flow.findings, *_slow_belts(model), *_sprung_walls(model), *_deep(model), *_points(model)]
     return sorted(findings, key=lambda finding: finding.level != "warning")
 
 
@@ -159,6 +159,12 @@ def _slow_belts(model: Model) -> list[Finding]:
     """Return a warning about belts below the slip limit."""
     slow = slow_drag(model.plant, {choice.name for choice in model.effects if choice.on})
     return [] if slow is None else [Finding(slow.belt.path, slow.text)]
+
+
+def _deep(model: Model) -> list[Finding]:
+    """Return a warning about overlaps that are large at the largest expected force."""
+    warning = expected_deep_warning(model.impacts, model.prediction.force)
+    return [Finding(("contacts",), warning)] if warning else []
 
 
 def _sprung_walls(model: Model) -> list[Finding]:
