@@ -150,18 +150,19 @@ def explain(scene: str | None, limits: bool, price: bool, at: float | None, opti
     Lists why each effect is on or off, and what bounds the time step; with --price, what each effect costs; with
     --limits, what no scene models.
     """
+    alone = limits and scene is None and not price and at is None
+    if scene is None and not alone:
+        raise ConveyorError("explain: no SCENE given, expected a scene file, or --limits alone")
+    loaded = None if scene is None else options.load(scene)
     if limits:
         from conveyor_sim.physics.effects.limits import limits_text
 
         show_lines(limits_text(line_width() or LIMITS_WIDTH))
-        if scene is None and not price and at is None:
-            return
-    if scene is None:
-        raise ConveyorError("explain: no SCENE given, expected a scene file, or --limits alone")
+    if loaded is None:
+        return
     from conveyor_sim.physics.model import build_model
     from conveyor_sim.report.explain.choices import explanation, price_table
 
-    loaded = options.load(scene)
     if at is not None and not price:
         raise ConveyorError(f"--at: {at:g} given, expected --price with it, for it is the time to measure at")
     if at is not None and not 0.0 < at <= loaded.duration:

@@ -27,7 +27,7 @@ MOST = 10
 FACTORS = {
     "availability": "availability",
     "effectiveness": "effectiveness",
-    "at the set rate": "set_effectiveness",
+    "at the\nset rate": "set_effectiveness",
     "quality": "quality",
     "OEE": "oee",
 }

@@ -161,6 +161,7 @@ def test_no_name_and_no_number_is_cut_on_a_terminal_of_80_columns(bag: Path) -> 
     assert "\N{HORIZONTAL ELLIPSIS}" not in shown
     for machine in MACHINES:  # bottles, time, efficiency, failures, reasons, longest stops
         assert len({line for line in shown.splitlines() if line.startswith(f"  {machine} ")}) >= 6
+    assert any(line.startswith("  efficiency ") for line in shown.splitlines())
 
 
 def test_forced_signals_are_named_and_change_no_figure(bag: Path, tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ import re
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -37,8 +38,10 @@ NOT_INSTALLED = {"ros2 security", "ros2 bag"}
 """Commands of ROS 2 that the wheels don't have, and that no client takes the place of here."""
 PLACEHOLDERS = {"my_node"}
 """Programs of the reader."""
-ENDLESS = {"read_poses_and_forces.py", "serve", "view", "--publish"}
-"""Words of commands that run until Ctrl-C."""
+ENDLESS = {"read_poses_and_forces.py": "bottles", "serve": "://", "view": "://", "--publish": "conveyor_replay"}
+"""Words of commands that run until Ctrl-C, with a part of their output or the node that they start."""
+COMPILING = 900.0
+"""Longest time of a command that may compile kernels on a busy machine, s of wall time."""
 REFUSED = ("feeder", "99")
 """Arguments of a command that the page describes as refused."""
 RECORDED = 1
@@ -133,11 +136,9 @@ class Reader:
             self.end()
         terminal = self._node(words)
 
-        def started() -> bool:
+        while not STARTED.search(terminal.log.read_text()):  # however long its kernels take to compile
             assert terminal.process.poll() is None, terminal.log.read_text()
-            return STARTED.search(terminal.log.read_text()) is not None
-
-        until(started, f"the start of {words}")
+            time.sleep(0.05)
         if any(word.startswith("record:=") for word in words):
             with self.client.listen(Clock, "/clock", "clock") as heard:
                 until(lambda: heard.messages and heard.messages[-1].clock.sec >= RECORDED, "a recording")
@@ -161,19 +162,21 @@ class Reader:
             ports = [part for word in words[1:] for part in ((word, "0") if word == "--foxglove" else (word,))]
             arguments = ["-c", "from conveyor_sim.cli import main; main()", *ports]
         terminal = self._terminal(words, arguments)
-        if ENDLESS & {part for word in words for part in word.split("/")}:
-            until(lambda: self._shows(terminal), f"output of {words}")
+        shown = [ENDLESS[part] for word in words for part in word.split("/") if part in ENDLESS]
+        if shown:
+            while not self._shows(terminal, shown[0]):
+                time.sleep(0.05)
             self.open.remove(terminal)
             terminal.interrupt()
             return
-        code = terminal.process.wait(120.0)
+        code = terminal.process.wait(COMPILING)
         assert code == (1 if tuple(words[-2:]) == REFUSED else 0), f"{words}: {terminal.log.read_text()}"
         self.open.remove(terminal)
 
-    def _shows(self, terminal: Terminal) -> bool:
-        """Return True once a program has printed something, plays a recording, or has ended."""
-        plays = "conveyor_replay" in self.client.node.get_node_names()
-        return plays or bool(terminal.log.read_text()) or terminal.process.poll() is not None
+    def _shows(self, terminal: Terminal, text: str) -> bool:
+        """Return True once a program has printed a text or started a node of that name, or has ended."""
+        names = self.client.node.get_node_names()
+        return text in names or text in terminal.log.read_text() or terminal.process.poll() is not None
 
     def _script(self, words: Sequence[str]) -> None:
         done = subprocess.run([ROOT / words[0], self.folder / "ws"], capture_output=True, text=True, check=False)

@@ -19,7 +19,7 @@ TEXT = """# Validation: comparison with published experiments
 Each source below was measured, derived or published by others. A figure **agrees** if its 95 % interval overlaps that
 of the simulation. The published interval includes the error of reading a figure; a number in a text without an error is
 taken as exact. Overlap is a weak test where an interval is wide: the table shows both intervals. Misses are listed as
-misses, with the measurement that would decide them.
+misses, with the measurement that would decide them. Runs without scatter have their numerical error as interval.
 
 No figure is used that was not read in the source. *Read* says how: many papers could be read only in part. "Validation
 notes" means that the figure was copied from notes on the paper, and not checked against the paper.

@@ -13,7 +13,7 @@ from facts import missing
 
 from conveyor_sim.cli import main
 from conveyor_sim.physics.effects.choice import EFFECTS
-from conveyor_sim.physics.effects.limits import LIMITS, limits_page, limits_text
+from conveyor_sim.physics.effects.limits import LEAST_WIDTH, LIMITS, limits_page, limits_text
 from conveyor_sim.scene import Scene
 
 ROOT = Path(__file__).parents[3]
@@ -101,9 +101,9 @@ def test_the_page_and_the_command_have_all_entries() -> None:
         assert "limits.md)" in place.read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("width", [70, 80, 120])
-def test_lines_fit_the_terminal(width: int) -> None:
-    assert max(map(len, limits_text(width))) <= width
+@pytest.mark.parametrize("width", [1, LEAST_WIDTH, 80, 120])
+def test_lines_fit_the_terminal_unless_it_is_too_narrow_to_read(width: int) -> None:
+    assert max(map(len, limits_text(width))) <= max(width, LEAST_WIDTH)
 
 
 def test_without_a_scene_only_the_limits_can_be_explained() -> None:
@@ -111,6 +111,13 @@ def test_without_a_scene_only_the_limits_can_be_explained() -> None:
         refused = CliRunner().invoke(main, arguments)
         assert refused.exit_code != 0
         assert missing(refused.output, "SCENE", "--limits") == []
+
+
+def test_a_scene_that_is_missing_is_refused_before_anything_is_printed() -> None:
+    refused = CliRunner().invoke(main, ["explain", "nosuch.yaml", "--limits"])
+    assert refused.exit_code != 0
+    assert "nosuch.yaml" in refused.output
+    assert "instead" not in refused.output
 
 
 def test_with_a_scene_both_are_printed() -> None:
