@@ -250,8 +250,8 @@ SOURCE = Source(
     "across travel; springs between discs, and the curve at walls. 'Vanishes' is taken as within 5 %. Jams: the hopper "
     f"of To, Lai and Pak, on a belt at {SPEED:g} m/s, {len(HOPPER_SEEDS)} lattices per point.",
     discussion="Springs at straight walls carry a part of a long column, unlike the walls of the experiment. The "
-    "friction curve carries nothing at straight walls, because it creeps; its arches creep too. Springs between discs "
-    "with the curve at straight walls give both results (`test/published/test_walls.py`): use them where loads in "
+    "friction curve carries nothing at straight walls, because it creeps. So do its arches (see the "
+    "hopper of To, Lai and Pak), but on a belt this slow they can last for 4 s. Springs between discs with the curve at straight walls give both results (`test/published/test_walls.py`): use them where loads in "
     "queues and jams both matter. A chain that vibrates as one body relaxes springs at straight walls in part, and a "
     "sawtooth keeps its share. The vibration of the experiment is that of single discs on a sliding belt, which this "
     "model does not have; its amplitude and frequency would have to be measured.",
