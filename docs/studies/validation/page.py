@@ -39,6 +39,7 @@ notes" means that the figure was copied from notes on the paper, and not checked
 ABSENT = """
 - arXiv:2103.09144 (exponent of the discharge of a plane hopper against friction at its walls): only the abstract
   was read. Plates before and behind the discs have no counterpart on a belt.
+- Chinese Journal of Physics 40, 379 (2002) (jamming probability against the hopper angle): not run yet.
 - JSTAT 2009 P05006 (jamming of a silo against the number of discs): no probability could be read.
 - Comm. Phys. 5, 4 (2022) (an obstacle before the outlet of a belt-driven hopper): only the outlet's width is known.
 - Line pressure along a queue of bottles, in newtons, and the restitution of bottles: no measurement was found.
