@@ -83,7 +83,13 @@ NAVIGATION = {
     "docs/ros": {"Pages": [f"ros/{page.stem}" for page in sorted(ROOT.glob("docs/ros/*.md"))]},
     "docs/scene": {"Parts": [f"parts/{page}" for page in PARTS]},
     "docs/performance": {"Tables": [*(f"performance/{page}" for page in MEASURED), "studies/performance_history"]},
-    "docs/accuracy": {"Tables": ["accuracy/promises", *(f"accuracy/{page.parent.name}/tables" for page in STUDIES)]},
+    "docs/accuracy": {
+        "Tables": [
+            "accuracy/promises",
+            "accuracy/defaults",
+            *(f"accuracy/{page.parent.name}/tables" for page in STUDIES),
+        ]
+    },
     "docs/stability": {"Tables": ["stability/cases", "stability/fuzz"]},
     "docs/api/index": {"Modules": ["simulation", "observations", "testing", "control", "recordings", "errors"]},
 }

@@ -5,9 +5,13 @@ from __future__ import annotations
 
 import math
 import re
+from pathlib import Path
 
 import pytest
+from facts import missing
 from published.studies import NAMES, module, source
+
+from conveyor_sim.errors import ConveyorError
 
 Range, Row = module("source").Range, module("source").Row
 STORE, PAGE = module("store"), module("page")
@@ -64,4 +68,21 @@ def test_intervals_of_shares_and_slopes() -> None:
 
 
 def test_numbers_of_a_table_show_their_interval() -> None:
-    assert re.findall(r"[\d.]+", PAGE.text_of(Range.within(0.12345, 0.002))) == ["0.123", "0.121", "0.125"]
+    assert re.findall(r"[\d.]+", PAGE.text_of(Range.within(0.1234, 0.002))) == ["0.1234", "0.1214", "0.1254"]
+
+
+def test_claims_without_a_number_have_one_end() -> None:
+    assert [PAGE.text_of(Range.above(1.5)), PAGE.text_of(Range.below(0.25))] == ["above 1.5", "below 0.25"]
+    assert Range.above(1.5).overlaps(Range.within(2.2, 0.6))
+    assert not Range.above(1.5).overlaps(Range.within(1.0, 0.4))
+
+
+@pytest.mark.parametrize("text", ["load,cpu_s\nheld,1\n", "load,h/R,mu h/R,index,cpu_s\nheld,3\n"])
+def test_a_damaged_table_is_refused_with_file_and_line(
+    text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(STORE, "FOLDER", tmp_path)
+    (tmp_path / "tipping.csv").write_text(text)
+    with pytest.raises(ConveyorError) as refused:
+        STORE.read(source("tipping"))
+    assert missing(str(refused.value), "tipping.csv", "line 2", "mu h/R") == []

@@ -84,7 +84,8 @@ def _resting(terms: Terms, dt: float) -> list[Term]:
     turns = terms.laws.base_friction is not None and "curved_belts" in terms.on
     behind = terms.method.turned * _turning(terms.plant) * dt if turns else 0.0
     late = [Term("load on turning belts", behind, "half a step's turn of the belt")] if behind > 0.0 else []
-    return [*_lag("load on turning belts", terms.method.creep_off, terms, dt), *late]
+    part = terms.method.implicit_creep_off if _implicit_point(terms) else terms.method.creep_off
+    return [*_lag("load on turning belts", part, terms, dt), *late]
 
 
 def _turning(plant: Plant) -> float:
@@ -167,10 +168,10 @@ BASE_FRICTION = Effect(
     "most impacts are slower",
     resting=_resting,
     rest="on curved belts 1 / n with semi-implicit Euler, where n is the number of steps per v_lim / (mu g); "
-    "Omega dt / 2 with leapfrog",
+    "Omega dt / 2 with leapfrog; 0.4 / n^2 with velocity Verlet and implicit friction",
     side=_creep,
-    beside="in the creep on curved belts 1 / n with semi-implicit Euler, 2 / n with leapfrog and implicit friction; n "
-    "as above",
+    beside="in the creep on curved belts 1 / n with semi-implicit Euler, 0.4 / n^2 with velocity Verlet and implicit "
+    "friction; n as above",
 )
 RING_BASE = Effect(
     name="ring_base",

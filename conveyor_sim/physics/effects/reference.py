@@ -80,11 +80,13 @@ sliding belt makes the discs vibrate, and this relaxes friction at the walls. Th
 | question | contacts of bottles | contacts with straight rails |
 | --- | --- | --- |
 | loads in queues, crushing, force on stops and gates | either | friction curve (no `tangential`) |
-| jams at outlets and in funnels, arches | springs | springs at funnel walls |
+| jams at outlets and in funnels, arches | springs | either |
+| both | springs | friction curve (no `tangential`) |
 
-`check`, `explain` and `run` warn of springs at straight rails along a belt if `limits` or `outputs.damage` ask for
-loads. `vibration` of the chain does not replace the choice: it moves all bottles alike, and relaxes springs at rails
-only in part.
+With springs between discs and the curve at walls, the stop bears the complete drag of 200 discs, and a hopper of 2.5
+diameters jams (`test/published/test_walls.py`). `check`, `explain` and `run` warn of springs at straight rails along a
+belt if `limits` or `outputs.damage` ask for loads. `vibration` of the chain does not replace the choice: it moves all
+bottles alike, and relaxes springs at rails only in part.
 
 `stiffness` is the same at every overlap. With `stiffness_ratio`, for Hertz contacts, the stiffness grows with the
 overlap as in Mindlin's theory: `tangential: {stiffness_ratio: 0.88}` for glass. A contact sticks or slides as one

@@ -142,13 +142,13 @@ SOURCE = Source(
     discussion="The flow is proportional to the belt speed where discs reach that speed within a fraction of a "
     "diameter. At 0.2 m/s a disc slips for v^2 / (2 mu g) = 5 mm, half a diameter, and the flow falls a little "
     "behind.\n\n"
-    "The flow is not independent of the number of discs: it grows by about a fifth with each doubling, most in "
-    "the narrow container. A dense packing that leaves at belt speed gives 930 discs per m of belt; larger "
-    "flows mean that the pressure pushes discs out faster than the belt. Springs, more friction between discs, "
-    "a sharper slip limit and a disordered start do not remove this. Why the experiment shows no such effect is "
-    "not known: its numbers of discs and the width of its container could not be read. The velocity of discs in "
-    "the outlet over the belt speed, against the number of discs, would decide it. Until then, flows that a "
-    "long queue pushes through an outlet may be too large by this factor.",
+    "The flow is not independent of the number of discs: it grows by 16 to 30 % with a doubling, most in the "
+    "narrow container, least from a disordered start. A dense packing that leaves at belt speed gives 930 discs "
+    "per m of belt; larger flows mean that the pressure pushes discs out faster than the belt. Springs, more "
+    "friction between discs, a sharper slip limit and a disordered start do not remove this. Why the experiment "
+    "shows no such effect is not known: its numbers of discs and the width of its container could not be read. "
+    "The velocity of discs in the outlet over the belt speed, against the number of discs, would decide it. "
+    "Until then, flows that a long queue pushes through an outlet may be too large by this factor.",
     draw=draw,
     caption="Flow over belt speed, against belt speed and against the number of discs, with 95 % intervals.",
 )

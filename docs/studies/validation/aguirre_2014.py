@@ -46,7 +46,7 @@ SOURCE = Source(
     name="aguirre_2014",
     title="Discharge against packing fraction",
     citation="M. A. Aguirre, R. De Schant, J.-C. Géminard, Granular flow through an aperture: influence of "
-    "the packing fraction, Physical Review E 90, 012203 (2014), arXiv:1407.0883.",
+    "the packing fraction, arXiv:1407.0883 (2014).",
     read="Abstract and first page (ar5iv).",
     measured="A belt discharges packings of different initial packing fraction. The packing fraction does "
     "not affect the velocity of the discs at the outlet; variations of the flow follow those of the packing "

@@ -79,7 +79,7 @@ SOURCE = Source(
     name="mankoc_2007",
     title="Discharge of a two-dimensional silo",
     citation="C. Mankoc, A. Janda, R. Arévalo, J. M. Pastor, I. Zuriguel, A. Garcimartín, D. Maza, The flow "
-    "rate of granular materials through an orifice, Granular Matter 9, 407 (2007), arXiv:0707.4550.",
+    "rate of granular materials through an orifice, Granular Matter 9 (2007), arXiv:0707.4550.",
     read="Abstract and first page (ar5iv, Scribd). The proposed law and its coefficients could not be read.",
     measured="Discharge through large orifices follows a power law of the diameter, 5/2 in three dimensions. "
     "Small openings need a correction. A new law holds for all openings, in three and in two dimensions.",

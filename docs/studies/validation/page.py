@@ -19,7 +19,7 @@ TEXT = """# Validation: comparison with published experiments
 Each source below was measured, derived or published by others. A figure **agrees** if its 95 % interval overlaps that
 of the simulation. The published interval includes the error of reading a figure; a number in a text without an error is
 taken as exact. Overlap is a weak test where an interval is wide: the table shows both intervals. Misses are listed as
-misses, with the measurement that would decide them.
+misses, with the measurement that would decide them. Runs without scatter have their numerical error as interval.
 
 No figure is used that was not read in the source. *Read* says how: many papers could be read only in part. "Validation
 notes" means that the figure was copied from notes on the paper, and not checked against the paper.
@@ -39,6 +39,7 @@ notes" means that the figure was copied from notes on the paper, and not checked
 ABSENT = """
 - arXiv:2103.09144 (exponent of the discharge of a plane hopper against friction at its walls): only the abstract
   was read. Plates before and behind the discs have no counterpart on a belt.
+- Chinese Journal of Physics 40, 379 (2002) (jamming probability against the hopper angle): not run yet.
 - JSTAT 2009 P05006 (jamming of a silo against the number of discs): no probability could be read.
 - Comm. Phys. 5, 4 (2022) (an obstacle before the outlet of a belt-driven hopper): only the outlet's width is known.
 - Line pressure along a queue of bottles, in newtons, and the restitution of bottles: no measurement was found.
