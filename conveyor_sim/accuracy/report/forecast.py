@@ -43,7 +43,7 @@ class Forecast:
     bottles: int
     """Number of bottles for which the cost is stated."""
     deep: str
-    """Warning if overlaps at the largest expected force are too large; empty otherwise."""
+    """Warning if overlaps in expected impacts are too large; empty otherwise."""
     better: float | None
     """Cost of a setting that is BETTER times as exact over that of this one; None if nothing tried is."""
 
@@ -64,7 +64,7 @@ def forecast(scene: Scene, tolerance: float) -> Forecast:
         touches=any(one.predicted is not None for one in points),
         seconds=0.0 if point is None else seconds(scene, point.setting, many),
         bottles=many,
-        deep=expected_deep_warning(model.impacts, model.prediction.force),
+        deep=expected_deep_warning(model.impacts),
         better=None
         if point is None or better is None
         else seconds(scene, better.setting, many) / seconds(scene, point.setting, many),

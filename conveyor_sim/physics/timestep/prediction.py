@@ -151,7 +151,7 @@ def deepest(impacts: Sequence[Impact], force: float) -> float:
 def deep_warning(overlap: float, of: str) -> str:
     """Return a sentence on an overlap (relative to the diameter) above DEEP; empty up to it.
 
-    of: the overlap in words, such as `expected overlap at 120 N`.
+    of: the overlap in words, such as `overlap in impacts`.
     """
     if not overlap > DEEP:
         return ""
@@ -161,9 +161,15 @@ def deep_warning(overlap: float, of: str) -> str:
     )
 
 
-def expected_deep_warning(impacts: Sequence[Impact], force: float) -> str:
-    """Return the warning about the overlap at the largest expected force (N); empty up to DEEP."""
-    return deep_warning(deepest(impacts, force), f"expected overlap at {force:.3g} N")
+def expected_deep_warning(impacts: Sequence[Impact]) -> str:
+    """Return the warning about the overlap of the hardest expected impact, with its price; empty up to DEEP.
+
+    Forces of crowds, which may be larger, are left out: their bounds are far above those of most runs. At a given speed
+    an impact lasts in proportion to its overlap, and the steps per second are in inverse proportion to its duration.
+    """
+    overlap = max((impact.overlap(impact.force) / impact.diameter for impact in impacts), default=0.0)
+    warning = deep_warning(overlap, "overlap in impacts")
+    return warning and f"{warning}; contacts stiff enough take {overlap / DEEP:.2g} times the steps"
 
 
 def without_rounding(error: float) -> float:

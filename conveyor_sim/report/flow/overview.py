@@ -162,8 +162,8 @@ def _slow_belts(model: Model) -> list[Finding]:
 
 
 def _deep(model: Model) -> list[Finding]:
-    """Return a warning about overlaps that are large at the largest expected force."""
-    warning = expected_deep_warning(model.impacts, model.prediction.force)
+    """Return a warning about large overlaps in expected impacts."""
+    warning = expected_deep_warning(model.impacts)
     return [Finding(("contacts",), warning)] if warning else []
 
 
