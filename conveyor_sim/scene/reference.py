@@ -10,7 +10,7 @@ from typing import Annotated, Any, Union, get_args, get_origin
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from conveyor_sim.scene import accuracy, belts, contacts, drives, failures, limits, schema
+from conveyor_sim.scene import accuracy, belts, contacts, drives, failures, limits, schema, vibration
 from conveyor_sim.scene.layout import parts
 from conveyor_sim.scene.layout.devices import PLACEABLE
 from conveyor_sim.scene.parts import machine, station
@@ -71,6 +71,7 @@ BEHIND: dict[str, list[tuple[str, type[BaseModel]]]] = {
         ("An entry of `surfaces` of a path belt: `kind: straight`", belts.StraightSurface),
         ("An entry of `surfaces` of a path belt: `kind: curved`", belts.CurvedSurface),
         ("`drive` of a belt", drives.Drive),
+        ("`vibration` of a belt", vibration.ChainVibration),
     ],
     "machines": [
         ("`acting_times` of a machine", machine.ActingTimes),

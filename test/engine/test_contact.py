@@ -136,10 +136,21 @@ def test_a_share_scales_the_whole_law() -> None:
 def test_implicit_friction_takes_the_slip_after_the_step() -> None:
     """T dt/m_t is the loss of slip: s + b v_lim p(s) = s_0 with mu N p(s) = -T."""
     compliance, slip = 5e-4, 0.6 * LIMIT
-    normal, tangential = force(0.002, 0.5, slip, implicit=(compliance, 0.0), stiffness=K, friction=MU, damping_normal=C)
+    columns = {"stiffness": K, "friction": MU, "damping_normal": C}
+    normal, tangential = force(0.002, 0.5, slip, implicit=(compliance, 0.0, slip), **columns)
     after = slip + compliance * tangential
     assert 0.0 < after < slip
     assert -tangential == pytest.approx(MU * normal * (2.0 * after / LIMIT - (after / LIMIT) ** 2))
+
+
+@pytest.mark.parametrize("compliance", [1e-6, 5e-4, 1.0])
+def test_implicit_friction_keeps_a_steady_slip(compliance: float) -> None:
+    """Started from the friction of that slip, the solver returns it: creep does not depend on the step."""
+    slip, columns = 0.02 * LIMIT, {"stiffness": K, "friction": MU}
+    normal, explicit = force(0.002, 0.0, slip, **columns)
+    start = slip - compliance * explicit
+    assert force(0.002, 0.0, slip, implicit=(compliance, 0.0, start), **columns)[1] == pytest.approx(explicit, rel=1e-9)
+    assert abs(explicit) < 0.1 * MU * normal
 
 
 def test_implicit_friction_of_a_small_ease_is_the_explicit_one() -> None:
@@ -148,9 +159,9 @@ def test_implicit_friction_of_a_small_ease_is_the_explicit_one() -> None:
     columns = {"stiffness": K, "friction": MU}
     normal, explicit = force(0.002, 0.0, slip, **columns)
     one = LIMIT / (MU * normal)
-    assert force(0.002, 0.0, slip, implicit=(0.5 * one, 0.5), **columns)[1] == pytest.approx(explicit, rel=1e-14)
-    ahead = force(0.002, 0.0, slip, implicit=(1.5 * one, 0.5), **columns)
-    assert ahead == force(0.002, 0.0, slip, implicit=(one, 0.0), **columns)
+    assert force(0.002, 0.0, slip, implicit=(0.5 * one, 0.5, slip), **columns)[1] == pytest.approx(explicit, rel=1e-14)
+    ahead = force(0.002, 0.0, slip, implicit=(1.5 * one, 0.5, slip), **columns)
+    assert ahead == force(0.002, 0.0, slip, implicit=(one, 0.0, slip), **columns)
 
 
 def test_the_tangential_spring_holds_up_to_coulombs_limit() -> None:
@@ -221,15 +232,15 @@ def test_apart_there_is_no_force_at_all(overlap: float) -> None:
     """Every law gives exactly 0, at any velocities, because loops add it up for all listed pairs."""
     for closing in (-3.0, 0.0, 3.0):
         for slip in (-3.0, 0.0, 1e-3):
-            assert force(overlap, closing, slip, **EVERYTHING, spring=0.01, implicit=(1e-3, 0.5)) == (0.0, 0.0)
+            assert force(overlap, closing, slip, **EVERYTHING, spring=0.01, implicit=(1e-3, 0.5, slip)) == (0.0, 0.0)
             assert force(overlap, closing, slip, **EVERYTHING, spring=0.01, atan=1) == (0.0, 0.0)
 
 
 def test_what_is_not_a_number_stays_visible() -> None:
     """No clamp hides a NaN."""
     for arguments in ((math.nan, 0.1, 0.1), (0.001, math.nan, 0.1)):
-        assert math.isnan(force(*arguments, **EVERYTHING, spring=0.01, implicit=(1e-3, 0.5))[0])
-    assert math.isnan(force(0.001, 0.1, math.nan, **EVERYTHING, spring=0.01, implicit=(1e-3, 0.5))[1])
+        assert math.isnan(force(*arguments, **EVERYTHING, spring=0.01, implicit=(1e-3, 0.5, 0.1))[0])
+    assert math.isnan(force(0.001, 0.1, math.nan, **EVERYTHING, spring=0.01, implicit=(1e-3, 0.5, math.nan))[1])
 
 
 @pytest.mark.parametrize("share", [0.2, 0.5, 1.0])
