@@ -164,8 +164,8 @@ def test_ctrl_c_before_anything_is_measured_answers_what_is_predicted(tmp_path: 
     assert missing(errors, ["answer", "51", "compiling"]) == []  # --thorough
     assert PRELIMINARY not in errors
     assert answers[0] == f"Interrupted; the best answer so far. {PREDICTED}"
-    assert [line.partition(":")[0] for line in answers[-4:]] == ["Forces", "Throughput", "Cost", "Setting"]
-    assert "predicted" in answers[-4]
+    assert [line.partition(":")[0] for line in answers[-5:]] == ["Forces", "Throughput", "Cost", "Setting", "Warning"]
+    assert "predicted" in answers[-5]
 
 
 def test_ctrl_c_after_the_first_settings_answers_what_was_measured(tmp_path: Path, made: Made) -> None:
