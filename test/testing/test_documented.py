@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """docs/testing_control_logic.md does what it says: its files, run in its order."""
 
+import os
 import re
+import sys
 from pathlib import Path
 
 import pytest
@@ -73,8 +75,10 @@ def test_it_starts_from_a_warm_line(pytester: pytest.Pytester) -> None:
     pytester.runpytest_inprocess(*PLUGIN).assert_outcomes(passed=2)
 
 
-def test_a_node_is_the_controller(pytester: pytest.Pytester) -> None:
+def test_a_node_is_the_controller(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The node's command lies beside this interpreter, as in an activated environment."""
     pytest.importorskip("rclpy", reason="ROS 2 is not sourced")
+    monkeypatch.setenv("PATH", str(Path(sys.executable).parent), prepend=os.pathsep)
     write(pytester.path, 2, 5, 7)
     pytester.runpytest_inprocess(*PLUGIN).assert_outcomes(passed=1)
 
