@@ -28,7 +28,7 @@ def test_the_tests_pass_with_the_controller_and_the_first_fails_without(pytester
 def test_without_a_controller_the_queue_presses_as_it_says(tmp_path: Path) -> None:
     scene = tmp_path / "my_line.yaml"
     scene.write_text(BLOCKS["my_line.yaml"])
-    (newtons,) = re.findall(r"first bottle reaches (\d+) N\.", PAGE)
+    (newtons,) = re.findall(r"largest contact force is (\d+) N;", PAGE)
     with Scenario(scene) as plant:
         plant.run_for(60.0)
         assert plant.simulation.contacts().normal_force.max() == pytest.approx(float(newtons), rel=0.02)
