@@ -121,7 +121,7 @@ class Source:
     """Subject in a few words, for headings."""
     citation: str
     read: str
-    """How the source was read: in full, the abstract, a figure; or `validation notes` for figures taken second hand."""
+    """Parts of the source that were read: all, the abstract, a figure; `validation notes` for second-hand figures."""
     measured: str
     """Set-up and result of the publication."""
     simulated: str

@@ -75,7 +75,7 @@ def test_no_field_of_a_scene_models_it(effect: str) -> None:
 
 
 def test_named_fields_faults_pages_and_effects_exist() -> None:
-    """What an alternative names in code style can be found."""
+    """Names in code style in an alternative can be found."""
     names = fields(Scene.model_json_schema()) | {effect.name for effect in EFFECTS}
     documents = "\n".join(page.read_text(encoding="utf-8") for page in (ROOT / "docs" / "parts").glob("*.md"))
     for one in ALL:
