@@ -213,8 +213,7 @@ IMPLICIT_FRICTION = Effect(
     called_for=partial(_chosen, field="friction_solver", value="implicit"),
     absent="friction_solver is explicit, or nothing has friction",
     needs="closed contacts and 1/m + R^2/J of each bottle",
-    bound="none. It removes the bounds of contact_friction and, for bases that are points, of base_friction. With "
-    "semi-implicit Euler the bound of turning belts remains",
+    bound="none. It removes the bounds of contact_friction and, for bases that are points, of base_friction",
     resting=_implicit_resting,
     rest="5 % of the error of the creep, because forces change by less than 10 % in 1 s",
     side=_implicit_creep,
