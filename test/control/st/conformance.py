@@ -11,19 +11,21 @@ one of:
 - `matrix`: a table of conversions, a row for what is converted, a column for a type; each is computed twice likewise.
   `=` is the type itself, `!` has no value and stops the program, `x` is no conversion, which the compiler says;
 - `error`: what the compiler says of it; `stops`: what the program says as it stops.
+`dialects`: those that have it, else iec. `lacking`: what the compiler says in all other dialects.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from ruamel.yaml import YAML
 
 from conveyor_sim.control.st.compile import compile_text
+from conveyor_sim.control.st.dialect import DIALECTS
 from conveyor_sim.control.st.program import Program
 
 CASES = Path(__file__).parent / "cases"
@@ -42,6 +44,7 @@ class Case:
     scans: str = ""
     error: str = ""
     stops: str = ""
+    dialect: str = "iec"
 
     @property
     def id(self) -> str:
@@ -51,7 +54,17 @@ class Case:
 def cases() -> Iterator[Case]:
     for path in sorted(CASES.glob("*.yaml")):
         for given in YAML(typ="safe").load(path.read_text()):
-            yield from _read(path.stem, given)
+            dialects = given.get("dialects", ["iec"])
+            for dialect in dialects:
+                for case in _read(path.stem, given):
+                    name = case.name if dialect == "iec" else f"{case.name}, {dialect}"
+                    yield replace(case, name=name, dialect=dialect)
+            if "lacking" in given:
+                for dialect in DIALECTS:
+                    if dialect not in dialects:
+                        case = next(_read(path.stem, given))
+                        name = f"{case.name}, not in {dialect}"
+                        yield replace(case, name=name, dialect=dialect, error=given["lacking"], scans="", stops="")
 
 
 def _read(group: str, given: dict[str, Any]) -> Iterator[Case]:
@@ -112,7 +125,7 @@ def in_variables(expression: str) -> tuple[str, str]:
 
 def play(case: Case) -> None:
     """Run the scans of a case, and compare."""
-    running = Program(compile_text(case.text))
+    running = Program(compile_text(case.text, dialect=DIALECTS[case.dialect]))
     header, *rows = [line for line in (case.scans or "|\n|").splitlines() if line.strip()]
     given, expected = (part.split() for part in header.split("|"))
     for number, row in enumerate(rows):
