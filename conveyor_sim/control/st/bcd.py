@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Conversions between numbers and bit strings of decimal digits, four bits each (IEC 61131-3:2013, table 24).
 
-A value that can't be converted stops the program. TIA Portal has BCD16 and BCD32, with a sign in the highest four bits.
+A value that can't be converted stops the program. In CODESYS, BCD_TO_INT returns -1 and INT_TO_BCD returns 255 instead
+(library Util). TIA Portal has BCD16 and BCD32, with a sign in the highest four bits.
 """
 
 from __future__ import annotations
@@ -20,10 +21,12 @@ def _number_of(source: Type | None, target: Type) -> Build:
 
     def build(call: Application) -> Value:
         (value,) = call.values
-        kind = source or (BYTE if value.literal else value.type.base)
+        literal = next((one for one in BITS if value.literal == "int" and value.constant <= one.high), BYTE)
+        kind = source or (literal if value.literal else value.type.base)
         if kind not in BITS:
             raise call.refuse(value, "BYTE, WORD, DWORD or LWORD")
-        return call.result(f"_of_bcd({converted(value, kind)}, {call.name!r}, {target.high})", target)
+        instead = -1 if _is_marked(call) else None
+        return call.result(f"_of_bcd({converted(value, kind)}, {call.name!r}, {target.high}, {instead})", target)
 
     return build
 
@@ -34,7 +37,8 @@ def _digits_of(source: Type | None, target: Type) -> Build:
     def build(call: Application) -> Value:
         (value,) = call.values
         code = call.whole(value) if source is None else converted(value, source)
-        return call.result(f"_to_bcd({code}, {call.name!r}, {target.width // 4})", target)
+        instead = target.high if _is_marked(call) else None
+        return call.result(f"_to_bcd({code}, {call.name!r}, {target.width // 4}, {instead})", target)
 
     return build
 
@@ -48,16 +52,25 @@ def _signed(source: Type, target: Type, python: str) -> Build:
     return build
 
 
-def _number(word: int, name: str, most: int) -> int:
+def _is_marked(call: Application) -> bool:
+    """Return True if a value that can't be converted does not stop the program."""
+    return call.name in ("BCD_TO_INT", "INT_TO_BCD") and call.expressions.scope.names.dialect.bcd_marks
+
+
+def _number(word: int, name: str, most: int, instead: int | None = None) -> int:
     digits = f"{word:x}"
     if digits.isdecimal() and int(digits) <= most:
         return int(digits)
+    if instead is not None:
+        return instead
     raise Fault(f"{name}: found 16#{digits.upper()}, expected decimal digits of at most {most}")
 
 
-def _word(number: int, name: str, digits: int) -> int:
+def _word(number: int, name: str, digits: int, instead: int | None) -> int:
     if 0 <= number < 10**digits:
         return int(str(number), 16)
+    if instead is not None:
+        return instead
     raise Fault(f"{name}: found {number}, expected 0 to {10**digits - 1}")
 
 

@@ -146,7 +146,7 @@ class CallCompiler:
         inputs = [one for one in node.arguments if not one.output]
         named = [one.name is not None for one in inputs]
         given = [one for one in node.arguments if one.output]
-        if any(named) and not all(named) or (given and not names):
+        if (any(named) and not all(named)) or (given and not names):
             raise SourceError(node.at, f"found arguments of {name} of two kinds, expected all by position or by :=")
         outputs: dict[str, Place] = {}
         count = len(function_of(name).parameters)
@@ -154,7 +154,8 @@ class CallCompiler:
             inputs, rest = inputs[:count], inputs[count:]
             given = [replace(one, name=word, output=True) for one, word in zip(rest, names, strict=False)]
             if len(rest) > len(names):
-                raise SourceError(node.at, f"found {count + len(rest)} arguments of {name}, expected {count + len(names)}")
+                most = count + len(names)
+                raise SourceError(node.at, f"found {count + len(rest)} arguments of {name}, expected {most}")
         for one in given:
             word = str(one.name).upper()
             if word not in names or word in outputs or one.negated:

@@ -13,6 +13,7 @@ from types import CodeType
 from conveyor_sim.control.st import tree
 from conveyor_sim.control.st.calls import PASSED, CallCompiler
 from conveyor_sim.control.st.declarations import Declarations, require_small
+from conveyor_sim.control.st.dialect import IEC, Dialect, dialect_of
 from conveyor_sim.control.st.errors import Position, SourceError, StructuredTextError
 from conveyor_sim.control.st.expressions import Expressions
 from conveyor_sim.control.st.located import NOTHING_SHARED, Layout, laid_out
@@ -61,31 +62,35 @@ class Compiled:
     """Programs in the order in which they run."""
     globals: BlockType
     digest: str
-    """SHA-256 of the text. A snapshot fits the same program only."""
+    """SHA-256 of the text and its dialect. A snapshot fits the same program only."""
     trace: bool
     """True if assignments record the last write of a variable."""
     shared: Mapping[tuple[str, str], int]
     """Number of the memory that a located variable shares with others, by Python class and slot."""
 
 
-def compile_file(path: Path, trace: bool = False) -> Compiled:
-    """Compile the program in a file. Raise StructuredTextError if the file can't be read or the program is wrong."""
+def compile_file(path: Path, trace: bool = False, dialect: str = "") -> Compiled:
+    """Compile the program in a file. Raise StructuredTextError if the file can't be read or the program is wrong.
+
+    dialect: name in `DIALECTS`; "" for the default of the file's type.
+    """
+    chosen = dialect_of(str(path), dialect)
     try:
         text = read_file(path, MOST_BYTES).decode("utf-8-sig")
     except FileError as error:
         raise StructuredTextError(f"{path}: {error}, expected a program in Structured Text") from error
     except UnicodeDecodeError as error:
         raise StructuredTextError(f"{path}: is not UTF-8 ({error.reason} at byte {error.start})") from error
-    return compile_text(text, str(path), trace)
+    return compile_text(text, str(path), trace, chosen)
 
 
-def compile_text(text: str, file: str = "program.st", trace: bool = False) -> Compiled:
+def compile_text(text: str, file: str = "program.st", trace: bool = False, dialect: Dialect = IEC) -> Compiled:
     """Compile a text. Raise StructuredTextError if it is wrong.
 
     trace: True to record the last write of each variable.
     """
     try:
-        return _compile(text, file, trace)
+        return _compile(text, file, trace, dialect)
     except SourceError as error:
         place = f"{file}:{error.at.line}:{error.at.column}"
         raise StructuredTextError(f"{place}: {printable(error, SENTENCE)}") from None
@@ -93,13 +98,13 @@ def compile_text(text: str, file: str = "program.st", trace: bool = False) -> Co
         raise StructuredTextError(f"{file}: found a program nested too deeply, expected a flatter one") from None
 
 
-def _compile(text: str, file: str, trace: bool) -> Compiled:
-    source = parse(text)
+def _compile(text: str, file: str, trace: bool, dialect: Dialect) -> Compiled:
+    source = parse(text, dialect)
     if len(source.units) > MOST_UNITS:
         at, count = source.units[MOST_UNITS].at, len(source.units)
         raise SourceError(at, f"found {count} programs, functions and blocks, expected at most {MOST_UNITS}")
     calls = CallCompiler(trace)
-    declared = calls.declarations = Declarations(source, calls)
+    declared = calls.declarations = Declarations(source, calls, dialect)
     declared.resolve()
     lines = CodeLines()
     for one in source.types:
@@ -131,10 +136,15 @@ def _compile(text: str, file: str, trace: bool) -> Compiled:
         tuple(lines.positions),
         tuple(sorted(scheduled, key=lambda one: one.priority)),
         declared.names.globals,
-        hashlib.sha256(text.encode()).hexdigest(),
+        _digest(text, dialect),
         trace,
         {place: one.group for place, one in layout.places.items()},
     )
+
+
+def _digest(text: str, dialect: Dialect) -> str:
+    """Return the digest of a program; that of a text in IEC 61131-3 does not depend on the dialect's name."""
+    return hashlib.sha256((text if dialect == IEC else f"{dialect.name}\0{text}").encode()).hexdigest()
 
 
 def _layout(source: tree.SourceFile, declared: Declarations) -> Layout:

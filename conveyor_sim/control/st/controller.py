@@ -34,19 +34,21 @@ class StructuredText:
         budget: int = BUDGET,
         trace: bool = False,
         record: str | Iterable[str] = (),
+        dialect: str = "",
     ) -> None:
         """Compile a program.
 
         path: of the program. tags: by variable ("main/speed"); they override those in the program. modbus_map: file
         with the addresses of located variables (AT %IX0.0). budget: largest number of statements of all programs in one
         scan; the watchdog stops a program that exceeds it. trace: True to make `last_written` available; scans take
-        longer. record: patterns of variables to record ("main/*", `control/recorded.py`).
+        longer. record: patterns of variables to record ("main/*", `control/recorded.py`). dialect: iec, codesys,
+        twincat or tia; "" for the default of the file's type.
 
         Raise StructuredTextError, a ControlError, for a wrong program, and MapError for a wrong map.
         """
         self._tags = dict(tags or {})
         self._addresses: Addresses = {} if modbus_map is None else read_addresses(Path(modbus_map))
-        self.program = Program(compile_file(Path(path), trace), budget)
+        self.program = Program(compile_file(Path(path), trace, dialect), budget)
         self.record = patterns(record)
         """Patterns of the variables to record."""
         self.mapping: TagMapping | None = None

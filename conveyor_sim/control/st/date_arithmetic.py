@@ -62,4 +62,3 @@ def conversion_code(source: Type, code: str, target: Type) -> str | None:
 
 
 NAMESPACE.update(_moment_text=moment_text)
-

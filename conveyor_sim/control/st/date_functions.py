@@ -25,7 +25,8 @@ def _operator(word: str, *types: str) -> Build:
             if value.literal or not fits(value.type, ELEMENTARY[name]):
                 raise call.refuse(value, name)
         empty = tree.Name(call.at, "")
-        return call.expressions.binary(tree.Binary(call.at, word, empty, empty), *call.values, call.hint)
+        first, second = call.values
+        return call.expressions.binary(tree.Binary(call.at, word, empty, empty), first, second, call.hint)
 
     return build
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from conveyor_sim.control.st import tree
 from conveyor_sim.control.st.blocks import STANDARD
+from conveyor_sim.control.st.dialect import Dialect
 from conveyor_sim.control.st.errors import Position, SourceError
 from conveyor_sim.control.st.expressions import Expressions
 from conveyor_sim.control.st.located import Located, address_of, require_fit
@@ -47,12 +48,12 @@ MOST_CONSTANTS = 50
 class Declarations:
     """Declarations of one file. Names are resolved at their first use, so the order in the file is free."""
 
-    def __init__(self, source: tree.SourceFile, calls: Any) -> None:
+    def __init__(self, source: tree.SourceFile, calls: Any, dialect: Dialect) -> None:
         """Register all names of a file.
 
         calls: as `Expressions` takes it.
         """
-        self.names = Names(types={name.lower(): block for name, block in STANDARD.items()})
+        self.names = Names(dialect, types={name.lower(): block for name, block in STANDARD.items()})
         self.structures: list[Structure] = []
         """Declared structures, each after those it contains."""
         self.located: list[Located] = []
@@ -289,7 +290,7 @@ class Declarations:
         type_ = self._type(declared.type, known)
         if isinstance(type_, BlockType) and (type_.function or type_.python.startswith("_P_")):
             raise SourceError(declared.at, f"found {type_.name}, expected a type or a function block")
-        constant = "CONSTANT" in qualifiers
+        constant = "CONSTANT" in qualifiers and section != "VAR_INPUT"  # of an input the caller's value counts
         code, value = type_.initial, None
         if declared.initial is not None:
             if section in ("VAR_IN_OUT", "VAR_EXTERNAL"):
@@ -315,6 +316,7 @@ class Declarations:
             value,
             declared.address,
             declared.tag,
+            "CONSTANT" in qualifiers and section == "VAR_INPUT",
             declared.at,
         )
         if declared.address:

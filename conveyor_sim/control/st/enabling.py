@@ -69,7 +69,8 @@ def enabled(value: Value, enabling: Enabling, expressions: Expressions, traced: 
         reference = traced or place.reference
         if not reference:
             raise SourceError(place.at, f"found {described(place)} for ENO, expected a variable that is no single bit")
-        code = f"(_reported({reference}, True, {value.code}) if {condition} else _reported({reference}, False, {start}))"
+        done, omitted = f"_reported({reference}, True, {value.code})", f"_reported({reference}, False, {start})"
+        code = f"({done} if {condition} else {omitted})"
     span = value.span and (min(value.span[0], int(start)), max(value.span[1], int(start)))
     return Value(value.at, value.type, code, span=span)
 

@@ -135,7 +135,8 @@ class Expressions:
                 node.at, "found an assignment to the control variable of a FOR inside of it, expected none"
             )
         if place.fixed:
-            raise SourceError(node.at, f"found {place.fixed}, expected a variable that can be written")
+            advice = self.scope.names.dialect.advice(place.lacks) if place.lacks else ""
+            raise SourceError(node.at, f"found {place.fixed}, expected a variable that can be written{advice}")
         return place
 
     def _literal(self, node: tree.Literal) -> Value:
@@ -203,6 +204,7 @@ class Expressions:
             write=lambda new: f"{code} = {new}",
             reference=f"_Attribute({base.code}, {member.slot!r}, {root})",
             fixed=fixed,
+            lacks=base.lacks,
             root=root,
         )
 
@@ -225,6 +227,7 @@ class Expressions:
             write=lambda new: f"{element} = {new}",
             reference=f"_Element({code}, {index}, {base.root})",
             fixed=base.fixed,
+            lacks=base.lacks,
             root=base.root,
         )
 
@@ -263,6 +266,7 @@ class Expressions:
                 else base.write(f"{base.code} | {bit} if {new} else {base.code} & {rest}")
             ),
             fixed=base.fixed,
+            lacks=base.lacks,
             root=base.root,
         )
 

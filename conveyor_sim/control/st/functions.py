@@ -33,6 +33,7 @@ from conveyor_sim.control.st.values import Place, Value, converted, described, f
 from conveyor_sim.control.st.work import MANY, MANY_SEARCHED
 from conveyor_sim.control.st.work import conversion as conversion_work
 
+
 def _real(call: Application) -> Value:
     kind = REAL if REAL in (call.hint, call.values[0].type) else LREAL
     if any(one.type == LREAL and not one.literal for one in call.values):

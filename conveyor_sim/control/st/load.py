@@ -8,12 +8,14 @@ from importlib.util import find_spec
 
 from conveyor_sim.control import load as python
 from conveyor_sim.control.scan import ControlError, Controller
+from conveyor_sim.control.st.dialect import DIALECTS
 
 SUFFIX, LIBRARY = ".st", ".so"
 
 
 _TAGS, _MAP = "tags (a mapping from variables to tags)", "modbus_map (a file)"
 _RECORD, _BUDGET, _PATIENCE = "record (patterns of variables)", "budget (statements)", "patience (s)"
+_DIALECT = f"dialect ({', '.join(DIALECTS)})"
 
 
 def load(reference: str, parameters: Mapping[str, object] | None = None) -> Controller:
@@ -31,7 +33,9 @@ def load(reference: str, parameters: Mapping[str, object] | None = None) -> Cont
         raise ControlError(f"controller {reference!r}: lark is missing, expected it: pip install 'conveyor_sim[st]'")
     from conveyor_sim.control.st.controller import StructuredText
 
-    _require(reference, given, {"tags": _TAGS, "modbus_map": _MAP, "record": _RECORD, "budget": _BUDGET})
+    _require(
+        reference, given, {"tags": _TAGS, "modbus_map": _MAP, "record": _RECORD, "budget": _BUDGET, "dialect": _DIALECT}
+    )
     return StructuredText(reference, **given)  # type: ignore[arg-type]
 
 
@@ -66,5 +70,6 @@ _IS: Mapping[str, Callable[[object], bool]] = {
     "record": lambda value: _is_text(value) or (isinstance(value, list) and all(map(_is_text, value))),
     "budget": lambda value: _is_number(value) and isinstance(value, int),
     "patience": _is_number,
+    "dialect": lambda value: isinstance(value, str) and value in DIALECTS,
 }
 """Checks of the parameters, by name."""

@@ -58,8 +58,8 @@ _OPERATORS = {
     *("AT_MOST", "AT_LEAST", "PLUS", "MINUS", "TIMES", "OVER", "POWER"),
 }
 _VALUES = {
-    *("INTEGER", "BASED", "DECIMAL", "TIME", "MOMENT", "TEXT", "WIDE_TEXT", "TRUE", "FALSE", "PREFIX", "NOT", "PLUS", "MINUS"),
-    *("NAME", "LPAR"),
+    *("INTEGER", "BASED", "DECIMAL", "TIME", "MOMENT", "TEXT", "WIDE_TEXT", "TRUE", "FALSE", "PREFIX", "NOT", "PLUS"),
+    *("MINUS", "NAME", "LPAR"),
 }
 
 

@@ -17,6 +17,7 @@ from lark.visitors import Transformer
 
 from conveyor_sim.control.st import literals, tree
 from conveyor_sim.control.st.dates import moment
+from conveyor_sim.control.st.dialect import IEC, Dialect
 from conveyor_sim.control.st.errors import Position, SourceError
 from conveyor_sim.control.st.mistakes import at_of, not_refused, unexpected
 from conveyor_sim.control.st.pragmas import selected
@@ -49,12 +50,13 @@ MOST_OPERANDS = 1000
 _ONE_AT_A_TIME = threading.Lock()
 
 
-def parse(text: str) -> tree.SourceFile:
+def parse(text: str, dialect: Dialect = IEC) -> tree.SourceFile:
     """Return the syntax tree of a file. Raise SourceError."""
     text = selected(text)
     try:
         with _ONE_AT_A_TIME:
             parser, made = _parser()
+            made.dialect = dialect
             try:
                 source = parser.parse(text)
             finally:
@@ -114,6 +116,8 @@ class _Tree(Transformer[Any]):
 
     def __init__(self) -> None:
         super().__init__()
+        self.dialect = IEC
+        """Dialect of the present text."""
         self.depths: dict[int, tuple[object, int]] = {}
         """Depths of nodes by id, with the nodes, which keeps the ids valid."""
 

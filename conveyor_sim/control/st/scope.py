@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 
+from conveyor_sim.control.st.dialect import Dialect
 from conveyor_sim.control.st.errors import Position, SourceError
 from conveyor_sim.control.st.types import BlockType, Enumeration, Member, Type
 from conveyor_sim.control.st.values import Place, Value, constant
@@ -23,6 +24,7 @@ class Thing:
 class Names:
     """Names known in all units of a file, in small letters. They grow as the file is read."""
 
+    dialect: Dialect
     types: dict[str, Type] = field(default_factory=dict)
     """Derived types, blocks and programs."""
     functions: dict[str, BlockType] = field(default_factory=dict)
@@ -55,7 +57,7 @@ class Scope:
             if member.section == "VAR_EXTERNAL":
                 place = self._global(at, key, name)
                 return replace(place, fixed=place.fixed or f"{name}, a CONSTANT") if member.constant else place
-            return place_of(at, "self", member, inside=True)
+            return place_of(at, "self", member, self.names.dialect)
         if self.names.global_(key) is not None:
             return self._global(at, key, name)
         for known, what in self._others():
@@ -91,7 +93,7 @@ class Scope:
         member = self.names.global_(key)
         if member is None:
             raise SourceError(at, f"found {name}, expected a variable of VAR_GLOBAL of that name")
-        return place_of(at, "_g", member, inside=True)
+        return place_of(at, "_g", member, self.names.dialect)
 
     def _others(self, everything: bool = False) -> list[tuple[Mapping[str, object], str]]:
         own = self.unit.members if self.unit is not None else {}
@@ -109,11 +111,8 @@ class Scope:
         return member.name if member else key
 
 
-def place_of(at: Position, owner: str, member: Member, inside: bool) -> Place:
-    """Return a variable of an object.
-
-    inside: True in the unit that the variable belongs to.
-    """
+def place_of(at: Position, owner: str, member: Member, dialect: Dialect) -> Place:
+    """Return a variable of an object, in the unit that it belongs to."""
     slot = member.slot
     if member.section == "VAR_IN_OUT":
         reference = f"{owner}.{slot}"
@@ -126,9 +125,9 @@ def place_of(at: Position, owner: str, member: Member, inside: bool) -> Place:
             root=f"{reference}.root",
         )
     code = f"{owner}.{slot}"
-    fixed = f"{member.name}, a CONSTANT" if member.constant else ""
-    if inside and member.section == "VAR_INPUT":
-        fixed = f"{member.name}, an input"
+    fixed, lacks = f"{member.name}, a CONSTANT" if member.constant else "", ""
+    if member.section == "VAR_INPUT" and (member.read_only or not dialect.written_inputs):
+        fixed, lacks = f"{member.name}, an input", "" if member.read_only else "written_inputs"
     elif member.address.startswith("%I"):
         fixed = f"{member.name}, an input at {member.address}"
     known = member.value
@@ -140,5 +139,6 @@ def place_of(at: Position, owner: str, member: Member, inside: bool) -> Place:
         write=lambda new: f"{code} = {new}",
         reference=f"_Attribute({owner}, {slot!r})",
         fixed=fixed,
+        lacks=lacks,
         root=f"({owner}, {slot!r})",
     )

@@ -214,6 +214,8 @@ class Member:
     """Value of a constant."""
     address: str = ""
     tag: str = ""
+    read_only: bool = False
+    """VAR_INPUT CONSTANT."""
     at: tuple[int, int] = (1, 1)
 
     @property

@@ -85,6 +85,8 @@ class Place(Value):
     """Code that passes the variable as VAR_IN_OUT; "" if that is impossible."""
     fixed: str = ""
     """Reason why it can't be written; "" if it can."""
+    lacks: str = ""
+    """Flag of a `Dialect` in which it can be written."""
     root: str = ""
     """Code of the variable that contains it: the object that it belongs to, and its slot."""
 
