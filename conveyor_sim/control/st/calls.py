@@ -3,11 +3,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from conveyor_sim.control.st import tree
 from conveyor_sim.control.st.declarations import Declarations
+from conveyor_sim.control.st.enabling import Enabling, enabled, separated
 from conveyor_sim.control.st.errors import Position, SourceError
 from conveyor_sim.control.st.expressions import Expressions
-from conveyor_sim.control.st.functions import apply, is_standard
+from conveyor_sim.control.st.functions import apply, function_of, is_standard
 from conveyor_sim.control.st.tia_blocks import IEC_TIMER, INSTRUCTIONS
 from conveyor_sim.control.st.types import BOOL, VOID, BlockType, Member, Type
 from conveyor_sim.control.st.values import Place, Value, assignment, converted, described
@@ -51,6 +54,8 @@ class CallCompiler:
             if target.name.lower() in scope.names.types:
                 raise SourceError(node.at, f"found a call of {target.name}, a type, expected a variable of it")
             raise SourceError(node.at, f"found {target.name}(...), expected a function that is declared")
+        enabling = separated(node, function)
+        node = enabling.call
         self._note(expressions, function, node)
         expressions.work += CALL
         codes = []
@@ -65,7 +70,7 @@ class CallCompiler:
             else:
                 codes.append(self.reference(expressions, argument, member, node.at))
         code = f"_f_{function.name.lower()}({', '.join(codes)})"
-        return Value(node.at, function.result or VOID, code)
+        return self._enabled(expressions, Value(node.at, function.result or VOID, code), enabling)
 
     def block(self, expressions: Expressions, node: tree.Call) -> tuple[Place, list[str]]:
         """Return the block of a call statement, and the lines of the call."""
@@ -73,6 +78,8 @@ class CallCompiler:
         kind = place.type
         if not isinstance(kind, BlockType):
             raise SourceError(node.at, f"found a call of {described(place)}, expected a function or a block")
+        enabling = separated(node, kind)
+        node = enabling.call
         self._note(expressions, kind, node)
         lines, after = [f"_o = {place.code}"], []
         written = [one.slot for one in kind.of("VAR_OUTPUT") if kind.standard]
@@ -91,7 +98,16 @@ class CallCompiler:
             else:
                 after += self._output(expressions, argument, member, node.at)
         noted = [line for slot in written for line in self.noted(expressions, f"(_o, {slot!r})", node.at)]
-        return place, [*lines, f"_o.{run}(_rt.now)", *noted, *after]
+        lines += [f"_o.{run}(_rt.now)", *noted, *after]
+        if enabling.en is None and enabling.eno is None:
+            return place, lines
+        report = enabling.report(expressions)
+        ends: list[list[str]] = [[], ["pass"]]
+        if report is not None:
+            written = self.noted(expressions, report.root, node.at)
+            ends = [[report.write(on), *written] for on in ("True", "False")]
+        lines = [" " + line for line in (*lines, *ends[0])]
+        return place, [f"if {enabling.condition(expressions)}:", *lines, "else:", *(" " + line for line in ends[1])]
 
     def _called(self, expressions: Expressions, target: tree.Expression) -> tuple[Place, str]:
         """Return the block that a statement calls, and the name of its method: of an IEC_TIMER the instruction."""
@@ -137,11 +153,43 @@ class CallCompiler:
             self.edges.setdefault(expressions.scope.unit.python, {}).setdefault(kind.python, node)
 
     def _standard(self, expressions: Expressions, node: tree.Call, name: str, hint: Type | None) -> Value:
-        named = [one.name is not None for one in node.arguments]
-        if any(one.output for one in node.arguments) or (any(named) and not all(named)):
+        enabling = separated(node, None)
+        node, names = enabling.call, function_of(name).outputs
+        inputs = [one for one in node.arguments if not one.output]
+        named = [one.name is not None for one in inputs]
+        given = [one for one in node.arguments if one.output]
+        if (any(named) and not all(named)) or (given and not names):
             raise SourceError(node.at, f"found arguments of {name} of two kinds, expected all by position or by :=")
-        arguments = [(one.name, expressions.value(one.value, hint)) for one in node.arguments]
-        return apply(node.at, name, arguments, expressions, hint)
+        outputs: dict[str, Place] = {}
+        count = len(function_of(name).parameters)
+        if names and not any(named) and not given:  # outputs by position, after the inputs
+            inputs, rest = inputs[:count], inputs[count:]
+            given = [replace(one, name=word, output=True) for one, word in zip(rest, names, strict=False)]
+            if len(rest) > len(names):
+                most = count + len(names)
+                raise SourceError(node.at, f"found {count + len(rest)} arguments of {name}, expected {most}")
+        for one in given:
+            word = str(one.name).upper()
+            if word not in names or word in outputs or one.negated:
+                raise SourceError(one.at, f"found {one.name} of {name}, expected one of {', '.join(names)}, each once")
+            outputs[word] = self._traced(expressions, expressions.target(one.value), node.at)
+        arguments = [(one.name, expressions.value(one.value, hint)) for one in inputs]
+        return self._enabled(expressions, apply(node.at, name, arguments, expressions, hint, outputs), enabling)
+
+    def _enabled(self, expressions: Expressions, value: Value, enabling: Enabling) -> Value:
+        """Return the value of a call with EN and ENO."""
+        report = enabling.report(expressions)
+        traced = "" if report is None else self._traced(expressions, report, value.at).reference
+        return enabled(value, enabling, expressions, traced)
+
+    def _traced(self, expressions: Expressions, place: Place, at: Position) -> Place:
+        """Return a variable whose reference records writes, if these are traced.
+
+        at: of the call.
+        """
+        if not place.reference or not self.noted(expressions, place.root, at):
+            return place
+        return replace(place, reference=f"_Traced({place.reference}, _noted, {at.line}, {at.column})")
 
     def _bound(self, expressions: Expressions, node: tree.Call, kind: BlockType) -> dict[str, tree.Argument]:
         """Return arguments by the slot of their variable."""
@@ -189,9 +237,7 @@ class CallCompiler:
         if place.type != member.type or not place.reference or argument.negated:
             expected = f"a variable of type {member.type.name}"
             raise SourceError(argument.at, f"found {described(place)} for {member.name}, expected {expected}")
-        if member.section == "VAR_OUTPUT" and self.noted(expressions, place.root, at):
-            return f"_Traced({place.reference}, _noted, {at.line}, {at.column})"
-        return place.reference
+        return self._traced(expressions, place, at).reference if member.section == "VAR_OUTPUT" else place.reference
 
     def _output(self, expressions: Expressions, argument: tree.Argument, member: Member, at: Position) -> list[str]:
         place = expressions.target(argument.value)

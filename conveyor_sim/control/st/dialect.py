@@ -30,6 +30,7 @@ class Dialect:
     name: str
     tia_sources: bool = _flag("DATA_BLOCK, `TON_TIME`, `CTU_INT`, `IEC_TIMER` and its `t.TON(...)`")
     written_inputs: bool = _flag("a unit writes its VAR_INPUT")
+    bcd_marks: bool = _flag("BCD_TO_INT of no BCD is -1, INT_TO_BCD of more than 99 is 255 (else the program stops)")
 
     def require(self, flag: str, at: Position, found: str, expected: str) -> None:
         """Raise SourceError, with the dialects that have a feature, if this one has not.
@@ -52,7 +53,12 @@ IEC = Dialect("iec")
 
 DIALECTS: dict[str, Dialect] = {
     one.name: one
-    for one in (IEC, Dialect("codesys", **_CODESYS), Dialect("twincat", **_CODESYS), Dialect("tia", tia_sources=True))
+    for one in (
+        IEC,
+        Dialect("codesys", bcd_marks=True, **_CODESYS),
+        Dialect("twincat", **_CODESYS),
+        Dialect("tia", tia_sources=True),
+    )
 }
 """Dialects by name."""
 

@@ -9,6 +9,8 @@ from dataclasses import replace
 from typing import Any
 
 from conveyor_sim.control.st import tree
+from conveyor_sim.control.st.date_arithmetic import ALLOWED, combined
+from conveyor_sim.control.st.dates import PREFIXES, expected_literal
 from conveyor_sim.control.st.errors import SourceError
 from conveyor_sim.control.st.integers import computed, negated
 from conveyor_sim.control.st.operations import divide, modulo
@@ -146,8 +148,12 @@ class Expressions:
                 return constant(node.at, BOOL, node.value)
             if node.kind == "time":
                 return constant(node.at, LTIME if node.text[0] in "lL" else TIME, node.value)
+            if node.kind == "date":
+                return constant(node.at, PREFIXES[node.text.partition("#")[0].upper()], node.value)
             kind = WSTRING if node.kind == "wide" else STRING
             return constant(node.at, replace(kind, high=len(str(node.value))), node.value)
+        if node.type in PREFIXES:
+            raise SourceError(node.at, f"found {node.text}, expected {expected_literal(PREFIXES[node.type].part)}")
         target = ELEMENTARY.get(node.type)
         if target is None or (target.kind == "time"):
             raise SourceError(node.at, f"found {node.text}, expected an elementary type before #")
@@ -305,7 +311,12 @@ class Expressions:
             return self._logic(node, left, right)
         if left.literal and right.literal:
             return self._exact(node, left, right)
-        if "time" in (left.type.base.kind, right.type.base.kind):
+        kinds = (left.type.base.kind, right.type.base.kind)
+        if "date" in kinds:
+            if (result := combined(node.at, word, left, right)) is None:
+                raise self._no_operator(node, left, right, ALLOWED)
+            return result
+        if "time" in kinds:
             return self._time(node, left, right)
         kind = unified(left, right, hint)
         if kind is None or kind.kind not in ("int", "real"):

@@ -16,6 +16,7 @@ from lark.lark import PostLex
 from lark.visitors import Transformer
 
 from conveyor_sim.control.st import data_blocks, literals, tree
+from conveyor_sim.control.st.dates import moment
 from conveyor_sim.control.st.dialect import IEC, Dialect
 from conveyor_sim.control.st.errors import Position, SourceError
 from conveyor_sim.control.st.mistakes import at_of, not_refused, unexpected
@@ -417,6 +418,8 @@ def _literal(token: Token, at: Position | None = None) -> tree.Literal:
         return tree.Literal(at, text, "real", literals.real(text))
     if token.type == "TIME":
         return tree.Literal(at, text, "time", literals.duration(at, text))
+    if token.type == "MOMENT":
+        return tree.Literal(at, text, "date", moment(at, text))
     if token.type in ("TRUE", "FALSE"):
         return tree.Literal(at, text, "bool", token.type == "TRUE")
     wide = token.type == "WIDE_TEXT"

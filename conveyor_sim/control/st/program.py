@@ -197,7 +197,7 @@ def python_value(kind: Type, number: float) -> Any:
         return number >= 0.5
     if base.kind == "real":
         return NAMESPACE["_single"](number) if base.name == "REAL" else float(number)
-    whole = round(number * 1e9) if base.kind == "time" else round(number)
+    whole = round(number * 1e9) if base.kind in ("time", "date") else round(number)
     if not kind.low <= whole <= kind.high:
         raise StructuredTextError(f"found {number:g}, expected {kind.name}, {kind.low} to {kind.high}")
     return whole

@@ -29,7 +29,7 @@ class Literal(Expression):
     """
 
     text: str
-    kind: OneOf["int", "real", "bool", "time", "string", "wide"]
+    kind: OneOf["int", "real", "bool", "time", "date", "string", "wide"]
     value: int | float | bool | str
     type: str = ""
     """Type before the value: "UINT" in UINT#5."""

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
+from conveyor_sim.control.st.dates import moment_text
 from conveyor_sim.control.st.errors import Fault, Position, SourceError
 from conveyor_sim.control.st.literals import long_time_text, time_text
 from conveyor_sim.control.st.located import Cell, Memory
@@ -25,6 +26,7 @@ from conveyor_sim.control.st.types import (
     ULINT,
     Array,
     BlockType,
+    Moment,
     String,
     Structure,
     Subrange,
@@ -132,6 +134,8 @@ def described(value: Value) -> str:
         return f"the number {value.constant}"
     if value.constant is None:
         return value.type.name
+    if isinstance(value.type.base, Moment):
+        return moment_text(value.constant, value.type.base.name)
     texts = {TIME: time_text, LTIME: long_time_text}
     text = texts.get(value.type.base)
     return text(value.constant) if text else f"{value.type.name} {value.constant}"
@@ -226,7 +230,7 @@ def _has_blocks(kind: Type) -> bool:
 
 def _advice(value: Value, target: Type) -> str:
     source, into = value.type.base, target.base
-    kinds = {"int", "real", "bits", "bool", "time", "string"}
+    kinds = {"int", "real", "bits", "bool", "time", "date", "string"}
     if value.literal or source.kind not in kinds or into.kind not in kinds:
         return ""
     return f"; {source.name.partition('[')[0]}_TO_{into.name.partition('[')[0]} converts"

@@ -47,9 +47,9 @@ class Variable:
         return root
 
     def number(self) -> float:
-        """Return the value as a number: a bool is 0 or 1, a TIME is in s, a text is its length."""
+        """Return the value as a number: a bool is 0 or 1, a TIME or a date is in s, a text is its length."""
         value = self.read()
-        if self.type.base.kind == "time":
+        if self.type.base.kind in ("time", "date"):
             return float(value) * 1e-9
         return float(len(value)) if isinstance(value, str) else float(value)
 

@@ -19,6 +19,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -31,8 +32,8 @@ from conveyor_sim.control.st.program import Program
 CASES = Path(__file__).parent / "cases"
 TICK = 10_000_000  # ns
 TYPED = re.compile(
-    r"\b(?!16#|8#|2#|T#|LTIME#)[A-Z]+#(?:16#[0-9A-F]+|-?[0-9][0-9_.]*(?:[eE][+-]?\d+)?|TRUE|FALSE|'[^']*')"
-    r"|\b(?:T|LTIME)#-?[\w.]+"
+    r"\b(?!16#|8#|2#|T#|LTIME#|L?(?:DT?|LD|DATE|TOD|TIME_OF_DAY|DATE_AND_TIME)#)[A-Z]+#(?:16#[0-9A-F]+|-?[0-9][0-9_.]*(?:[eE][+-]?\d+)?|TRUE|FALSE|'[^']*')"
+    r"|\b(?:T|LTIME)#-?[\w.]+|(?<!')\bL?(?:DATE|TOD|DT)#[\d:.-]*\d"
 )
 
 
@@ -148,13 +149,25 @@ def variable(running: Program, name: str) -> Any:
 
 
 def value(word: str) -> Any:
-    """Return T and F; times in ms as 30ms; numbers; texts in quotes, with _ for a blank."""
+    """Return T and F; times in ms as 30ms; dates as literals; numbers; texts in quotes, with _ for a blank."""
     if word in ("T", "F"):
         return word == "T"
     if word.endswith("ms"):
         return round(float(word[:-2]) * 1e6)
     if word.endswith("ns"):
         return int(word[:-2])
+    if re.match(r"L?(DATE|TOD|DT)#", word):
+        return moment(word)
     if word.startswith("'"):
         return word[1:-1].replace("_", " ")
     return float(word) if any(letter in word for letter in ".ein") else int(word, 0)
+
+
+def moment(word: str) -> int:
+    """Return a date, a time of day, or both, in ns, by Python's calendar. Fractions have at most 9 digits."""
+    kind, _, text = word.partition("#")
+    whole, _, fraction = text.partition(".")
+    form = {"DATE": "%Y-%m-%d", "TOD": "%H:%M:%S", "DT": "%Y-%m-%d-%H:%M:%S"}[kind.removeprefix("L")]
+    start = datetime(1900, 1, 1) if "TOD" in kind else datetime(1970, 1, 1)
+    seconds = (datetime.strptime(whole, form) - start) // timedelta(seconds=1)
+    return seconds * 10**9 + int(fraction.ljust(9, "0"))
