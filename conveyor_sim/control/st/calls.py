@@ -11,6 +11,7 @@ from conveyor_sim.control.st.enabling import Enabling, enabled, separated
 from conveyor_sim.control.st.errors import Position, SourceError
 from conveyor_sim.control.st.expressions import Expressions
 from conveyor_sim.control.st.functions import apply, function_of, is_standard
+from conveyor_sim.control.st.tia_blocks import IEC_TIMER, INSTRUCTIONS
 from conveyor_sim.control.st.types import BOOL, VOID, BlockType, Member, Type
 from conveyor_sim.control.st.values import Place, Value, assignment, converted, described
 from conveyor_sim.control.st.work import CALL
@@ -73,7 +74,7 @@ class CallCompiler:
 
     def block(self, expressions: Expressions, node: tree.Call) -> tuple[Place, list[str]]:
         """Return the block of a call statement, and the lines of the call."""
-        place = expressions.place(node.target)
+        place, run = self._called(expressions, node.target)
         kind = place.type
         if not isinstance(kind, BlockType):
             raise SourceError(node.at, f"found a call of {described(place)}, expected a function or a block")
@@ -97,7 +98,7 @@ class CallCompiler:
             else:
                 after += self._output(expressions, argument, member, node.at)
         noted = [line for slot in written for line in self.noted(expressions, f"(_o, {slot!r})", node.at)]
-        lines += ["_o.run(_rt.now)", *noted, *after]
+        lines += [f"_o.{run}(_rt.now)", *noted, *after]
         if enabling.en is None and enabling.eno is None:
             return place, lines
         report = enabling.report(expressions)
@@ -107,6 +108,17 @@ class CallCompiler:
             ends = [[report.write(on), *written] for on in ("True", "False")]
         lines = [" " + line for line in (*lines, *ends[0])]
         return place, [f"if {enabling.condition(expressions)}:", *lines, "else:", *(" " + line for line in ends[1])]
+
+    def _called(self, expressions: Expressions, target: tree.Expression) -> tuple[Place, str]:
+        """Return the block that a statement calls, and the name of its method: of an IEC_TIMER the instruction."""
+        if isinstance(target, tree.MemberAccess) and (name := target.name.lower()) in INSTRUCTIONS:
+            timer = expressions.place(target.base)
+            if timer.type is IEC_TIMER:
+                return timer, f"run_{name}"
+        place = expressions.place(target)
+        if place.type is IEC_TIMER:
+            raise SourceError(target.at, f"found a call of {place.type.name}, expected .TON, .TOF or .TP before (")
+        return place, "run"
 
     def noted(self, expressions: Expressions, root: str, at: Position) -> list[str]:
         """Return the line that records the last write of a variable, if that is traced.

@@ -14,6 +14,7 @@ from conveyor_sim.control.st.expressions import Expressions
 from conveyor_sim.control.st.located import Located, address_of, require_fit
 from conveyor_sim.control.st.scope import Names, Scope
 from conveyor_sim.control.st.sections import LOCATED, OUTSIDE, meaning
+from conveyor_sim.control.st.tia_blocks import BLOCKS
 from conveyor_sim.control.st.types import (
     ELEMENTARY,
     MOST_CHARACTERS,
@@ -53,7 +54,8 @@ class Declarations:
 
         calls: as `Expressions` takes it.
         """
-        self.names = Names(dialect, types={name.lower(): block for name, block in STANDARD.items()})
+        blocks = {**STANDARD, **BLOCKS} if dialect.tia_sources else STANDARD
+        self.names = Names(dialect, types={name.lower(): block for name, block in blocks.items()})
         self.structures: list[Structure] = []
         """Declared structures, each after those it contains."""
         self.located: list[Located] = []

@@ -15,7 +15,7 @@ from lark.exceptions import UnexpectedCharacters, UnexpectedToken
 from lark.lark import PostLex
 from lark.visitors import Transformer
 
-from conveyor_sim.control.st import literals, tree
+from conveyor_sim.control.st import data_blocks, literals, tree
 from conveyor_sim.control.st.dates import moment
 from conveyor_sim.control.st.dialect import IEC, Dialect
 from conveyor_sim.control.st.errors import Position, SourceError
@@ -34,6 +34,8 @@ _LEVELS = (
 )
 """Operators between two operands, from the lowest precedence; of equal precedence they go from left to right."""
 _PRECEDENCE = {word: level for level, words in enumerate(_LEVELS) for word in words}
+_TIA_WORDS = ("DATA_BLOCK", "BEGIN", "END_DATA_BLOCK")
+"""Words that are names in other dialects."""
 _CHAINS = ({"+", "-"}, {"OR"}, {"AND"}, {"XOR"})
 
 _N = TypeVar("_N", bound=tree.Node)
@@ -81,7 +83,7 @@ def _parser() -> tuple[Lark, _Tree]:
         lexer="basic",  # type: ignore[arg-type]  # lark accepts it, its type hints do not
         maybe_placeholders=True,
         transformer=made,
-        postlex=_Checked(),
+        postlex=_Checked(made),
     )
     return parser, made
 
@@ -91,11 +93,16 @@ class _Checked(PostLex):
 
     always_accept = ()
 
+    def __init__(self, made: _Tree) -> None:
+        self._made = made
+
     def process(self, stream: Iterator[Token]) -> Iterator[Token]:
         """Yield the tokens. Raise SourceError for more than MOST_TOKENS, and for words of unsupported features."""
         for number, token in enumerate(stream):
             if number == MOST_TOKENS:
                 raise SourceError(at_of(token), f"found more than {MOST_TOKENS} words and signs, expected fewer")
+            if token.type == "NAME" and self._made.dialect.tia_sources and token.upper() in _TIA_WORDS:
+                token.type = token.upper()
             yield not_refused(token) if token.type in ("NAME", "PREFIX") else token
 
 
@@ -201,6 +208,13 @@ class _Tree(Transformer[Any]):
             tree.VariableDeclaration(at_of(name), str(name), spec, initial, str(address or "").upper(), mapped)
             for name in names
         ]
+
+    def structured_declaration(self, items: list[Any]) -> list[tree.VariableDeclaration]:
+        *names, spec = items
+        return [tree.VariableDeclaration(at_of(name), str(name), spec, None) for name in names]
+
+    def data_block(self, items: list[Any]) -> tree.VariableSection:
+        return data_blocks.declared(items)
 
     def repeated(self, items: list[Any]) -> Any:
         return literals.integer(at_of(items[0]), items[0]), items[1]

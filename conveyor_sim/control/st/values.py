@@ -8,12 +8,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from conveyor_sim.control.st.blocks import CLASSES
 from conveyor_sim.control.st.dates import moment_text
 from conveyor_sim.control.st.errors import Fault, Position, SourceError
 from conveyor_sim.control.st.literals import long_time_text, time_text
 from conveyor_sim.control.st.located import Cell, Memory
 from conveyor_sim.control.st.operations import NAMES
+from conveyor_sim.control.st.tia_blocks import CLASSES
 from conveyor_sim.control.st.types import (
     BOOL,
     DINT,
