@@ -16,6 +16,7 @@ from lark.lark import PostLex
 from lark.visitors import Transformer
 
 from conveyor_sim.control.st import data_blocks, literals, tree
+from conveyor_sim.control.st.attributes import require_listed
 from conveyor_sim.control.st.dates import moment
 from conveyor_sim.control.st.dialect import IEC, Dialect
 from conveyor_sim.control.st.errors import Position, SourceError
@@ -84,8 +85,15 @@ def _parser() -> tuple[Lark, _Tree]:
         maybe_placeholders=True,
         transformer=made,
         postlex=_Checked(made),
+        lexer_callbacks={"PRAGMA": _listed},
     )
     return parser, made
+
+
+def _listed(token: Token) -> Token:
+    """Return a pragma, which the parser ignores. Raise SourceError for one that the page does not list."""
+    require_listed(at_of(token), token)
+    return token
 
 
 class _Checked(PostLex):
