@@ -29,15 +29,15 @@ IGNORED: Mapping[str, tuple[str, ...]] = {
     _EDITOR: (
         *("hide", "hide_all_locals", "obsolete", "displaymode", "conditionalshow", "conditionalshow_all_locals"),
         *("expandfully", "naming", "analysis", "analysis:report-multiple-instance-calls", "no_assign", "dataflow"),
-        *("no_assign_warning", "no_explicit_call", "estimated-stack-usage", "reflection", "tcignorewarning"),
-        *("suppress_warning_0", "warning", "io_function_block", "generate_implicit_init_function"),
+        *("no_assign_warning", "no_explicit_call", "estimated-stack-usage", "reflection"),
+        "warning",
     ),
     _SYMBOLS: (
-        *("symbol", "monitoring", "linkalways", "parameter_only", "tcnosymbol", "tchidesubitems", "tcrpcenable"),
-        *("tcdisplayscale", "tcdisplaymode", "tcdisplaytype", "tchmisymbol.show", "tchmisymbol.hide", "processvalue"),
-        *("addproperty", "clr", "wpf", "container", "group"),
+        *("symbol", "monitoring", "linkalways", "tcnosymbol", "tchidesubitems", "tcrpcenable"),
+        *("tcdisplayscale", "tcdisplaymode", "tchmisymbol.show", "tchmisymbol.hide", "processvalue"),
+        *("addproperty", "clr", "wpf", "container"),
     ),
-    _LINKS: ("tclinkto", "tclinktooso", "tcncaxis", "iodevice", "generatedusingterminal"),
+    _LINKS: ("tclinkto", "tclinktooso", "tcncaxis", "generatedusingterminal"),
     _MEMORY: ("pack_mode", "subsequent", "const_replaced", "const_non_replaced", "enable_dynamic_creation"),
 }
 """Names of ignored attributes, in small letters, by what they concern."""

@@ -43,7 +43,7 @@ LOCATED: Mapping[str, tuple[str, ...]] = {"PROGRAM": ("VAR", "VAR_INPUT", "VAR_O
 """Sections whose variables may have an address (AT) or a tag, without CONSTANT, by kind of unit."""
 
 INCOMPLETE: Mapping[str, tuple[str, ...]] = {**LOCATED, "FUNCTION_BLOCK": ("VAR", "VAR_INPUT", "VAR_OUTPUT")}
-"""The same for addresses without a number (AT %I*), of which each instance of a block has its own."""
+"""Sections whose variables may have an address without a number (AT %I*), which each instance of a block has."""
 
 _PAIRS = ({"RETAIN", "PERSISTENT"},)
 """Qualifiers that go together."""
