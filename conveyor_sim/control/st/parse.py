@@ -176,6 +176,10 @@ class _Tree(Transformer[Any]):
     def array(self, items: list[Any]) -> tree.TypeSpec:
         return self._deep(tree.ArrayType(at_of(items[0]), tuple(items[1:-1]), items[-1]), items[-1])
 
+    def open_array(self, items: list[Any]) -> tree.TypeSpec:
+        node = tree.ArrayType(at_of(items[0]), (), items[-1], dimensions=len(items) - 2)
+        return self._deep(node, items[-1])
+
     def enumerator(self, items: list[Any]) -> Any:
         return at_of(items[0]), str(items[0]), items[1]
 
