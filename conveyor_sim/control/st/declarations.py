@@ -11,6 +11,7 @@ from conveyor_sim.control.st.blocks import STANDARD
 from conveyor_sim.control.st.dialect import Dialect
 from conveyor_sim.control.st.errors import Position, SourceError
 from conveyor_sim.control.st.expressions import Expressions
+from conveyor_sim.control.st.foreign import advice
 from conveyor_sim.control.st.located import Located, address_of, incomplete, is_incomplete, require_fit
 from conveyor_sim.control.st.scope import Names, Scope
 from conveyor_sim.control.st.sections import INCOMPLETE, LOCATED, OUTSIDE, meaning
@@ -123,7 +124,7 @@ class Declarations:
             return known
         declared = self._pending.get(name.lower())
         if declared is None:
-            raise SourceError(at, f"found {name}, expected a type")
+            raise SourceError(at, f"found {name}, expected {advice(name) or 'a type'}")
         key = name.lower()
         if key in self._open:
             raise SourceError(at, f"found {name} inside of itself, expected another type")
