@@ -17,6 +17,7 @@ from typing import Any, NoReturn
 from conveyor_sim.bag.input_log import InputLog, copier
 from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.recorder import Recorder
+from conveyor_sim.control.recorded import PREFIX
 from conveyor_sim.control.scan import ALARMS, ControlError, Controller, Inputs
 from conveyor_sim.errors import CommandError, SimulationError
 from conveyor_sim.line.changeover import changeover
@@ -71,7 +72,12 @@ class Present(Inputs):
         """Names, in the order of the first reading."""
 
     def __getitem__(self, name: str) -> float:
-        """Return the value of a signal, or of an alarm by its full name. Raise NoSuchSignal, which is a KeyError."""
+        """Return the value of a signal, an alarm by its full name, or a variable of a PLC program in any case.
+
+        Raise NoSuchSignal, which is a KeyError.
+        """
+        if name[: len(PREFIX)].lower() == PREFIX and name not in self._signals:
+            name = name.lower()
         value = super().__getitem__(name)
         self.read[name] = None
         return value
