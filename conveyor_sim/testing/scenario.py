@@ -37,6 +37,7 @@ from conveyor_sim.support.resources import scene_path
 from conveyor_sim.testing import plc
 from conveyor_sim.testing.conditions import text_of, words_of
 from conveyor_sim.testing.history import ScenarioHistory
+from conveyor_sim.testing.panel import OperatorPanel
 from conveyor_sim.testing.plc import ServedPlc
 
 
@@ -220,6 +221,8 @@ class Scenario(AbstractContextManager["Scenario"]):
         """Operator at the panel of the line."""
         self.engineer = PanelUser(TEST, "engineer", self._give)
         """Engineer, with more rights than the operator (docs/line.md, Who may command)."""
+        self.panel = OperatorPanel(self.simulation.process_image.tags, self.operator.set)
+        """Operator panel of the line."""
         self.failed: Assertion | None = None
         """The assertion that failed; None if none did."""
         self.failure = ""
