@@ -21,6 +21,7 @@ from asyncua.server.internal_server import InternalServer
 from conveyor_sim.columns.alarms import AlarmColumns
 from conveyor_sim.columns.events import Event
 from conveyor_sim.line.alarms.alarm import NEVER, WAITING, AlarmState
+from conveyor_sim.protocols.opcua.dates import Dates
 from conveyor_sim.protocols.opcua.methods import ALARM_METHODS, ALARM_STATES, add_alarm_methods
 from conveyor_sim.protocols.opcua.nodes import LINE, Nodes, node_id, nothing
 from conveyor_sim.protocols.opcua.values import status_of
@@ -175,8 +176,8 @@ _VARIABLES: Mapping[str, _Variable] = {
     "text": _Variable(ua.VariantType.String, "Text of the alarm."),
     "tag": _Variable(ua.VariantType.String, "Signal of the alarm; empty: none."),
     "group": _Variable(ua.VariantType.String, "Group for first-out detection."),
-    "since": _Variable(ua.VariantType.DateTime, "Simulated time of the last change of its state."),
-    "shelved_until": _Variable(ua.VariantType.DateTime, "Simulated time at which shelving ends; year 1601: none."),
+    "since": _Variable(ua.VariantType.DateTime, "Time of the last change of its state."),
+    "shelved_until": _Variable(ua.VariantType.DateTime, "Time at which shelving ends; year 1601: none."),
     "changed_by": _Variable(
         ua.VariantType.String, "Writer of the latest operation, such as acknowledge, shelve or reset."
     ),
@@ -186,8 +187,10 @@ _VARIABLES: Mapping[str, _Variable] = {
 class AlarmStates:
     """Alarms of one line."""
 
-    def __init__(self, nodes: Nodes, emitter: Emitter, clock: TickClock) -> None:
+    def __init__(self, nodes: Nodes, emitter: Emitter, clock: TickClock, tick: float) -> None:
+        """Add the object of all alarms. tick: its length, s."""
         self._nodes, self._emitter, self._clock = nodes, emitter, clock
+        self._dates = Dates(clock, tick)
         nodes.object(ALARM_STATES, ALARM_STATES, node_id(LINE), "All alarms, each with its state.")
         add_alarm_methods(nodes)
         self._template: Any = None
@@ -209,9 +212,10 @@ class AlarmStates:
             return
         first, self._columns, self._status = self._columns is None, snapshot.alarms, status
         rows = _rows(snapshot.alarms)
-        stamp = self._clock.stamp(snapshot.tick, heard)
+        if back:
+            self._dates.begin()
         for id in self._rows.keys() - rows.keys():
-            await self._write(id, self._rows.pop(id), stamp, ua.StatusCodes.BadNoData)
+            await self._write(id, self._rows.pop(id), snapshot, heard, ua.StatusCodes.BadNoData)
             self._emitter.forget(_object(id))
             self._event_ids.pop(id, None)
         for id, row in rows.items():
@@ -220,7 +224,7 @@ class AlarmStates:
             if before is None and not self._add(id):
                 pass
             elif before != row or every:
-                await self._write(id, row, stamp, status)
+                await self._write(id, row, snapshot, heard, status)
             changed = before is None or (before.state, before.active) != (row.state, row.active)
             if changed and not (row.state == AlarmState.NORMAL and (first or before is None)):
                 await self._emit(id, row, self._clock.stamp(row.since, heard))
@@ -257,14 +261,15 @@ class AlarmStates:
             self._nodes.refer(made, target, ua.ObjectIds.HasComponent, ua.NodeClass.Method)
         return True
 
-    async def _write(self, id: str, row: _Row, stamp: datetime, status: int) -> None:
-        name = f"{ALARM_STATES}/{id}"
+    async def _write(self, id: str, row: _Row, snapshot: LineSnapshot, heard: datetime, status: int) -> None:
+        name, stamp = f"{ALARM_STATES}/{id}", self._clock.stamp(snapshot.tick, heard)
         if name not in self._nodes:
             return
         for field, raw in row._asdict().items():
             value: Any = raw
             if _VARIABLES[field].kind is ua.VariantType.DateTime:
-                value = nothing(ua.VariantType.DateTime) if raw == NEVER else self._clock.simulated(raw)
+                never = raw == NEVER
+                value = nothing(ua.VariantType.DateTime) if never else self._dates.of((id, field), raw, snapshot, heard)
             await self._nodes.write(f"{name}/{field}", ua.Variant(value, _VARIABLES[field].kind), stamp, status)
 
     async def _emit(self, id: str, row: _Row, at: datetime) -> None:

@@ -16,6 +16,7 @@ from conveyor_sim.line.commands.inputs import DISOWN, FORCE, INJECT, MODE, OWN, 
 from conveyor_sim.line.run_state import RUN
 from conveyor_sim.line.tag import COMMANDS, SIGNALS
 from conveyor_sim.protocols.opcua.nodes import LINE, Nodes, name_of, node_id
+from conveyor_sim.protocols.opcua.reasons import as_status
 from conveyor_sim.protocols.opcua.requests import Codes, Requests
 from conveyor_sim.protocols.tags.tag_provider import Control, TagProvider
 
@@ -208,8 +209,9 @@ class Methods:
         if target != owner and (owner != ALARM_STATES or alarm == target or not self.knows_alarm(alarm)):
             return _result(Codes.BadMethodInvalid)
         inputs = [] if request.InputArguments is None else list(request.InputArguments)
-        may = self._requests.may(client, method.operation) if method.operation else self._requests.may_control(client)
-        if not may:
+        if method.operation and not self._requests.may(client, method.operation):
+            return _result(self._requests.denied(client, method.operation))
+        if not method.operation and not self._requests.may_control(client):
             return _result(Codes.BadUserAccessDenied)
         if len(inputs) != len(method.parameters):
             few = len(inputs) < len(method.parameters)
@@ -232,7 +234,7 @@ class Methods:
         if not self.knows_alarm(alarm):
             return _result(Codes.BadNodeIdInvalid)
         if not self._requests.may(client, "acknowledge"):
-            return _result(Codes.BadUserAccessDenied)
+            return _result(self._requests.denied(client, "acknowledge"))
         inputs = request.InputArguments or []
         if not inputs or not isinstance(inputs[0].Value, bytes) or not self._is_last_event(alarm, inputs[0].Value):
             return _result(Codes.BadEventIdUnknown)
@@ -284,4 +286,4 @@ def _of_arguments(code: int, places: Mapping[int, int], arguments: Sequence[Any]
 
 
 def _result(code: int, arguments: Sequence[int] = ()) -> ua.CallMethodResult:
-    return ua.CallMethodResult(ua.StatusCode(code), [ua.StatusCode(each) for each in arguments], [], [])
+    return ua.CallMethodResult(as_status(code), [ua.StatusCode(each) for each in arguments], [], [])
