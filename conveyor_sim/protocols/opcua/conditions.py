@@ -20,7 +20,7 @@ from asyncua.server.internal_server import InternalServer
 
 from conveyor_sim.columns.alarms import AlarmColumns
 from conveyor_sim.columns.events import Event
-from conveyor_sim.line.alarms.alarm import NEVER, WAITING, AlarmState
+from conveyor_sim.line.alarms.alarm import CONFIRMED, HIDDEN, NEVER, WAITING, AlarmState
 from conveyor_sim.protocols.opcua.dates import Dates
 from conveyor_sim.protocols.opcua.methods import ALARM_METHODS, ALARM_STATES, add_alarm_methods
 from conveyor_sim.protocols.opcua.nodes import LINE, Nodes, node_id, nothing
@@ -140,8 +140,8 @@ MOST_OBJECTS = 4000
 
 STATE_TEXTS = [state.name.replace("_", " ").capitalize() for state in AlarmState]
 
-_HIDDEN = (AlarmState.SHELVED, AlarmState.SUPPRESSED)
-_LATCHED = (AlarmState.LATCHED_UNACKNOWLEDGED, AlarmState.LATCHED_ACKNOWLEDGED)
+_HIDDEN = HIDDEN - {AlarmState.OUT_OF_SERVICE}
+_LATCHED = (AlarmState.LATCHED_UNACKNOWLEDGED, AlarmState.LATCHED_ACKNOWLEDGED, AlarmState.LATCHED_UNCONFIRMED)
 
 
 class _Row(NamedTuple):
@@ -150,6 +150,7 @@ class _Row(NamedTuple):
     state: int
     active: bool
     acknowledged: bool
+    confirmed: bool
     first_out: bool
     priority: int
     alarm_class: str
@@ -170,6 +171,7 @@ _VARIABLES: Mapping[str, _Variable] = {
     "state": _Variable(ua.VariantType.UInt32, "State by ISA-18.2."),
     "active": _Variable(ua.VariantType.Boolean, "True while its condition holds."),
     "acknowledged": _Variable(ua.VariantType.Boolean, "True if it does not wait for an acknowledgement."),
+    "confirmed": _Variable(ua.VariantType.Boolean, "True if it does not wait for a confirmation."),
     "first_out": _Variable(ua.VariantType.Boolean, "True if it was the first of its group."),
     "priority": _Variable(ua.VariantType.UInt16, "1 to 1000."),
     "alarm_class": _Variable(ua.VariantType.String, "error, warning or message."),
@@ -179,7 +181,7 @@ _VARIABLES: Mapping[str, _Variable] = {
     "since": _Variable(ua.VariantType.DateTime, "Time of the last change of its state."),
     "shelved_until": _Variable(ua.VariantType.DateTime, "Time at which shelving ends; year 1601: none."),
     "changed_by": _Variable(
-        ua.VariantType.String, "Writer of the latest operation, such as acknowledge, shelve or reset."
+        ua.VariantType.String, "Writer of the latest operation, such as acknowledge, confirm, shelve or reset."
     ),
 }
 
@@ -295,6 +297,7 @@ class AlarmStates:
             ("EnabledState", True, "Enabled", "Disabled"),
             ("ActiveState", row.active, "Active", "Inactive"),
             ("AckedState", row.acknowledged, "Acknowledged", "Unacknowledged"),
+            ("ConfirmedState", row.confirmed, "Confirmed", "Unconfirmed"),
             ("SuppressedState", row.state == AlarmState.SUPPRESSED, "Suppressed", "Unsuppressed"),
             ("OutOfServiceState", row.state == AlarmState.OUT_OF_SERVICE, "Out of Service", "In Service"),
             ("LatchedState", row.state in _LATCHED, "Latched", "Unlatched"),
@@ -312,6 +315,7 @@ def _rows(columns: AlarmColumns) -> dict[str, _Row]:
             state,
             bool(columns.active[place]),
             state not in WAITING,
+            state not in CONFIRMED,
             bool(columns.first_out[place]),
             int(columns.priority[place]),
             columns.alarm_class[place],
