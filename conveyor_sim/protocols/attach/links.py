@@ -3,18 +3,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from urllib.parse import urlsplit
 
+from conveyor_sim.protocols.attach.access import ANONYMOUS, PlcAccess
 from conveyor_sim.protocols.attach.plc_link import PlcLink, PlcLinkError
 from conveyor_sim.protocols.attach.tag_map import MappedTag
 from conveyor_sim.support.printable import printable
 
 
-def plc_link(url: str, mapped: Sequence[MappedTag], user: str = "", password: str = "") -> PlcLink:
-    """Return a link for mapped tags. url: "opc.tcp://host:port" or "modbus://host:port"; user: "" for anonymous.
+def plc_link(
+    url: str,
+    mapped: Sequence[MappedTag],
+    access: PlcAccess = ANONYMOUS,
+    say: Callable[[str], object] = lambda _: None,
+) -> PlcLink:
+    """Return a link for mapped tags.
 
-    Raises PlcLinkError for another URL, TagMapError for an invalid place in Modbus, ImportError without the library.
+    url: "opc.tcp://host:port" or "modbus://host:port". access: user and security of OPC UA. say: takes sentences for
+    the user, such as the security of a new connection.
+
+    Raises PlcLinkError for another URL, or an access that the protocol lacks; TagMapError for an invalid place in
+    Modbus; ImportError without the library.
     """
     try:
         parts = urlsplit(url)
@@ -23,10 +33,12 @@ def plc_link(url: str, mapped: Sequence[MappedTag], user: str = "", password: st
         host = port = None
     if not host or parts.scheme not in ("opc.tcp", "modbus"):
         raise PlcLinkError(f"{printable(url)} given, expected opc.tcp://host:port or modbus://host:port")
+    if access != ANONYMOUS and parts.scheme != "opc.tcp":
+        raise PlcLinkError(f"{parts.scheme}://: given with a user or security, expected neither, or opc.tcp://")
     if parts.scheme == "modbus":
         from conveyor_sim.protocols.attach.modbus_link import ModbusLink
 
         return ModbusLink(host, port or 502, mapped)
     from conveyor_sim.protocols.attach.opcua_link import OpcUaLink
 
-    return OpcUaLink(url, mapped, user, password)
+    return OpcUaLink(url, mapped, access, say)

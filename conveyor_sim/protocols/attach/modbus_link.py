@@ -11,10 +11,8 @@ from typing import Any, get_args
 from pymodbus.client import AsyncModbusTcpClient
 from pymodbus.exceptions import ModbusException
 
-from conveyor_sim.line.tag import SIGNALS
 from conveyor_sim.protocols.attach.plc_link import PATIENCE, PlcLinkError
-from conveyor_sim.protocols.attach.tag_map import OWN, MappedTag, TagMapError
-from conveyor_sim.protocols.tags.handshake import TICK
+from conveyor_sim.protocols.attach.tag_map import MappedTag, TagMapError, is_written
 from conveyor_sim.support.modbus_rows import MOST_ADDRESSES, Row, Table, Type, WordOrder, decode, encode
 from conveyor_sim.support.printable import printable
 
@@ -125,7 +123,6 @@ def _row(mapped: MappedTag) -> Row:
     if (kind == "bool") != (table in _BITS):
         raise TagMapError(f"{mapped.where}: {kind} given in a {table}, {expected}")
     tag = mapped.tag
-    written = tag.name == TICK or (tag.role in SIGNALS and not tag.name.startswith(OWN))
-    if written and table not in _WRITABLE:
+    if is_written(mapped) and table not in _WRITABLE:
         raise TagMapError(f"{mapped.where}: {tag.name} is written, but {table}s can't be, expected {_WRITABLE_TEXT}")
     return Row(tag.name, table, int(rest[0]), kind, order, tag.unit, "read", tag.low, tag.high, "")
