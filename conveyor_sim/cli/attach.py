@@ -72,7 +72,8 @@ def attach(
 ) -> None:
     """Have the PLC at URL control SCENE in real time.
 
-    URL is that of the PLC's server: opc.tcp://host:port or modbus://host:port. The line writes its signals there, and
+    URL is that of the PLC's server: opc.tcp://host:port, modbus://host:port, s7://host/rack/slot (Siemens),
+    eip://host/slot (Rockwell) or ads://net-id:port?host=address (Beckhoff). The line writes its signals there, and
     reads what the PLC commands. The simulation does not wait for the PLC; the lag is reported. Ctrl-C ends it.
 
     Without SCENE, --trust stores the certificate of the PLC, and --browse prints its variables.

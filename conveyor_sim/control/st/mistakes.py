@@ -11,18 +11,12 @@ from lark import Token
 
 from conveyor_sim.control.st.errors import Position, SourceError
 
-_DATES = "dates and times of day"
-
 REFUSED: Mapping[str, str] = {
     **dict.fromkeys(("POINTER", "REF_TO"), "pointers and references"),
     **dict.fromkeys(("CLASS", "INTERFACE", "EXTENDS", "IMPLEMENTS", "NAMESPACE"), "classes, methods and namespaces"),
     **dict.fromkeys(("INITIAL_STEP", "END_STEP", "END_TRANSITION", "END_ACTION"), "SFC"),
     **dict.fromkeys(("VAR_ACCESS", "VAR_CONFIG"), "access paths and VAR_CONFIG"),
     **dict.fromkeys(("VAR_STAT", "VAR_INST"), "VAR_STAT and VAR_INST; VAR of a block keeps its values"),
-    **dict.fromkeys(("DATE", "TIME_OF_DAY", "TOD", "DATE_AND_TIME", "DT"), _DATES),
-    **dict.fromkeys(("D#", "DATE#", "TIME_OF_DAY#", "TOD#", "DATE_AND_TIME#", "DT#"), _DATES),
-    **dict.fromkeys(("LDATE", "LTIME_OF_DAY", "LTOD", "LDATE_AND_TIME", "LDT"), _DATES),
-    **dict.fromkeys(("LD#", "LDATE#", "LTIME_OF_DAY#", "LTOD#", "LDATE_AND_TIME#", "LDT#"), _DATES),
 }
 """Words of the standard and of dialects that this interpreter does not support, with the feature they belong to."""
 
@@ -64,8 +58,8 @@ _OPERATORS = {
     *("AT_MOST", "AT_LEAST", "PLUS", "MINUS", "TIMES", "OVER", "POWER"),
 }
 _VALUES = {
-    *("INTEGER", "BASED", "DECIMAL", "TIME", "TEXT", "WIDE_TEXT", "TRUE", "FALSE", "PREFIX", "NOT", "PLUS", "MINUS"),
-    *("NAME", "LPAR"),
+    *("INTEGER", "BASED", "DECIMAL", "TIME", "MOMENT", "TEXT", "WIDE_TEXT", "TRUE", "FALSE", "PREFIX", "NOT", "PLUS"),
+    *("MINUS", "NAME", "LPAR"),
 }
 
 

@@ -49,8 +49,7 @@ _PAIRS = ({"RETAIN", "PERSISTENT"},)
 def meaning(section: tree.VariableSection, unit: str) -> tuple[str, ...]:
     """Return the qualifiers that apply to the variables of a section in a kind of unit.
 
-    PERSISTENT is RETAIN. CONSTANT of an input has no effect, because no unit writes its inputs: the caller's value
-    counts. Raise SourceError for a section or qualifier that the unit does not take.
+    PERSISTENT is RETAIN. Raise SourceError for a section or qualifier that the unit does not take.
     """
     allowed = TAKES[unit]
     name, qualifiers = section.section, section.qualifiers
@@ -68,6 +67,4 @@ def meaning(section: tree.VariableSection, unit: str) -> tuple[str, ...]:
     applied = set(qualifiers)
     if "PERSISTENT" in applied:
         applied.add("RETAIN")
-    if name == "VAR_INPUT":
-        applied.discard("CONSTANT")
     return tuple(sorted(applied))

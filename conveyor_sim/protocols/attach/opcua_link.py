@@ -14,8 +14,7 @@ from conveyor_sim.protocols.attach.access import ANONYMOUS, PlcAccess
 from conveyor_sim.protocols.attach.opcua_client import close_client, open_client
 from conveyor_sim.protocols.attach.opcua_requests import OpcUaRequests, is_writable
 from conveyor_sim.protocols.attach.plc_link import PlcLinkError
-from conveyor_sim.protocols.attach.tag_map import MappedTag, TagMapError, is_written
-from conveyor_sim.protocols.tags.handshake import TICK
+from conveyor_sim.protocols.attach.tag_map import MappedTag, TagMapError
 from conveyor_sim.support.printable import printable
 from conveyor_sim.support.rounded_limit import at_limit
 
@@ -71,24 +70,21 @@ class OpcUaLink:
             theirs = printable(mapped.theirs)
             if (bad := problem(value)) is not None:
                 raise TagMapError(f"{mapped.where}: {theirs} is {bad}, expected a number or a bool")
-            if is_written(mapped) and not is_writable(right):
+            if mapped.is_written and not is_writable(right):
                 raise TagMapError(
                     f"{mapped.where}: {theirs} is read-only, but {name} is written, expected write access"
                 )
             self._types[name] = value.Value.VariantType
 
     async def write(self, values: Mapping[str, float]) -> None:
-        """Write variables, by our names. `run/tick` is written when the server has accepted all others."""
-        others = [name for name in values if name != TICK]
-        for names in (others, [TICK] if TICK in values else []):
-            if names:
-                # Without a status, because servers may refuse to write one.
-                variants = [ua.DataValue(_variant(self._types[name], values[name]), StatusCode=None) for name in names]
-                codes = await self._connected().write([self._ids[name] for name in names], variants)
-                for name, code in zip(names, codes, strict=True):
-                    if not code.is_good():
-                        theirs = printable(self._mapped[name].theirs)
-                        raise PlcLinkError(f"{self._url}: refuses {theirs} ({name}) with {printable(code.name)}")
+        """Write variables, by our names."""
+        # Without a status, because servers may refuse to write one.
+        variants = [ua.DataValue(_variant(self._types[name], value), StatusCode=None) for name, value in values.items()]
+        codes = await self._connected().write([self._ids[name] for name in values], variants)
+        for name, code in zip(values, codes, strict=True):
+            if not code.is_good():
+                theirs = printable(self._mapped[name].theirs)
+                raise PlcLinkError(f"{self._url}: refuses {theirs} ({name}) with {printable(code.name)}")
 
     async def read(self, names: Sequence[str]) -> dict[str, float]:
         """Return values, by our names. Raise PlcLinkError for a value with a bad status as well."""

@@ -10,7 +10,8 @@ Signals are written to the PLC. Commands, and alarms that the PLC raises, are re
 such as a state or a counter, have names that begin with `plc/`; conditions of a test may read them.
 
 `theirs` is a NodeId of OPC UA, or a place in Modbus: table, address, type, word order ("holding register 12 float32
-big"). A third column, `note`, is for the reader. Rows without a tag are ignored: `attach URL --browse` writes them.
+big"), a place in a Siemens PLC ("DB1.DBD4 REAL"), a tag of a Rockwell PLC, or a symbol of a Beckhoff PLC.
+A third column, `note`, is for the reader. Rows without a tag are ignored: `attach URL --browse` writes them.
 """
 
 from __future__ import annotations
@@ -46,6 +47,12 @@ class MappedTag(NamedTuple):
     theirs: str
     where: str
     """File and line, for errors."""
+
+    @property
+    def is_written(self) -> bool:
+        """True for signals and `run/tick`, which are written to the PLC."""
+        name = self.tag.name
+        return name == TICK or (self.tag.role in SIGNALS and not name.startswith(OWN))
 
 
 class TagMap(NamedTuple):
@@ -112,12 +119,6 @@ def read_tag_map(path: Path, tags: Sequence[Tag]) -> TagMap:
 def mappable(tags: Sequence[Tag]) -> dict[str, Tag]:
     """Return the tags of a line that a map may name, and those of the handshake, by name."""
     return {tag.name: tag for tag in tags if tag.role in (*SIGNALS, *COMMANDS)} | _HANDSHAKE
-
-
-def is_written(mapped: MappedTag) -> bool:
-    """Return True for a tag that the line writes to the PLC: a signal or `run/tick`."""
-    name = mapped.tag.name
-    return name == TICK or (mapped.tag.role in SIGNALS and not name.startswith(OWN))
 
 
 def _of_the_plc(name: str) -> Tag | None:
