@@ -13,13 +13,15 @@ from typing import Any, TypeVar
 from lark import Lark, Token
 from lark.exceptions import UnexpectedCharacters, UnexpectedToken
 from lark.lark import PostLex
+from lark.lexer import PatternStr
 from lark.visitors import Transformer
 
 from conveyor_sim.control.st import data_blocks, literals, tree
+from conveyor_sim.control.st.attributes import require_listed
 from conveyor_sim.control.st.dates import moment
 from conveyor_sim.control.st.dialect import IEC, Dialect
 from conveyor_sim.control.st.errors import Position, SourceError
-from conveyor_sim.control.st.mistakes import at_of, not_refused, unexpected
+from conveyor_sim.control.st.mistakes import at_of, not_refused, unexpected, unexpected_character
 from conveyor_sim.control.st.pragmas import selected
 
 _LEVELS = (
@@ -64,11 +66,9 @@ def parse(text: str, dialect: Dialect = IEC) -> tree.SourceFile:
             finally:
                 made.depths.clear()
     except UnexpectedToken as error:
-        raise unexpected(error, text) from None
+        raise unexpected(error, text, terminals(parser)) from None
     except UnexpectedCharacters as error:
-        at, char = Position(error.line, error.column), text[error.pos_in_stream]
-        hint = "; pointers are not supported" if char == "^" else ""
-        raise SourceError(at, f"found {char!r}, expected Structured Text{hint}") from None
+        raise unexpected_character(error, text, terminals(parser)) from None
     assert isinstance(source, tree.SourceFile)
     return source
 
@@ -84,8 +84,21 @@ def _parser() -> tuple[Lark, _Tree]:
         maybe_placeholders=True,
         transformer=made,
         postlex=_Checked(made),
+        lexer_callbacks={"PRAGMA": _listed},
     )
     return parser, made
+
+
+def _listed(token: Token) -> Token:
+    """Return a pragma, which the parser ignores. Raise SourceError for one that the page does not list."""
+    require_listed(at_of(token), token)
+    return token
+
+
+def terminals(parser: Lark) -> dict[str, str]:
+    """Return the texts of the tokens that have only one, by name."""
+    fixed = {one.name: one.pattern.value for one in parser.terminals if isinstance(one.pattern, PatternStr)}
+    return {**fixed, **{word: word for word in _TIA_WORDS}}
 
 
 class _Checked(PostLex):

@@ -24,7 +24,7 @@ from typing import NamedTuple
 
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.commands.refusal import ALARMS
-from conveyor_sim.line.tag import COMMANDS, SIGNALS, Tag, count, switch
+from conveyor_sim.line.tag import CONTROLLED, SIGNALS, Tag, count, switch
 from conveyor_sim.protocols.tags.handshake import TARGET, TICK
 from conveyor_sim.support.files import MB, FileError, read_file
 from conveyor_sim.support.printable import printable
@@ -118,7 +118,7 @@ def read_tag_map(path: Path, tags: Sequence[Tag]) -> TagMap:
 
 def mappable(tags: Sequence[Tag]) -> dict[str, Tag]:
     """Return the tags of a line that a map may name, and those of the handshake, by name."""
-    return {tag.name: tag for tag in tags if tag.role in (*SIGNALS, *COMMANDS)} | _HANDSHAKE
+    return {tag.name: tag for tag in tags if tag.role in (*SIGNALS, *CONTROLLED)} | _HANDSHAKE
 
 
 def _of_the_plc(name: str) -> Tag | None:
