@@ -9,6 +9,8 @@ from dataclasses import replace
 from typing import Any
 
 from conveyor_sim.control.st import tree
+from conveyor_sim.control.st.date_arithmetic import ALLOWED, combined
+from conveyor_sim.control.st.dates import PREFIXES, expected_literal
 from conveyor_sim.control.st.errors import SourceError
 from conveyor_sim.control.st.integers import computed, negated
 from conveyor_sim.control.st.operations import divide, modulo
@@ -23,6 +25,7 @@ from conveyor_sim.control.st.types import (
     TIME,
     WSTRING,
     Array,
+    OpenArray,
     String,
     Structure,
     Type,
@@ -133,7 +136,8 @@ class Expressions:
                 node.at, "found an assignment to the control variable of a FOR inside of it, expected none"
             )
         if place.fixed:
-            raise SourceError(node.at, f"found {place.fixed}, expected a variable that can be written")
+            advice = self.scope.names.dialect.advice(place.lacks) if place.lacks else ""
+            raise SourceError(node.at, f"found {place.fixed}, expected a variable that can be written{advice}")
         return place
 
     def _literal(self, node: tree.Literal) -> Value:
@@ -145,8 +149,12 @@ class Expressions:
                 return constant(node.at, BOOL, node.value)
             if node.kind == "time":
                 return constant(node.at, LTIME if node.text[0] in "lL" else TIME, node.value)
+            if node.kind == "date":
+                return constant(node.at, PREFIXES[node.text.partition("#")[0].upper()], node.value)
             kind = WSTRING if node.kind == "wide" else STRING
             return constant(node.at, replace(kind, high=len(str(node.value))), node.value)
+        if node.type in PREFIXES:
+            raise SourceError(node.at, f"found {node.text}, expected {expected_literal(PREFIXES[node.type].part)}")
         target = ELEMENTARY.get(node.type)
         if target is None or (target.kind == "time"):
             raise SourceError(node.at, f"found {node.text}, expected an elementary type before #")
@@ -197,6 +205,7 @@ class Expressions:
             write=lambda new: f"{code} = {new}",
             reference=f"_Attribute({base.code}, {member.slot!r}, {root})",
             fixed=fixed,
+            lacks=base.lacks,
             root=root,
         )
 
@@ -205,8 +214,11 @@ class Expressions:
         kind = base.type
         if not isinstance(kind, Array):
             raise SourceError(node.at, f"found an index of {kind.name}, expected an array before it")
-        if len(node.indices) != len(kind.ranges):
-            raise SourceError(node.at, f"found {len(node.indices)} indices, expected {len(kind.ranges)}")
+        dimensions = kind.dimensions if isinstance(kind, OpenArray) else len(kind.ranges)
+        if len(node.indices) != dimensions:
+            raise SourceError(node.at, f"found {len(node.indices)} indices, expected {dimensions}")
+        if isinstance(kind, OpenArray):
+            return self._open_item(node, base, kind)
         code, index = base.code, ""
         for each, (low, high) in zip(node.indices, kind.ranges, strict=True):
             code = f"{code}[{index}]" if index else code
@@ -219,13 +231,32 @@ class Expressions:
             write=lambda new: f"{element} = {new}",
             reference=f"_Element({code}, {index}, {base.root})",
             fixed=base.fixed,
+            lacks=base.lacks,
             root=base.root,
         )
 
-    def _index(self, node: tree.Expression, low: int, high: int) -> str:
+    def _open_item(self, node: tree.Item, base: Place, kind: OpenArray) -> Place:
+        indices = [f"{base.reference}.place({self._whole(one).code}, {n})" for n, one in enumerate(node.indices)]
+        code = "".join([base.code, *(f"[{one}]" for one in indices[:-1])])
+        element = f"{code}[{indices[-1]}]"
+        return replace(
+            base,
+            at=node.at,
+            type=kind.element,
+            code=element,
+            write=lambda new: f"{element} = {new}",
+            reference=f"_Element({code}, {indices[-1]}, {base.root})",
+        )
+
+    def _whole(self, node: tree.Expression) -> Value:
+        """Return the value of an index."""
         value = self.value(node)
         if value.type.base.kind != "int" or value.literal == "real":
             raise SourceError(node.at, f"found {described(value)}, expected a whole number as an index")
+        return value
+
+    def _index(self, node: tree.Expression, low: int, high: int) -> str:
+        value = self._whole(node)
         if value.constant is not None:
             if not low <= value.constant <= high:
                 raise SourceError(node.at, f"found index {value.constant}, expected {low} to {high}")
@@ -257,6 +288,7 @@ class Expressions:
                 else base.write(f"{base.code} | {bit} if {new} else {base.code} & {rest}")
             ),
             fixed=base.fixed,
+            lacks=base.lacks,
             root=base.root,
         )
 
@@ -301,7 +333,12 @@ class Expressions:
             return self._logic(node, left, right)
         if left.literal and right.literal:
             return self._exact(node, left, right)
-        if "time" in (left.type.base.kind, right.type.base.kind):
+        kinds = (left.type.base.kind, right.type.base.kind)
+        if "date" in kinds:
+            if (result := combined(node.at, word, left, right)) is None:
+                raise self._no_operator(node, left, right, ALLOWED)
+            return result
+        if "time" in kinds:
             return self._time(node, left, right)
         kind = unified(left, right, hint)
         if kind is None or kind.kind not in ("int", "real"):

@@ -13,12 +13,17 @@ from typing import Any, TypeVar
 from lark import Lark, Token
 from lark.exceptions import UnexpectedCharacters, UnexpectedToken
 from lark.lark import PostLex
+from lark.lexer import PatternStr
 from lark.visitors import Transformer
 
-from conveyor_sim.control.st import literals, tree
+from conveyor_sim.control.st import data_blocks, literals, tree
+from conveyor_sim.control.st.attributes import require_listed
+from conveyor_sim.control.st.dates import moment
+from conveyor_sim.control.st.dialect import IEC, Dialect
 from conveyor_sim.control.st.errors import Position, SourceError
-from conveyor_sim.control.st.mistakes import at_of, not_refused, unexpected
+from conveyor_sim.control.st.mistakes import at_of, not_refused, unexpected, unexpected_character
 from conveyor_sim.control.st.pragmas import selected
+from conveyor_sim.control.st.unit_ends import with_ends
 
 _LEVELS = (
     ("OR", "OR_ELSE"),
@@ -32,6 +37,8 @@ _LEVELS = (
 )
 """Operators between two operands, from the lowest precedence; of equal precedence they go from left to right."""
 _PRECEDENCE = {word: level for level, words in enumerate(_LEVELS) for word in words}
+_TIA_WORDS = ("DATA_BLOCK", "BEGIN", "END_DATA_BLOCK")
+"""Words that are names in other dialects."""
 _CHAINS = ({"+", "-"}, {"OR"}, {"AND"}, {"XOR"})
 
 _N = TypeVar("_N", bound=tree.Node)
@@ -48,22 +55,21 @@ MOST_OPERANDS = 1000
 _ONE_AT_A_TIME = threading.Lock()
 
 
-def parse(text: str) -> tree.SourceFile:
+def parse(text: str, dialect: Dialect = IEC) -> tree.SourceFile:
     """Return the syntax tree of a file. Raise SourceError."""
     text = selected(text)
     try:
         with _ONE_AT_A_TIME:
             parser, made = _parser()
+            made.dialect = dialect
             try:
                 source = parser.parse(text)
             finally:
                 made.depths.clear()
     except UnexpectedToken as error:
-        raise unexpected(error, text) from None
+        raise unexpected(error, text, terminals(parser)) from None
     except UnexpectedCharacters as error:
-        at, char = Position(error.line, error.column), text[error.pos_in_stream]
-        hint = "; pointers are not supported" if char == "^" else ""
-        raise SourceError(at, f"found {char!r}, expected Structured Text{hint}") from None
+        raise unexpected_character(error, text, terminals(parser)) from None
     assert isinstance(source, tree.SourceFile)
     return source
 
@@ -78,9 +84,22 @@ def _parser() -> tuple[Lark, _Tree]:
         lexer="basic",  # type: ignore[arg-type]  # lark accepts it, its type hints do not
         maybe_placeholders=True,
         transformer=made,
-        postlex=_Checked(),
+        postlex=_Checked(made),
+        lexer_callbacks={"PRAGMA": _listed},
     )
     return parser, made
+
+
+def _listed(token: Token) -> Token:
+    """Return a pragma, which the parser ignores. Raise SourceError for one that the page does not list."""
+    require_listed(at_of(token), token)
+    return token
+
+
+def terminals(parser: Lark) -> dict[str, str]:
+    """Return the texts of the tokens that have only one, by name."""
+    fixed = {one.name: one.pattern.value for one in parser.terminals if isinstance(one.pattern, PatternStr)}
+    return {**fixed, **{word: word for word in _TIA_WORDS}}
 
 
 class _Checked(PostLex):
@@ -88,11 +107,16 @@ class _Checked(PostLex):
 
     always_accept = ()
 
+    def __init__(self, made: _Tree) -> None:
+        self._made = made
+
     def process(self, stream: Iterator[Token]) -> Iterator[Token]:
         """Yield the tokens. Raise SourceError for more than MOST_TOKENS, and for words of unsupported features."""
-        for number, token in enumerate(stream):
+        for number, token in enumerate(with_ends(stream, self._made.dialect)):
             if number == MOST_TOKENS:
                 raise SourceError(at_of(token), f"found more than {MOST_TOKENS} words and signs, expected fewer")
+            if token.type == "NAME" and self._made.dialect.tia_sources and token.upper() in _TIA_WORDS:
+                token.type = token.upper()
             yield not_refused(token) if token.type in ("NAME", "PREFIX") else token
 
 
@@ -113,6 +137,8 @@ class _Tree(Transformer[Any]):
 
     def __init__(self) -> None:
         super().__init__()
+        self.dialect = IEC
+        """Dialect of the present text."""
         self.depths: dict[int, tuple[object, int]] = {}
         """Depths of nodes by id, with the nodes, which keeps the ids valid."""
 
@@ -159,6 +185,10 @@ class _Tree(Transformer[Any]):
     def array(self, items: list[Any]) -> tree.TypeSpec:
         return self._deep(tree.ArrayType(at_of(items[0]), tuple(items[1:-1]), items[-1]), items[-1])
 
+    def open_array(self, items: list[Any]) -> tree.TypeSpec:
+        node = tree.ArrayType(at_of(items[0]), (), items[-1], dimensions=len(items) - 2)
+        return self._deep(node, items[-1])
+
     def enumerator(self, items: list[Any]) -> Any:
         return at_of(items[0]), str(items[0]), items[1]
 
@@ -196,6 +226,13 @@ class _Tree(Transformer[Any]):
             tree.VariableDeclaration(at_of(name), str(name), spec, initial, str(address or "").upper(), mapped)
             for name in names
         ]
+
+    def structured_declaration(self, items: list[Any]) -> list[tree.VariableDeclaration]:
+        *names, spec = items
+        return [tree.VariableDeclaration(at_of(name), str(name), spec, None) for name in names]
+
+    def data_block(self, items: list[Any]) -> tree.VariableSection:
+        return data_blocks.declared(items)
 
     def repeated(self, items: list[Any]) -> Any:
         return literals.integer(at_of(items[0]), items[0]), items[1]
@@ -399,6 +436,8 @@ def _literal(token: Token, at: Position | None = None) -> tree.Literal:
         return tree.Literal(at, text, "real", literals.real(text))
     if token.type == "TIME":
         return tree.Literal(at, text, "time", literals.duration(at, text))
+    if token.type == "MOMENT":
+        return tree.Literal(at, text, "date", moment(at, text))
     if token.type in ("TRUE", "FALSE"):
         return tree.Literal(at, text, "bool", token.type == "TRUE")
     wide = token.type == "WIDE_TEXT"

@@ -7,8 +7,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 
+from conveyor_sim.control.st.dialect import Dialect
 from conveyor_sim.control.st.errors import Position, SourceError
-from conveyor_sim.control.st.types import BlockType, Enumeration, Member, Type
+from conveyor_sim.control.st.foreign import advice
+from conveyor_sim.control.st.types import BlockType, Enumeration, Member, OpenArray, Type
 from conveyor_sim.control.st.values import Place, Value, constant
 
 
@@ -23,6 +25,7 @@ class Thing:
 class Names:
     """Names known in all units of a file, in small letters. They grow as the file is read."""
 
+    dialect: Dialect
     types: dict[str, Type] = field(default_factory=dict)
     """Derived types, blocks and programs."""
     functions: dict[str, BlockType] = field(default_factory=dict)
@@ -55,7 +58,7 @@ class Scope:
             if member.section == "VAR_EXTERNAL":
                 place = self._global(at, key, name)
                 return replace(place, fixed=place.fixed or f"{name}, a CONSTANT") if member.constant else place
-            return place_of(at, "self", member, inside=True)
+            return place_of(at, "self", member, self.names.dialect)
         if self.names.global_(key) is not None:
             return self._global(at, key, name)
         for known, what in self._others():
@@ -63,6 +66,8 @@ class Scope:
                 return Thing(what)
         if key in self.names.reading:
             raise SourceError(at, f"found {name} in its own declaration, expected another value")
+        if expected := advice(name):
+            raise SourceError(at, f"found {name}, expected {expected}")
         close = get_close_matches(key, [one for known, _ in self._others(True) for one in known], 1)
         hint = f"; there is {self._written(close[0])}" if close else ""
         raise SourceError(at, f"found {name}, which is not declared, expected a variable{hint}")
@@ -81,6 +86,11 @@ class Scope:
             raise SourceError(at, f"found {name}, {named.what}, expected a value")
         return named
 
+    def has_variable(self, name: str) -> bool:
+        """Return True if a name is that of a variable here."""
+        key = name.lower()
+        return (self.unit is not None and key in self.unit.members) or self.names.global_(key) is not None
+
     def enumeration(self, name: str) -> Enumeration | None:
         """Return the enumeration of a name, unless a variable hides it."""
         kind = self.names.types.get(name.lower())
@@ -91,7 +101,7 @@ class Scope:
         member = self.names.global_(key)
         if member is None:
             raise SourceError(at, f"found {name}, expected a variable of VAR_GLOBAL of that name")
-        return place_of(at, "_g", member, inside=True)
+        return place_of(at, "_g", member, self.names.dialect)
 
     def _others(self, everything: bool = False) -> list[tuple[Mapping[str, object], str]]:
         own = self.unit.members if self.unit is not None else {}
@@ -109,13 +119,10 @@ class Scope:
         return member.name if member else key
 
 
-def place_of(at: Position, owner: str, member: Member, inside: bool) -> Place:
-    """Return a variable of an object.
-
-    inside: True in the unit that the variable belongs to.
-    """
+def place_of(at: Position, owner: str, member: Member, dialect: Dialect) -> Place:
+    """Return a variable of an object, in the unit that it belongs to."""
     slot = member.slot
-    if member.section == "VAR_IN_OUT":
+    if member.section == "VAR_IN_OUT" or isinstance(member.type, OpenArray):
         reference = f"{owner}.{slot}"
         return Place(
             at,
@@ -123,12 +130,13 @@ def place_of(at: Position, owner: str, member: Member, inside: bool) -> Place:
             f"{reference}.get()",
             write=lambda new: f"{reference}.set({new})",
             reference=reference,
+            fixed="" if member.section == "VAR_IN_OUT" else f"{member.name}, an input",
             root=f"{reference}.root",
         )
     code = f"{owner}.{slot}"
-    fixed = f"{member.name}, a CONSTANT" if member.constant else ""
-    if inside and member.section == "VAR_INPUT":
-        fixed = f"{member.name}, an input"
+    fixed, lacks = f"{member.name}, a CONSTANT" if member.constant else "", ""
+    if member.section == "VAR_INPUT" and (member.read_only or not dialect.written_inputs):
+        fixed, lacks = f"{member.name}, an input", "" if member.read_only else "written_inputs"
     elif member.address.startswith("%I"):
         fixed = f"{member.name}, an input at {member.address}"
     known = member.value
@@ -140,5 +148,6 @@ def place_of(at: Position, owner: str, member: Member, inside: bool) -> Place:
         write=lambda new: f"{code} = {new}",
         reference=f"_Attribute({owner}, {slot!r})",
         fixed=fixed,
+        lacks=lacks,
         root=f"({owner}, {slot!r})",
     )

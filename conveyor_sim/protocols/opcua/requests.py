@@ -29,6 +29,7 @@ from conveyor_sim.protocols.tags.control_mode import (
     refused_for_good,
 )
 from conveyor_sim.protocols.tags.handshake import MAY_GO_ON, TARGET
+from conveyor_sim.protocols.tags.held_buttons import HeldButtons
 from conveyor_sim.protocols.tags.tag_provider import OPCUA, Control, TagProvider
 
 Codes = ua.StatusCodes
@@ -69,6 +70,8 @@ class Requests:
         self._receipt = Receipt(source.info.tags, source.info.where)
         self._commands: Mapping[str, Tag] = {tag.name: tag for tag in source.info.tags if tag.role in COMMANDS}
         self._modes: Mapping[str, Tag] = {tag.name: tag for tag in source.info.tags if is_mode(tag)}
+        self.held = HeldButtons(source)
+        """Buttons that clients hold, by the identity of their users (`Client`)."""
         self.writes = self.refused = 0
         """Requests that were passed on to the line, and requests that were refused."""
 
@@ -214,8 +217,14 @@ class Requests:
             return ReasonedCode(Codes.BadNoCommunication, snapshot.lost)
         if snapshot.run.state in TAKES_NO_INPUT:
             return ReasonedCode(Codes.BadInvalidState, f"the run is {snapshot.run.text}, and takes no input")
-        refused = self._source.give(request)
-        return ReasonedCode(Codes.BadTooManyOperations, refused) if refused else Codes.GoodCompletesAsynchronously
+        if refused := self._source.give(request):
+            return ReasonedCode(Codes.BadTooManyOperations, refused)
+        self.held.note(id(client), request)
+        return Codes.GoodCompletesAsynchronously
+
+    def leave(self, client: User) -> None:
+        """Release the buttons that a client holds, because its session has ended or has another user."""
+        self.held.leave(id(client))
 
 
 def _judge_form(value: ua.WriteValue, kind: ua.VariantType) -> int:

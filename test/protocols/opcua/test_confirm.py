@@ -159,7 +159,7 @@ def test_a_confirmation_is_recorded_and_replayed(opcua: Any, tmp_path: Path) -> 
     with Scenario(scene, bag=tmp_path / "bag") as line:
         server = opcua(line, users={"jo": ("operator", "open sesame")})
         with node_session(server.address, tmp_path, "jo") as session:
-            line.eventually(lambda s: s["belts/zone1/bottles"] > 0, within=5.0)
+            line.eventually(lambda s: s["alarms/busy"] == 1, within=5.0)
             for operation in ("acknowledge", "confirm"):
                 assert session.call("line", f"line/{operation}", ("String", "busy")) == LATER
                 line.run_for(0.1)
