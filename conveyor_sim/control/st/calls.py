@@ -11,6 +11,7 @@ from conveyor_sim.control.st.enabling import Enabling, enabled, separated
 from conveyor_sim.control.st.errors import Position, SourceError
 from conveyor_sim.control.st.expressions import Expressions
 from conveyor_sim.control.st.functions import apply, function_of, is_standard
+from conveyor_sim.control.st.implicit import adapted
 from conveyor_sim.control.st.types import BOOL, VOID, BlockType, Member, Type
 from conveyor_sim.control.st.values import Place, Value, assignment, converted, described
 from conveyor_sim.control.st.work import CALL
@@ -38,13 +39,13 @@ class CallCompiler:
 
     def __call__(self, expressions: Expressions, node: tree.Call, hint: Type | None) -> Value:
         """Compile a call of a function. Raise SourceError."""
-        target = node.target
+        target = expressions.scope.unprefixed(node.target)
         if not isinstance(target, tree.Name):
             block = expressions.place(target)
             raise SourceError(node.at, f"found a call of {described(block)} as a value, expected a function")
         scope = expressions.scope
         own = scope.unit.members.get(target.name.lower()) if scope.unit is not None else None
-        if own is not None and own.section != "RESULT":
+        if own is not None and own.section != "RESULT" and not target.qualified:
             raise SourceError(node.at, f"found a call of {target.name}, a variable, as a value, expected a function")
         function = self.declarations.function(target.name)
         if function is None:
@@ -64,22 +65,27 @@ class CallCompiler:
             if argument is None:
                 codes.append(self._missing(node, function, member))
             elif member.section == "VAR_INPUT":
-                value = expressions.value(argument.value, member.type)
+                value = adapted(expressions.value(argument.value, member.type), member.type, scope.names)
                 codes.append(converted(value, member.type, f"{member.name} of {function.name}"))
             else:
                 codes.append(self.reference(expressions, argument, member, node.at))
         code = f"_f_{function.name.lower()}({', '.join(codes)})"
         return self._enabled(expressions, Value(node.at, function.result or VOID, code), enabling)
 
-    def block(self, expressions: Expressions, node: tree.Call) -> tuple[Place, list[str]]:
-        """Return the block of a call statement, and the lines of the call."""
-        place = expressions.place(node.target)
+    def block(self, expressions: Expressions, node: tree.Call, bare: bool) -> list[str]:
+        """Return the lines of the call of a block or its action.
+
+        bare: True without parentheses, as only actions are called.
+        """
+        place, action = self._called(expressions, node.target)
         kind = place.type
         if not isinstance(kind, BlockType):
             raise SourceError(node.at, f"found a call of {described(place)}, expected a function or a block")
+        if bare and not action:
+            raise SourceError(node.at, f"found a {kind.name} without (), expected its call with ()")
         enabling = separated(node, kind)
         node = enabling.call
-        self._note(expressions, kind, node)
+        self._note(expressions, kind, node, action)
         lines, after = [f"_o = {place.code}"], []
         written = [one.slot for one in kind.of("VAR_OUTPUT") if kind.standard]
         arguments = self._bound(expressions, node, kind)
@@ -90,6 +96,7 @@ class CallCompiler:
                     raise SourceError(node.at, f"found no {member.name}, expected {member.name} := and a variable")
             elif member.section == "VAR_INPUT":
                 value = expressions.value(argument.value, member.type)
+                value = adapted(value, member.type, expressions.scope.names)
                 lines.append(f"_o.{member.slot} = {converted(value, member.type, f'{member.name} of {kind.name}')}")
                 written.append(member.slot)
             elif member.section == "VAR_IN_OUT":
@@ -97,16 +104,35 @@ class CallCompiler:
             else:
                 after += self._output(expressions, argument, member, node.at)
         noted = [line for slot in written for line in self.noted(expressions, f"(_o, {slot!r})", node.at)]
-        lines += ["_o.run(_rt.now)", *noted, *after]
+        lines += [f"_o.{f'a_{action}' if action else 'run'}(_rt.now)", *noted, *after]
         if enabling.en is None and enabling.eno is None:
-            return place, lines
+            return lines
         report = enabling.report(expressions)
         ends: list[list[str]] = [[], ["pass"]]
         if report is not None:
             written = self.noted(expressions, report.root, node.at)
             ends = [[report.write(on), *written] for on in ("True", "False")]
         lines = [" " + line for line in (*lines, *ends[0])]
-        return place, [f"if {enabling.condition(expressions)}:", *lines, "else:", *(" " + line for line in ends[1])]
+        return [f"if {enabling.condition(expressions)}:", *lines, "else:", *(" " + line for line in ends[1])]
+
+    def own_action(self, expressions: Expressions, node: tree.Call) -> str:
+        """Return the code that calls an action of the same unit; "" if the call is another one."""
+        unit, target = expressions.scope.unit, node.target
+        if unit is None or not isinstance(target, tree.Name) or target.name.lower() not in unit.actions:
+            return ""
+        if node.arguments:
+            raise SourceError(node.arguments[0].at, f"found an argument of the action {target.name}, expected none")
+        self._note(expressions, unit, node, target.name.lower())
+        return f"self.a_{target.name.lower()}(_rt.now)"
+
+    def _called(self, expressions: Expressions, target: tree.Expression) -> tuple[Place, str]:
+        """Return the block of a call, and its action, in small letters; "" for the body."""
+        if isinstance(target, tree.MemberAccess) and expressions.scope.names.dialect.actions:
+            plain = expressions.scope.unprefixed(target)
+            owner = None if isinstance(plain, tree.Name) else expressions.place(target.base)
+            if owner is not None and isinstance(owner.type, BlockType) and target.name.lower() in owner.type.actions:
+                return owner, target.name.lower()
+        return expressions.place(target), ""
 
     def noted(self, expressions: Expressions, root: str, at: Position) -> list[str]:
         """Return the line that records the last write of a variable, if that is traced.
@@ -136,9 +162,12 @@ class CallCompiler:
                 elif called not in done:
                     path.append((called, iter(self.edges.get(called, {}).items())))
 
-    def _note(self, expressions: Expressions, kind: BlockType, node: tree.Call) -> None:
-        if expressions.scope.unit is not None and not kind.standard:
-            self.edges.setdefault(expressions.scope.unit.python, {}).setdefault(kind.python, node)
+    def _note(self, expressions: Expressions, kind: BlockType, node: tree.Call, action: str = "") -> None:
+        unit = expressions.scope.unit
+        if unit is not None and not kind.standard:
+            caller = f"{unit.python}.{expressions.action}" if expressions.action else unit.python
+            called = f"{kind.python}.{action}" if action else kind.python
+            self.edges.setdefault(caller, {}).setdefault(called, node)
 
     def _standard(self, expressions: Expressions, node: tree.Call, name: str, hint: Type | None) -> Value:
         enabling = separated(node, None)
@@ -234,5 +263,6 @@ class CallCompiler:
             if member.type != BOOL:
                 raise SourceError(argument.at, f"found NOT of {member.type.name}, expected a BOOL")
             code = f"(not {code})"
-        written = assignment(place, Value(argument.at, member.type, code))
+        value = adapted(Value(argument.at, member.type, code), place.type, expressions.scope.names)
+        written = assignment(place, value)
         return [written, *self.noted(expressions, place.root, at)]

@@ -11,6 +11,7 @@ from conveyor_sim.control.st.blocks import STANDARD
 from conveyor_sim.control.st.dialect import Dialect
 from conveyor_sim.control.st.errors import Position, SourceError
 from conveyor_sim.control.st.expressions import Expressions
+from conveyor_sim.control.st.implicit import adapted
 from conveyor_sim.control.st.located import Located, address_of, require_fit
 from conveyor_sim.control.st.scope import Names, Scope
 from conveyor_sim.control.st.sections import LOCATED, OUTSIDE, meaning
@@ -153,6 +154,8 @@ class Declarations:
 
     def _type(self, spec: tree.TypeSpec, known: Expressions, name: str = "") -> Type:
         if isinstance(spec, tree.NamedType):
+            if spec.prefix:
+                known.scope.require_prefix(spec.at, spec.prefix, spec.name)
             kind = self.named(spec.at, spec.name)
             if spec.length is None:
                 return kind
@@ -245,9 +248,15 @@ class Declarations:
         prefix = {"FUNCTION": "_F_", "FUNCTION_BLOCK": "_B_", "PROGRAM": "_P_"}[unit.kind]
         result = self.type(unit.result) if unit.result is not None else None
         kind = BlockType(
-            unit.name, "block", python=prefix + unit.name.lower(), function=unit.kind == "FUNCTION", result=result
+            unit.name,
+            "block",
+            python=prefix + unit.name.lower(),
+            function=unit.kind == "FUNCTION",
+            result=result,
+            actions=frozenset(one.name.lower() for one in unit.actions),
         )
         self._members(kind, unit.sections, unit.kind)
+        _require_apart(unit, kind)
         if result is not None:
             name = unit.name.lower()
             if name in kind.members:
@@ -331,7 +340,7 @@ class Declarations:
             return self._initial_array(node, kind, known)
         if isinstance(node, tree.InitialStructure):
             return self._initial_structure(node, kind, known)
-        value = known.value(node, kind)
+        value = adapted(known.value(node, kind), kind, self.names)
         if value.constant is None:
             raise SourceError(node.at, f"found {described(value)}, expected a constant as an initial value")
         code = converted(value, kind)
@@ -374,6 +383,17 @@ class Declarations:
                 )
             fields.append(f"{member.slot}={self._initial(value, member.type, known)}")
         return f"_with({kind.python}(), {', '.join(fields)})"
+
+
+def _require_apart(unit: tree.ProgramUnit, kind: BlockType) -> None:
+    """Raise SourceError for an action of a function, and for one whose name is not unique in its unit."""
+    taken = set(kind.members)
+    for action in unit.actions:
+        if kind.function:
+            raise SourceError(action.at, f"found the action {action.name} of a FUNCTION, expected a block or a program")
+        if action.name.lower() in taken:
+            raise SourceError(action.at, f"found {action.name} again, expected another name for the action")
+        taken.add(action.name.lower())
 
 
 def require_small(elements: int, characters: int, at: Position, of: str = "") -> None:

@@ -27,6 +27,22 @@ class Dialect:
     """Dialect of a program: True for each feature that it has beyond IEC 61131-3, or in which it differs."""
 
     name: str
+    actions: bool = _flag("`ACTION name: ... END_ACTION` in a unit or after it; `name();` and `block.name();`")
+    prefixes: bool = _flag(
+        "a variable list or a library before the name of a variable, type or function: `GVL.x`, `Standard.TON`; the "
+        "prefix is ignored"
+    )
+    integer_bits: bool = _flag("parts of integers: `n.3`, `n.%X3`, `n.%B1`; the number of a bit is a constant's name")
+    bit_numbers: bool = _flag(
+        "BYTE, WORD, DWORD and LWORD are unsigned numbers: `w + 1`, `v[b]`, `SQRT(w)`; `DWORD_TO_REAL` and "
+        "`REAL_TO_DWORD` convert the number"
+    )
+    integer_logic: bool = _flag("AND, OR, XOR, NOT, SHL, SHR, ROL and ROR of integers; SHR keeps the sign")
+    enumeration_numbers: bool = _flag("enumerations are numbers: `n := Color.Red`, `color := n`, `color + 1`")
+    narrowing: bool = _flag(
+        "a number is converted to a smaller type, DINT to REAL and LREAL to REAL, with a warning if its value may "
+        "change; REAL with an integer is computed in REAL"
+    )
     written_inputs: bool = _flag("a unit writes its VAR_INPUT")
     bcd_marks: bool = _flag("BCD_TO_INT of no BCD is -1, INT_TO_BCD of more than 99 is 255 (else the program stops)")
 
@@ -44,7 +60,13 @@ class Dialect:
         return f"; dialect {' or '.join(having)} has it" if having else ""
 
 
-_CODESYS = {"written_inputs": True}
+_CODESYS = dict.fromkeys(
+    (
+        *("actions", "prefixes", "integer_bits", "bit_numbers", "integer_logic", "enumeration_numbers", "narrowing"),
+        "written_inputs",
+    ),
+    True,
+)
 """Features of CODESYS, from which TwinCAT 3 is derived."""
 
 IEC = Dialect("iec")
@@ -55,7 +77,7 @@ DIALECTS: dict[str, Dialect] = {
         IEC,
         Dialect("codesys", bcd_marks=True, **_CODESYS),
         Dialect("twincat", **_CODESYS),
-        Dialect("tia"),
+        Dialect("tia", integer_bits=True),
     )
 }
 """Dialects by name."""

@@ -14,7 +14,7 @@ from conveyor_sim.control.st.errors import Position, SourceError
 REFUSED: Mapping[str, str] = {
     **dict.fromkeys(("POINTER", "REF_TO"), "pointers and references"),
     **dict.fromkeys(("CLASS", "INTERFACE", "EXTENDS", "IMPLEMENTS", "NAMESPACE"), "classes, methods and namespaces"),
-    **dict.fromkeys(("INITIAL_STEP", "END_STEP", "END_TRANSITION", "END_ACTION"), "SFC"),
+    **dict.fromkeys(("INITIAL_STEP", "END_STEP", "END_TRANSITION"), "SFC"),
     **dict.fromkeys(("VAR_ACCESS", "VAR_CONFIG"), "access paths and VAR_CONFIG"),
     **dict.fromkeys(("VAR_STAT", "VAR_INST"), "VAR_STAT and VAR_INST; VAR of a block keeps its values"),
 }
@@ -106,13 +106,13 @@ def unexpected(error: Any, text: str) -> SourceError:
     if token.type == "ADDRESS":
         return SourceError(at_of(token), f"found {token}, expected a variable that is declared AT {token}")
     found = "the end of the file" if token.type == "$END" else f"'{token.value}'"
-    expected = set(error.accepts or error.expected)
+    expected = set(error.accepts or error.expected) - {"ACTION"}
     words = []
     if expected >= _STATEMENTS:
         expected -= _STATEMENTS | {"NAME", "PREFIX", "SEMICOLON"}
         words.append("a statement")
     if expected >= _VALUES:
-        expected -= _VALUES
+        expected -= {*_VALUES, "AND", "OR", "XOR", "MOD"}  # their calls as functions
         words.append("a value")
     if expected >= _OPERATORS:
         expected -= _OPERATORS

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from functools import cache
 from importlib.resources import files
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar
 
 from lark import Lark, Token
 from lark.exceptions import UnexpectedCharacters, UnexpectedToken
@@ -34,6 +34,7 @@ _LEVELS = (
 )
 """Operators between two operands, from the lowest precedence; of equal precedence they go from left to right."""
 _PRECEDENCE = {word: level for level, words in enumerate(_LEVELS) for word in words}
+_SIZES = {"X": 1, "B": 8, "W": 16, "D": 32, "L": 64}
 _CHAINS = ({"+", "-"}, {"OR"}, {"AND"}, {"XOR"})
 
 _N = TypeVar("_N", bound=tree.Node)
@@ -93,10 +94,32 @@ class _Checked(PostLex):
 
     def process(self, stream: Iterator[Token]) -> Iterator[Token]:
         """Yield the tokens. Raise SourceError for more than MOST_TOKENS, and for words of unsupported features."""
+        before: Token | None = None
         for number, token in enumerate(stream):
             if number == MOST_TOKENS:
                 raise SourceError(at_of(token), f"found more than {MOST_TOKENS} words and signs, expected fewer")
-            yield not_refused(token) if token.type in ("NAME", "PREFIX") else token
+            if before is not None:
+                if token.type == "NAME":  # two names in sequence
+                    before.type = "ACTION"
+                yield before
+                before = None
+            if token.type == "NAME" and token.value.upper() == "ACTION":
+                before = token
+            else:
+                yield not_refused(token) if token.type in ("NAME", "PREFIX") else token
+        if before is not None:
+            yield before
+
+
+def _attach(source: tree.SourceFile, action: tree.Action) -> None:
+    """Add an action outside of all units to the unit of its name, or to the last one before it."""
+    wanted = action.unit.lower()
+    for number, unit in reversed(list(enumerate(source.units))):
+        if not wanted or unit.name.lower() == wanted:
+            source.units[number] = replace(unit, actions=(*unit.actions, action))
+            return
+    expected = f"the unit {action.unit} before it" if wanted else "the unit that it belongs to before it"
+    raise SourceError(action.at, f"found the action {action.name}, expected {expected}")
 
 
 def _of(first: Token | tree.Node) -> Position:
@@ -126,6 +149,8 @@ class _Tree(Transformer[Any]):
         for item in items:
             if isinstance(item, tree.ProgramUnit):
                 source.units.append(item)
+            elif isinstance(item, tree.Action):
+                _attach(source, item)
             elif isinstance(item, tree.Configuration):
                 source.configurations.append(item)
             elif isinstance(item, tree.VariableSection):
@@ -150,7 +175,7 @@ class _Tree(Transformer[Any]):
         return tree.TypeDeclaration(at_of(name), str(name), spec, initial[0] if initial else None)
 
     def named(self, items: list[Any]) -> tree.TypeSpec:
-        return tree.NamedType(_of(items[0]), str(items[0]))
+        return tree.NamedType(_of(items[0]), str(items[-1]), prefix=".".join(items[:-1]))
 
     def sized(self, items: list[Any]) -> tree.TypeSpec:
         return tree.NamedType(_of(items[0]), str(items[0]), items[1])
@@ -180,12 +205,21 @@ class _Tree(Transformer[Any]):
         return tree.ProgramUnit(at_of(name), "FUNCTION", str(name), result, tuple(sections), body)
 
     def block(self, items: list[Any]) -> tree.ProgramUnit:
-        name, *sections, body = items
-        return tree.ProgramUnit(at_of(name), "FUNCTION_BLOCK", str(name), None, tuple(sections), body)
+        return self._acting("FUNCTION_BLOCK", items)
 
     def program(self, items: list[Any]) -> tree.ProgramUnit:
-        name, *sections, body = items
-        return tree.ProgramUnit(at_of(name), "PROGRAM", str(name), None, tuple(sections), body)
+        return self._acting("PROGRAM", items)
+
+    def _acting(self, kind: Literal["FUNCTION_BLOCK", "PROGRAM"], items: list[Any]) -> tree.ProgramUnit:
+        name, *inner = items
+        actions = tuple(item for item in inner if isinstance(item, tree.Action))
+        *sections, body = (item for item in inner if not isinstance(item, tree.Action))
+        return tree.ProgramUnit(at_of(name), kind, str(name), None, tuple(sections), body, actions)
+
+    def action(self, items: list[Any]) -> tree.Action:
+        word, first, second, body = items
+        self.dialect.require("actions", at_of(word), f"ACTION {first}", "a program without actions")
+        return tree.Action(at_of(word), str(second or first), str(first) if second else "", body)
 
     def variables(self, items: list[Any]) -> tree.VariableSection:
         qualifiers = tuple(item.upper() for item in items[1:] if isinstance(item, Token))
@@ -254,6 +288,9 @@ class _Tree(Transformer[Any]):
     def call_statement(self, items: list[Any]) -> tree.Statement:
         at = items[0].at
         return tree.CallStatement(at, tree.Call(at, items[0], items[1] or ()))
+
+    def bare_call(self, items: list[Any]) -> tree.Statement:
+        return tree.CallStatement(items[0].at, tree.Call(items[0].at, items[0], ()), bare=True)
 
     def elsif(self, items: list[Any]) -> Any:
         return [(items[0], items[1])]
@@ -360,6 +397,10 @@ class _Tree(Transformer[Any]):
         arguments = items[1] or ()
         return self._deep(tree.Call(items[0].at, items[0], arguments), *(one.value for one in arguments))
 
+    def operator_call(self, items: list[Any]) -> tree.Expression:
+        name = tree.Name(at_of(items[0]), str(items[0]))
+        return self.call([name, items[1]])
+
     def name(self, items: list[Any]) -> tree.Expression:
         return tree.Name(_of(items[0]), str(items[0]))
 
@@ -370,7 +411,9 @@ class _Tree(Transformer[Any]):
         return self._deep(tree.Item(_of(items[0]), items[0], tuple(items[1:])), *items)
 
     def bit(self, items: list[Any]) -> tree.Expression:
-        return tree.Bit(_of(items[0]), items[0], int(items[1].upper().removeprefix("%X").replace("_", "")))
+        base, written = items
+        size = _SIZES[written[1].upper()] if written.startswith("%") else 1
+        return tree.Bit(_of(base), base, literals.integer(at_of(written), written.lstrip("%XBWDLxbwdl")), size)
 
     def enum_value(self, items: list[Any]) -> tree.Expression:
         return tree.EnumValue(_of(items[0]), items[0].rstrip("#"), str(items[1]))

@@ -274,6 +274,8 @@ class BlockType(Structure):
     standard: bool = False
     function: bool = False
     result: Type | None = None
+    actions: frozenset[str] = frozenset()
+    """Names of its actions, in small letters."""
 
     def of(self, *sections: str) -> list[Member]:
         """Return the variables of some sections, in their order."""
