@@ -30,7 +30,7 @@ RULES: Mapping[str, str] = {
     "report": "bag columns errors line page physics run scene simulation statistics support | "
     "click matplotlib numpy rich",
     "protocols": "bag columns errors line page run scene simulation support | "
-    "aiohttp asyncua cryptography foxglove google numpy paho pymodbus",
+    "aiohttp asyncua cryptography foxglove google numpy paho pyads pylogix pymodbus snap7",
     "accuracy": "columns engine errors line physics report scene simulation statistics support | "
     "matplotlib numpy rich ruamel scipy",
     "studies": "bag columns control errors line physics report run scene simulation statistics support | "

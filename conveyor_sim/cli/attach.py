@@ -33,7 +33,8 @@ from conveyor_sim.support.garbage import collected_later
 def attach(scene: str, url: str, tags: Path, user: str, period: float, **of_scene: Any) -> None:
     """Have the PLC at URL control SCENE in real time.
 
-    URL is that of the PLC's server: opc.tcp://host:port or modbus://host:port. The line writes its signals there, and
+    URL is that of the PLC's server: opc.tcp://host:port, modbus://host:port, s7://host/rack/slot (Siemens),
+    eip://host/slot (Rockwell) or ads://net-id:port?host=address (Beckhoff). The line writes its signals there, and
     reads what the PLC commands. The simulation does not wait for the PLC; the lag is reported. Ctrl-C ends it.
     """
     with collected_later():

@@ -19,12 +19,12 @@ from conveyor_sim.control.scan import ControlError, Inputs
 from conveyor_sim.line.commands.inputs import SET
 from conveyor_sim.line.tag import ProcessImage
 from conveyor_sim.protocols.attach.links import plc_link
-from conveyor_sim.protocols.attach.plc_link import PlcLinkError, read_answer
+from conveyor_sim.protocols.attach.plc_link import PlcLinkError, read_answer, write_signals
 from conveyor_sim.protocols.attach.tag_map import TagMapError, read_tag_map
 from conveyor_sim.protocols.hosting.server_thread import ServerThread
 from conveyor_sim.protocols.modbus.address_map import modbus_map
 from conveyor_sim.protocols.server.interface import ProtocolServer
-from conveyor_sim.protocols.tags.handshake import TARGET, TICK, HandshakeTagProvider
+from conveyor_sim.protocols.tags.handshake import TARGET, TICK, HandshakeTagProvider, problem
 from conveyor_sim.protocols.tags.tag_provider import PLC, TagProvider
 from conveyor_sim.run.alarm_changes import AlarmChanges
 from conveyor_sim.run.scan_loop import AttachedController
@@ -83,7 +83,7 @@ class ServedPlc(AttachedController):
         if inputs.tick >= self._target:
             signals = {each.tag.name: inputs[each.tag.name] for each in self._map.written}
             try:
-                self._thread.run(self._link.write({**signals, TICK: float(inputs.tick)}))
+                self._thread.run(write_signals(self._link, signals, inputs.tick))
                 self._target = self._wait(inputs)
                 self._answer, self.variables = self._thread.run(read_answer(self._link, self._map))
             except PlcLinkError as error:
@@ -98,6 +98,8 @@ class ServedPlc(AttachedController):
                     f"at {inputs.time:.2f} s no {TARGET} after {inputs.tick} within {self._patience:g} s of wall time, "
                     f"expected from the PLC at {self._url}; it is {target:g} there"
                 )
+        if reason := problem("target", target, inputs.tick):
+            raise ControlError(f"at {inputs.time:.2f} s the PLC at {self._url} set {reason}")
         return int(target)
 
 

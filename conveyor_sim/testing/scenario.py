@@ -378,9 +378,10 @@ class Scenario(AbstractContextManager["Scenario"]):
     ) -> None:
         """Attach a running PLC that is a server, in place of the controller before. The line is its client.
 
-        url: "opc.tcp://host:port" or "modbus://host:port". tags: CSV file that maps our tags to those of the PLC,
-        including `run/tick` and `run/target_tick` (docs/plc.md). user: "" for anonymous. patience: longest time for
-        each scan, s of wall time.
+        url: "opc.tcp://host:port", "modbus://host:port", "s7://host/rack/slot", "eip://host/slot" or
+        "ads://net-id:port?host=address". tags: CSV file that maps our tags to those of the PLC, including `run/tick`
+        and `run/target_tick` (docs/plc.md). user: "" for anonymous. patience: longest time for each scan, s of wall
+        time.
 
         Raises TagMapError for a map that does not fit; PlcLinkError if the PLC can't be reached; ControlError if it
         does not answer, which every later tick may raise as well; ImportError without the library of the protocol.

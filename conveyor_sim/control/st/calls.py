@@ -12,7 +12,10 @@ from conveyor_sim.control.st.errors import Position, SourceError
 from conveyor_sim.control.st.expressions import Expressions
 from conveyor_sim.control.st.functions import apply, function_of, is_standard
 from conveyor_sim.control.st.implicit import adapted
-from conveyor_sim.control.st.types import BOOL, VOID, BlockType, Member, Type
+from conveyor_sim.control.st.open_arrays import BOUNDS, accepts, bound, passed
+from conveyor_sim.control.st.sizes import size_of
+from conveyor_sim.control.st.tia_blocks import IEC_TIMER, INSTRUCTIONS
+from conveyor_sim.control.st.types import BOOL, VOID, BlockType, Member, OpenArray, Type
 from conveyor_sim.control.st.values import Place, Value, assignment, converted, described
 from conveyor_sim.control.st.work import CALL
 
@@ -49,6 +52,8 @@ class CallCompiler:
             raise SourceError(node.at, f"found a call of {target.name}, a variable, as a value, expected a function")
         function = self.declarations.function(target.name)
         if function is None:
+            if target.name.upper() in BOUNDS or target.name.upper() == "SIZEOF":
+                return self._of_variable(expressions, node, target.name.upper())
             if is_standard(target.name):
                 return self._standard(expressions, node, target.name, hint)
             if target.name.lower() in scope.names.types:
@@ -64,6 +69,8 @@ class CallCompiler:
             argument = arguments.get(member.slot)
             if argument is None:
                 codes.append(self._missing(node, function, member))
+            elif isinstance(member.type, OpenArray) and member.section == "VAR_INPUT":
+                codes.append(self._open(expressions, argument, member, expressions.place(argument.value)))
             elif member.section == "VAR_INPUT":
                 value = adapted(expressions.value(argument.value, member.type), member.type, scope.names)
                 codes.append(converted(value, member.type, f"{member.name} of {function.name}"))
@@ -77,7 +84,7 @@ class CallCompiler:
 
         bare: True without parentheses, as only actions are called.
         """
-        place, action = self._called(expressions, node.target)
+        place, action, run = self._called(expressions, node.target)
         kind = place.type
         if not isinstance(kind, BlockType):
             raise SourceError(node.at, f"found a call of {described(place)}, expected a function or a block")
@@ -104,7 +111,7 @@ class CallCompiler:
             else:
                 after += self._output(expressions, argument, member, node.at)
         noted = [line for slot in written for line in self.noted(expressions, f"(_o, {slot!r})", node.at)]
-        lines += [f"_o.{f'a_{action}' if action else 'run'}(_rt.now)", *noted, *after]
+        lines += [f"_o.{run}(_rt.now)", *noted, *after]
         if enabling.en is None and enabling.eno is None:
             return lines
         report = enabling.report(expressions)
@@ -125,14 +132,23 @@ class CallCompiler:
         self._note(expressions, unit, node, target.name.lower())
         return f"self.a_{target.name.lower()}(_rt.now)"
 
-    def _called(self, expressions: Expressions, target: tree.Expression) -> tuple[Place, str]:
-        """Return the block of a call, and its action, in small letters; "" for the body."""
-        if isinstance(target, tree.MemberAccess) and expressions.scope.names.dialect.actions:
-            plain = expressions.scope.unprefixed(target)
+    def _called(self, expressions: Expressions, target: tree.Expression) -> tuple[Place, str, str]:
+        """Return the block that a statement calls, its action in small letters ("" for the body), and its method.
+
+        The method of an IEC_TIMER is that of the instruction.
+        """
+        names = expressions.scope.names
+        if isinstance(target, tree.MemberAccess) and (names.dialect.actions or target.name.lower() in INSTRUCTIONS):
+            name, plain = target.name.lower(), expressions.scope.unprefixed(target)
             owner = None if isinstance(plain, tree.Name) else expressions.place(target.base)
-            if owner is not None and isinstance(owner.type, BlockType) and target.name.lower() in owner.type.actions:
-                return owner, target.name.lower()
-        return expressions.place(target), ""
+            if owner is not None and owner.type is IEC_TIMER and name in INSTRUCTIONS:
+                return owner, "", f"run_{name}"
+            if owner is not None and isinstance(owner.type, BlockType) and name in owner.type.actions:
+                return owner, name, f"a_{name}"
+        place = expressions.place(target)
+        if place.type is IEC_TIMER:
+            raise SourceError(target.at, f"found a call of {place.type.name}, expected .TON, .TOF or .TP before (")
+        return place, "", "run"
 
     def noted(self, expressions: Expressions, root: str, at: Position) -> list[str]:
         """Return the line that records the last write of a variable, if that is traced.
@@ -168,6 +184,20 @@ class CallCompiler:
             caller = f"{unit.python}.{expressions.action}" if expressions.action else unit.python
             called = f"{kind.python}.{action}" if action else kind.python
             self.edges.setdefault(caller, {}).setdefault(called, node)
+
+    def _of_variable(self, expressions: Expressions, node: tree.Call, name: str) -> Value:
+        """Compile a call of SIZEOF, LOWER_BOUND or UPPER_BOUND, whose argument is a variable rather than a value."""
+        if any(one.output or (one.name or "").upper() not in ("", "ARR", "DIM") for one in node.arguments):
+            raise SourceError(node.at, f"found arguments of {name} by name, expected them by position")
+        arguments = [one.value for one in node.arguments]
+        if name in BOUNDS:
+            return bound(expressions, node, name, arguments)
+        if len(arguments) != 1:
+            raise SourceError(node.at, f"found {len(arguments)} arguments of SIZEOF, expected 1: a variable or a type")
+        (argument,) = arguments
+        if isinstance(argument, tree.Name) and not expressions.scope.has_variable(argument.name):
+            return size_of(node.at, self.declarations.named(argument.at, argument.name))
+        return size_of(node.at, expressions.place(argument).type)
 
     def _standard(self, expressions: Expressions, node: tree.Call, name: str, hint: Type | None) -> Value:
         enabling = separated(node, None)
@@ -239,8 +269,10 @@ class CallCompiler:
 
     def _missing(self, node: tree.Call, function: BlockType, member: Member) -> str:
         """Return the code of an argument that is left out."""
-        if member.section == "VAR_IN_OUT" or (
-            member.section == "VAR_INPUT" and any(a.name is None for a in node.arguments)
+        if (
+            isinstance(member.type, OpenArray)
+            or member.section == "VAR_IN_OUT"
+            or (member.section == "VAR_INPUT" and any(a.name is None for a in node.arguments))
         ):
             raise SourceError(node.at, f"found no {member.name} of {function.name}, expected all of its arguments")
         return member.initial if member.section == "VAR_INPUT" else "None"
@@ -251,10 +283,20 @@ class CallCompiler:
         at: of the call.
         """
         place = expressions.target(argument.value)
+        if isinstance(member.type, OpenArray):
+            return self._open(expressions, argument, member, place)
         if place.type != member.type or not place.reference or argument.negated:
             expected = f"a variable of type {member.type.name}"
             raise SourceError(argument.at, f"found {described(place)} for {member.name}, expected {expected}")
         return self._traced(expressions, place, at).reference if member.section == "VAR_OUTPUT" else place.reference
+
+    def _open(self, expressions: Expressions, argument: tree.Argument, member: Member, place: Place) -> str:
+        """Return the code that passes an array as ARRAY [*]."""
+        if argument.negated or not accepts(place, member):
+            expected = f"a variable that is an array of this kind, {member.type.name}"
+            raise SourceError(argument.at, f"found {described(place)} for {member.name}, expected {expected}")
+        expressions.work += place.type.work if member.section == "VAR_INPUT" else 0
+        return passed(place, member)
 
     def _output(self, expressions: Expressions, argument: tree.Argument, member: Member, at: Position) -> list[str]:
         place = expressions.target(argument.value)

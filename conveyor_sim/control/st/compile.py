@@ -3,11 +3,9 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from types import CodeType
 
 from conveyor_sim.control.st import tree
@@ -17,18 +15,13 @@ from conveyor_sim.control.st.dialect import IEC, Dialect, dialect_of
 from conveyor_sim.control.st.errors import Position, SourceError, StructuredTextError
 from conveyor_sim.control.st.expressions import Expressions
 from conveyor_sim.control.st.located import NOTHING_SHARED, Layout, laid_out
-from conveyor_sim.control.st.parse import parse
+from conveyor_sim.control.st.program_files import Paths, ProgramFiles, Text, digest, joined, read_texts
 from conveyor_sim.control.st.statements import CodeLines, Statements
 from conveyor_sim.control.st.types import TIME, BlockType, Member, Structure, Type
 from conveyor_sim.control.st.work import statements
-from conveyor_sim.support.files import MB, FileError, read_file
-from conveyor_sim.support.printable import SENTENCE, printable
 
 LOWEST = 2**31
 """Priority of a program without a task: after all others."""
-
-MOST_BYTES = 2 * MB
-"""Largest size of a file, bytes."""
 
 MOST_UNITS = 5000
 """Largest number of programs, functions and blocks in a file."""
@@ -50,9 +43,9 @@ class Scheduled:
 
 @dataclass(frozen=True)
 class Compiled:
-    """Compiled file."""
+    """Compiled program."""
 
-    file: str
+    files: ProgramFiles
     code: CodeType
     source: str
     """Python code."""
@@ -70,38 +63,43 @@ class Compiled:
     warnings: tuple[str, ...] = ()
     """Sentences about implicit conversions that may change a value, in the order of the text."""
 
+    @property
+    def file(self) -> str:
+        """First file of the program."""
+        return self.files.names[0]
 
-def compile_file(path: Path, trace: bool = False, dialect: str = "") -> Compiled:
-    """Compile the program in a file. Raise StructuredTextError if the file can't be read or the program is wrong.
 
-    dialect: name in `DIALECTS`; "" for the default of the file's type.
+def compile_files(paths: Paths, trace: bool = False, dialect: str = "") -> Compiled:
+    """Compile the program in files or folders. Raise StructuredTextError if one can't be read or is wrong.
+
+    dialect: name in `DIALECTS`; "" for the default of the files' types.
     """
-    chosen = dialect_of(str(path), dialect)
-    try:
-        text = read_file(path, MOST_BYTES).decode("utf-8-sig")
-    except FileError as error:
-        raise StructuredTextError(f"{path}: {error}, expected a program in Structured Text") from error
-    except UnicodeDecodeError as error:
-        raise StructuredTextError(f"{path}: is not UTF-8 ({error.reason} at byte {error.start})") from error
-    return compile_text(text, str(path), trace, chosen)
+    texts = read_texts(paths)
+    return compile_texts(texts, trace, dialect_of([one.file for one in texts], dialect))
 
 
 def compile_text(text: str, file: str = "program.st", trace: bool = False, dialect: Dialect = IEC) -> Compiled:
-    """Compile a text. Raise StructuredTextError if it is wrong.
+    """Compile a program in one text. Raise StructuredTextError if it is wrong.
 
     trace: True to record the last write of each variable.
     """
+    return compile_texts([Text(file, text)], trace, dialect)
+
+
+def compile_texts(texts: Sequence[Text], trace: bool, dialect: Dialect) -> Compiled:
+    """Compile a program in texts. Raise StructuredTextError if it is wrong."""
+    file = texts[0].file
     try:
-        return _compile(text, file, trace, dialect)
-    except SourceError as error:
-        place = f"{file}:{error.at.line}:{error.at.column}"
-        raise StructuredTextError(f"{place}: {printable(error, SENTENCE)}") from None
+        source, files = joined(texts, dialect)
+        try:
+            return _compile(source, files, digest(texts, dialect), trace, dialect)
+        except SourceError as error:
+            raise files.error(error) from None
     except (RecursionError, MemoryError, SyntaxError):  # limits of Python's compiler
         raise StructuredTextError(f"{file}: found a program nested too deeply, expected a flatter one") from None
 
 
-def _compile(text: str, file: str, trace: bool, dialect: Dialect) -> Compiled:
-    source = parse(text, dialect)
+def _compile(source: tree.SourceFile, files: ProgramFiles, fingerprint: str, trace: bool, dialect: Dialect) -> Compiled:
     if len(source.units) > MOST_UNITS:
         at, count = source.units[MOST_UNITS].at, len(source.units)
         raise SourceError(at, f"found {count} programs, functions and blocks, expected at most {MOST_UNITS}")
@@ -132,22 +130,17 @@ def _compile(text: str, file: str, trace: bool, dialect: Dialect) -> Compiled:
             conflict = f"found {shared.name}, which has the name of a program"
             raise SourceError(Position(*shared.at), f"{conflict}, expected another: {key}/x would be two variables")
     return Compiled(
-        file,
-        compile(python, f"<{file}>", "exec"),
+        files,
+        compile(python, f"<{files.names[0]}>", "exec"),
         python,
         tuple(lines.positions),
         tuple(sorted(scheduled, key=lambda one: one.priority)),
         declared.names.globals,
-        _digest(text, dialect),
+        fingerprint,
         trace,
         {place: one.group for place, one in layout.places.items()},
-        tuple(f"{file}:{at.line}:{at.column}: {words}" for at, words in sorted(declared.names.warnings.items())),
+        tuple(f"{files.place(at)}: {words}" for at, words in sorted(declared.names.warnings.items())),
     )
-
-
-def _digest(text: str, dialect: Dialect) -> str:
-    """Return the digest of a program; that of a text in IEC 61131-3 does not depend on the dialect's name."""
-    return hashlib.sha256((text if dialect == IEC else f"{dialect.name}\0{text}").encode()).hexdigest()
 
 
 def _layout(source: tree.SourceFile, declared: Declarations) -> Layout:

@@ -11,7 +11,7 @@ from typing import Any
 
 from conveyor_sim.control.recorded import PREFIX, patterns
 from conveyor_sim.control.scan import ControlError, Inputs, LineTags
-from conveyor_sim.control.st.compile import compile_file
+from conveyor_sim.control.st.compile import compile_files
 from conveyor_sim.control.st.errors import StructuredTextError
 from conveyor_sim.control.st.mapping import Addresses, TagMapping, mapped, read_addresses
 from conveyor_sim.control.st.program import BUDGET, Program, python_value
@@ -37,20 +37,22 @@ class StructuredText:
         trace: bool = False,
         record: str | Iterable[str] = (),
         dialect: str = "",
+        files: Iterable[str | PathLike[str]] = (),
     ) -> None:
         """Compile a program.
 
-        path: of the program. tags: by variable ("main/speed"); they override those in the program. modbus_map: file
-        with the addresses of located variables (AT %IX0.0). budget: largest number of statements of all programs in one
-        scan; the watchdog stops a program that exceeds it. trace: True to make `last_written` available; scans take
-        longer. record: patterns of variables to record ("main/*", `control/recorded.py`). dialect: iec, codesys,
-        twincat or tia; "" for the default of the file's type.
+        path: of the program: a file, or a folder whose files are one program. tags: by variable ("main/speed"); they
+        override those in the program. modbus_map: file with the addresses of located variables (AT %IX0.0). budget:
+        largest number of statements of all programs in one scan; the watchdog stops a program that exceeds it. trace:
+        True to make `last_written` available; scans take longer. record: patterns of variables to record ("main/*",
+        `control/recorded.py`). dialect: iec, codesys, twincat or tia; "" for the default of the files' types. files:
+        further files and folders of the program, in any order.
 
         Raise StructuredTextError, a ControlError, for a wrong program, and MapError for a wrong map.
         """
         self._tags = dict(tags or {})
         self._addresses: Addresses = {} if modbus_map is None else read_addresses(Path(modbus_map))
-        self.program = Program(compile_file(Path(path), trace, dialect), budget)
+        self.program = Program(compile_files([path, *files], trace, dialect), budget)
         self.record = patterns(record)
         """Patterns of the variables to record."""
         self.mapping: TagMapping | None = None

@@ -15,6 +15,7 @@ from conveyor_sim.control.st.implicit import adapted
 from conveyor_sim.control.st.located import Located, address_of, require_fit
 from conveyor_sim.control.st.scope import Names, Scope
 from conveyor_sim.control.st.sections import LOCATED, OUTSIDE, meaning
+from conveyor_sim.control.st.tia_blocks import BLOCKS
 from conveyor_sim.control.st.types import (
     ELEMENTARY,
     MOST_CHARACTERS,
@@ -22,6 +23,7 @@ from conveyor_sim.control.st.types import (
     BlockType,
     Enumeration,
     Member,
+    OpenArray,
     String,
     Structure,
     Subrange,
@@ -54,7 +56,8 @@ class Declarations:
 
         calls: as `Expressions` takes it.
         """
-        self.names = Names(dialect, types={name.lower(): block for name, block in STANDARD.items()})
+        blocks = {**STANDARD, **BLOCKS} if dialect.tia_sources else STANDARD
+        self.names = Names(dialect, types={name.lower(): block for name, block in blocks.items()})
         self.structures: list[Structure] = []
         """Declared structures, each after those it contains."""
         self.located: list[Located] = []
@@ -199,6 +202,10 @@ class Declarations:
             require_small(elements, 0, spec.at)
             ranges.append((low, high))
         element = self._type(spec.element, known)
+        _require_closed(element, spec.element.at, "an ARRAY")
+        if spec.dimensions:
+            shown = ", ".join("*" * spec.dimensions)
+            return OpenArray(f"ARRAY [{shown}] OF {element.name}", "array", element=element, dimensions=spec.dimensions)
         require_small(elements * element.size, elements * element.characters, spec.at)
         shown = ", ".join(f"{low}..{high}" for low, high in ranges)
         return Array(f"ARRAY [{shown}] OF {element.name}", "array", ranges=tuple(ranges), element=element)
@@ -240,6 +247,7 @@ class Declarations:
     def _declared(self, declared: tree.TypeDeclaration) -> Type:
         known = Expressions(self.scope(None), self._calls)
         kind = self._type(declared.type, known, declared.name)
+        _require_closed(kind, declared.type.at, "a TYPE")
         if declared.initial is None:
             return kind
         return replace(kind, start=self._initial(declared.initial, kind, known))
@@ -247,6 +255,8 @@ class Declarations:
     def _unit(self, unit: tree.ProgramUnit) -> BlockType:
         prefix = {"FUNCTION": "_F_", "FUNCTION_BLOCK": "_B_", "PROGRAM": "_P_"}[unit.kind]
         result = self.type(unit.result) if unit.result is not None else None
+        if unit.result is not None and result is not None:
+            _require_closed(result, unit.result.at, "a result")
         kind = BlockType(
             unit.name,
             "block",
@@ -297,6 +307,8 @@ class Declarations:
             where = f"{', '.join(LOCATED[unit])} of a PROGRAM" if unit else "a PROGRAM or VAR_GLOBAL only"
             raise SourceError(declared.at, f"found {written}, expected it in {where}")
         type_ = self._type(declared.type, known)
+        if section != "VAR_IN_OUT" and not (section == "VAR_INPUT" and isinstance(kind, BlockType) and kind.function):
+            _require_closed(type_, declared.type.at, section)
         if isinstance(type_, BlockType) and (type_.function or type_.python.startswith("_P_")):
             raise SourceError(declared.at, f"found {type_.name}, expected a type or a function block")
         constant = "CONSTANT" in qualifiers and section != "VAR_INPUT"  # of an input the caller's value counts
@@ -394,6 +406,13 @@ def _require_apart(unit: tree.ProgramUnit, kind: BlockType) -> None:
         if action.name.lower() in taken:
             raise SourceError(action.at, f"found {action.name} again, expected another name for the action")
         taken.add(action.name.lower())
+
+
+def _require_closed(kind: Type, at: Position, where: str) -> None:
+    """Raise SourceError for ARRAY [*] in a place where no call gives it bounds."""
+    if isinstance(kind, OpenArray):
+        expected = "expected it in VAR_IN_OUT, or in VAR_INPUT of a FUNCTION"
+        raise SourceError(at, f"found {kind.name} in {where}, {expected}")
 
 
 def require_small(elements: int, characters: int, at: Position, of: str = "") -> None:

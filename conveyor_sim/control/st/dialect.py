@@ -7,6 +7,7 @@ TwinCAT 3 and TIA Portal.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import PurePath
 
@@ -43,6 +44,7 @@ class Dialect:
         "a number is converted to a smaller type, DINT to REAL and LREAL to REAL, with a warning if its value may "
         "change; REAL with an integer is computed in REAL"
     )
+    tia_sources: bool = _flag("DATA_BLOCK, `TON_TIME`, `CTU_INT`, `IEC_TIMER` and its `t.TON(...)`")
     written_inputs: bool = _flag("a unit writes its VAR_INPUT")
     bcd_marks: bool = _flag("BCD_TO_INT of no BCD is -1, INT_TO_BCD of more than 99 is 255 (else the program stops)")
 
@@ -77,21 +79,32 @@ DIALECTS: dict[str, Dialect] = {
         IEC,
         Dialect("codesys", bcd_marks=True, **_CODESYS),
         Dialect("twincat", **_CODESYS),
-        Dialect("tia", integer_bits=True),
+        Dialect("tia", tia_sources=True, integer_bits=True),
     )
 }
 """Dialects by name."""
 
-SUFFIXES = {".st": "iec"}
-"""Default dialect by the file's type."""
+SUFFIXES = {
+    ".st": "iec",
+    **dict.fromkeys((".typ", ".var", ".fun"), "iec"),
+    ".exp": "codesys",
+    **dict.fromkeys((".scl", ".udt", ".db"), "tia"),
+}
+"""Default dialect by the file's type: text, B&R, CODESYS 2.3 and TIA Portal."""
 
 
-def dialect_of(path: str, name: str = "") -> Dialect:
-    """Return the dialect of a name, or the default of the file's type. Raise StructuredTextError for another name."""
-    chosen = name or SUFFIXES.get(PurePath(path).suffix.lower(), IEC.name)
-    if chosen not in DIALECTS:
-        raise StructuredTextError(f"{path}: dialect: {name!r:.200} given, expected one of {', '.join(DIALECTS)}")
-    return DIALECTS[chosen]
+def dialect_of(paths: Sequence[str], name: str = "") -> Dialect:
+    """Return the dialect of a name, or the default of the files' types, other than `iec` if one is.
+
+    Raise StructuredTextError for another name, and for files of two vendors without a name.
+    """
+    if name and name not in DIALECTS:
+        raise StructuredTextError(f"{paths[0]}: dialect: {name!r:.200} given, expected one of {', '.join(DIALECTS)}")
+    defaults = {SUFFIXES.get(PurePath(path).suffix.lower(), IEC.name) for path in paths} - {IEC.name}
+    if len(defaults) > 1 and not name:
+        found = " and ".join(sorted(defaults))
+        raise StructuredTextError(f"{paths[0]}: found files of {found} in one program, expected dialect= with one")
+    return DIALECTS[name or next(iter(defaults), IEC.name)]
 
 
 def tables() -> dict[str, dict[str, str]]:

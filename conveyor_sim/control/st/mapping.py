@@ -98,7 +98,7 @@ def mapped(compiled: Compiled, tags: LineTags, chosen: Mapping[str, str], addres
     bound: list[TagBinding] = []
     left: list[str] = []
     for name, member, shared in ((one.name, one.member, one.is_global) for one in candidates):
-        where = f"{file}:{member.at[0]}:{member.at[1]}: {member.name}"
+        where = f"{compiled.files.place(Position(*member.at))}: {member.name}"
         tag, how = wanted.get(name) or member.tag, "tag"
         if not tag and member.address:
             tag, how = _located(where, member, addresses), "address"

@@ -15,7 +15,7 @@ from lark.exceptions import UnexpectedCharacters, UnexpectedToken
 from lark.lark import PostLex
 from lark.visitors import Transformer
 
-from conveyor_sim.control.st import literals, tree
+from conveyor_sim.control.st import actions, data_blocks, literals, tree
 from conveyor_sim.control.st.dates import moment
 from conveyor_sim.control.st.dialect import IEC, Dialect
 from conveyor_sim.control.st.errors import Position, SourceError
@@ -35,6 +35,8 @@ _LEVELS = (
 """Operators between two operands, from the lowest precedence; of equal precedence they go from left to right."""
 _PRECEDENCE = {word: level for level, words in enumerate(_LEVELS) for word in words}
 _SIZES = {"X": 1, "B": 8, "W": 16, "D": 32, "L": 64}
+_TIA_WORDS = ("DATA_BLOCK", "BEGIN", "END_DATA_BLOCK")
+"""Words that are names in other dialects."""
 _CHAINS = ({"+", "-"}, {"OR"}, {"AND"}, {"XOR"})
 
 _N = TypeVar("_N", bound=tree.Node)
@@ -82,7 +84,7 @@ def _parser() -> tuple[Lark, _Tree]:
         lexer="basic",  # type: ignore[arg-type]  # lark accepts it, its type hints do not
         maybe_placeholders=True,
         transformer=made,
-        postlex=_Checked(),
+        postlex=_Checked(made),
     )
     return parser, made
 
@@ -92,9 +94,13 @@ class _Checked(PostLex):
 
     always_accept = ()
 
+    def __init__(self, made: _Tree) -> None:
+        self._made = made
+
     def process(self, stream: Iterator[Token]) -> Iterator[Token]:
         """Yield the tokens. Raise SourceError for more than MOST_TOKENS, and for words of unsupported features."""
         before: Token | None = None
+        tia = self._made.dialect.tia_sources
         for number, token in enumerate(stream):
             if number == MOST_TOKENS:
                 raise SourceError(at_of(token), f"found more than {MOST_TOKENS} words and signs, expected fewer")
@@ -103,23 +109,14 @@ class _Checked(PostLex):
                     before.type = "ACTION"
                 yield before
                 before = None
+            if token.type == "NAME" and tia and token.upper() in _TIA_WORDS:
+                token.type = token.upper()
             if token.type == "NAME" and token.value.upper() == "ACTION":
                 before = token
             else:
                 yield not_refused(token) if token.type in ("NAME", "PREFIX") else token
         if before is not None:
             yield before
-
-
-def _attach(source: tree.SourceFile, action: tree.Action) -> None:
-    """Add an action outside of all units to the unit of its name, or to the last one before it."""
-    wanted = action.unit.lower()
-    for number, unit in reversed(list(enumerate(source.units))):
-        if not wanted or unit.name.lower() == wanted:
-            source.units[number] = replace(unit, actions=(*unit.actions, action))
-            return
-    expected = f"the unit {action.unit} before it" if wanted else "the unit that it belongs to before it"
-    raise SourceError(action.at, f"found the action {action.name}, expected {expected}")
 
 
 def _of(first: Token | tree.Node) -> Position:
@@ -150,7 +147,7 @@ class _Tree(Transformer[Any]):
             if isinstance(item, tree.ProgramUnit):
                 source.units.append(item)
             elif isinstance(item, tree.Action):
-                _attach(source, item)
+                actions.attach(source, item)
             elif isinstance(item, tree.Configuration):
                 source.configurations.append(item)
             elif isinstance(item, tree.VariableSection):
@@ -189,6 +186,10 @@ class _Tree(Transformer[Any]):
     def array(self, items: list[Any]) -> tree.TypeSpec:
         return self._deep(tree.ArrayType(at_of(items[0]), tuple(items[1:-1]), items[-1]), items[-1])
 
+    def open_array(self, items: list[Any]) -> tree.TypeSpec:
+        node = tree.ArrayType(at_of(items[0]), (), items[-1], dimensions=len(items) - 2)
+        return self._deep(node, items[-1])
+
     def enumerator(self, items: list[Any]) -> Any:
         return at_of(items[0]), str(items[0]), items[1]
 
@@ -212,9 +213,9 @@ class _Tree(Transformer[Any]):
 
     def _acting(self, kind: Literal["FUNCTION_BLOCK", "PROGRAM"], items: list[Any]) -> tree.ProgramUnit:
         name, *inner = items
-        actions = tuple(item for item in inner if isinstance(item, tree.Action))
+        own = tuple(item for item in inner if isinstance(item, tree.Action))
         *sections, body = (item for item in inner if not isinstance(item, tree.Action))
-        return tree.ProgramUnit(at_of(name), kind, str(name), None, tuple(sections), body, actions)
+        return tree.ProgramUnit(at_of(name), kind, str(name), None, tuple(sections), body, own)
 
     def action(self, items: list[Any]) -> tree.Action:
         word, first, second, body = items
@@ -235,6 +236,13 @@ class _Tree(Transformer[Any]):
             tree.VariableDeclaration(at_of(name), str(name), spec, initial, str(address or "").upper(), mapped)
             for name in names
         ]
+
+    def structured_declaration(self, items: list[Any]) -> list[tree.VariableDeclaration]:
+        *names, spec = items
+        return [tree.VariableDeclaration(at_of(name), str(name), spec, None) for name in names]
+
+    def data_block(self, items: list[Any]) -> tree.VariableSection:
+        return data_blocks.declared(items)
 
     def repeated(self, items: list[Any]) -> Any:
         return literals.integer(at_of(items[0]), items[0]), items[1]

@@ -240,10 +240,11 @@ class SubrangeType(TypeSpec):
 
 @dataclass(frozen=True)
 class ArrayType(TypeSpec):
-    """Array type: ARRAY [1..3, 0..7] OF INT."""
+    """Array type: ARRAY [1..3, 0..7] OF INT, or ARRAY [*, *] OF INT with `dimensions` and without ranges."""
 
     ranges: tuple[tuple[Expression, Expression], ...]
     element: TypeSpec
+    dimensions: int = 0
 
 
 @dataclass(frozen=True)
@@ -358,3 +359,5 @@ class SourceFile:
     globals: list[VariableSection] = field(default_factory=list)
     units: list[ProgramUnit] = field(default_factory=list)
     configurations: list[Configuration] = field(default_factory=list)
+    actions: list[Action] = field(default_factory=list)
+    """Actions without a unit before them."""

@@ -8,12 +8,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from conveyor_sim.control.st.blocks import CLASSES
 from conveyor_sim.control.st.dates import moment_text
 from conveyor_sim.control.st.errors import Fault, Position, SourceError
 from conveyor_sim.control.st.literals import long_time_text, time_text
 from conveyor_sim.control.st.located import Cell, Memory
 from conveyor_sim.control.st.operations import NAMES
+from conveyor_sim.control.st.tia_blocks import CLASSES
 from conveyor_sim.control.st.types import (
     BOOL,
     DINT,
@@ -27,6 +27,7 @@ from conveyor_sim.control.st.types import (
     Array,
     BlockType,
     Moment,
+    OpenArray,
     String,
     Structure,
     Subrange,
@@ -197,6 +198,8 @@ def converted(value: Value, target: Type, what: str = "") -> str:
         return f"{value.code}[:{target.high}]"
     if isinstance(target, BlockType):
         raise SourceError(value.at, f"found a block, {target.name}, expected a value: blocks are not copied")
+    if isinstance(target, OpenArray):
+        raise SourceError(value.at, f"found {target.name}, expected one of its elements: it is passed on, not copied")
     if isinstance(target, (Array, Structure)):
         if _has_blocks(target):
             raise SourceError(

@@ -18,8 +18,8 @@ from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.commands.inputs import SET, Input
 from conveyor_sim.line.commands.refusal import ALARMS, refusal
 from conveyor_sim.line.tag import COMMANDS
-from conveyor_sim.protocols.attach.links import plc_link
-from conveyor_sim.protocols.attach.plc_link import PlcLink, PlcLinkError, read_answer
+from conveyor_sim.protocols.attach.links import LIBRARIES, plc_link
+from conveyor_sim.protocols.attach.plc_link import PlcLink, PlcLinkError, read_answer, write_signals
 from conveyor_sim.protocols.attach.tag_map import TagMap, read_tag_map
 from conveyor_sim.protocols.hosting.server_kinds import ServerKind
 from conveyor_sim.protocols.server.interface import ProtocolServer, Status
@@ -110,10 +110,7 @@ class FreeRunningPlc:
         last = {} if before is None else before.values
         names = [each.tag.name for each in self._tags.written]
         changed = {name: shown.values[name] for name in names if shown.values[name] != last.get(name)}
-        if self._tags.tick is not None:
-            changed[self._tags.tick.tag.name] = float(shown.tick)
-        if changed:
-            await link.write(changed)
+        await write_signals(link, changed, None if self._tags.tick is None else shown.tick)
         self._written = shown
         answer, own = await read_answer(link, self._tags)
         if own:
@@ -181,6 +178,6 @@ def plc_kind(
             source, url, mapped, lambda: plc_link(url, mapped.all, user, password), period, say, observe
         )
 
-    library = "pymodbus" if url.startswith("modbus") else "asyncua"
+    library, extra = LIBRARIES.get(url.partition(":")[0], LIBRARIES["opc.tcp"])
     # Not isolated in a child process, because it needs functions of this one.
-    return ServerKind(PLC, 0, (library,), __name__, make, lambda _: "command it", isolated=False)
+    return ServerKind(PLC, 0, (library,), __name__, make, lambda _: "command it", extra=extra, isolated=False)

@@ -10,7 +10,7 @@ Signals are written to the PLC. Commands, and alarms that the PLC raises, are re
 such as a state or a counter, have names that begin with `plc/`; conditions of a test may read them.
 
 `theirs` is a NodeId of OPC UA, or a place in Modbus: table, address, type, word order ("holding register 12 float32
-big").
+big"), a place in a Siemens PLC ("DB1.DBD4 REAL"), a tag of a Rockwell PLC, or a symbol of a Beckhoff PLC.
 """
 
 from __future__ import annotations
@@ -45,6 +45,12 @@ class MappedTag(NamedTuple):
     theirs: str
     where: str
     """File and line, for errors."""
+
+    @property
+    def is_written(self) -> bool:
+        """True for signals and `run/tick`, which are written to the PLC."""
+        name = self.tag.name
+        return name == TICK or (self.tag.role in SIGNALS and not name.startswith(OWN))
 
 
 class TagMap(NamedTuple):
