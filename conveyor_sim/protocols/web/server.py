@@ -15,7 +15,16 @@ from typing import Any, NamedTuple
 
 from aiohttp import WSCloseCode, WSMsgType, web
 
-from conveyor_sim.line.commands.authority import AUTOMATIC, IN_CONTROL, MAY, MAY_SET, MODES, PEOPLE, unauthorized
+from conveyor_sim.line.commands.authority import (
+    AT_PANEL,
+    AUTOMATIC,
+    IN_CONTROL,
+    MAY,
+    MAY_SET,
+    MODES,
+    PEOPLE,
+    unauthorized,
+)
 from conveyor_sim.line.commands.inputs import DECLARE, SET, Input, WriterKind
 from conveyor_sim.line.commands.receipt import Receipt
 from conveyor_sim.line.machines.packml import CNTRL_CMD, Command, PackMLState, mode_objection, stops
@@ -69,6 +78,7 @@ def page_rights() -> dict[str, Any]:
         "texts": MODES,
         "automatic": AUTOMATIC,
         "people": PEOPLE,
+        "panel": AT_PANEL,
         "stop": {"name": CNTRL_CMD, "values": [value for value in Command if stops(CNTRL_CMD, value)]},
         "over": [STATES[state] for state in TAKES_NO_INPUT],
     }
