@@ -7,7 +7,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from conveyor_sim.control.st import tree
-from conveyor_sim.control.st.blocks import STANDARD
+from conveyor_sim.control.st.actions import require_apart
+from conveyor_sim.control.st.blocks import CODESYS, STANDARD
 from conveyor_sim.control.st.dialect import Dialect
 from conveyor_sim.control.st.errors import Position, SourceError
 from conveyor_sim.control.st.expressions import Expressions
@@ -56,7 +57,7 @@ class Declarations:
 
         calls: as `Expressions` takes it.
         """
-        blocks = {**STANDARD, **BLOCKS} if dialect.tia_sources else STANDARD
+        blocks = {**STANDARD, **(CODESYS if dialect.standard_names else BLOCKS if dialect.tia_sources else {})}
         self.names = Names(dialect, types={name.lower(): block for name, block in blocks.items()})
         self.structures: list[Structure] = []
         """Declared structures, each after those it contains."""
@@ -266,14 +267,15 @@ class Declarations:
             actions=frozenset(one.name.lower() for one in unit.actions),
         )
         self._members(kind, unit.sections, unit.kind)
-        _require_apart(unit, kind)
+        require_apart(unit, kind)
         if result is not None:
             name = unit.name.lower()
             if name in kind.members:
                 raise SourceError(unit.at, f"found a variable {unit.name} in the function of that name")
             kind.members[name] = Member(unit.name, result, result.initial, "RESULT")
         for member in kind.members.values():
-            if kind.function and isinstance(member.type, BlockType) and member.section != "VAR_IN_OUT":
+            passing = member.section == "VAR_IN_OUT" or member.name.lower() in kind.statics
+            if kind.function and isinstance(member.type, BlockType) and not passing:
                 at = Position(*member.at)
                 raise SourceError(at, f"found {member.name}, a block, in a function, expected it in a block or program")
         self._bound(kind, unit.at)
@@ -285,10 +287,51 @@ class Declarations:
         unit: its kind, as in `sections.py`.
         """
         known = Expressions(self.scope(None if kind is self.names.globals else kind), self._calls)
+        open_: dict[int, tuple[tree.VariableDeclaration, tree.VariableSection, tuple[str, ...]]] = {}
+        constants: dict[str, int] = {}
         for section in sections:
-            qualifiers = meaning(section, unit)
+            static = section.section == "VAR_STAT"
+            if static:
+                self.names.dialect.require("static_variables", section.at, "VAR_STAT", "another section")
+            qualifiers = meaning(replace(section, section="VAR") if static else section, unit)
             for declared in section.declarations:
-                self._add(kind, declared, section.section, qualifiers, known)
+                if section.section == "VAR" and "CONSTANT" in qualifiers:
+                    constants.setdefault(declared.name.lower(), len(open_))
+                open_[len(open_)] = declared, section, qualifiers
+        order = list(open_.values())
+
+        def declare(number: int) -> None:
+            if (one := open_.pop(number, None)) is not None:
+                declared, section, qualifiers = one
+                add = self._add_static if section.section == "VAR_STAT" else self._add
+                add(kind, declared, section.section, qualifiers, known)
+
+        known.scope.late = lambda key: declare(constants.get(key, -1))
+        for number in range(len(order)):
+            declare(number)
+        known.scope.late = None
+        if constants:
+            for declared, *_ in order:
+                kind.members[declared.name.lower()] = kind.members.pop(declared.name.lower())
+
+    def _add_static(
+        self,
+        kind: BlockType,
+        declared: tree.VariableDeclaration,
+        section: str,
+        qualifiers: tuple[str, ...],
+        known: Expressions,
+    ) -> None:
+        """Add a variable of VAR_STAT as a global one with the name of the unit before its name."""
+        key, shared = declared.name.lower(), self.names.globals
+        if key in kind.members:
+            raise SourceError(declared.at, f"found {declared.name} again, expected another name")
+        name = f"{kind.name}.{declared.name}"
+        python = f"s_{len(shared.members)}"
+        self._add(shared, replace(declared, name=name), "VAR_GLOBAL", qualifiers, known, python)
+        kind.statics[key] = name.lower()
+        member = shared.members[name.lower()]
+        kind.members[key] = replace(member, name=declared.name, section="VAR_EXTERNAL", address="", tag="")
 
     def _add(
         self,
@@ -297,10 +340,12 @@ class Declarations:
         section: str,
         qualifiers: tuple[str, ...],
         known: Expressions,
+        python: str = "",
     ) -> None:
         key = declared.name.lower()
         if key in kind.members:
             raise SourceError(declared.at, f"found {declared.name} again, expected another name")
+        declared = self._with_arguments(declared)
         unit = OUTSIDE if kind is self.names.globals else "PROGRAM" if kind.python.startswith("_P_") else ""
         if (declared.tag or declared.address) and section not in LOCATED.get(unit, ()):
             written = declared.address or f"{{tag: {declared.tag}}}"
@@ -338,13 +383,37 @@ class Declarations:
             declared.address,
             declared.tag,
             "CONSTANT" in qualifiers and section == "VAR_INPUT",
+            python,
             declared.at,
         )
         if declared.address:
-            address = address_of(declared.at, declared.address)
+            address = address_of(declared.at, declared.address, self.names.dialect.byte_addresses)
             require_fit(declared.at, declared.name, type_, address, constant)
             initial = declared.initial is not None or bool(type_.start)
             self.located.append(Located(kind.python, member, address, initial))
+
+    def _with_arguments(self, declared: tree.VariableDeclaration) -> tree.VariableDeclaration:
+        """Return a declaration with the arguments of its block or structure, TON (PT := T#1s), as initial values."""
+        spec = declared.type
+        if not isinstance(spec, tree.EnumType) or not spec.prefixed:
+            return declared
+        kind = self.named(spec.at, spec.base)
+        if not isinstance(kind, Structure):
+            return declared
+        expected = f"{declared.name} : {spec.base} := ( and the values"
+        self.names.dialect.require("instance_arguments", spec.at, f"arguments of {spec.base}", expected)
+        if declared.initial is not None:
+            raise SourceError(declared.initial.at, f"found a second initial value of {declared.name}, expected one")
+        fields = []
+        for at, name, value in spec.values:
+            if value is None:
+                raise SourceError(at, f"found {name}, expected {name} := and a value")
+            fields.append((at, name, value))
+        return replace(
+            declared,
+            type=tree.NamedType(spec.at, spec.base),
+            initial=tree.InitialStructure(spec.at, tuple(fields)),
+        )
 
     def _initial(self, node: tree.Expression, kind: Type, known: Expressions) -> str:
         """Code of an initial value, made of constants."""
@@ -395,17 +464,6 @@ class Declarations:
                 )
             fields.append(f"{member.slot}={self._initial(value, member.type, known)}")
         return f"_with({kind.python}(), {', '.join(fields)})"
-
-
-def _require_apart(unit: tree.ProgramUnit, kind: BlockType) -> None:
-    """Raise SourceError for an action of a function, and for one whose name is not unique in its unit."""
-    taken = set(kind.members)
-    for action in unit.actions:
-        if kind.function:
-            raise SourceError(action.at, f"found the action {action.name} of a FUNCTION, expected a block or a program")
-        if action.name.lower() in taken:
-            raise SourceError(action.at, f"found {action.name} again, expected another name for the action")
-        taken.add(action.name.lower())
 
 
 def _require_closed(kind: Type, at: Position, where: str) -> None:

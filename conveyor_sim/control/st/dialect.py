@@ -44,7 +44,15 @@ class Dialect:
         "a number is converted to a smaller type, DINT to REAL and LREAL to REAL, with a warning if its value may "
         "change; REAL with an integer is computed in REAL"
     )
-    tia_sources: bool = _flag("DATA_BLOCK, `TON_TIME`, `CTU_INT`, `IEC_TIMER` and its `t.TON(...)`")
+    tia_sources: bool = _flag("DATA_BLOCK, `TON_TIME`, `IEC_TIMER` and its `t.TON(...)`")
+    configuration_words: bool = _flag("CONFIGURATION, RESOURCE, TASK, ON and WITH are names outside of a CONFIGURATION")
+    standard_names: bool = _flag(
+        "`SR(SET1, RESET)`, `RS(SET, RESET1)`, `CTU(RESET)`, `CTD(LOAD)`, `CTUD(RESET, LOAD)`; PV and CV are WORD"
+    )
+    static_variables: bool = _flag("VAR_STAT: one variable for all instances and calls of its unit")
+    instance_arguments: bool = _flag("`t : TON(PT := T#1s);`")
+    bare_arrays: bool = _flag("`v : ARRAY [1..3] OF INT := 1, 2(0);`")
+    byte_addresses: bool = _flag("`%MW2` begins at byte 2 (else `%MW2` is bytes 4 and 5)")
     written_inputs: bool = _flag("a unit writes its VAR_INPUT")
     bcd_marks: bool = _flag("BCD_TO_INT of no BCD is -1, INT_TO_BCD of more than 99 is 255 (else the program stops)")
 
@@ -65,6 +73,7 @@ class Dialect:
 _CODESYS = dict.fromkeys(
     (
         *("actions", "prefixes", "integer_bits", "bit_numbers", "integer_logic", "enumeration_numbers", "narrowing"),
+        *("configuration_words", "standard_names", "static_variables", "instance_arguments", "bare_arrays"),
         "written_inputs",
     ),
     True,
@@ -78,8 +87,8 @@ DIALECTS: dict[str, Dialect] = {
     for one in (
         IEC,
         Dialect("codesys", bcd_marks=True, **_CODESYS),
-        Dialect("twincat", **_CODESYS),
-        Dialect("tia", tia_sources=True, integer_bits=True),
+        Dialect("twincat", byte_addresses=True, **_CODESYS),
+        Dialect("tia", tia_sources=True, integer_bits=True, configuration_words=True, byte_addresses=True),
     )
 }
 """Dialects by name."""

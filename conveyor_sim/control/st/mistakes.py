@@ -16,7 +16,7 @@ REFUSED: Mapping[str, str] = {
     **dict.fromkeys(("CLASS", "INTERFACE", "EXTENDS", "IMPLEMENTS", "NAMESPACE"), "classes, methods and namespaces"),
     **dict.fromkeys(("INITIAL_STEP", "END_STEP", "END_TRANSITION"), "SFC"),
     **dict.fromkeys(("VAR_ACCESS", "VAR_CONFIG"), "access paths and VAR_CONFIG"),
-    **dict.fromkeys(("VAR_STAT", "VAR_INST"), "VAR_STAT and VAR_INST; VAR of a block keeps its values"),
+    "VAR_INST": "VAR_INST, which belongs to methods; VAR of a block keeps its values",
 }
 """Words of the standard and of dialects that this interpreter does not support, with the feature they belong to."""
 

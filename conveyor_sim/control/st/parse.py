@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import replace
 from functools import cache
 from importlib.resources import files
@@ -12,15 +12,15 @@ from typing import Any, Literal, TypeVar
 
 from lark import Lark, Token
 from lark.exceptions import UnexpectedCharacters, UnexpectedToken
-from lark.lark import PostLex
 from lark.visitors import Transformer
 
 from conveyor_sim.control.st import actions, data_blocks, literals, tree
 from conveyor_sim.control.st.dates import moment
 from conveyor_sim.control.st.dialect import IEC, Dialect
 from conveyor_sim.control.st.errors import Position, SourceError
-from conveyor_sim.control.st.mistakes import at_of, not_refused, unexpected
+from conveyor_sim.control.st.mistakes import at_of, unexpected
 from conveyor_sim.control.st.pragmas import selected
+from conveyor_sim.control.st.words import Words
 
 _LEVELS = (
     ("OR", "OR_ELSE"),
@@ -35,8 +35,6 @@ _LEVELS = (
 """Operators between two operands, from the lowest precedence; of equal precedence they go from left to right."""
 _PRECEDENCE = {word: level for level, words in enumerate(_LEVELS) for word in words}
 _SIZES = {"X": 1, "B": 8, "W": 16, "D": 32, "L": 64}
-_TIA_WORDS = ("DATA_BLOCK", "BEGIN", "END_DATA_BLOCK")
-"""Words that are names in other dialects."""
 _CHAINS = ({"+", "-"}, {"OR"}, {"AND"}, {"XOR"})
 
 _N = TypeVar("_N", bound=tree.Node)
@@ -44,9 +42,6 @@ _N = TypeVar("_N", bound=tree.Node)
 DEEPEST = 60
 """Largest depth of nested expressions and statements, below the limit of Python's compiler."""
 
-MOST_TOKENS = 300_000
-"""Largest number of words, numbers and signs in a file: about 30 000 statements, which take 6 s to compile and 500
-MB."""
 MOST_OPERANDS = 1000
 """Largest number of operands in an expression without parentheses."""
 
@@ -84,39 +79,9 @@ def _parser() -> tuple[Lark, _Tree]:
         lexer="basic",  # type: ignore[arg-type]  # lark accepts it, its type hints do not
         maybe_placeholders=True,
         transformer=made,
-        postlex=_Checked(made),
+        postlex=Words(lambda: made.dialect),
     )
     return parser, made
-
-
-class _Checked(PostLex):
-    """Filter that counts tokens and checks names."""
-
-    always_accept = ()
-
-    def __init__(self, made: _Tree) -> None:
-        self._made = made
-
-    def process(self, stream: Iterator[Token]) -> Iterator[Token]:
-        """Yield the tokens. Raise SourceError for more than MOST_TOKENS, and for words of unsupported features."""
-        before: Token | None = None
-        tia = self._made.dialect.tia_sources
-        for number, token in enumerate(stream):
-            if number == MOST_TOKENS:
-                raise SourceError(at_of(token), f"found more than {MOST_TOKENS} words and signs, expected fewer")
-            if before is not None:
-                if token.type == "NAME":  # two names in sequence
-                    before.type = "ACTION"
-                yield before
-                before = None
-            if token.type == "NAME" and tia and token.upper() in _TIA_WORDS:
-                token.type = token.upper()
-            if token.type == "NAME" and token.value.upper() == "ACTION":
-                before = token
-            else:
-                yield not_refused(token) if token.type in ("NAME", "PREFIX") else token
-        if before is not None:
-            yield before
 
 
 def _of(first: Token | tree.Node) -> Position:
@@ -196,6 +161,12 @@ class _Tree(Transformer[Any]):
     def enumeration(self, items: list[Any]) -> tree.TypeSpec:
         return tree.EnumType(at_of(items[0]), tuple(items[1:-1]), str(items[-1] or ""))
 
+    def typed_enumeration(self, items: list[Any]) -> tree.TypeSpec:
+        return tree.EnumType(at_of(items[0]), tuple(items[1:]), str(items[0]), prefixed=True)
+
+    def unvalued(self, items: list[Any]) -> Any:
+        return at_of(items[0]), str(items[0]), None
+
     def structure(self, items: list[Any]) -> tree.TypeSpec:
         fields = tuple(one for many in items[1:] for one in many)
         return self._deep(tree.StructureType(at_of(items[0]), fields), *(one.type for one in fields))
@@ -250,6 +221,13 @@ class _Tree(Transformer[Any]):
     def initial_array(self, items: list[Any]) -> tree.Expression:
         elements = tuple(item if isinstance(item, tuple) else (1, item) for item in items[1:])
         return self._deep(tree.InitialArray(at_of(items[0]), elements), *(element for _, element in elements))
+
+    def bare_array(self, items: list[Any]) -> tree.Expression:
+        first = items[0][1] if isinstance(items[0], tuple) else items[0]
+        at = first.at if first is not None else Position(1, 1)
+        self.dialect.require("bare_arrays", at, "several initial values", "one, or [ ] around them")
+        elements = tuple(item if isinstance(item, tuple) else (1, item) for item in items)
+        return self._deep(tree.InitialArray(at, elements), *(element for _, element in elements))
 
     def initial_field(self, items: list[Any]) -> Any:
         return at_of(items[0]), str(items[0]), items[1]

@@ -52,6 +52,16 @@ class Scope:
     def __init__(self, names: Names, unit: BlockType | None) -> None:
         self.names = names
         self.unit = unit
+        self.late: Callable[[str], None] | None = None
+        """Declares the constant of a name, if it follows later in the unit that is being declared."""
+
+    def own(self, key: str) -> Member | None:
+        """Return a variable of the unit by its name in small letters; None if it has none of that name."""
+        if self.unit is None:
+            return None
+        if self.late is not None and key not in self.unit.members:
+            self.late(key)
+        return self.unit.members.get(key)
 
     def require_prefix(self, at: Position, prefix: str, name: str) -> None:
         """Raise SourceError if a name may not stand for a variable list or a library before another one."""
@@ -70,7 +80,7 @@ class Scope:
 
     def _is_known(self, name: str) -> bool:
         key = name.lower()
-        if self.unit is not None and key in self.unit.members:
+        if self.own(key) is not None:
             return True
         names = self.names
         return names.global_(key) is not None or key in names.values or key in names.functions or key in names.types
@@ -79,9 +89,9 @@ class Scope:
         """Return the variable or other meaning of a name. Raise SourceError for an unknown name."""
         at, name = node.at, node.name
         key = name.lower()
-        if self.unit is not None and not node.qualified and (member := self.unit.members.get(key)):
+        if self.unit is not None and not node.qualified and (member := self.own(key)):
             if member.section == "VAR_EXTERNAL":
-                place = self._global(at, key, name)
+                place = self._global(at, self.unit.statics.get(key, key), name)
                 return replace(place, fixed=place.fixed or f"{name}, a CONSTANT") if member.constant else place
             return place_of(at, "self", member, self.names.dialect)
         if self.names.global_(key) is not None:
@@ -99,7 +109,7 @@ class Scope:
         """Return the value of a name. Raise SourceError."""
         at, name = node.at, node.name
         key = name.lower()
-        own = self.unit is not None and key in self.unit.members and not node.qualified
+        own = not node.qualified and self.own(key) is not None
         if not own and (kinds := self.names.values.get(key)) and self.names.global_(key) is None:
             if len(kinds) > 1:
                 listed = " or ".join(f"{kind.name}#{name}" for kind in kinds)

@@ -249,10 +249,14 @@ class ArrayType(TypeSpec):
 
 @dataclass(frozen=True)
 class EnumType(TypeSpec):
-    """Enumeration: (Red, Green := 5), with the type of its values, "" if not stated."""
+    """Enumeration: (Red, Green := 5), with the type of its values, "" if not stated.
+
+    prefixed: True with the type before the values, as in INT (Red, Green := 5) and TON (PT := T#1s).
+    """
 
     values: tuple[tuple[Position, str, Expression | None], ...]
     base: str
+    prefixed: bool = False
 
 
 @dataclass(frozen=True)
