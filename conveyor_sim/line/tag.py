@@ -56,7 +56,10 @@ SIGNALS: tuple[Role, ...] = ("actual", "status", "counter", "alarm")
 PANEL: Role = "panel"
 """Role of tags that people and tests write, and controllers do not."""
 
-COMMANDS: tuple[Role, ...] = ("setpoint", "command", PANEL)
+CONTROLLED: tuple[Role, ...] = ("setpoint", "command")
+"""Roles of tags that a controller writes."""
+
+COMMANDS: tuple[Role, ...] = (*CONTROLLED, PANEL)
 """Roles of tags that clients write."""
 
 MOST_COUNT = 2.0**53

@@ -17,6 +17,7 @@ from typing import Any, NoReturn
 from conveyor_sim.bag.input_log import InputLog, copier
 from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.recorder import Recorder
+from conveyor_sim.control.recorded import PREFIX
 from conveyor_sim.control.scan import ALARMS, ControlError, Controller, Inputs
 from conveyor_sim.errors import CommandError, SimulationError
 from conveyor_sim.line.changeover import changeover
@@ -36,6 +37,7 @@ from conveyor_sim.support.resources import scene_path
 from conveyor_sim.testing import plc
 from conveyor_sim.testing.conditions import text_of, words_of
 from conveyor_sim.testing.history import ScenarioHistory
+from conveyor_sim.testing.panel import OperatorPanel
 from conveyor_sim.testing.plc import ServedPlc
 
 
@@ -70,7 +72,12 @@ class Present(Inputs):
         """Names, in the order of the first reading."""
 
     def __getitem__(self, name: str) -> float:
-        """Return the value of a signal, or of an alarm by its full name. Raise NoSuchSignal, which is a KeyError."""
+        """Return the value of a signal, an alarm by its full name, or a variable of a PLC program in any case.
+
+        Raise NoSuchSignal, which is a KeyError.
+        """
+        if name[: len(PREFIX)].lower() == PREFIX and name not in self._signals:
+            name = name.lower()
         value = super().__getitem__(name)
         self.read[name] = None
         return value
@@ -214,6 +221,8 @@ class Scenario(AbstractContextManager["Scenario"]):
         """Operator at the panel of the line."""
         self.engineer = PanelUser(TEST, "engineer", self._give)
         """Engineer, with more rights than the operator (docs/line.md, Who may command)."""
+        self.panel = OperatorPanel(self.simulation.process_image.tags, self.operator.set)
+        """Operator panel of the line."""
         self.failed: Assertion | None = None
         """The assertion that failed; None if none did."""
         self.failure = ""

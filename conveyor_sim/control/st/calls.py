@@ -10,6 +10,7 @@ from conveyor_sim.control.st.declarations import Declarations
 from conveyor_sim.control.st.enabling import Enabling, enabled, separated
 from conveyor_sim.control.st.errors import Position, SourceError
 from conveyor_sim.control.st.expressions import Expressions
+from conveyor_sim.control.st.foreign import advice
 from conveyor_sim.control.st.functions import apply, function_of, is_standard
 from conveyor_sim.control.st.implicit import adapted
 from conveyor_sim.control.st.open_arrays import BOUNDS, accepts, bound, passed
@@ -58,7 +59,8 @@ class CallCompiler:
                 return self._standard(expressions, node, target.name, hint)
             if target.name.lower() in scope.names.types:
                 raise SourceError(node.at, f"found a call of {target.name}, a type, expected a variable of it")
-            raise SourceError(node.at, f"found {target.name}(...), expected a function that is declared")
+            expected = advice(target.name) or "a function that is declared"
+            raise SourceError(node.at, f"found {target.name}(...), expected {expected}")
         enabling = separated(node, function)
         node = enabling.call
         self._note(expressions, function, node)

@@ -12,10 +12,11 @@ from conveyor_sim.control.st.blocks import CODESYS, STANDARD
 from conveyor_sim.control.st.dialect import Dialect
 from conveyor_sim.control.st.errors import Position, SourceError
 from conveyor_sim.control.st.expressions import Expressions
+from conveyor_sim.control.st.foreign import advice
 from conveyor_sim.control.st.implicit import adapted
-from conveyor_sim.control.st.located import Located, address_of, require_fit
+from conveyor_sim.control.st.located import Located, address_of, incomplete, is_incomplete, require_fit
 from conveyor_sim.control.st.scope import Names, Scope
-from conveyor_sim.control.st.sections import LOCATED, OUTSIDE, meaning
+from conveyor_sim.control.st.sections import INCOMPLETE, LOCATED, OUTSIDE, meaning
 from conveyor_sim.control.st.tia_blocks import BLOCKS
 from conveyor_sim.control.st.types import (
     ELEMENTARY,
@@ -125,7 +126,7 @@ class Declarations:
             return known
         declared = self._pending.get(name.lower())
         if declared is None:
-            raise SourceError(at, f"found {name}, expected a type")
+            raise SourceError(at, f"found {name}, expected {advice(name) or 'a type'}")
         key = name.lower()
         if key in self._open:
             raise SourceError(at, f"found {name} inside of itself, expected another type")
@@ -347,7 +348,12 @@ class Declarations:
             raise SourceError(declared.at, f"found {declared.name} again, expected another name")
         declared = self._with_arguments(declared)
         unit = OUTSIDE if kind is self.names.globals else "PROGRAM" if kind.python.startswith("_P_") else ""
-        if (declared.tag or declared.address) and section not in LOCATED.get(unit, ()):
+        if is_incomplete(declared.address) and not declared.tag:
+            own = unit or ("FUNCTION_BLOCK" if kind.python.startswith("_B_") else "")
+            if section not in INCOMPLETE.get(own, ()):
+                where = "VAR, VAR_INPUT, VAR_OUTPUT of a PROGRAM or FUNCTION_BLOCK, or VAR_GLOBAL"
+                raise SourceError(declared.at, f"found {declared.address} in {section}, expected it in {where}")
+        elif (declared.tag or declared.address) and section not in LOCATED.get(unit, ()):
             written = declared.address or f"{{tag: {declared.tag}}}"
             where = f"{', '.join(LOCATED[unit])} of a PROGRAM" if unit else "a PROGRAM or VAR_GLOBAL only"
             raise SourceError(declared.at, f"found {written}, expected it in {where}")
@@ -386,7 +392,9 @@ class Declarations:
             python,
             declared.at,
         )
-        if declared.address:
+        if is_incomplete(declared.address):
+            require_fit(declared.at, declared.name, type_, incomplete(declared.address), constant)
+        elif declared.address:
             address = address_of(declared.at, declared.address, self.names.dialect.byte_addresses)
             require_fit(declared.at, declared.name, type_, address, constant)
             initial = declared.initial is not None or bool(type_.start)

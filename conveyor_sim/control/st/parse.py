@@ -12,15 +12,17 @@ from typing import Any, Literal, TypeVar
 
 from lark import Lark, Token
 from lark.exceptions import UnexpectedCharacters, UnexpectedToken
+from lark.lexer import PatternStr
 from lark.visitors import Transformer
 
 from conveyor_sim.control.st import actions, data_blocks, literals, tree
+from conveyor_sim.control.st.attributes import require_listed
 from conveyor_sim.control.st.dates import moment
 from conveyor_sim.control.st.dialect import IEC, Dialect
 from conveyor_sim.control.st.errors import Position, SourceError
-from conveyor_sim.control.st.mistakes import at_of, unexpected
+from conveyor_sim.control.st.mistakes import at_of, unexpected, unexpected_character
 from conveyor_sim.control.st.pragmas import selected
-from conveyor_sim.control.st.words import Words
+from conveyor_sim.control.st.words import TIA_WORDS, Words
 
 _LEVELS = (
     ("OR", "OR_ELSE"),
@@ -60,11 +62,9 @@ def parse(text: str, dialect: Dialect = IEC) -> tree.SourceFile:
             finally:
                 made.depths.clear()
     except UnexpectedToken as error:
-        raise unexpected(error, text) from None
+        raise unexpected(error, text, terminals(parser)) from None
     except UnexpectedCharacters as error:
-        at, char = Position(error.line, error.column), text[error.pos_in_stream]
-        hint = "; pointers are not supported" if char == "^" else ""
-        raise SourceError(at, f"found {char!r}, expected Structured Text{hint}") from None
+        raise unexpected_character(error, text, terminals(parser)) from None
     assert isinstance(source, tree.SourceFile)
     return source
 
@@ -80,8 +80,21 @@ def _parser() -> tuple[Lark, _Tree]:
         maybe_placeholders=True,
         transformer=made,
         postlex=Words(lambda: made.dialect),
+        lexer_callbacks={"PRAGMA": _listed},
     )
     return parser, made
+
+
+def _listed(token: Token) -> Token:
+    """Return a pragma, which the parser ignores. Raise SourceError for one that the page does not list."""
+    require_listed(at_of(token), token)
+    return token
+
+
+def terminals(parser: Lark) -> dict[str, str]:
+    """Return the texts of the tokens that have only one, by name."""
+    fixed = {one.name: one.pattern.value for one in parser.terminals if isinstance(one.pattern, PatternStr)}
+    return {**fixed, **{word: word for word in (*TIA_WORDS, "ACTION")}}
 
 
 def _of(first: Token | tree.Node) -> Position:

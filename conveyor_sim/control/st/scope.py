@@ -10,6 +10,7 @@ from difflib import get_close_matches
 from conveyor_sim.control.st import tree
 from conveyor_sim.control.st.dialect import Dialect
 from conveyor_sim.control.st.errors import Position, SourceError
+from conveyor_sim.control.st.foreign import advice
 from conveyor_sim.control.st.types import BlockType, Enumeration, Member, OpenArray, Type
 from conveyor_sim.control.st.values import Place, Value, constant
 
@@ -101,6 +102,8 @@ class Scope:
                 return Thing(what)
         if key in self.names.reading:
             raise SourceError(at, f"found {name} in its own declaration, expected another value")
+        if expected := advice(name):
+            raise SourceError(at, f"found {name}, expected {expected}")
         close = get_close_matches(key, [one for known, _ in self._others(True) for one in known], 1)
         hint = f"; there is {self._written(close[0])}" if close else ""
         raise SourceError(at, f"found {name}, which is not declared, expected a variable{hint}")

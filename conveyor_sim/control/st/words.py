@@ -16,7 +16,7 @@ MOST_TOKENS = 300_000
 """Largest number of words, numbers and signs in a file: about 30 000 statements, which take 6 s to compile and 500
 MB."""
 
-_TIA_WORDS = ("DATA_BLOCK", "BEGIN", "END_DATA_BLOCK")
+TIA_WORDS = ("DATA_BLOCK", "BEGIN", "END_DATA_BLOCK")
 """Words that are names in other dialects."""
 _CONFIGURED = {"RESOURCE", "TASK", "ON", "WITH"}
 """Words that are keywords in a CONFIGURATION only, where dialects let them be names outside of it."""
@@ -47,7 +47,7 @@ class Words(PostLex):
                 before = None
             if token.type == "NAME":
                 word = token.upper()
-                if tia and word in _TIA_WORDS:
+                if tia and word in TIA_WORDS:
                     token.type = word
                     yield token
                 elif word == "ACTION":

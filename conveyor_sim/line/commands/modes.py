@@ -24,7 +24,7 @@ from conveyor_sim.line.commands.inputs import DISOWN, MODE, OWN, SET, WRITER_KIN
 from conveyor_sim.line.commands.operation import Operation
 from conveyor_sim.line.commands.refusal import moved_belts, refusal
 from conveyor_sim.line.device import Device, ScanContext
-from conveyor_sim.line.tag import PANEL, Tag, choice
+from conveyor_sim.line.tag import CONTROLLED, Tag, choice, of_roles
 from conveyor_sim.support.printable import SENTENCE, printable
 
 _REASONS = 3
@@ -56,9 +56,7 @@ class Modes:
         devices: all devices of the line. where: the line's place in the plant. waiting: returns inputs that will be
         applied first. note: as EventLog.note.
         """
-        controlled = {
-            device.name: [command for command in device.commands if command.role != PANEL] for device in devices
-        }
+        controlled = {device.name: of_roles(device.commands, CONTROLLED) for device in devices}
         commanded = [device for device in devices if controlled[device.name]]
         self._devices = {device.name: device for device in commanded}
         self._where = where

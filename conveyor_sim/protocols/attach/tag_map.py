@@ -23,7 +23,7 @@ from typing import NamedTuple
 
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.commands.refusal import ALARMS
-from conveyor_sim.line.tag import COMMANDS, SIGNALS, Tag, count, switch
+from conveyor_sim.line.tag import CONTROLLED, SIGNALS, Tag, count, switch
 from conveyor_sim.protocols.tags.handshake import TARGET, TICK
 from conveyor_sim.support.files import MB, FileError, read_file
 from conveyor_sim.support.printable import printable
@@ -86,7 +86,7 @@ def read_tag_map(path: Path, tags: Sequence[Tag]) -> TagMap:
     if not rows or tuple(rows[0]) != COLUMNS:
         header = printable(",".join(rows[0])) if rows else "nothing"
         raise TagMapError(f"{path}: line 1: {header} given, expected {','.join(COLUMNS)}")
-    known = {tag.name: tag for tag in tags if tag.role in (*SIGNALS, *COMMANDS)} | _HANDSHAKE
+    known = {tag.name: tag for tag in tags if tag.role in (*SIGNALS, *CONTROLLED)} | _HANDSHAKE
     mapped: dict[str, MappedTag] = {}
     for number, cells in enumerate(rows[1:], start=2):
         if not cells:
