@@ -233,7 +233,7 @@ def apply(
         expected = f"{len(plain)}{' or more' if more else ''}: {', '.join(plain)}" if plain else "none"
         raise SourceError(at, f"found {len(values)} arguments of {name}, expected {expected}")
     expressions.work += 1
-    kinds = {one.type.base.kind for one in values if not one.literal}
+    kinds = {one.type.base.kind for one in values if not one.literal} - {"bool"}  # G of SEL
     if name.upper() in _NUMERIC or (len(kinds) > 1 and kinds <= {"bits", "int", "real", "enum"}):
         values = [as_number(one, expressions.scope.names.dialect) for one in values]
     for one in values:

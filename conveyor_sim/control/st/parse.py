@@ -20,6 +20,7 @@ from conveyor_sim.control.st.attributes import require_listed
 from conveyor_sim.control.st.dates import moment
 from conveyor_sim.control.st.dialect import IEC, Dialect
 from conveyor_sim.control.st.errors import Position, SourceError
+from conveyor_sim.control.st.foreign import advice
 from conveyor_sim.control.st.mistakes import at_of, unexpected, unexpected_character
 from conveyor_sim.control.st.pragmas import selected
 from conveyor_sim.control.st.words import TIA_WORDS, Words
@@ -289,6 +290,9 @@ class _Tree(Transformer[Any]):
         return tree.CallStatement(at, tree.Call(at, items[0], items[1] or ()))
 
     def bare_call(self, items: list[Any]) -> tree.Statement:
+        word = items[0].name if isinstance(items[0], tree.Name) else ""
+        if word.upper().startswith("END") and (expected := advice(word)):
+            raise SourceError(items[0].at, f"found {word}, expected {expected}")
         return tree.CallStatement(items[0].at, tree.Call(items[0].at, items[0], ()), bare=True)
 
     def elsif(self, items: list[Any]) -> Any:

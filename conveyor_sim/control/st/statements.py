@@ -12,6 +12,7 @@ from conveyor_sim.control.st import tree
 from conveyor_sim.control.st.calls import CallCompiler
 from conveyor_sim.control.st.errors import Position, SourceError
 from conveyor_sim.control.st.expressions import Expressions
+from conveyor_sim.control.st.foreign import advice
 from conveyor_sim.control.st.implicit import adapted, as_number
 from conveyor_sim.control.st.types import BlockType, Subrange, Type, register
 from conveyor_sim.control.st.values import Place, Value, assignment, converted, converts, described, operand
@@ -144,7 +145,9 @@ class Statements:
         target = self._expressions.scope.unprefixed(node.call.target)
         if isinstance(target, tree.Name) and not self._is_variable(target):
             if node.bare:
-                raise SourceError(node.at, f"found {target.name} without (), expected := or ()")
+                foreign = advice(target.name)
+                found = target.name if foreign else f"{target.name} without ()"
+                raise SourceError(node.at, f"found {found}, expected {foreign or ':= or ()'}")
             value = self._calls(self._expressions, node.call, None)
             self._lines.add(value.code, node.at)
             return
