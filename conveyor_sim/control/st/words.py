@@ -11,6 +11,7 @@ from lark.lark import PostLex
 from conveyor_sim.control.st.dialect import Dialect
 from conveyor_sim.control.st.errors import SourceError
 from conveyor_sim.control.st.mistakes import at_of, not_refused
+from conveyor_sim.control.st.unit_ends import with_ends
 
 MOST_TOKENS = 300_000
 """Largest number of words, numbers and signs in a file: about 30 000 statements, which take 6 s to compile and 500
@@ -36,7 +37,7 @@ class Words(PostLex):
         before: Token | None = None
         dialect = self._dialect()
         tia, free = dialect.tia_sources, dialect.configuration_words
-        for number, token in enumerate(stream):
+        for number, token in enumerate(with_ends(stream, dialect)):
             if number == MOST_TOKENS:
                 raise SourceError(at_of(token), f"found more than {MOST_TOKENS} words and signs, expected fewer")
             if before is not None:
