@@ -23,7 +23,7 @@ from conveyor_sim.control.st.errors import Position, SourceError
 from conveyor_sim.control.st.foreign import advice
 from conveyor_sim.control.st.mistakes import at_of, unexpected, unexpected_character
 from conveyor_sim.control.st.pragmas import selected
-from conveyor_sim.control.st.words import TIA_WORDS, Words
+from conveyor_sim.control.st.words import TIA_WORDS, WordFilter
 
 _LEVELS = (
     ("OR", "OR_ELSE"),
@@ -80,7 +80,7 @@ def _parser() -> tuple[Lark, _Tree]:
         lexer="basic",  # type: ignore[arg-type]  # lark accepts it, its type hints do not
         maybe_placeholders=True,
         transformer=made,
-        postlex=Words(lambda: made.dialect),
+        postlex=WordFilter(lambda: made.dialect),
         lexer_callbacks={"PRAGMA": _listed},
     )
     return parser, made

@@ -23,7 +23,7 @@ _CONFIGURED = {"RESOURCE", "TASK", "ON", "WITH"}
 """Words that are keywords in a CONFIGURATION only, where dialects let them be names outside of it."""
 
 
-class Words(PostLex):
+class WordFilter(PostLex):
     """Filter of tokens: counts them, refuses words, and tells keywords from names."""
 
     always_accept = ()
