@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import os
+import signal
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -146,3 +148,22 @@ def test_a_line_without_a_panel_has_no_room_for_one(browser: Any, html: Path) ->
     with opened_page(browser, html) as page:
         assert page.locator("#operator").is_hidden()
         assert page.evaluate("document.querySelector('#stage').getBoundingClientRect().left") == 0
+
+
+def test_a_button_is_released_when_its_page_closes(open_page: Callable[[str], Any], panel: Live) -> None:
+    page = open_page(panel.url)
+    signed_in(page, "jo")
+    page.hover(START)
+    page.mouse.down()
+    reads(panel, "start/contact", 1.0)
+    page.close()
+    reads(panel, "start/contact", 0.0)
+
+
+def test_a_button_is_released_when_its_server_is_killed(page: Any, panel: Live) -> None:
+    page.hover(START)
+    page.mouse.down()
+    reads(panel, "start/contact", 1.0)
+    assert panel.serving is not None
+    os.kill(panel.serving.hosts[0].pid, signal.SIGKILL)
+    reads(panel, "start/contact", 0.0)

@@ -23,6 +23,7 @@ from conveyor_sim.control.st.dialect import IEC, Dialect
 from conveyor_sim.control.st.errors import Position, SourceError
 from conveyor_sim.control.st.mistakes import at_of, not_refused, unexpected, unexpected_character
 from conveyor_sim.control.st.pragmas import selected
+from conveyor_sim.control.st.unit_ends import with_ends
 
 _LEVELS = (
     ("OR", "OR_ELSE"),
@@ -111,7 +112,7 @@ class _Checked(PostLex):
 
     def process(self, stream: Iterator[Token]) -> Iterator[Token]:
         """Yield the tokens. Raise SourceError for more than MOST_TOKENS, and for words of unsupported features."""
-        for number, token in enumerate(stream):
+        for number, token in enumerate(with_ends(stream, self._made.dialect)):
             if number == MOST_TOKENS:
                 raise SourceError(at_of(token), f"found more than {MOST_TOKENS} words and signs, expected fewer")
             if token.type == "NAME" and self._made.dialect.tia_sources and token.upper() in _TIA_WORDS:
