@@ -103,6 +103,7 @@ BCD: dict[str, Standard] = {
 }
 """Functions by name."""
 
+
 def _is_valid(call: Application) -> Value:
     (value,) = call.values
     if call.name == "IS_VALID_BCD":
