@@ -24,6 +24,7 @@ from conveyor_sim.line.changeover import changeover
 from conveyor_sim.line.commands.authority import MODES
 from conveyor_sim.line.commands.inputs import DISOWN, FAULT, FORCE, INJECT, MODE, SET, UNFORCE, Input, WriterKind
 from conveyor_sim.line.run_state import ENDED, RUNNING, STOPPED, RunState
+from conveyor_sim.protocols.attach.access import PlcAccess
 from conveyor_sim.protocols.tags.tag_provider import SCADA_SOURCES, SteppedTagProvider
 from conveyor_sim.run.scan_loop import AttachedController, LocalController, ScanLoop
 from conveyor_sim.scene import Scene, load_scene
@@ -383,20 +384,22 @@ class Scenario(AbstractContextManager["Scenario"]):
         *,
         user: str = "",
         password: str = "",
+        access: PlcAccess | None = None,
         patience: float = PATIENCE,
     ) -> None:
         """Attach a running PLC that is a server, in place of the controller before. The line is its client.
 
         url: "opc.tcp://host:port", "modbus://host:port", "s7://host/rack/slot", "eip://host/slot" or
         "ads://net-id:port?host=address". tags: CSV file that maps our tags to those of the PLC, including `run/tick`
-        and `run/target_tick` (docs/plc.md). user: "" for anonymous. patience: longest time for each scan, s of wall
-        time.
+        and `run/target_tick` (docs/plc.md). user: "" for anonymous. access: all settings of an OPC UA connection,
+        instead of user and password. patience: longest time for each scan, s of wall time.
 
         Raises TagMapError for a map that does not fit; PlcLinkError if the PLC can't be reached; ControlError if it
         does not answer, which every later tick may raise as well; ImportError without the library of the protocol.
         """
         image = self.simulation.process_image
-        self._attach(lambda: ServedPlc(image, url, Path(tags), user, password, patience))
+        chosen = PlcAccess(user, password) if access is None else access
+        self._attach(lambda: ServedPlc(image, url, Path(tags), chosen, patience))
 
     def source(self) -> SteppedTagProvider:
         """Return the line as a source for a protocol server. Inputs of clients are applied at the next tick.

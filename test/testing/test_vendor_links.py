@@ -175,13 +175,13 @@ def test_a_tick_that_would_overflow_is_refused(plc: Plc, tmp_path: Path) -> None
 
 def test_a_target_beyond_reach_fails_the_test(plc: Plc) -> None:
     """Otherwise the line would run on with its last commands until then."""
-    plc.thread.run(plc.made.halt())
-    plc.thread.run(plc.made.put({"target": 2**30}))
-    with (
-        Scenario(LINE) as plant,
-        pytest.raises(ControlError, match=stating("run/target_tick", "1.07374e+09", "100000")),
-    ):
+    with Scenario(LINE) as plant:
         plant.attach_plc(plc.url, plc.tags)
+        plant.run_for(0.05)
+        plc.thread.run(plc.made.halt())
+        plc.thread.run(plc.made.put({"target": 2**30}))
+        with pytest.raises(ControlError, match=stating("run/target_tick", "1.07374e+09")):
+            plant.run_for(0.05)
 
 
 class FreeRunning:

@@ -18,6 +18,10 @@ class PlcLinkError(ServerError):
     """A PLC that can't be reached, or does not answer correctly."""
 
 
+class PlcRefusedError(PlcLinkError):
+    """A PLC that is there, but is not trusted or does not admit the line. It stays so until somebody changes it."""
+
+
 class PlcLink(Protocol):
     """Used in one asyncio loop. All methods raise PlcLinkError; `connect` TagMapError for a map that does not fit."""
 
