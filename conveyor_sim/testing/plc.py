@@ -19,7 +19,7 @@ from conveyor_sim.control.scan import ControlError, Inputs
 from conveyor_sim.line.commands.inputs import SET
 from conveyor_sim.line.tag import ProcessImage
 from conveyor_sim.protocols.attach.links import plc_link
-from conveyor_sim.protocols.attach.plc_link import PlcLinkError, read_answer, write_signals
+from conveyor_sim.protocols.attach.plc_link import PlcLinkError, forget_target, read_answer, write_signals
 from conveyor_sim.protocols.attach.tag_map import TagMapError, read_tag_map
 from conveyor_sim.protocols.hosting.server_thread import ServerThread
 from conveyor_sim.protocols.modbus.address_map import modbus_map
@@ -83,6 +83,8 @@ class ServedPlc(AttachedController):
         if inputs.tick >= self._target:
             signals = {each.tag.name: inputs[each.tag.name] for each in self._map.written}
             try:
+                if self._target < 0:
+                    self._thread.run(forget_target(self._link, inputs.tick))
                 self._thread.run(write_signals(self._link, signals, inputs.tick))
                 self._target = self._wait(inputs)
                 self._answer, self.variables = self._thread.run(read_answer(self._link, self._map))
