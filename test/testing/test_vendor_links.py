@@ -109,7 +109,7 @@ def loaded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A checkpoint of LINE shortly before the program stops the first zone."""
     path = tmp_path_factory.mktemp("loaded") / "start.npz"
     with Scenario(LINE) as line:
-        line.run_for(5.8)
+        line.run_for(5.6)
         line.simulation.save(path)
     return path
 
@@ -292,15 +292,16 @@ FAULTS = {"silent": RIGHT_VALUES["silent"], "garbage": WRONG_VALUES["garbage"]}
 @pytest.mark.parametrize("fault", [*FAULTS])
 def test_a_free_running_line_survives_a_faulty_plc(plc: Plc, fault: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """It reports the fault in one sentence, gives no command until it has reached the PLC again, and runs on."""
-    monkeypatch.setattr(isolated_link, "LIMIT", 2.0)
     proxy = FaultyProxy(plc.port)
     with Scenario(LINE) as plant, ServerThread() as thread:
         free = FreeRunning(plant, plc.url.replace(f":{plc.port}", f":{proxy.port}"), plc.tags, thread)
         free.until(lambda: free.server.status().writes > 0)
+        monkeypatch.setattr(isolated_link, "LIMIT", 2.0)
         proxy.fault = partial(FAULTS[fault], random.Random(0))
         free.until(lambda: free.said)
         assert free.said[0].endswith("it commands nothing until it is connected again")
         assert "Traceback" not in free.said[0]
+        monkeypatch.undo()
         speed, lost = plant.signals["belts/zone1/speed"], plant.simulation.tick
         free.until(lambda: plant.simulation.tick > lost + 50)
         assert plant.signals["belts/zone1/speed"] == speed

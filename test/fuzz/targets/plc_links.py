@@ -32,7 +32,8 @@ KINDS = {"opc.tcp": SCADA_KINDS["opcua"], "modbus": SCADA_KINDS["modbus"], **VEN
 ROUNDS = 3
 """Writes and reads of one case."""
 PATIENCE, LIMIT = 1.0, 5.0
-"""s for an answer, and for a process that waits for one."""
+"""s for an answer of a faulty PLC, and for a process that waits for one."""
+USUAL = vendor_links.PATIENCE, isolated_link.LIMIT
 
 
 class Station:
@@ -72,20 +73,25 @@ def _station(scheme: str) -> Station:
 
 def attack(seed: int, folder: Path) -> str:
     """Play one case. Return the kind of link and what became of it. Raise Violation."""
-    vendor_links.PATIENCE = modbus_link.PATIENCE = PATIENCE
-    isolated_link.LIMIT = LIMIT
     rng = random.Random(seed)
     scheme = rng.choice([scheme for scheme, (library, _) in LIBRARIES.items() if find_spec(library)])
     station, begin = _station(scheme), rng.randrange(12)
     kind = rng.choice([*WRONG_VALUES, *RIGHT_VALUES, "cut off"])
     damage = {**WRONG_VALUES, **RIGHT_VALUES}.get(kind)
     station.proxy.fault = cut_off(begin, rng) if damage is None else after(begin, damage, rng)
+    _wait_up_to(PATIENCE, LIMIT)
     outcome = _play(station, kind not in WRONG_VALUES, rng)
+    _wait_up_to(*USUAL)
     station.proxy.fault = healthy
     station.proxy.cut()
     if (again := _play(station, True, rng)) != "works":
         raise Violation("not reached again", f"{scheme} after {kind}: {again}")
     return f"{scheme} {outcome}"
+
+
+def _wait_up_to(patience: float, limit: float) -> None:
+    vendor_links.PATIENCE = modbus_link.PATIENCE = patience
+    isolated_link.LIMIT = limit
 
 
 def _play(station: Station, is_right: bool, rng: random.Random) -> str:
