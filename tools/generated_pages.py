@@ -22,6 +22,7 @@ _TABLES = (
     "scene.reference",
     "studies.calibration.reference",
     "control.st.dialect",
+    "control.st.attributes",
 )
 """Modules with tables that are parts of pages."""
 

@@ -85,7 +85,7 @@ WITHIN: Mapping[str, Mapping[str, str]] = {
         "web": "server tags",
         "foxglove": "server tags",
         "hosting": "foxglove modbus mqtt opcua server tags web",
-        "attach": "hosting server tags",
+        "attach": "hosting opcua server tags",
     },
 }
 """Import rules inside a package, from the lowest up: what each part may import of the others.

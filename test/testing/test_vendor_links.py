@@ -236,14 +236,15 @@ def test_a_target_of_an_earlier_test_is_no_answer(plc: Plc) -> None:
         assert plc.made.scans == 6
 
 
-def test_a_target_beyond_reach_fails_the_test(plc: Plc, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_target_beyond_reach_fails_the_test(plc: Plc) -> None:
     """Otherwise the line would run on with its last commands until then."""
-    monkeypatch.setattr(plc.made, "ahead", 2**30)
-    with (
-        Scenario(LINE) as plant,
-        pytest.raises(ControlError, match=stating("run/target_tick", "1.07374e+09", "100000")),
-    ):
+    with Scenario(LINE) as plant:
         plant.attach_plc(plc.url, plc.tags)
+        plant.run_for(0.05)
+        plc.thread.run(plc.made.halt())
+        plc.thread.run(plc.made.put({"target": 2**30}))
+        with pytest.raises(ControlError, match=stating("run/target_tick", "1.07374e+09")):
+            plant.run_for(0.05)
 
 
 class FreeRunning:

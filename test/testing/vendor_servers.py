@@ -40,8 +40,6 @@ class VendorPlc(SoftPlc):
     """One with named values, whose speed is a REAL or an LREAL."""
 
     library, extra = "", ""
-    ahead = 1
-    """Ticks from `run/tick` to the target that a scan sets."""
     pause = 0.0002
     """s between two looks at the tick."""
 
@@ -77,7 +75,7 @@ class VendorPlc(SoftPlc):
                 answer, full = program(await self.get("bottles"))
                 await self.put({"speed": answer, "full": full})
                 self.scans += 1
-                await self.put({"target": tick + self.ahead})
+                await self.put({"target": tick + 1})
             await asyncio.sleep(self.pause)
 
 

@@ -10,9 +10,12 @@ from conveyor_sim.control.st.declarations import Declarations
 from conveyor_sim.control.st.enabling import Enabling, enabled, separated
 from conveyor_sim.control.st.errors import Position, SourceError
 from conveyor_sim.control.st.expressions import Expressions
+from conveyor_sim.control.st.foreign import advice
 from conveyor_sim.control.st.functions import apply, function_of, is_standard
+from conveyor_sim.control.st.open_arrays import BOUNDS, accepts, bound, passed
+from conveyor_sim.control.st.sizes import size_of
 from conveyor_sim.control.st.tia_blocks import IEC_TIMER, INSTRUCTIONS
-from conveyor_sim.control.st.types import BOOL, VOID, BlockType, Member, Type
+from conveyor_sim.control.st.types import BOOL, VOID, BlockType, Member, OpenArray, Type
 from conveyor_sim.control.st.values import Place, Value, assignment, converted, described
 from conveyor_sim.control.st.work import CALL
 
@@ -49,11 +52,14 @@ class CallCompiler:
             raise SourceError(node.at, f"found a call of {target.name}, a variable, as a value, expected a function")
         function = self.declarations.function(target.name)
         if function is None:
+            if target.name.upper() in BOUNDS or target.name.upper() == "SIZEOF":
+                return self._of_variable(expressions, node, target.name.upper())
             if is_standard(target.name):
                 return self._standard(expressions, node, target.name, hint)
             if target.name.lower() in scope.names.types:
                 raise SourceError(node.at, f"found a call of {target.name}, a type, expected a variable of it")
-            raise SourceError(node.at, f"found {target.name}(...), expected a function that is declared")
+            expected = advice(target.name) or "a function that is declared"
+            raise SourceError(node.at, f"found {target.name}(...), expected {expected}")
         enabling = separated(node, function)
         node = enabling.call
         self._note(expressions, function, node)
@@ -64,6 +70,8 @@ class CallCompiler:
             argument = arguments.get(member.slot)
             if argument is None:
                 codes.append(self._missing(node, function, member))
+            elif isinstance(member.type, OpenArray) and member.section == "VAR_INPUT":
+                codes.append(self._open(expressions, argument, member, expressions.place(argument.value)))
             elif member.section == "VAR_INPUT":
                 value = expressions.value(argument.value, member.type)
                 codes.append(converted(value, member.type, f"{member.name} of {function.name}"))
@@ -152,6 +160,20 @@ class CallCompiler:
         if expressions.scope.unit is not None and not kind.standard:
             self.edges.setdefault(expressions.scope.unit.python, {}).setdefault(kind.python, node)
 
+    def _of_variable(self, expressions: Expressions, node: tree.Call, name: str) -> Value:
+        """Compile a call of SIZEOF, LOWER_BOUND or UPPER_BOUND, whose argument is a variable rather than a value."""
+        if any(one.output or (one.name or "").upper() not in ("", "ARR", "DIM") for one in node.arguments):
+            raise SourceError(node.at, f"found arguments of {name} by name, expected them by position")
+        arguments = [one.value for one in node.arguments]
+        if name in BOUNDS:
+            return bound(expressions, node, name, arguments)
+        if len(arguments) != 1:
+            raise SourceError(node.at, f"found {len(arguments)} arguments of SIZEOF, expected 1: a variable or a type")
+        (argument,) = arguments
+        if isinstance(argument, tree.Name) and not expressions.scope.has_variable(argument.name):
+            return size_of(node.at, self.declarations.named(argument.at, argument.name))
+        return size_of(node.at, expressions.place(argument).type)
+
     def _standard(self, expressions: Expressions, node: tree.Call, name: str, hint: Type | None) -> Value:
         enabling = separated(node, None)
         node, names = enabling.call, function_of(name).outputs
@@ -222,8 +244,10 @@ class CallCompiler:
 
     def _missing(self, node: tree.Call, function: BlockType, member: Member) -> str:
         """Return the code of an argument that is left out."""
-        if member.section == "VAR_IN_OUT" or (
-            member.section == "VAR_INPUT" and any(a.name is None for a in node.arguments)
+        if (
+            isinstance(member.type, OpenArray)
+            or member.section == "VAR_IN_OUT"
+            or (member.section == "VAR_INPUT" and any(a.name is None for a in node.arguments))
         ):
             raise SourceError(node.at, f"found no {member.name} of {function.name}, expected all of its arguments")
         return member.initial if member.section == "VAR_INPUT" else "None"
@@ -234,10 +258,20 @@ class CallCompiler:
         at: of the call.
         """
         place = expressions.target(argument.value)
+        if isinstance(member.type, OpenArray):
+            return self._open(expressions, argument, member, place)
         if place.type != member.type or not place.reference or argument.negated:
             expected = f"a variable of type {member.type.name}"
             raise SourceError(argument.at, f"found {described(place)} for {member.name}, expected {expected}")
         return self._traced(expressions, place, at).reference if member.section == "VAR_OUTPUT" else place.reference
+
+    def _open(self, expressions: Expressions, argument: tree.Argument, member: Member, place: Place) -> str:
+        """Return the code that passes an array as ARRAY [*]."""
+        if argument.negated or not accepts(place, member):
+            expected = f"a variable that is an array of this kind, {member.type.name}"
+            raise SourceError(argument.at, f"found {described(place)} for {member.name}, expected {expected}")
+        expressions.work += place.type.work if member.section == "VAR_INPUT" else 0
+        return passed(place, member)
 
     def _output(self, expressions: Expressions, argument: tree.Argument, member: Member, at: Position) -> list[str]:
         place = expressions.target(argument.value)

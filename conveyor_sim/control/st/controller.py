@@ -14,7 +14,7 @@ from conveyor_sim.control.scan import ControlError, Inputs, LineTags
 from conveyor_sim.control.st.compile import compile_files
 from conveyor_sim.control.st.errors import StructuredTextError
 from conveyor_sim.control.st.mapping import Addresses, TagMapping, mapped, read_addresses
-from conveyor_sim.control.st.program import BUDGET, Program, python_value
+from conveyor_sim.control.st.program import BUDGET, MOST_VARIABLES, Program, python_value
 from conveyor_sim.control.st.types import TIME, Type
 from conveyor_sim.control.st.variables import Variable, load
 from conveyor_sim.support.rounded_limit import at_limit, single
@@ -71,6 +71,10 @@ class StructuredText:
         """Find the variables of the mapping in the present instances."""
         assert self.mapping is not None
         variables = self.program.variables
+        for one in self.mapping.bound:
+            if one.variable not in variables:
+                found = f"found a tag for {one.variable}, which is not among the first {MOST_VARIABLES} variables"
+                raise StructuredTextError(f"{self.program.compiled.file}: {found}, expected fewer variables before it")
         pairs = [(one.is_input, variables[one.variable], one.tag) for one in self.mapping.bound]
         self._ins = [(variable, tag) for is_input, variable, tag in pairs if is_input]
         self._outs = [(variable, tag) for is_input, variable, tag in pairs if not is_input]

@@ -11,9 +11,10 @@ from conveyor_sim.control.st.blocks import STANDARD
 from conveyor_sim.control.st.dialect import Dialect
 from conveyor_sim.control.st.errors import Position, SourceError
 from conveyor_sim.control.st.expressions import Expressions
-from conveyor_sim.control.st.located import Located, address_of, require_fit
+from conveyor_sim.control.st.foreign import advice
+from conveyor_sim.control.st.located import Located, address_of, incomplete, is_incomplete, require_fit
 from conveyor_sim.control.st.scope import Names, Scope
-from conveyor_sim.control.st.sections import LOCATED, OUTSIDE, meaning
+from conveyor_sim.control.st.sections import INCOMPLETE, LOCATED, OUTSIDE, meaning
 from conveyor_sim.control.st.tia_blocks import BLOCKS
 from conveyor_sim.control.st.types import (
     ELEMENTARY,
@@ -22,6 +23,7 @@ from conveyor_sim.control.st.types import (
     BlockType,
     Enumeration,
     Member,
+    OpenArray,
     String,
     Structure,
     Subrange,
@@ -122,7 +124,7 @@ class Declarations:
             return known
         declared = self._pending.get(name.lower())
         if declared is None:
-            raise SourceError(at, f"found {name}, expected a type")
+            raise SourceError(at, f"found {name}, expected {advice(name) or 'a type'}")
         key = name.lower()
         if key in self._open:
             raise SourceError(at, f"found {name} inside of itself, expected another type")
@@ -198,6 +200,10 @@ class Declarations:
             require_small(elements, 0, spec.at)
             ranges.append((low, high))
         element = self._type(spec.element, known)
+        _require_closed(element, spec.element.at, "an ARRAY")
+        if spec.dimensions:
+            shown = ", ".join("*" * spec.dimensions)
+            return OpenArray(f"ARRAY [{shown}] OF {element.name}", "array", element=element, dimensions=spec.dimensions)
         require_small(elements * element.size, elements * element.characters, spec.at)
         shown = ", ".join(f"{low}..{high}" for low, high in ranges)
         return Array(f"ARRAY [{shown}] OF {element.name}", "array", ranges=tuple(ranges), element=element)
@@ -239,6 +245,7 @@ class Declarations:
     def _declared(self, declared: tree.TypeDeclaration) -> Type:
         known = Expressions(self.scope(None), self._calls)
         kind = self._type(declared.type, known, declared.name)
+        _require_closed(kind, declared.type.at, "a TYPE")
         if declared.initial is None:
             return kind
         return replace(kind, start=self._initial(declared.initial, kind, known))
@@ -246,6 +253,8 @@ class Declarations:
     def _unit(self, unit: tree.ProgramUnit) -> BlockType:
         prefix = {"FUNCTION": "_F_", "FUNCTION_BLOCK": "_B_", "PROGRAM": "_P_"}[unit.kind]
         result = self.type(unit.result) if unit.result is not None else None
+        if unit.result is not None and result is not None:
+            _require_closed(result, unit.result.at, "a result")
         kind = BlockType(
             unit.name, "block", python=prefix + unit.name.lower(), function=unit.kind == "FUNCTION", result=result
         )
@@ -285,11 +294,18 @@ class Declarations:
         if key in kind.members:
             raise SourceError(declared.at, f"found {declared.name} again, expected another name")
         unit = OUTSIDE if kind is self.names.globals else "PROGRAM" if kind.python.startswith("_P_") else ""
-        if (declared.tag or declared.address) and section not in LOCATED.get(unit, ()):
+        if is_incomplete(declared.address) and not declared.tag:
+            own = unit or ("FUNCTION_BLOCK" if kind.python.startswith("_B_") else "")
+            if section not in INCOMPLETE.get(own, ()):
+                where = "VAR, VAR_INPUT, VAR_OUTPUT of a PROGRAM or FUNCTION_BLOCK, or VAR_GLOBAL"
+                raise SourceError(declared.at, f"found {declared.address} in {section}, expected it in {where}")
+        elif (declared.tag or declared.address) and section not in LOCATED.get(unit, ()):
             written = declared.address or f"{{tag: {declared.tag}}}"
             where = f"{', '.join(LOCATED[unit])} of a PROGRAM" if unit else "a PROGRAM or VAR_GLOBAL only"
             raise SourceError(declared.at, f"found {written}, expected it in {where}")
         type_ = self._type(declared.type, known)
+        if section != "VAR_IN_OUT" and not (section == "VAR_INPUT" and isinstance(kind, BlockType) and kind.function):
+            _require_closed(type_, declared.type.at, section)
         if isinstance(type_, BlockType) and (type_.function or type_.python.startswith("_P_")):
             raise SourceError(declared.at, f"found {type_.name}, expected a type or a function block")
         constant = "CONSTANT" in qualifiers and section != "VAR_INPUT"  # of an input the caller's value counts
@@ -321,7 +337,9 @@ class Declarations:
             "CONSTANT" in qualifiers and section == "VAR_INPUT",
             declared.at,
         )
-        if declared.address:
+        if is_incomplete(declared.address):
+            require_fit(declared.at, declared.name, type_, incomplete(declared.address), constant)
+        elif declared.address:
             address = address_of(declared.at, declared.address)
             require_fit(declared.at, declared.name, type_, address, constant)
             initial = declared.initial is not None or bool(type_.start)
@@ -376,6 +394,13 @@ class Declarations:
                 )
             fields.append(f"{member.slot}={self._initial(value, member.type, known)}")
         return f"_with({kind.python}(), {', '.join(fields)})"
+
+
+def _require_closed(kind: Type, at: Position, where: str) -> None:
+    """Raise SourceError for ARRAY [*] in a place where no call gives it bounds."""
+    if isinstance(kind, OpenArray):
+        expected = "expected it in VAR_IN_OUT, or in VAR_INPUT of a FUNCTION"
+        raise SourceError(at, f"found {kind.name} in {where}, {expected}")
 
 
 def require_small(elements: int, characters: int, at: Position, of: str = "") -> None:

@@ -28,6 +28,8 @@ class Dialect:
     """Dialect of a program: True for each feature that it has beyond IEC 61131-3, or in which it differs."""
 
     name: str
+    program_calls: bool = _flag("a unit calls a PROGRAM: `Outputs();`, which then does not run by itself")
+    open_units: bool = _flag("FUNCTIONBLOCK; a file may end without the END of its last unit")
     tia_sources: bool = _flag("DATA_BLOCK, `TON_TIME`, `CTU_INT`, `IEC_TIMER` and its `t.TON(...)`")
     written_inputs: bool = _flag("a unit writes its VAR_INPUT")
     bcd_marks: bool = _flag("BCD_TO_INT of no BCD is -1, INT_TO_BCD of more than 99 is 255 (else the program stops)")
@@ -46,7 +48,7 @@ class Dialect:
         return f"; dialect {' or '.join(having)} has it" if having else ""
 
 
-_CODESYS = {"written_inputs": True}
+_CODESYS = {"written_inputs": True, "open_units": True, "program_calls": True}
 """Features of CODESYS, from which TwinCAT 3 is derived."""
 
 IEC = Dialect("iec")

@@ -25,6 +25,7 @@ from conveyor_sim.control.st.types import (
     TIME,
     WSTRING,
     Array,
+    OpenArray,
     String,
     Structure,
     Type,
@@ -213,8 +214,11 @@ class Expressions:
         kind = base.type
         if not isinstance(kind, Array):
             raise SourceError(node.at, f"found an index of {kind.name}, expected an array before it")
-        if len(node.indices) != len(kind.ranges):
-            raise SourceError(node.at, f"found {len(node.indices)} indices, expected {len(kind.ranges)}")
+        dimensions = kind.dimensions if isinstance(kind, OpenArray) else len(kind.ranges)
+        if len(node.indices) != dimensions:
+            raise SourceError(node.at, f"found {len(node.indices)} indices, expected {dimensions}")
+        if isinstance(kind, OpenArray):
+            return self._open_item(node, base, kind)
         code, index = base.code, ""
         for each, (low, high) in zip(node.indices, kind.ranges, strict=True):
             code = f"{code}[{index}]" if index else code
@@ -231,10 +235,28 @@ class Expressions:
             root=base.root,
         )
 
-    def _index(self, node: tree.Expression, low: int, high: int) -> str:
+    def _open_item(self, node: tree.Item, base: Place, kind: OpenArray) -> Place:
+        indices = [f"{base.reference}.place({self._whole(one).code}, {n})" for n, one in enumerate(node.indices)]
+        code = "".join([base.code, *(f"[{one}]" for one in indices[:-1])])
+        element = f"{code}[{indices[-1]}]"
+        return replace(
+            base,
+            at=node.at,
+            type=kind.element,
+            code=element,
+            write=lambda new: f"{element} = {new}",
+            reference=f"_Element({code}, {indices[-1]}, {base.root})",
+        )
+
+    def _whole(self, node: tree.Expression) -> Value:
+        """Return the value of an index."""
         value = self.value(node)
         if value.type.base.kind != "int" or value.literal == "real":
             raise SourceError(node.at, f"found {described(value)}, expected a whole number as an index")
+        return value
+
+    def _index(self, node: tree.Expression, low: int, high: int) -> str:
+        value = self._whole(node)
         if value.constant is not None:
             if not low <= value.constant <= high:
                 raise SourceError(node.at, f"found index {value.constant}, expected {low} to {high}")

@@ -47,6 +47,16 @@ def address_of(at: Position, text: str) -> Address:
     return Address(area, size, number * 8 + int(match[4]) if match[4] is not None else number)
 
 
+def is_incomplete(text: str) -> bool:
+    """Return True for an address without a number, such as %I*, whose variable gets its tag by name."""
+    return text.endswith("*")
+
+
+def incomplete(text: str) -> Address:
+    """Return area and size of an address without a number. No size is that of the variable."""
+    return Address(text[1], text[2:-1] or "B", 0)
+
+
 @dataclass(frozen=True)
 class Located:
     """A variable with an address. unit: its Python class. initial: True if the program states an initial value."""

@@ -10,6 +10,7 @@ from typing import Any
 from lark import Token
 
 from conveyor_sim.control.st.errors import Position, SourceError
+from conveyor_sim.control.st.foreign import ASSIGN, form_at
 
 REFUSED: Mapping[str, str] = {
     **dict.fromkeys(("POINTER", "REF_TO"), "pointers and references"),
@@ -35,21 +36,20 @@ _WORDS = {
     "NAME": "a name",
     "PREFIX": "a value with its type",
     "INTEGER": "a whole number",
-    "SEMICOLON": "';'",
-    "COLON": "':'",
-    "COMMA": "','",
-    "DOT": "'.'",
-    "LPAR": "'('",
-    "RPAR": "')'",
-    "LSQB": "'['",
-    "RSQB": "']'",
+    "BASED": "a number such as 16#FF",
+    "DECIMAL": "a number such as 1.5",
+    "TIME": "a duration such as T#1s",
+    "MOMENT": "a date or time of day",
+    "TEXT": "a text",
+    "WIDE_TEXT": "a text",
     "ADDRESS": "an address such as %IX0.0",
+    "PARTIAL": "a part such as %X0",
     "SECTION": "VAR",
+    "QUALIFIER": "CONSTANT, RETAIN or another qualifier",
+    "TAG": "{tag: ...}",
     "$END": "the end of the file",
-    "__ANON_0": "':='",
-    "__ANON_1": "'..'",
-    "__ANON_2": "'=>'",
 }
+"""Tokens in words of the language, except those that have only one text."""
 _WORD = re.compile(r"\w+")
 _COMMENT = re.compile(r"\(\*|\*\)")
 _STATEMENTS = {"IF", "CASE", "FOR", "WHILE", "REPEAT", "EXIT", "CONTINUE", "RETURN"}
@@ -80,6 +80,20 @@ def not_refused(token: Token) -> Token:
     return token
 
 
+def word_of(name: str, terminals: Mapping[str, str]) -> str:
+    """Return a token in words of the language."""
+    if name in _WORDS:
+        return _WORDS[name]
+    shown = terminals[name]
+    return shown.upper() if shown.isidentifier() else f"'{shown}'"
+
+
+def _last_else_if(text: str, place: int) -> int | None:
+    """Return the index of the last ELSE IF before a place."""
+    matches = list(re.finditer(r"\bELSE[ \t]+IF\b", text[:place], re.IGNORECASE))
+    return matches[-1].start() if matches else None
+
+
 def _ends(text: str, place: int) -> bool:
     """Return True if a comment ends, with all comments in it."""
     depth = 0
@@ -90,10 +104,32 @@ def _ends(text: str, place: int) -> bool:
     return False
 
 
-def unexpected(error: Any, text: str) -> SourceError:
-    """Return the error for lark's UnexpectedToken."""
+def unexpected_character(error: Any, text: str, terminals: Mapping[str, str]) -> SourceError:
+    """Return the error for lark's UnexpectedCharacters.
+
+    terminals: as for `unexpected`.
+    """
+    place = error.pos_in_stream
+    if (form := form_at(text, place, _accepted(set(error.allowed or ()), terminals))) is not None:
+        return SourceError(place_of(text, form[0]), form[1])
+    return SourceError(place_of(text, place), f"found {text[place]!r}, expected Structured Text")
+
+
+def _accepted(names: set[str], terminals: Mapping[str, str]) -> set[str]:
+    """Return names of tokens, where := has the name ASSIGN."""
+    return names | {ASSIGN for name in names if terminals.get(name) == ":="}
+
+
+def unexpected(error: Any, text: str, terminals: Mapping[str, str]) -> SourceError:
+    """Return the error for lark's UnexpectedToken.
+
+    terminals: texts of the tokens that have only one, by name.
+    """
     token = error.token
     place = len(text) if token.type == "$END" else error.pos_in_stream
+    expected = set(error.accepts or error.expected)
+    if (form := form_at(text, place, _accepted(expected, terminals))) is not None:
+        return SourceError(place_of(text, form[0]), form[1])
     for match in (*list(_WORD.finditer(text, 0, place))[-1:], *_WORD.finditer(text, place, place + len(token.value))):
         if what := SUSPECT.get(match.group().upper()):
             return SourceError(
@@ -106,7 +142,8 @@ def unexpected(error: Any, text: str) -> SourceError:
     if token.type == "ADDRESS":
         return SourceError(at_of(token), f"found {token}, expected a variable that is declared AT {token}")
     found = "the end of the file" if token.type == "$END" else f"'{token.value}'"
-    expected = set(error.accepts or error.expected)
+    if "END_IF" in expected and (other := _last_else_if(text, place)) is not None:
+        return SourceError(place_of(text, other), "found ELSE IF, which opens another IF, expected ELSIF or END_IF")
     words = []
     if expected >= _STATEMENTS:
         expected -= _STATEMENTS | {"NAME", "PREFIX", "SEMICOLON"}
@@ -117,6 +154,6 @@ def unexpected(error: Any, text: str) -> SourceError:
     if expected >= _OPERATORS:
         expected -= _OPERATORS
         words.append("an operator")
-    words += sorted(_WORDS.get(name, name) for name in expected)
+    words += sorted({word_of(name, terminals) for name in expected})
     listed = words[0] if len(words) == 1 else f"one of {', '.join(words)}"
     return SourceError(at_of(token), f"found {found}, expected {listed}")

@@ -53,6 +53,53 @@ class Element:
         self._list[self._index] = value
 
 
+class Bounded:
+    """Reference to an array with its bounds, passed as ARRAY [*]."""
+
+    __slots__ = ("_reference", "bounds")
+
+    def __init__(self, reference: Attribute | Element | Held, bounds: tuple[tuple[int, int], ...]) -> None:
+        self._reference, self.bounds = reference, bounds
+
+    @property
+    def root(self) -> Root:
+        """Variable that contains the array."""
+        return self._reference.root
+
+    def get(self) -> Any:
+        """Return the array."""
+        return self._reference.get()
+
+    def place(self, index: int, dimension: int) -> int:
+        """Return the place of an index in a dimension, from 0. Raise Fault for an index beyond the bounds."""
+        low, high = self.bounds[dimension]
+        return index - low if low <= index <= high else outside(index, low, high)
+
+    def bound(self, dimension: int, end: int) -> int:
+        """Return the lower (end 0) or upper (end 1) bound of a dimension, which counts from 1. Raise Fault."""
+        if not 1 <= dimension <= len(self.bounds):
+            raise Fault(f"found dimension {dimension} of an array, expected 1 to {len(self.bounds)}")
+        return self.bounds[dimension - 1][end]
+
+
+class Held:
+    """Copy of an array, passed as VAR_INPUT ARRAY [*]."""
+
+    __slots__ = ("_value",)
+
+    def __init__(self, value: Any) -> None:
+        self._value = value
+
+    @property
+    def root(self) -> Root:
+        """Variable that contains the array: none but the copy itself."""
+        return self, "_value"
+
+    def get(self) -> Any:
+        """Return the array."""
+        return self._value
+
+
 class Traced:
     """Reference to a variable that receives a function's output. The write is recorded."""
 
@@ -329,6 +376,8 @@ NAMES: dict[str, Any] = {
     "_Record": StructureValue,
     "_Attribute": Attribute,
     "_Element": Element,
+    "_Bounded": Bounded,
+    "_Held": Held,
     "_Traced": Traced,
     "_left": left,
     "_right": right,

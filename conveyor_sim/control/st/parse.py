@@ -13,14 +13,17 @@ from typing import Any, TypeVar
 from lark import Lark, Token
 from lark.exceptions import UnexpectedCharacters, UnexpectedToken
 from lark.lark import PostLex
+from lark.lexer import PatternStr
 from lark.visitors import Transformer
 
 from conveyor_sim.control.st import data_blocks, literals, tree
+from conveyor_sim.control.st.attributes import require_listed
 from conveyor_sim.control.st.dates import moment
 from conveyor_sim.control.st.dialect import IEC, Dialect
 from conveyor_sim.control.st.errors import Position, SourceError
-from conveyor_sim.control.st.mistakes import at_of, not_refused, unexpected
+from conveyor_sim.control.st.mistakes import at_of, not_refused, unexpected, unexpected_character
 from conveyor_sim.control.st.pragmas import selected
+from conveyor_sim.control.st.unit_ends import with_ends
 
 _LEVELS = (
     ("OR", "OR_ELSE"),
@@ -64,11 +67,9 @@ def parse(text: str, dialect: Dialect = IEC) -> tree.SourceFile:
             finally:
                 made.depths.clear()
     except UnexpectedToken as error:
-        raise unexpected(error, text) from None
+        raise unexpected(error, text, terminals(parser)) from None
     except UnexpectedCharacters as error:
-        at, char = Position(error.line, error.column), text[error.pos_in_stream]
-        hint = "; pointers are not supported" if char == "^" else ""
-        raise SourceError(at, f"found {char!r}, expected Structured Text{hint}") from None
+        raise unexpected_character(error, text, terminals(parser)) from None
     assert isinstance(source, tree.SourceFile)
     return source
 
@@ -84,8 +85,21 @@ def _parser() -> tuple[Lark, _Tree]:
         maybe_placeholders=True,
         transformer=made,
         postlex=_Checked(made),
+        lexer_callbacks={"PRAGMA": _listed},
     )
     return parser, made
+
+
+def _listed(token: Token) -> Token:
+    """Return a pragma, which the parser ignores. Raise SourceError for one that the page does not list."""
+    require_listed(at_of(token), token)
+    return token
+
+
+def terminals(parser: Lark) -> dict[str, str]:
+    """Return the texts of the tokens that have only one, by name."""
+    fixed = {one.name: one.pattern.value for one in parser.terminals if isinstance(one.pattern, PatternStr)}
+    return {**fixed, **{word: word for word in _TIA_WORDS}}
 
 
 class _Checked(PostLex):
@@ -98,7 +112,7 @@ class _Checked(PostLex):
 
     def process(self, stream: Iterator[Token]) -> Iterator[Token]:
         """Yield the tokens. Raise SourceError for more than MOST_TOKENS, and for words of unsupported features."""
-        for number, token in enumerate(stream):
+        for number, token in enumerate(with_ends(stream, self._made.dialect)):
             if number == MOST_TOKENS:
                 raise SourceError(at_of(token), f"found more than {MOST_TOKENS} words and signs, expected fewer")
             if token.type == "NAME" and self._made.dialect.tia_sources and token.upper() in _TIA_WORDS:
@@ -170,6 +184,10 @@ class _Tree(Transformer[Any]):
 
     def array(self, items: list[Any]) -> tree.TypeSpec:
         return self._deep(tree.ArrayType(at_of(items[0]), tuple(items[1:-1]), items[-1]), items[-1])
+
+    def open_array(self, items: list[Any]) -> tree.TypeSpec:
+        node = tree.ArrayType(at_of(items[0]), (), items[-1], dimensions=len(items) - 2)
+        return self._deep(node, items[-1])
 
     def enumerator(self, items: list[Any]) -> Any:
         return at_of(items[0]), str(items[0]), items[1]

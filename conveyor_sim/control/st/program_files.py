@@ -14,6 +14,7 @@ from os import PathLike
 from pathlib import Path, PurePath
 
 from conveyor_sim.control.st import br, scl, tree
+from conveyor_sim.control.st.called_programs import with_instances
 from conveyor_sim.control.st.dialect import IEC, SUFFIXES, Dialect
 from conveyor_sim.control.st.errors import Position, SourceError, StructuredTextError
 from conveyor_sim.control.st.foreign import refused_file
@@ -120,7 +121,7 @@ def joined(texts: Sequence[Text], dialect: Dialect) -> tuple[tree.SourceFile, Pr
             path = PurePath(one.file)
             text = "\n" * (first - 1) + one.text
             parts.append((path, parse(scl.plain(text) if dialect.tia_sources else text, dialect)))
-        source = br.joined(parts)
+        source = with_instances(br.joined(parts), dialect)
         scl.require_tasks(source, dialect)
         return source, files
     except SourceError as error:

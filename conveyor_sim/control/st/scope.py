@@ -9,7 +9,8 @@ from difflib import get_close_matches
 
 from conveyor_sim.control.st.dialect import Dialect
 from conveyor_sim.control.st.errors import Position, SourceError
-from conveyor_sim.control.st.types import BlockType, Enumeration, Member, Type
+from conveyor_sim.control.st.foreign import advice
+from conveyor_sim.control.st.types import BlockType, Enumeration, Member, OpenArray, Type
 from conveyor_sim.control.st.values import Place, Value, constant
 
 
@@ -65,6 +66,8 @@ class Scope:
                 return Thing(what)
         if key in self.names.reading:
             raise SourceError(at, f"found {name} in its own declaration, expected another value")
+        if expected := advice(name):
+            raise SourceError(at, f"found {name}, expected {expected}")
         close = get_close_matches(key, [one for known, _ in self._others(True) for one in known], 1)
         hint = f"; there is {self._written(close[0])}" if close else ""
         raise SourceError(at, f"found {name}, which is not declared, expected a variable{hint}")
@@ -82,6 +85,11 @@ class Scope:
         if isinstance(named, Thing):
             raise SourceError(at, f"found {name}, {named.what}, expected a value")
         return named
+
+    def has_variable(self, name: str) -> bool:
+        """Return True if a name is that of a variable here."""
+        key = name.lower()
+        return (self.unit is not None and key in self.unit.members) or self.names.global_(key) is not None
 
     def enumeration(self, name: str) -> Enumeration | None:
         """Return the enumeration of a name, unless a variable hides it."""
@@ -114,7 +122,7 @@ class Scope:
 def place_of(at: Position, owner: str, member: Member, dialect: Dialect) -> Place:
     """Return a variable of an object, in the unit that it belongs to."""
     slot = member.slot
-    if member.section == "VAR_IN_OUT":
+    if member.section == "VAR_IN_OUT" or isinstance(member.type, OpenArray):
         reference = f"{owner}.{slot}"
         return Place(
             at,
@@ -122,6 +130,7 @@ def place_of(at: Position, owner: str, member: Member, dialect: Dialect) -> Plac
             f"{reference}.get()",
             write=lambda new: f"{reference}.set({new})",
             reference=reference,
+            fixed="" if member.section == "VAR_IN_OUT" else f"{member.name}, an input",
             root=f"{reference}.root",
         )
     code = f"{owner}.{slot}"

@@ -42,6 +42,9 @@ TAKES: Mapping[str, Mapping[str, tuple[str, ...]]] = {
 LOCATED: Mapping[str, tuple[str, ...]] = {"PROGRAM": ("VAR", "VAR_INPUT", "VAR_OUTPUT"), OUTSIDE: ("VAR_GLOBAL",)}
 """Sections whose variables may have an address (AT) or a tag, without CONSTANT, by kind of unit."""
 
+INCOMPLETE: Mapping[str, tuple[str, ...]] = {**LOCATED, "FUNCTION_BLOCK": ("VAR", "VAR_INPUT", "VAR_OUTPUT")}
+"""Sections whose variables may have an address without a number (AT %I*), which each instance of a block has."""
+
 _PAIRS = ({"RETAIN", "PERSISTENT"},)
 """Qualifiers that go together."""
 

@@ -227,10 +227,11 @@ class SubrangeType(TypeSpec):
 
 @dataclass(frozen=True)
 class ArrayType(TypeSpec):
-    """Array type: ARRAY [1..3, 0..7] OF INT."""
+    """Array type: ARRAY [1..3, 0..7] OF INT, or ARRAY [*, *] OF INT with `dimensions` and without ranges."""
 
     ranges: tuple[tuple[Expression, Expression], ...]
     element: TypeSpec
+    dimensions: int = 0
 
 
 @dataclass(frozen=True)

@@ -182,6 +182,38 @@ class Array(Type):
         return _LIST * lists + elements // _ELEMENTS + elements * self.element.work
 
 
+@dataclass(frozen=True)
+class OpenArray(Array):
+    """Parameter ARRAY [*], whose bounds are those of the argument."""
+
+    dimensions: int = 1
+
+    @property
+    def initial(self) -> str:
+        """Code of a parameter before a call."""
+        return "None"
+
+    @property
+    def size(self) -> int:
+        """Number of elementary variables that it stores itself."""
+        return 0
+
+    @property
+    def characters(self) -> int:
+        """Sum of the declared lengths of the texts that it stores itself."""
+        return 0
+
+    @property
+    def work(self) -> int:
+        """Work of building it; the copy of an argument counts at the call."""
+        return 0
+
+    def takes(self, argument: Type) -> bool:
+        """Return True if an array may be passed as this parameter."""
+        dimensions = argument.dimensions if isinstance(argument, OpenArray) else len(getattr(argument, "ranges", ()))
+        return isinstance(argument, Array) and dimensions == self.dimensions and argument.element == self.element
+
+
 def repeated(kind: Type, code: str, count: int) -> str:
     """Return the code of `count` elements of a list, each with a separate value.
 

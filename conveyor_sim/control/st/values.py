@@ -27,6 +27,7 @@ from conveyor_sim.control.st.types import (
     Array,
     BlockType,
     Moment,
+    OpenArray,
     String,
     Structure,
     Subrange,
@@ -197,6 +198,8 @@ def converted(value: Value, target: Type, what: str = "") -> str:
         return f"{value.code}[:{target.high}]"
     if isinstance(target, BlockType):
         raise SourceError(value.at, f"found a block, {target.name}, expected a value: blocks are not copied")
+    if isinstance(target, OpenArray):
+        raise SourceError(value.at, f"found {target.name}, expected one of its elements: it is passed on, not copied")
     if isinstance(target, (Array, Structure)):
         if _has_blocks(target):
             raise SourceError(

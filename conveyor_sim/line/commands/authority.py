@@ -71,6 +71,9 @@ IN_CONTROL: Mapping[int, tuple[WriterKind, ...]] = {
 }
 """Kinds of writer whose commands a device accepts, by its mode."""
 
+AT_PANEL: tuple[WriterKind, ...] = (*PEOPLE, "test")
+"""Kinds of writer that use the inputs of the panel, in every control mode and whichever controller owns the line."""
+
 OPERATORS_MODES = (AUTOMATIC, MANUAL)
 """Modes between which an operator may switch. Engineers and tests may switch between all modes."""
 
@@ -100,6 +103,20 @@ def advice(kind: WriterKind) -> str:
 def reserved(device: str, kind: str, mode: float) -> str:
     """Return why a kind of writer may not switch a device to or from a mode."""
     return f"{device}: {MODES[int(mode)]} is not for {kind}s, expected an engineer"
+
+
+def panel_problem(request: Input, panel: Collection[str]) -> str:
+    """Return why this kind of writer may not set the inputs of the panel in a request; "" if it may.
+
+    panel: names of these inputs.
+    """
+    if request.writer_kind in AT_PANEL:
+        return ""
+    name = next((name for name in request.names if name in panel), None)
+    if name is None:
+        return ""
+    expected = f"expected one of the kind {' or '.join(AT_PANEL)}"
+    return f"{name}: is an input of the panel, given by {who(request)}, {expected}"
 
 
 def covers(pattern: str, device: str, where: str) -> bool:

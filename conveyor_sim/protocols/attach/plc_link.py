@@ -8,7 +8,7 @@ from typing import Protocol
 
 from conveyor_sim.protocols.attach.tag_map import TagMap
 from conveyor_sim.protocols.server.interface import ServerError
-from conveyor_sim.protocols.tags.handshake import TARGET, TICK
+from conveyor_sim.protocols.tags.handshake import TICK
 
 PATIENCE = 5.0
 """Longest time of a PLC for each request, s of wall time."""
@@ -16,6 +16,10 @@ PATIENCE = 5.0
 
 class PlcLinkError(ServerError):
     """A PLC that can't be reached, or does not answer correctly."""
+
+
+class PlcRefusedError(PlcLinkError):
+    """A PLC that is there, but is not trusted or does not admit the line. It stays so until somebody changes it."""
 
 
 class PlcLink(Protocol):
@@ -40,12 +44,6 @@ async def write_signals(link: PlcLink, signals: Mapping[str, float], tick: int |
         await link.write(signals)
     if tick is not None:
         await link.write({TICK: float(tick)})
-
-
-async def forget_target(link: PlcLink, tick: int) -> None:
-    """Set `run/target_tick` to a tick if the PLC has a later one of an earlier test. Raise PlcLinkError."""
-    if (await link.read([TARGET]))[TARGET] > tick:
-        await link.write({TARGET: float(tick)})
 
 
 async def read_answer(link: PlcLink, tags: TagMap) -> tuple[dict[str, float], dict[str, float]]:

@@ -28,6 +28,7 @@ from conveyor_sim.protocols.tags.control_mode import (
     refused_for_good,
 )
 from conveyor_sim.protocols.tags.handshake import MAY_GO_ON, TARGET
+from conveyor_sim.protocols.tags.held_buttons import HeldButtons
 from conveyor_sim.protocols.tags.tag_provider import OPCUA, Control, TagProvider
 
 Codes = ua.StatusCodes
@@ -68,6 +69,8 @@ class Requests:
         self._receipt = Receipt(source.info.tags, source.info.where)
         self._commands: Mapping[str, Tag] = {tag.name: tag for tag in source.info.tags if tag.role in COMMANDS}
         self._modes: Mapping[str, Tag] = {tag.name: tag for tag in source.info.tags if is_mode(tag)}
+        self.held = HeldButtons(source)
+        """Buttons that clients hold, by the identity of their users (`Client`)."""
         self.writes = self.refused = 0
         """Requests that were passed on to the line, and requests that were refused."""
 
@@ -203,7 +206,14 @@ class Requests:
         snapshot = self._source.snapshot
         if snapshot.lost or snapshot.run.state in TAKES_NO_INPUT:
             return Codes.BadInvalidState
-        return Codes.BadTooManyOperations if self._source.give(request) else Codes.GoodCompletesAsynchronously
+        if self._source.give(request):
+            return Codes.BadTooManyOperations
+        self.held.note(id(client), request)
+        return Codes.GoodCompletesAsynchronously
+
+    def leave(self, client: User) -> None:
+        """Release the buttons that a client holds, because its session has ended or has another user."""
+        self.held.leave(id(client))
 
 
 def _judge_form(value: ua.WriteValue, kind: ua.VariantType) -> int:

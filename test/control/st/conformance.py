@@ -158,7 +158,7 @@ def value(word: str) -> Any:
         return int(word[:-2])
     if re.match(r"L?(DATE|TOD|DT)#", word):
         return moment(word)
-    if word.startswith("'"):
+    if word[0] in "'\"":
         return word[1:-1].replace("_", " ")
     return float(word) if any(letter in word for letter in ".ein") else int(word, 0)
 

@@ -94,6 +94,10 @@ def test_located_variables_are_tags_by_their_address_in_the_modbus_map(tmp_path:
     assert plant.history["belts/table/cmd_speed"][-1] == 0.25
     assert plant.history["machines/packer/run"][-1] == 1.0
     assert plant.signals["plc/main/actual"] == plant.signals["belts/table/speed"] == 0.25
+    plant.always(lambda s: s["PLC/Main/Actual"] == s["plc/main/actual"], for_=0.05)
+    assert plant.history["plc/main/actual"][-1] == 0.25
+    with pytest.raises(KeyError, match="plc/main/absent"):
+        plant.signals["PLC/Main/Absent"]
     assert "main/eye <- photo_eyes/high/blocked (by address)" in str(plc.mapping)
     wrong = controller(tmp_path, f"VAR speed AT %QW{speed.address} : INT; END_VAR", modbus_map=kept)
     with pytest.raises(StructuredTextError, match=stating(f"%QW{speed.address}", "belts/table/cmd_speed", "32 bits")):

@@ -243,6 +243,33 @@ def test_what_a_project_of_automation_studio_can_not_have(tmp_path: Path) -> Non
         compile_files(folder)
 
 
+def test_a_unit_as_codesys_shows_it_needs_no_end(tmp_path: Path) -> None:
+    """Declaration and body without END_FUNCTION_BLOCK, each in a file, and FUNCTIONBLOCK as CODESYS 2.3 has it."""
+    main = "PROGRAM main VAR f : Adding; n : INT; END_VAR f(); f(); n := f.n;"
+    folder = written(tmp_path, main__st=main, f__st="FUNCTIONBLOCK Adding VAR_OUTPUT n : INT; END_VAR n := n + 1;")
+    assert values(scanned(folder, dialect="codesys"), "main/n") == [2.0]
+    with pytest.raises(StructuredTextError, match="FUNCTIONBLOCK"):
+        compile_files(folder)
+    written(folder, f__st="FUNCTION_BLOCK Adding VAR_OUTPUT n : INT; END_VAR IF TRUE THEN n := n + 1;")
+    with pytest.raises(StructuredTextError, match="END_IF"):
+        compile_files(folder, dialect="codesys")
+
+
+def test_a_program_calls_another_in_codesys(tmp_path: Path) -> None:
+    """The called program runs once in each scan, where it is called; its variables are those of its name."""
+    main = "PROGRAM main VAR n : INT; END_VAR Outputs(); n := Outputs.sum; END_PROGRAM"
+    outputs = "PROGRAM Outputs VAR sum : INT; END_VAR sum := sum + 1; END_PROGRAM"
+    folder = written(tmp_path, main__st=main, outputs__st=outputs)
+    program = scanned(folder, 3, "codesys")
+    assert values(program, "main/n", "outputs/sum") == [3.0, 3.0]
+    assert [one.name for one in program.compiled.programs] == ["main"]
+    with pytest.raises(StructuredTextError, match="Outputs"):
+        compile_files(folder)
+    written(folder, outputs__st="PROGRAM Outputs VAR sum : INT; END_VAR main(); END_PROGRAM")
+    with pytest.raises(StructuredTextError, match=r"no recursion|no PROGRAM"):
+        compile_files(folder, dialect="codesys")
+
+
 def test_files_of_two_vendors_need_a_dialect(tmp_path: Path) -> None:
     folder = written(
         tmp_path, a__exp="FUNCTION f : INT f := 1; END_FUNCTION", b__scl="FUNCTION g : Int g := 1; END_FUNCTION"
