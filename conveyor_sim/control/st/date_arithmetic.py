@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from conveyor_sim.control.st.dates import DAY, moment_text
+from conveyor_sim.control.st.dates import DAY, midnight, moment_text
 from conveyor_sim.control.st.errors import Position
 from conveyor_sim.control.st.types import LTIME, REAL, TIME, Moment, Type, is_long
 from conveyor_sim.control.st.values import NAMESPACE, Value, folded
@@ -56,9 +56,9 @@ def conversion_code(source: Type, code: str, target: Type) -> str | None:
         return None
     if target.part == "TOD":
         return f"({code} % {DAY})"
-    if target.part == "DATE":
-        code = f"{code} // {DAY} * {DAY}"
-    return target.wrapped(code) if source.kind in ("int", "bits", "bool") else f"({code})"
+    if source.kind in ("int", "bits", "bool"):
+        code = target.wrapped(code)
+    return f"_midnight({code})" if target.part == "DATE" else f"({code})"
 
 
-NAMESPACE.update(_moment_text=moment_text)
+NAMESPACE.update(_midnight=midnight, _moment_text=moment_text)

@@ -15,6 +15,7 @@ from conveyor_sim.control.st.types import DATE, DT, LDATE, LDT, LTOD, TOD, Momen
 DAY = 86_400_000_000_000
 """Nanoseconds of a day."""
 
+_FIRST = -(2**63 // DAY)
 _EPOCH = date(1970, 1, 1).toordinal()
 _SHORT = {"DATE": "D", "LDATE": "LD"}
 """Names of types as texts have them, where they differ."""
@@ -115,6 +116,11 @@ def time_of_day(name: str, hour: int, minute: int, second: int, millisecond: int
         found = f"{hour}:{minute}:{second} and {millisecond} ms"
         raise Fault(f"{name}: found {found}, expected a time from 0:0:0 to 23:59:59 and 0 to 999 ms")
     return (((hour * 60 + minute) * 60 + second) * 1000 + millisecond) * 1_000_000
+
+
+def midnight(value: int) -> int:
+    """Return the begin of a day, or of the first whole one that 64 bits hold."""
+    return max(value // DAY, _FIRST) * DAY
 
 
 def date_fields(value: int) -> tuple[int, int, int]:

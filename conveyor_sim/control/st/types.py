@@ -248,12 +248,14 @@ class Member:
     tag: str = ""
     read_only: bool = False
     """VAR_INPUT CONSTANT."""
+    python: str = ""
+    """Name in Python, if it is not made of the name."""
     at: tuple[int, int] = (1, 1)
 
     @property
     def slot(self) -> str:
         """Name in Python."""
-        return f"v_{self.name.lower()}"
+        return self.python or f"v_{self.name.lower()}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -306,6 +308,10 @@ class BlockType(Structure):
     standard: bool = False
     function: bool = False
     result: Type | None = None
+    actions: frozenset[str] = frozenset()
+    """Names of its actions, in small letters."""
+    statics: dict[str, str] = field(default_factory=dict)
+    """Names of the global variables that its VAR_STAT are, by name in small letters."""
 
     def of(self, *sections: str) -> list[Member]:
         """Return the variables of some sections, in their order."""
