@@ -16,6 +16,15 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
+_TABLES = (
+    "bag.messages.reference",
+    "line.reference",
+    "scene.reference",
+    "studies.calibration.reference",
+    "control.st.dialect",
+    "control.st.attributes",
+)
+"""Modules with tables that are parts of pages."""
 
 
 def pages() -> Iterator[tuple[Path, str]]:
@@ -28,8 +37,8 @@ def pages() -> Iterator[tuple[Path, str]]:
     yield rules.PAGE, rules.page(rules.PAGE.read_text(encoding="utf-8"))
     with_parts = importlib.import_module("page_parts").with_parts
     tables: dict[str, dict[str, str]] = {}
-    for package in ("bag.messages", "line", "scene", "studies.calibration"):
-        for name, parts in importlib.import_module(f"conveyor_sim.{package}.reference").tables().items():
+    for package in _TABLES:
+        for name, parts in importlib.import_module(f"conveyor_sim.{package}").tables().items():
             tables[name] = {**tables.get(name, {}), **parts}
     for name, parts in tables.items():
         page = DOCS / f"{name}.md"

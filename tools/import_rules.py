@@ -30,7 +30,7 @@ RULES: Mapping[str, str] = {
     "report": "bag columns errors line page physics run scene simulation statistics support | "
     "click matplotlib numpy rich",
     "protocols": "bag columns errors line page run scene simulation support | "
-    "aiohttp asyncua cryptography foxglove google numpy paho pymodbus",
+    "aiohttp asyncua cryptography foxglove google numpy paho pyads pylogix pymodbus snap7",
     "accuracy": "columns engine errors line physics report scene simulation statistics support | "
     "matplotlib numpy rich ruamel scipy",
     "studies": "bag columns control errors line physics report run scene simulation statistics support | "
@@ -85,7 +85,7 @@ WITHIN: Mapping[str, Mapping[str, str]] = {
         "web": "server tags",
         "foxglove": "server tags",
         "hosting": "foxglove modbus mqtt opcua server tags web",
-        "attach": "hosting server tags",
+        "attach": "hosting opcua server tags",
     },
 }
 """Import rules inside a package, from the lowest up: what each part may import of the others.

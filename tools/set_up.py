@@ -24,7 +24,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-EXTRAS = ("foxglove", "mqtt", "scada", "st")
+EXTRAS = ("ads", "ethernet_ip", "foxglove", "mqtt", "s7", "scada", "st", "test-servers")
 """Whose lists in requirements/ those of the tools include."""
 DISTROS = {"jazzy": ".venv", "kilted": ".venv-kilted"}
 TOOLS = {"test": "the test tools", "bench": "what is compared with", "docs": "what the docs site is built with"}

@@ -21,6 +21,11 @@ from conveyor_sim.support.progress import ProgressBar
 )
 @click.option("--duration", type=float, help="Simulated time in s, instead of the scene's.")
 @controller_options
+@click.option(
+    "--actions",
+    type=click.Path(path_type=Path),
+    help="CSV or YAML file of an operator's actions at the panel, with their simulated times.",
+)
 @click.option("--no-record", is_flag=True, help="Simulate only; nothing is written.")
 @click.option("--no-pictures", is_flag=True, help="Draw nothing; `conveyor-sim plot` does, any time later.")
 @click.option("--details", is_flag=True, help="Print setting, checks of forces, belts, topics and speed, too.")
@@ -33,6 +38,7 @@ def run(
     controller: str | None,
     parameters: str,
     variables: tuple[str, ...],
+    actions: Path | None,
     no_record: bool,
     no_pictures: bool,
     details: bool,
@@ -65,7 +71,7 @@ def run(
             drawing.get_ready()
     Compilation(loaded, say).run()
     with ProgressBar(loaded.name, loaded.duration) as bar:
-        done = run_scene(loaded, folder, bar.update, threads, controls, variables, say)
+        done = run_scene(loaded, folder, bar.update, threads, controls, variables, say, actions)
     if done.interrupted:
         say(f"interrupted at {done.simulated:.2f} s")
     if done.bag is None:

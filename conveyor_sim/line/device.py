@@ -218,6 +218,9 @@ class Device:
         """Take a command that stops the device (`stops`) from a person who has no control of it."""
         raise NotImplementedError(f"{self.name} takes no stops")
 
+    def cut_power(self, now: ScanContext) -> None:
+        """Stop, because an emergency stop takes the power (`DeviceSetup.power`)."""
+
     def take_mode(self, mode: int, now: ScanContext) -> None:
         """Switch to another control mode (authority.MODES) at this tick. Commands in force stay."""
 

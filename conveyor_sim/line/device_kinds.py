@@ -11,6 +11,13 @@ from conveyor_sim.line.devices.drive import NamedDriveDevice
 from conveyor_sim.line.devices.indicator import IndicatorDevice
 from conveyor_sim.line.devices.infeed import InfeedDevice
 from conveyor_sim.line.devices.mover import Mover
+from conveyor_sim.line.devices.panel import (
+    ButtonDevice,
+    EmergencyStopDevice,
+    LightsDevice,
+    NumberFieldDevice,
+    SelectorDevice,
+)
 from conveyor_sim.line.devices.photo_eye import PhotoEyeDevice
 from conveyor_sim.line.devices.region import OutfeedDevice, ZoneDevice
 from conveyor_sim.line.devices.reject import RejectDevice
@@ -22,6 +29,13 @@ from conveyor_sim.physics.model import Model
 from conveyor_sim.scene.schema import Scene
 
 DEVICES: Mapping[str, Callable[[str, Any, DeviceSetup], Device]] = {
+    "button": ButtonDevice,
+    "selector": SelectorDevice,
+    "emergency_stop": EmergencyStopDevice,
+    "lamp": LightsDevice,
+    "horn": LightsDevice,
+    "stack_light": LightsDevice,
+    "numeric": NumberFieldDevice,
     "drive": NamedDriveDevice,
     "belt": belt_device,
     "gate": Mover,

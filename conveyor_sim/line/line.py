@@ -15,7 +15,7 @@ from conveyor_sim.columns.events import Event, Kind
 from conveyor_sim.columns.image import Image
 from conveyor_sim.line.alarm_system import AlarmSystem
 from conveyor_sim.line.alarms.alarms import Alarms
-from conveyor_sim.line.commands.authority import MAY, PEOPLE, unauthorized
+from conveyor_sim.line.commands.authority import MAY, PEOPLE, panel_problem, unauthorized
 from conveyor_sim.line.commands.forcing import Forcing
 from conveyor_sim.line.commands.inputs import FAULT, INJECT, SET, WATCHDOG, CommandOutcome, Input, normalized
 from conveyor_sim.line.commands.modes import Modes
@@ -30,7 +30,7 @@ from conveyor_sim.line.devices.photo_eye import PhotoEyeDevice
 from conveyor_sim.line.devices.setpoint import SetpointDevice
 from conveyor_sim.line.machines.counters import RESET_COUNTERS, ProductionCounters
 from conveyor_sim.line.run_state import RUN_TAGS
-from conveyor_sim.line.tag import Adds, ProcessImage
+from conveyor_sim.line.tag import PANEL, Adds, ProcessImage
 from conveyor_sim.physics.model import build_model
 from conveyor_sim.physics.state import State
 from conveyor_sim.physics.state.snapshot import entries, restore, snapshot, typed
@@ -181,6 +181,7 @@ class Line:
         """Present value and writer of each command."""
         self._owner = {entry.name: device for device in devices for entry in (*device.commands, *device.faults)}
         self._commands = {tag.name: tag for tag in self.image.commands}
+        self._panel = frozenset(tag.name for tag in self.image.commands if tag.role == PANEL)
         self._faults = {tag.name: tag for tag in self.image.faults}
         self._moved = moved_belts(self.image.tags)
         objecting = [device for device in devices if type(device).objection is not Device.objection]
@@ -273,6 +274,8 @@ class Line:
     def _set_refusal(self, request: Input) -> str:
         names, values = request.names, request.values
         if reason := _with_texts(request) or refusal(self._commands, "command", names, values, self._moved):
+            return reason
+        if self._panel and (reason := panel_problem(request, self._panel)):
             return reason
         for name, value in zip(names, values, strict=True) if self._objecting else ():
             if name in self._objecting and (reason := self._objecting[name].objection(name, value, self.now)):

@@ -19,6 +19,15 @@ contacts:
   - {between: [glass, glass], stiffness: 5000}
   - {between: [glass, rail], stiffness: 5000}
 base: [{between: [glass, chain], friction: 0.4}]
+panel:
+  button: {kind: button}
+  maintained: {kind: button, action: maintained, contact: NC}
+  selector: {kind: selector, positions: [manual, auto]}
+  estop: {kind: emergency_stop, cuts: [drives, machines], deceleration: 1}
+  lamp: {kind: lamp}
+  horn: {kind: horn}
+  stack: {kind: stack_light}
+  number: {kind: numeric, unit: m/s, limits: [0, 1], written_by: both}
 drives: {m: {acceleration: 1.0, pulses_per_metre: 1000}}
 belts:
   b:
@@ -58,6 +67,7 @@ PAGES: dict[str, dict[str, tuple[str, ...]]] = {
     "parts/photo_eyes": {"photo_eyes": ("photo_eyes",)},
     "parts/zones": {"zones": ("zones",), "counters": ("counters",)},
     "parts/indicators": {"indicators": ("indicators",)},
+    "parts/panel": {"panel": ("panel",)},
     "parts/alarms": {"alarms": ("alarm_counts", "alarms")},
     "line": {"run": ("run",)},
 }

@@ -41,10 +41,10 @@ UNITS: Mapping[str, UnitOfMeasure] = {
 Kind = Literal["bool", "count", "number", "enumeration"]
 """bool: 0 or 1; count: whole number; enumeration: whole number that stands for a text."""
 
-Role = Literal["actual", "setpoint", "status", "command", "counter", "alarm", "fault", "run"]
+Role = Literal["actual", "setpoint", "status", "command", "counter", "alarm", "fault", "run", "panel"]
 """actual: measured; setpoint: number from a controller; status: state of a device; command: switch or push-button
 that a controller writes; counter: number of occurrences or total time; alarm: of the line; fault: injected by a test;
-run: about the simulation."""
+run: about the simulation; panel: input that an operator uses at the panel, whatever the control mode."""
 
 Adds = Literal["", "fed", "removed", "rejected", "state"]
 """Sum that a signal adds to: bottles put onto the line, taken off it, or rejected. "state": each change of the
@@ -53,8 +53,14 @@ signal is an event. "": neither."""
 SIGNALS: tuple[Role, ...] = ("actual", "status", "counter", "alarm")
 """Roles of tags that a controller reads."""
 
-COMMANDS: tuple[Role, ...] = ("setpoint", "command")
+PANEL: Role = "panel"
+"""Role of tags that people and tests write, and controllers do not."""
+
+CONTROLLED: tuple[Role, ...] = ("setpoint", "command")
 """Roles of tags that a controller writes."""
+
+COMMANDS: tuple[Role, ...] = (*CONTROLLED, PANEL)
+"""Roles of tags that clients write."""
 
 MOST_COUNT = 2.0**53
 """Largest count. A float64 represents all whole numbers up to it."""

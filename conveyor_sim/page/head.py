@@ -15,6 +15,7 @@ from conveyor_sim.scene import Scene
 from conveyor_sim.scene.geometry import BeltShape, named_surfaces, rail_shapes, surface_shapes
 from conveyor_sim.scene.marks import marks_of
 from conveyor_sim.scene.moving import moving_shapes
+from conveyor_sim.scene.parts.panel import PanelPart
 
 _ARC_POINTS = 96
 _DIGITS = 5
@@ -39,6 +40,7 @@ def head(line: Any, scene: Scene) -> dict[str, Any]:
         },
         "signals": signals,
         "commands": list(line.command_names),
+        "panel": [_panel_part(name, part) for name, part in scene.panel.items()],
         "tags": _tags(line),
         "fields": fields(),
         "steps": {
@@ -50,6 +52,11 @@ def head(line: Any, scene: Scene) -> dict[str, Any]:
             "forceFrames": FORCE_FRAMES,
         },
     }
+
+
+def _panel_part(name: str, part: PanelPart) -> dict[str, Any]:
+    """Return the fields of a part of the operator panel that decide its look."""
+    return {**part.model_dump(mode="json"), "name": name, "label": part.label or name.replace("_", " ")}
 
 
 def plan_head(scene: Scene) -> dict[str, Any]:

@@ -21,6 +21,7 @@ with while_importing(), needing_packages("controller_node"):
     from conveyor_sim.control.scan import ControlError, Controller, LineTags, bind
     from conveyor_sim.control.st.load import load
     from conveyor_sim.errors import ConveyorError
+    from conveyor_sim.line.tag import CONTROLLED
     from conveyor_sim.ros.context import new_node, running_ros
     from conveyor_sim.ros.controller import ControllerRun, Stopped
     from conveyor_sim.ros.parameters import DeclaredParameter, declare_table
@@ -54,8 +55,9 @@ def run(stop: StopRequest) -> None:
             controller = load(values["controller"], parameters)
             if line is not None:
                 tags = {tag.name: tag for tag in line.tags}
+                controlled = [name for name in line.command_names if tags[name].role in CONTROLLED]
                 signals, commands = (
-                    {name: tags[name].kind for name in names} for names in (line.signal_names, line.command_names)
+                    {name: tags[name].kind for name in names} for names in (line.signal_names, controlled)
                 )
                 limits = {name: (tags[name].min, tags[name].max) for name in commands}
                 bind(controller, LineTags(signals, commands, limits))

@@ -21,6 +21,7 @@ from conveyor_sim.run.force_check import PeakWatch
 from conveyor_sim.run.scan_loop import ScanLoop
 from conveyor_sim.run.session import keep_stopped
 from conveyor_sim.run.speed import Spent
+from conveyor_sim.run.timed_actions import TimedActions
 from conveyor_sim.scene import Scene
 from conveyor_sim.scene.recorded import sources_of
 from conveyor_sim.simulation import Simulation
@@ -57,18 +58,22 @@ def run_scene(
     controller: Controller | None = None,
     record: Sequence[str] = (),
     say: Callable[[str], None] | None = None,
+    actions: Path | None = None,
 ) -> Run:
     """Run a scene for its duration, and record it to the folder `bag`, if one is passed.
 
     progress: called with the simulated time (s) after every tick. threads: number of threads; None to choose it.
     controller: scans at every tick. record: patterns of its variables that are recorded (`control/recorded.py`).
     say: called with a sentence for each variable without a tag, and each command that the controller never gives.
+    actions: file of an operator's actions at the panel (`timed_actions.py`).
     Ctrl-C ends the run at the next tick, with an intact bag; a second one ends the process.
 
     Raises SceneError, SimulationError, BagError if the recording can't be written, and ConveyorError for a controller
-    that can't go on. A controller that can't begin leaves no recording.
+    that can't go on, CommandError for a file of actions that can't be read. A controller that can't begin leaves no
+    recording.
     """
     simulation = Simulation(scene, threads)
+    operator = None if actions is None else TimedActions(actions, simulation)
     scans = ScanLoop(simulation, controller, record)
     if say is not None:
         for sentence in getattr(controller, "left_over", ()):
@@ -84,6 +89,8 @@ def run_scene(
         while simulation.tick < scene.duration_ticks and not stop.is_set():
             began = time.perf_counter()
             try:
+                if operator is not None:
+                    operator.before_tick()
                 scans.before_tick(outputs)
                 simulation.advance(1)
             except SimulationError as error:

@@ -16,6 +16,7 @@ from conveyor_sim.control.recorded import RecordedVariables
 from conveyor_sim.control.scan import ALARMS, ControlError, Controller, Inputs, LineTags, bind, declared_alarms
 from conveyor_sim.errors import CommandError, ConveyorError
 from conveyor_sim.line.commands.inputs import DECLARE, OWN, CommandOutcome, Input
+from conveyor_sim.line.tag import CONTROLLED, of_roles
 from conveyor_sim.physics.state.checkpoint import read_checkpoint
 from conveyor_sim.run.alarm_changes import AlarmChanges
 from conveyor_sim.run.controller_source import located
@@ -70,7 +71,8 @@ class LocalController(AttachedController):
         Raises ControlError for a controller that does not fit the line, and for a pattern that fits no variable.
         """
         image = simulation.process_image
-        signals, commands = ({tag.name: tag.kind for tag in tags} for tags in (image.signals, image.commands))
+        controlled = of_roles(image.commands, CONTROLLED)
+        signals, commands = ({tag.name: tag.kind for tag in tags} for tags in (image.signals, controlled))
         bind(controller, LineTags(signals, commands, image.command_limits))
         declared = declared_alarms(controller)
         self.writer = type(controller).__name__

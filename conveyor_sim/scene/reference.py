@@ -32,6 +32,7 @@ PAGES: dict[str, tuple[str, ...]] = {
     "machines": ("`machines`", "`acting_times`"),
     "materials": ("`contacts`", "of a contact", "`base`", "`floor`", "`bottle_types`"),
     "movers": ("`gates`", "`pushers`", "`diverters`"),
+    "panel": ("`panel`",),
     "photo_eyes": ("`photo_eyes`",),
     "rails": ("`rails`",),
     "zones": ("`zones`", "`counters`"),

@@ -27,6 +27,7 @@ from conveyor_sim.scene.parts.infeed import Infeed
 from conveyor_sim.scene.parts.inspection import Inspection
 from conveyor_sim.scene.parts.movers import Diverter, Gate, Pusher
 from conveyor_sim.scene.parts.outfeed import Outfeed
+from conveyor_sim.scene.parts.panel import Button, EmergencyStop, Horn, Lamp, NumberField, Selector, StackLight
 from conveyor_sim.scene.parts.photo_eye import PhotoEye
 from conveyor_sim.scene.parts.reject import Reject
 from conveyor_sim.scene.parts.sink import Sink
@@ -63,6 +64,23 @@ Machine = Annotated[
     | Annotated[Inspection, Tag("(inspection)")]
     | Annotated[Reject, Tag("(reject)")],
     one_of({kind: f"({kind})" for kind in ("source", "sink", "station", "inspection", "reject")}),
+]
+
+
+OnPanel = Annotated[
+    Annotated[Button, Tag("(button)")]
+    | Annotated[Selector, Tag("(selector)")]
+    | Annotated[EmergencyStop, Tag("(emergency_stop)")]
+    | Annotated[Lamp, Tag("(lamp)")]
+    | Annotated[Horn, Tag("(horn)")]
+    | Annotated[StackLight, Tag("(stack_light)")]
+    | Annotated[NumberField, Tag("(numeric)")],
+    one_of(
+        {
+            kind: f"({kind})"
+            for kind in ("button", "selector", "emergency_stop", "lamp", "horn", "stack_light", "numeric")
+        }
+    ),
 ]
 
 
@@ -246,6 +264,9 @@ class Scene(Part):
     )
     bottle_types: Annotated[dict[Name, BottleType], Len(1), _named("bottle types, at least one")] = quantity(
         "Kinds of bottles."
+    )
+    panel: Annotated[dict[Name, OnPanel], _named("parts of the panel")] = quantity(
+        "Operator panel: inputs and outputs beside the line.", default={}
     )
     drives: Annotated[dict[Name, NamedDrive], _named("drives")] = quantity(
         "Drives that move several belts.", default={}

@@ -18,13 +18,14 @@ from conveyor_sim.control.recorded import RecordedVariables
 from conveyor_sim.control.scan import ControlError, Inputs
 from conveyor_sim.line.commands.inputs import SET
 from conveyor_sim.line.tag import ProcessImage
+from conveyor_sim.protocols.attach.access import PlcAccess
 from conveyor_sim.protocols.attach.links import plc_link
-from conveyor_sim.protocols.attach.plc_link import PlcLinkError, read_answer
+from conveyor_sim.protocols.attach.plc_link import PlcLinkError, read_answer, write_signals
 from conveyor_sim.protocols.attach.tag_map import TagMapError, read_tag_map
 from conveyor_sim.protocols.hosting.server_thread import ServerThread
 from conveyor_sim.protocols.modbus.address_map import modbus_map
 from conveyor_sim.protocols.server.interface import ProtocolServer
-from conveyor_sim.protocols.tags.handshake import TARGET, TICK, HandshakeTagProvider
+from conveyor_sim.protocols.tags.handshake import TARGET, TICK, HandshakeTagProvider, problem
 from conveyor_sim.protocols.tags.tag_provider import PLC, TagProvider
 from conveyor_sim.run.alarm_changes import AlarmChanges
 from conveyor_sim.run.scan_loop import AttachedController
@@ -42,10 +43,10 @@ class ServedPlc(AttachedController):
     source = PLC
     """Source of its commands."""
 
-    def __init__(self, image: ProcessImage, url: str, tags: Path, user: str, password: str, patience: float) -> None:
+    def __init__(self, image: ProcessImage, url: str, tags: Path, access: PlcAccess, patience: float) -> None:
         """Connect to the PLC.
 
-        image: process image of the line. url, user, password: as for `plc_link`. tags: file of the map.
+        image: process image of the line. url, access: as for `plc_link`. tags: file of the map.
         patience: longest time for each scan, s of wall time.
 
         Raises TagMapError for a map that does not fit or lacks the handshake, PlcLinkError, ImportError.
@@ -64,9 +65,11 @@ class ServedPlc(AttachedController):
         self.recorded = RecordedVariables(self)
         with ExitStack() as stack:
             self._thread = stack.enter_context(ServerThread())
-            self._link = plc_link(url, self._map.all, user, password)
+            self._link = plc_link(url, self._map.all, access)
             stack.callback(lambda: self._thread.run(self._link.close()))
             self._thread.run(self._link.connect())
+            # The PLC may have a target of an earlier run, which does not belong to its next commands.
+            self._old_target: float | None = self._read_target()
             self._open = stack.pop_all()
 
     def close(self) -> None:
@@ -83,21 +86,28 @@ class ServedPlc(AttachedController):
         if inputs.tick >= self._target:
             signals = {each.tag.name: inputs[each.tag.name] for each in self._map.written}
             try:
-                self._thread.run(self._link.write({**signals, TICK: float(inputs.tick)}))
+                self._thread.run(write_signals(self._link, signals, inputs.tick))
                 self._target = self._wait(inputs)
                 self._answer, self.variables = self._thread.run(read_answer(self._link, self._map))
             except PlcLinkError as error:
                 raise ControlError(f"at {inputs.time:.2f} s no PLC: {error}") from error
         return alarms.with_commands(self._answer)
 
+    def _read_target(self) -> float:
+        return self._thread.run(self._link.read([TARGET]))[TARGET]
+
     def _wait(self, inputs: Inputs) -> int:
         end = time.monotonic() + self._patience
-        while (target := self._thread.run(self._link.read([TARGET]))[TARGET]) <= inputs.tick:
+        while (target := self._read_target()) <= inputs.tick or target == self._old_target:
             if time.monotonic() > end:
                 raise ControlError(
                     f"at {inputs.time:.2f} s no {TARGET} after {inputs.tick} within {self._patience:g} s of wall time, "
                     f"expected from the PLC at {self._url}; it is {target:g} there"
+                    + (", as before the first scan" if target == self._old_target else "")
                 )
+        if reason := problem("target", target, inputs.tick):
+            raise ControlError(f"at {inputs.time:.2f} s the PLC at {self._url} set {reason}")
+        self._old_target = None
         return int(target)
 
 

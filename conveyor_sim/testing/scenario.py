@@ -17,12 +17,14 @@ from typing import Any, NoReturn
 from conveyor_sim.bag.input_log import InputLog, copier
 from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.recorder import Recorder
+from conveyor_sim.control.recorded import PREFIX
 from conveyor_sim.control.scan import ALARMS, ControlError, Controller, Inputs
 from conveyor_sim.errors import CommandError, SimulationError
 from conveyor_sim.line.changeover import changeover
 from conveyor_sim.line.commands.authority import MODES
 from conveyor_sim.line.commands.inputs import DISOWN, FAULT, FORCE, INJECT, MODE, SET, UNFORCE, Input, WriterKind
 from conveyor_sim.line.run_state import ENDED, RUNNING, STOPPED, RunState
+from conveyor_sim.protocols.attach.access import PlcAccess
 from conveyor_sim.protocols.tags.tag_provider import SCADA_SOURCES, SteppedTagProvider
 from conveyor_sim.run.scan_loop import AttachedController, LocalController, ScanLoop
 from conveyor_sim.scene import Scene, load_scene
@@ -36,6 +38,7 @@ from conveyor_sim.support.resources import scene_path
 from conveyor_sim.testing import plc
 from conveyor_sim.testing.conditions import text_of, words_of
 from conveyor_sim.testing.history import ScenarioHistory
+from conveyor_sim.testing.panel import OperatorPanel
 from conveyor_sim.testing.plc import ServedPlc
 
 
@@ -70,7 +73,12 @@ class Present(Inputs):
         """Names, in the order of the first reading."""
 
     def __getitem__(self, name: str) -> float:
-        """Return the value of a signal, or of an alarm by its full name. Raise NoSuchSignal, which is a KeyError."""
+        """Return the value of a signal, an alarm by its full name, or a variable of a PLC program in any case.
+
+        Raise NoSuchSignal, which is a KeyError.
+        """
+        if name[: len(PREFIX)].lower() == PREFIX and name not in self._signals:
+            name = name.lower()
         value = super().__getitem__(name)
         self.read[name] = None
         return value
@@ -144,6 +152,10 @@ class PanelUser:
         """Acknowledge alarms by ID; without IDs: all unacknowledged alarms."""
         self.operate("acknowledge", alarms)
 
+    def confirm(self, *alarms: str) -> None:
+        """Confirm acknowledged alarms by ID; without IDs: all that wait to be confirmed."""
+        self.operate("confirm", alarms)
+
     def reset(self, *alarms: str) -> None:
         """Reset latched alarms whose condition has ended, by ID; without IDs: all of them."""
         self.operate("reset", alarms)
@@ -214,6 +226,8 @@ class Scenario(AbstractContextManager["Scenario"]):
         """Operator at the panel of the line."""
         self.engineer = PanelUser(TEST, "engineer", self._give)
         """Engineer, with more rights than the operator (docs/line.md, Who may command)."""
+        self.panel = OperatorPanel(self.simulation.process_image.tags, self.operator.set)
+        """Operator panel of the line."""
         self.failed: Assertion | None = None
         """The assertion that failed; None if none did."""
         self.failure = ""
@@ -374,19 +388,22 @@ class Scenario(AbstractContextManager["Scenario"]):
         *,
         user: str = "",
         password: str = "",
+        access: PlcAccess | None = None,
         patience: float = PATIENCE,
     ) -> None:
         """Attach a running PLC that is a server, in place of the controller before. The line is its client.
 
-        url: "opc.tcp://host:port" or "modbus://host:port". tags: CSV file that maps our tags to those of the PLC,
-        including `run/tick` and `run/target_tick` (docs/plc.md). user: "" for anonymous. patience: longest time for
-        each scan, s of wall time.
+        url: "opc.tcp://host:port", "modbus://host:port", "s7://host/rack/slot", "eip://host/slot" or
+        "ads://net-id:port?host=address". tags: CSV file that maps our tags to those of the PLC, including `run/tick`
+        and `run/target_tick` (docs/plc.md). user: "" for anonymous. access: all settings of an OPC UA connection,
+        instead of user and password. patience: longest time for each scan, s of wall time.
 
         Raises TagMapError for a map that does not fit; PlcLinkError if the PLC can't be reached; ControlError if it
         does not answer, which every later tick may raise as well; ImportError without the library of the protocol.
         """
         image = self.simulation.process_image
-        self._attach(lambda: ServedPlc(image, url, Path(tags), user, password, patience))
+        chosen = PlcAccess(user, password) if access is None else access
+        self._attach(lambda: ServedPlc(image, url, Path(tags), chosen, patience))
 
     def source(self) -> SteppedTagProvider:
         """Return the line as a source for a protocol server. Inputs of clients are applied at the next tick.

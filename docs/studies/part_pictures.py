@@ -2,7 +2,8 @@
 """Pictures of the pages in docs/parts/: python docs/studies/part_pictures.py [NAME ...].
 
 Each page has a scene as YAML. The scene is simulated until MOMENT, and drawn with the forces between bottles.
-Needs matplotlib and Pillow, as the tests do. Without names all pictures are drawn, in about two minutes.
+Needs matplotlib and Pillow, as the tests do. Without names all pictures are drawn, in about two minutes. The picture of
+the operator panel is one of the web page, by view_pictures.py.
 """
 
 from __future__ import annotations
@@ -78,7 +79,8 @@ def save_image(image: Image.Image, file: Path) -> Path:
 
 def main() -> None:
     """Draw the pictures of the named pages, or of all pages with a picture."""
-    names = sys.argv[1:] or [page.stem for page in sorted(PARTS.glob("*.md")) if "images/parts/" in page.read_text()]
+    drawn = [page.stem for page in sorted(PARTS.glob("*.md")) if "images/parts/" in page.read_text()]
+    names = sys.argv[1:] or [name for name in drawn if name != "panel"]
     for name in names:
         print(draw(PARTS / f"{name}.md"), flush=True)
 

@@ -18,6 +18,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from part_pictures import PARTS, save_image, scene_text
 from PIL import Image, ImageDraw
 from playwright.sync_api import sync_playwright
 
@@ -26,7 +27,7 @@ from conveyor_sim.protocols.server.users import keep_user, new_user
 from conveyor_sim.protocols.tags.scene_messages import SceneTask
 from conveyor_sim.protocols.tags.scene_provider import SceneTagProvider
 from conveyor_sim.run.runner import run_scene
-from conveyor_sim.scene import load_scene
+from conveyor_sim.scene import load_scene, parse_scene
 from conveyor_sim.support.resources import scene_path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -226,6 +227,27 @@ def live(studio: Studio) -> None:
         served.end()
 
 
+def panel(studio: Studio) -> None:
+    """Take a picture of the scene of docs/parts/panel.md after an operator has pressed the emergency stop."""
+    keep_user(studio.folder / "users", "jo", new_user("operator", PASSWORD))
+    scene = parse_scene(scene_text(PARTS / "panel.md"))
+    with (
+        SceneTagProvider(SceneTask(scene, None, 0, 1.0, 1), lambda text: None) as source,
+        studio.opened((1280, 900)) as page,
+    ):
+        source.wait_for_line()
+        served = Live(studio.folder, source)
+        served.serve()
+        page.goto(served.url)
+        page.wait_for_selector("body[data-told]", state="attached")
+        signed_in(page, "jo")
+        soon(page, lambda: clock(page) > 9.0, "bottles at the packer")
+        page.click("[data-part=estop] .mushroom")
+        soon(page, lambda: clock(page) > 11.0, "the belt stands")
+        save_image(grab(page), IMAGES / "parts" / "panel.webp")
+        served.end()
+
+
 def with_pointer(picture: Image.Image, x: float, y: float) -> Image.Image:
     """With the pointer of a mouse, which is in no picture of a browser."""
     arrow = [(0, 0), (0, 17), (4, 13), (7, 20), (10, 19), (7, 12), (12, 12)]
@@ -239,6 +261,7 @@ PICTURES: dict[str, Callable[[Studio], None]] = {
     "view_table": moving("view_table", "accumulation_table", (1050, 500), 1, 18, 2, 2 * MOMENT),
     "view_scrubbed": scrubbed,
     "live": live,
+    "panel": panel,
 }
 
 

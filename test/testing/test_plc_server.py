@@ -24,6 +24,7 @@ from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.replay import replay
 from conveyor_sim.cli import main
 from conveyor_sim.control.scan import ControlError, Inputs
+from conveyor_sim.protocols.attach.access import ANONYMOUS, PlcAccess
 from conveyor_sim.protocols.attach.free_running import FreeRunningPlc
 from conveyor_sim.protocols.attach.links import plc_link
 from conveyor_sim.protocols.attach.plc_link import PlcLinkError
@@ -245,13 +246,16 @@ def test_a_variable_that_the_plc_lacks_is_named(plcs: Callable[[str], Plc], tmp_
 class FreeRunning:
     """A line that a PLC commands without waiting for it, run by a test."""
 
-    def __init__(self, plant: Scenario, plc: Plc, thread: ServerThread) -> None:
+    def __init__(self, plant: Scenario, plc: Any, thread: ServerThread, access: PlcAccess = ANONYMOUS) -> None:
+        """plc: has a URL and a map of tags."""
         self.plant, self.plc, self._thread = plant, plc, thread
         self.said: list[str] = []
+        self.connected: list[str] = []
+        """Descriptions of the connections."""
         self.observed: list[Mapping[str, float]] = []
         self.source = plant.source()
         tags = read_tag_map(plc.tags, self.source.info.tags)
-        way = partial(plc_link, plc.url, tags.all)
+        way = partial(plc_link, plc.url, tags.all, access, self.connected.append)
         self.face = FreeRunningPlc(self.source, plc.url, tags, way, 0.005, self.said.append, self.observed.append)
         thread.run(self.face.start())
 

@@ -3,12 +3,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from conveyor_sim.control.st import tree
 from conveyor_sim.control.st.declarations import Declarations
+from conveyor_sim.control.st.enabling import Enabling, enabled, separated
 from conveyor_sim.control.st.errors import Position, SourceError
 from conveyor_sim.control.st.expressions import Expressions
-from conveyor_sim.control.st.functions import apply, is_standard
-from conveyor_sim.control.st.types import BOOL, VOID, BlockType, Member, Type
+from conveyor_sim.control.st.foreign import advice
+from conveyor_sim.control.st.functions import apply, function_of, is_standard
+from conveyor_sim.control.st.implicit import adapted
+from conveyor_sim.control.st.open_arrays import BOUNDS, accepts, bound, passed
+from conveyor_sim.control.st.sizes import size_of
+from conveyor_sim.control.st.tia_blocks import IEC_TIMER, INSTRUCTIONS
+from conveyor_sim.control.st.types import BOOL, VOID, BlockType, Member, OpenArray, Type
 from conveyor_sim.control.st.values import Place, Value, assignment, converted, described
 from conveyor_sim.control.st.work import CALL
 
@@ -35,21 +43,26 @@ class CallCompiler:
 
     def __call__(self, expressions: Expressions, node: tree.Call, hint: Type | None) -> Value:
         """Compile a call of a function. Raise SourceError."""
-        target = node.target
+        target = expressions.scope.unprefixed(node.target)
         if not isinstance(target, tree.Name):
             block = expressions.place(target)
             raise SourceError(node.at, f"found a call of {described(block)} as a value, expected a function")
         scope = expressions.scope
         own = scope.unit.members.get(target.name.lower()) if scope.unit is not None else None
-        if own is not None and own.section != "RESULT":
+        if own is not None and own.section != "RESULT" and not target.qualified:
             raise SourceError(node.at, f"found a call of {target.name}, a variable, as a value, expected a function")
         function = self.declarations.function(target.name)
         if function is None:
+            if target.name.upper() in BOUNDS or target.name.upper() == "SIZEOF":
+                return self._of_variable(expressions, node, target.name.upper())
             if is_standard(target.name):
                 return self._standard(expressions, node, target.name, hint)
             if target.name.lower() in scope.names.types:
                 raise SourceError(node.at, f"found a call of {target.name}, a type, expected a variable of it")
-            raise SourceError(node.at, f"found {target.name}(...), expected a function that is declared")
+            expected = advice(target.name) or "a function that is declared"
+            raise SourceError(node.at, f"found {target.name}(...), expected {expected}")
+        enabling = separated(node, function)
+        node = enabling.call
         self._note(expressions, function, node)
         expressions.work += CALL
         codes = []
@@ -58,21 +71,30 @@ class CallCompiler:
             argument = arguments.get(member.slot)
             if argument is None:
                 codes.append(self._missing(node, function, member))
+            elif isinstance(member.type, OpenArray) and member.section == "VAR_INPUT":
+                codes.append(self._open(expressions, argument, member, expressions.place(argument.value)))
             elif member.section == "VAR_INPUT":
-                value = expressions.value(argument.value, member.type)
+                value = adapted(expressions.value(argument.value, member.type), member.type, scope.names)
                 codes.append(converted(value, member.type, f"{member.name} of {function.name}"))
             else:
                 codes.append(self.reference(expressions, argument, member, node.at))
         code = f"_f_{function.name.lower()}({', '.join(codes)})"
-        return Value(node.at, function.result or VOID, code)
+        return self._enabled(expressions, Value(node.at, function.result or VOID, code), enabling)
 
-    def block(self, expressions: Expressions, node: tree.Call) -> tuple[Place, list[str]]:
-        """Return the block of a call statement, and the lines of the call."""
-        place = expressions.place(node.target)
+    def block(self, expressions: Expressions, node: tree.Call, bare: bool) -> list[str]:
+        """Return the lines of the call of a block or its action.
+
+        bare: True without parentheses, as only actions are called.
+        """
+        place, action, run = self._called(expressions, node.target)
         kind = place.type
         if not isinstance(kind, BlockType):
             raise SourceError(node.at, f"found a call of {described(place)}, expected a function or a block")
-        self._note(expressions, kind, node)
+        if bare and not action:
+            raise SourceError(node.at, f"found a {kind.name} without (), expected its call with ()")
+        enabling = separated(node, kind)
+        node = enabling.call
+        self._note(expressions, kind, node, action)
         lines, after = [f"_o = {place.code}"], []
         written = [one.slot for one in kind.of("VAR_OUTPUT") if kind.standard]
         arguments = self._bound(expressions, node, kind)
@@ -83,6 +105,7 @@ class CallCompiler:
                     raise SourceError(node.at, f"found no {member.name}, expected {member.name} := and a variable")
             elif member.section == "VAR_INPUT":
                 value = expressions.value(argument.value, member.type)
+                value = adapted(value, member.type, expressions.scope.names)
                 lines.append(f"_o.{member.slot} = {converted(value, member.type, f'{member.name} of {kind.name}')}")
                 written.append(member.slot)
             elif member.section == "VAR_IN_OUT":
@@ -90,7 +113,44 @@ class CallCompiler:
             else:
                 after += self._output(expressions, argument, member, node.at)
         noted = [line for slot in written for line in self.noted(expressions, f"(_o, {slot!r})", node.at)]
-        return place, [*lines, "_o.run(_rt.now)", *noted, *after]
+        lines += [f"_o.{run}(_rt.now)", *noted, *after]
+        if enabling.en is None and enabling.eno is None:
+            return lines
+        report = enabling.report(expressions)
+        ends: list[list[str]] = [[], ["pass"]]
+        if report is not None:
+            written = self.noted(expressions, report.root, node.at)
+            ends = [[report.write(on), *written] for on in ("True", "False")]
+        lines = [" " + line for line in (*lines, *ends[0])]
+        return [f"if {enabling.condition(expressions)}:", *lines, "else:", *(" " + line for line in ends[1])]
+
+    def own_action(self, expressions: Expressions, node: tree.Call) -> str:
+        """Return the code that calls an action of the same unit; "" if the call is another one."""
+        unit, target = expressions.scope.unit, node.target
+        if unit is None or not isinstance(target, tree.Name) or target.name.lower() not in unit.actions:
+            return ""
+        if node.arguments:
+            raise SourceError(node.arguments[0].at, f"found an argument of the action {target.name}, expected none")
+        self._note(expressions, unit, node, target.name.lower())
+        return f"self.a_{target.name.lower()}(_rt.now)"
+
+    def _called(self, expressions: Expressions, target: tree.Expression) -> tuple[Place, str, str]:
+        """Return the block that a statement calls, its action in small letters ("" for the body), and its method.
+
+        The method of an IEC_TIMER is that of the instruction.
+        """
+        names = expressions.scope.names
+        if isinstance(target, tree.MemberAccess) and (names.dialect.actions or target.name.lower() in INSTRUCTIONS):
+            name, plain = target.name.lower(), expressions.scope.unprefixed(target)
+            owner = None if isinstance(plain, tree.Name) else expressions.place(target.base)
+            if owner is not None and owner.type is IEC_TIMER and name in INSTRUCTIONS:
+                return owner, "", f"run_{name}"
+            if owner is not None and isinstance(owner.type, BlockType) and name in owner.type.actions:
+                return owner, name, f"a_{name}"
+        place = expressions.place(target)
+        if place.type is IEC_TIMER:
+            raise SourceError(target.at, f"found a call of {place.type.name}, expected .TON, .TOF or .TP before (")
+        return place, "", "run"
 
     def noted(self, expressions: Expressions, root: str, at: Position) -> list[str]:
         """Return the line that records the last write of a variable, if that is traced.
@@ -120,16 +180,65 @@ class CallCompiler:
                 elif called not in done:
                     path.append((called, iter(self.edges.get(called, {}).items())))
 
-    def _note(self, expressions: Expressions, kind: BlockType, node: tree.Call) -> None:
-        if expressions.scope.unit is not None and not kind.standard:
-            self.edges.setdefault(expressions.scope.unit.python, {}).setdefault(kind.python, node)
+    def _note(self, expressions: Expressions, kind: BlockType, node: tree.Call, action: str = "") -> None:
+        unit = expressions.scope.unit
+        if unit is not None and not kind.standard:
+            caller = f"{unit.python}.{expressions.action}" if expressions.action else unit.python
+            called = f"{kind.python}.{action}" if action else kind.python
+            self.edges.setdefault(caller, {}).setdefault(called, node)
+
+    def _of_variable(self, expressions: Expressions, node: tree.Call, name: str) -> Value:
+        """Compile a call of SIZEOF, LOWER_BOUND or UPPER_BOUND, whose argument is a variable rather than a value."""
+        if any(one.output or (one.name or "").upper() not in ("", "ARR", "DIM") for one in node.arguments):
+            raise SourceError(node.at, f"found arguments of {name} by name, expected them by position")
+        arguments = [one.value for one in node.arguments]
+        if name in BOUNDS:
+            return bound(expressions, node, name, arguments)
+        if len(arguments) != 1:
+            raise SourceError(node.at, f"found {len(arguments)} arguments of SIZEOF, expected 1: a variable or a type")
+        (argument,) = arguments
+        if isinstance(argument, tree.Name) and not expressions.scope.has_variable(argument.name):
+            return size_of(node.at, self.declarations.named(argument.at, argument.name))
+        return size_of(node.at, expressions.place(argument).type)
 
     def _standard(self, expressions: Expressions, node: tree.Call, name: str, hint: Type | None) -> Value:
-        named = [one.name is not None for one in node.arguments]
-        if any(one.output for one in node.arguments) or (any(named) and not all(named)):
+        enabling = separated(node, None)
+        node, names = enabling.call, function_of(name).outputs
+        inputs = [one for one in node.arguments if not one.output]
+        named = [one.name is not None for one in inputs]
+        given = [one for one in node.arguments if one.output]
+        if (any(named) and not all(named)) or (given and not names):
             raise SourceError(node.at, f"found arguments of {name} of two kinds, expected all by position or by :=")
-        arguments = [(one.name, expressions.value(one.value, hint)) for one in node.arguments]
-        return apply(node.at, name, arguments, expressions, hint)
+        outputs: dict[str, Place] = {}
+        count = len(function_of(name).parameters)
+        if names and not any(named) and not given:  # outputs by position, after the inputs
+            inputs, rest = inputs[:count], inputs[count:]
+            given = [replace(one, name=word, output=True) for one, word in zip(rest, names, strict=False)]
+            if len(rest) > len(names):
+                most = count + len(names)
+                raise SourceError(node.at, f"found {count + len(rest)} arguments of {name}, expected {most}")
+        for one in given:
+            word = str(one.name).upper()
+            if word not in names or word in outputs or one.negated:
+                raise SourceError(one.at, f"found {one.name} of {name}, expected one of {', '.join(names)}, each once")
+            outputs[word] = self._traced(expressions, expressions.target(one.value), node.at)
+        arguments = [(one.name, expressions.value(one.value, hint)) for one in inputs]
+        return self._enabled(expressions, apply(node.at, name, arguments, expressions, hint, outputs), enabling)
+
+    def _enabled(self, expressions: Expressions, value: Value, enabling: Enabling) -> Value:
+        """Return the value of a call with EN and ENO."""
+        report = enabling.report(expressions)
+        traced = "" if report is None else self._traced(expressions, report, value.at).reference
+        return enabled(value, enabling, expressions, traced)
+
+    def _traced(self, expressions: Expressions, place: Place, at: Position) -> Place:
+        """Return a variable whose reference records writes, if these are traced.
+
+        at: of the call.
+        """
+        if not place.reference or not self.noted(expressions, place.root, at):
+            return place
+        return replace(place, reference=f"_Traced({place.reference}, _noted, {at.line}, {at.column})")
 
     def _bound(self, expressions: Expressions, node: tree.Call, kind: BlockType) -> dict[str, tree.Argument]:
         """Return arguments by the slot of their variable."""
@@ -162,8 +271,10 @@ class CallCompiler:
 
     def _missing(self, node: tree.Call, function: BlockType, member: Member) -> str:
         """Return the code of an argument that is left out."""
-        if member.section == "VAR_IN_OUT" or (
-            member.section == "VAR_INPUT" and any(a.name is None for a in node.arguments)
+        if (
+            isinstance(member.type, OpenArray)
+            or member.section == "VAR_IN_OUT"
+            or (member.section == "VAR_INPUT" and any(a.name is None for a in node.arguments))
         ):
             raise SourceError(node.at, f"found no {member.name} of {function.name}, expected all of its arguments")
         return member.initial if member.section == "VAR_INPUT" else "None"
@@ -174,12 +285,20 @@ class CallCompiler:
         at: of the call.
         """
         place = expressions.target(argument.value)
+        if isinstance(member.type, OpenArray):
+            return self._open(expressions, argument, member, place)
         if place.type != member.type or not place.reference or argument.negated:
             expected = f"a variable of type {member.type.name}"
             raise SourceError(argument.at, f"found {described(place)} for {member.name}, expected {expected}")
-        if member.section == "VAR_OUTPUT" and self.noted(expressions, place.root, at):
-            return f"_Traced({place.reference}, _noted, {at.line}, {at.column})"
-        return place.reference
+        return self._traced(expressions, place, at).reference if member.section == "VAR_OUTPUT" else place.reference
+
+    def _open(self, expressions: Expressions, argument: tree.Argument, member: Member, place: Place) -> str:
+        """Return the code that passes an array as ARRAY [*]."""
+        if argument.negated or not accepts(place, member):
+            expected = f"a variable that is an array of this kind, {member.type.name}"
+            raise SourceError(argument.at, f"found {described(place)} for {member.name}, expected {expected}")
+        expressions.work += place.type.work if member.section == "VAR_INPUT" else 0
+        return passed(place, member)
 
     def _output(self, expressions: Expressions, argument: tree.Argument, member: Member, at: Position) -> list[str]:
         place = expressions.target(argument.value)
@@ -188,5 +307,6 @@ class CallCompiler:
             if member.type != BOOL:
                 raise SourceError(argument.at, f"found NOT of {member.type.name}, expected a BOOL")
             code = f"(not {code})"
-        written = assignment(place, Value(argument.at, member.type, code))
+        value = adapted(Value(argument.at, member.type, code), place.type, expressions.scope.names)
+        written = assignment(place, value)
         return [written, *self.noted(expressions, place.root, at)]

@@ -3,31 +3,25 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from types import CodeType
 
 from conveyor_sim.control.st import tree
 from conveyor_sim.control.st.calls import PASSED, CallCompiler
 from conveyor_sim.control.st.declarations import Declarations, require_small
+from conveyor_sim.control.st.dialect import IEC, Dialect, dialect_of
 from conveyor_sim.control.st.errors import Position, SourceError, StructuredTextError
 from conveyor_sim.control.st.expressions import Expressions
 from conveyor_sim.control.st.located import NOTHING_SHARED, Layout, laid_out
-from conveyor_sim.control.st.parse import parse
+from conveyor_sim.control.st.program_files import Paths, ProgramFiles, Text, digest, joined, read_texts
 from conveyor_sim.control.st.statements import CodeLines, Statements
 from conveyor_sim.control.st.types import TIME, BlockType, Member, Structure, Type
 from conveyor_sim.control.st.work import statements
-from conveyor_sim.support.files import MB, FileError, read_file
-from conveyor_sim.support.printable import SENTENCE, printable
 
 LOWEST = 2**31
 """Priority of a program without a task: after all others."""
-
-MOST_BYTES = 2 * MB
-"""Largest size of a file, bytes."""
 
 MOST_UNITS = 5000
 """Largest number of programs, functions and blocks in a file."""
@@ -49,9 +43,9 @@ class Scheduled:
 
 @dataclass(frozen=True)
 class Compiled:
-    """Compiled file."""
+    """Compiled program."""
 
-    file: str
+    files: ProgramFiles
     code: CodeType
     source: str
     """Python code."""
@@ -61,45 +55,56 @@ class Compiled:
     """Programs in the order in which they run."""
     globals: BlockType
     digest: str
-    """SHA-256 of the text. A snapshot fits the same program only."""
+    """SHA-256 of the text and its dialect. A snapshot fits the same program only."""
     trace: bool
     """True if assignments record the last write of a variable."""
     shared: Mapping[tuple[str, str], int]
     """Number of the memory that a located variable shares with others, by Python class and slot."""
+    warnings: tuple[str, ...] = ()
+    """Sentences about implicit conversions that may change a value, in the order of the text."""
+
+    @property
+    def file(self) -> str:
+        """First file of the program."""
+        return self.files.names[0]
 
 
-def compile_file(path: Path, trace: bool = False) -> Compiled:
-    """Compile the program in a file. Raise StructuredTextError if the file can't be read or the program is wrong."""
-    try:
-        text = read_file(path, MOST_BYTES).decode("utf-8-sig")
-    except FileError as error:
-        raise StructuredTextError(f"{path}: {error}, expected a program in Structured Text") from error
-    except UnicodeDecodeError as error:
-        raise StructuredTextError(f"{path}: is not UTF-8 ({error.reason} at byte {error.start})") from error
-    return compile_text(text, str(path), trace)
+def compile_files(paths: Paths, trace: bool = False, dialect: str = "") -> Compiled:
+    """Compile the program in files or folders. Raise StructuredTextError if one can't be read or is wrong.
+
+    dialect: name in `DIALECTS`; "" for the default of the files' types.
+    """
+    texts = read_texts(paths)
+    return compile_texts(texts, trace, dialect_of([one.file for one in texts], dialect))
 
 
-def compile_text(text: str, file: str = "program.st", trace: bool = False) -> Compiled:
-    """Compile a text. Raise StructuredTextError if it is wrong.
+def compile_text(text: str, file: str = "program.st", trace: bool = False, dialect: Dialect = IEC) -> Compiled:
+    """Compile a program in one text. Raise StructuredTextError if it is wrong.
 
     trace: True to record the last write of each variable.
     """
+    return compile_texts([Text(file, text)], trace, dialect)
+
+
+def compile_texts(texts: Sequence[Text], trace: bool, dialect: Dialect) -> Compiled:
+    """Compile a program in texts. Raise StructuredTextError if it is wrong."""
+    file = texts[0].file
     try:
-        return _compile(text, file, trace)
-    except SourceError as error:
-        place = f"{file}:{error.at.line}:{error.at.column}"
-        raise StructuredTextError(f"{place}: {printable(error, SENTENCE)}") from None
+        source, files = joined(texts, dialect)
+        try:
+            return _compile(source, files, digest(texts, dialect), trace, dialect)
+        except SourceError as error:
+            raise files.error(error) from None
     except (RecursionError, MemoryError, SyntaxError):  # limits of Python's compiler
         raise StructuredTextError(f"{file}: found a program nested too deeply, expected a flatter one") from None
 
 
-def _compile(text: str, file: str, trace: bool) -> Compiled:
-    source = parse(text)
+def _compile(source: tree.SourceFile, files: ProgramFiles, fingerprint: str, trace: bool, dialect: Dialect) -> Compiled:
     if len(source.units) > MOST_UNITS:
         at, count = source.units[MOST_UNITS].at, len(source.units)
         raise SourceError(at, f"found {count} programs, functions and blocks, expected at most {MOST_UNITS}")
     calls = CallCompiler(trace)
-    declared = calls.declarations = Declarations(source, calls)
+    declared = calls.declarations = Declarations(source, calls, dialect)
     declared.resolve()
     lines = CodeLines()
     for one in source.types:
@@ -110,7 +115,7 @@ def _compile(text: str, file: str, trace: bool) -> Compiled:
     if layout.size:
         lines.add(f"_memory = _Memory({layout.size})")
     for unit, kind in units:
-        _unit(unit, kind, Expressions(declared.scope(kind), calls), lines, calls, layout)
+        _unit(unit, kind, declared, lines, calls, layout)
     calls.require_finite()
     for structure in declared.structures:
         _class(lines, structure.python, "_Record", list(structure.members.values()))
@@ -125,15 +130,16 @@ def _compile(text: str, file: str, trace: bool) -> Compiled:
             conflict = f"found {shared.name}, which has the name of a program"
             raise SourceError(Position(*shared.at), f"{conflict}, expected another: {key}/x would be two variables")
     return Compiled(
-        file,
-        compile(python, f"<{file}>", "exec"),
+        files,
+        compile(python, f"<{files.names[0]}>", "exec"),
         python,
         tuple(lines.positions),
         tuple(sorted(scheduled, key=lambda one: one.priority)),
         declared.names.globals,
-        hashlib.sha256(text.encode()).hexdigest(),
+        fingerprint,
         trace,
         {place: one.group for place, one in layout.places.items()},
+        tuple(f"{files.place(at)}: {words}" for at, words in sorted(declared.names.warnings.items())),
     )
 
 
@@ -161,12 +167,12 @@ def _type_of(unit: tree.ProgramUnit, declared: Declarations) -> BlockType:
 def _unit(
     unit: tree.ProgramUnit,
     kind: BlockType,
-    expressions: Expressions,
+    declared: Declarations,
     lines: CodeLines,
     calls: CallCompiler,
     layout: Layout,
 ) -> None:
-    """Write the class of a unit. Its method `run` is the body."""
+    """Write the class of a unit. Its method `run` is the body; those of actions are named a_NAME."""
     members = [one for one in kind.members.values() if one.section != "VAR_EXTERNAL"]
     _class(lines, kind.python, "", members, layout)
     with lines.inner():
@@ -175,7 +181,13 @@ def _unit(
         with lines.inner():
             for member in kind.of("VAR_TEMP"):
                 lines.add(f"self.{member.slot} = {member.initial}")
+        expressions = Expressions(declared.scope(kind), calls)
         Statements(lines, expressions, calls).block(unit.body, unit.at, statements(made))
+        for action in unit.actions:
+            expressions = Expressions(declared.scope(kind), calls)
+            expressions.action = action.name.lower()
+            lines.add(f"def a_{expressions.action}(self, now):", action.at)
+            Statements(lines, expressions, calls).block(action.body, action.at)
     if kind.function:
         _function(kind, lines)
 

@@ -11,15 +11,17 @@ from typing import Any
 
 from conveyor_sim.control.recorded import PREFIX, patterns
 from conveyor_sim.control.scan import ControlError, Inputs, LineTags
-from conveyor_sim.control.st.compile import compile_file
+from conveyor_sim.control.st.compile import compile_files
 from conveyor_sim.control.st.errors import StructuredTextError
 from conveyor_sim.control.st.mapping import Addresses, TagMapping, mapped, read_addresses
-from conveyor_sim.control.st.program import BUDGET, Program, python_value
+from conveyor_sim.control.st.program import BUDGET, MOST_VARIABLES, Program, python_value
 from conveyor_sim.control.st.types import TIME, Type
 from conveyor_sim.control.st.variables import Variable, load
 from conveyor_sim.support.rounded_limit import at_limit, single
 
 _NS = 1e9
+MOST_WARNINGS = 20
+"""Largest number of listed warnings of the compiler."""
 
 
 class StructuredText:
@@ -34,19 +36,23 @@ class StructuredText:
         budget: int = BUDGET,
         trace: bool = False,
         record: str | Iterable[str] = (),
+        dialect: str = "",
+        files: Iterable[str | PathLike[str]] = (),
     ) -> None:
         """Compile a program.
 
-        path: of the program. tags: by variable ("main/speed"); they override those in the program. modbus_map: file
-        with the addresses of located variables (AT %IX0.0). budget: largest number of statements of all programs in one
-        scan; the watchdog stops a program that exceeds it. trace: True to make `last_written` available; scans take
-        longer. record: patterns of variables to record ("main/*", `control/recorded.py`).
+        path: of the program: a file, or a folder whose files are one program. tags: by variable ("main/speed"); they
+        override those in the program. modbus_map: file with the addresses of located variables (AT %IX0.0). budget:
+        largest number of statements of all programs in one scan; the watchdog stops a program that exceeds it. trace:
+        True to make `last_written` available; scans take longer. record: patterns of variables to record ("main/*",
+        `control/recorded.py`). dialect: iec, codesys, twincat or tia; "" for the default of the files' types. files:
+        further files and folders of the program, in any order.
 
         Raise StructuredTextError, a ControlError, for a wrong program, and MapError for a wrong map.
         """
         self._tags = dict(tags or {})
         self._addresses: Addresses = {} if modbus_map is None else read_addresses(Path(modbus_map))
-        self.program = Program(compile_file(Path(path), trace), budget)
+        self.program = Program(compile_files([path, *files], trace, dialect), budget)
         self.record = patterns(record)
         """Patterns of the variables to record."""
         self.mapping: TagMapping | None = None
@@ -67,15 +73,29 @@ class StructuredText:
         """Find the variables of the mapping in the present instances."""
         assert self.mapping is not None
         variables = self.program.variables
+        for one in self.mapping.bound:
+            if one.variable not in variables:
+                found = f"found a tag for {one.variable}, which is not among the first {MOST_VARIABLES} variables"
+                raise StructuredTextError(f"{self.program.compiled.file}: {found}, expected fewer variables before it")
         pairs = [(one.is_input, variables[one.variable], one.tag) for one in self.mapping.bound]
         self._ins = [(variable, tag) for is_input, variable, tag in pairs if is_input]
         self._outs = [(variable, tag) for is_input, variable, tag in pairs if not is_input]
 
     @property
     def left_over(self) -> tuple[str, ...]:
-        """Sentences about variables without a tag and commands without a variable, after `bind`."""
-        file = self.program.compiled.file
-        return () if self.mapping is None else tuple(f"{file}: {words}" for words in self.mapping.left_over())
+        """Sentences about implicit conversions, variables without a tag and commands without a variable.
+
+        The latter are available after `bind`.
+        """
+        file, warnings = self.program.compiled.file, self.program.compiled.warnings
+        more = len(warnings) - MOST_WARNINGS
+        listed = (
+            *warnings[:MOST_WARNINGS],
+            *([f"{file}: {more} more conversions that may change a value"] * (more > 0)),
+        )
+        return (
+            listed if self.mapping is None else (*listed, *(f"{file}: {words}" for words in self.mapping.left_over()))
+        )
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
         """Return commands and alarms after this scan. Raise StructuredTextError if the program stops."""

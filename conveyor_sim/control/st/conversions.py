@@ -4,6 +4,7 @@
 Whole numbers and bit strings keep their lowest bits; reals become the nearest whole number, of two the even one, and
 stop the program where the type has none. A DWORD is the bits of a REAL, an LWORD those of an LREAL. A TIME is a number
 of milliseconds and an LTIME a number of nanoseconds, as in CODESYS and TwinCAT; the standard leaves this open.
+`date_arithmetic.py` converts dates and times of day.
 """
 
 from __future__ import annotations
@@ -14,7 +15,11 @@ import struct
 from dataclasses import replace
 from typing import Any
 
+from conveyor_sim.control.st.date_arithmetic import conversion_code
+from conveyor_sim.control.st.dates import PREFIXES, moment
+from conveyor_sim.control.st.dialect import Dialect
 from conveyor_sim.control.st.errors import Fault, Position, SourceError
+from conveyor_sim.control.st.implicit import as_number
 from conveyor_sim.control.st.literals import duration, long_time_text, time_text
 from conveyor_sim.control.st.types import (
     DINT,
@@ -27,6 +32,7 @@ from conveyor_sim.control.st.types import (
     STRING,
     TIME,
     Enumeration,
+    Moment,
     String,
     Type,
     single,
@@ -52,7 +58,7 @@ def conversion(name: str, hint: Type | None) -> tuple[Type | None, Type, bool] |
     return ELEMENTARY[source] if source else None, ELEMENTARY[target], word == "TRUNC"
 
 
-def convert(at: Position, name: str, value: Value, hint: Type | None) -> Value:
+def convert(at: Position, name: str, value: Value, hint: Type | None, dialect: Dialect) -> Value:
     """Compile a call of a conversion function."""
     types = conversion(name, hint)
     assert types is not None
@@ -66,7 +72,10 @@ def convert(at: Position, name: str, value: Value, hint: Type | None) -> Value:
         value = Value(at, value.type if isinstance(source, String) else source, argument, known)
     elif value.literal:
         value = Value(at, value.type, value.code, value.constant)
-    code = _cut(value, target) if cut else _code(value, target)
+    if target.kind == "real":
+        value = as_number(value, dialect)
+    into = as_number(Value(at, target, ""), dialect).type if value.type.base.kind == "real" else target
+    code = _cut(value, into) if cut else _code(value, into)
     if code is None:
         raise SourceError(
             at, f"found {name} of {described(value)}, which is no conversion, expected one of the standard"
@@ -94,6 +103,8 @@ def _code(value: Value, target: Type) -> str | None:
         code = f"int({code})" if source.kind == "bool" else code
     if target.kind == "bool":
         return f"({code} != 0)"
+    if "date" in (source.kind, target.kind):
+        return conversion_code(source, code, target)
     if source.kind == "real":
         return _from_real(source, code, target)
     if target.kind == "real":
@@ -126,6 +137,8 @@ def _from_real(source: Type, code: str, target: Type) -> str | None:
 def _to_text(source: Type, code: str) -> str | None:
     if isinstance(source, Enumeration):
         return f"dict({ {value: name[: STRING.high] for name, value in source.values}!r}).get({code}, '')"
+    if isinstance(source, Moment):
+        return f"_moment_text({code}, {source.name!r})"
     names = {"bool": "_bool_text", "int": "str", "bits": "str", "time": "_time_text", "real": "repr"}
     name = {REAL: "_single_text", LTIME: "_long_time_text"}.get(source) or names.get(source.kind)
     return f"{name}({code})" if name else None
@@ -158,6 +171,8 @@ def _parsed(text: str, name: str) -> Any:
                 return whole
         if target.kind == "time" and _DURATION.match(plain):
             return duration(Position(1, 1), plain)
+        if isinstance(target, Moment) and PREFIXES[plain.partition("#")[0].upper()].part == target.part:
+            return moment(Position(1, 1), plain)
     except (ValueError, KeyError, SourceError):
         pass
     raise Fault(f"STRING_TO_{name}: found {text[:40]!r}, expected {name}")

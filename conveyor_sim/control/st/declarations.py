@@ -7,12 +7,17 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from conveyor_sim.control.st import tree
-from conveyor_sim.control.st.blocks import STANDARD
+from conveyor_sim.control.st.actions import require_apart
+from conveyor_sim.control.st.blocks import CODESYS, STANDARD
+from conveyor_sim.control.st.dialect import Dialect
 from conveyor_sim.control.st.errors import Position, SourceError
 from conveyor_sim.control.st.expressions import Expressions
-from conveyor_sim.control.st.located import Located, address_of, require_fit
+from conveyor_sim.control.st.foreign import advice
+from conveyor_sim.control.st.implicit import adapted
+from conveyor_sim.control.st.located import Located, address_of, incomplete, is_incomplete, require_fit
 from conveyor_sim.control.st.scope import Names, Scope
-from conveyor_sim.control.st.sections import LOCATED, OUTSIDE, meaning
+from conveyor_sim.control.st.sections import INCOMPLETE, LOCATED, OUTSIDE, meaning
+from conveyor_sim.control.st.tia_blocks import BLOCKS
 from conveyor_sim.control.st.types import (
     ELEMENTARY,
     MOST_CHARACTERS,
@@ -20,6 +25,7 @@ from conveyor_sim.control.st.types import (
     BlockType,
     Enumeration,
     Member,
+    OpenArray,
     String,
     Structure,
     Subrange,
@@ -47,12 +53,13 @@ MOST_CONSTANTS = 50
 class Declarations:
     """Declarations of one file. Names are resolved at their first use, so the order in the file is free."""
 
-    def __init__(self, source: tree.SourceFile, calls: Any) -> None:
+    def __init__(self, source: tree.SourceFile, calls: Any, dialect: Dialect) -> None:
         """Register all names of a file.
 
         calls: as `Expressions` takes it.
         """
-        self.names = Names(types={name.lower(): block for name, block in STANDARD.items()})
+        blocks = {**STANDARD, **(CODESYS if dialect.standard_names else BLOCKS if dialect.tia_sources else {})}
+        self.names = Names(dialect, types={name.lower(): block for name, block in blocks.items()})
         self.structures: list[Structure] = []
         """Declared structures, each after those it contains."""
         self.located: list[Located] = []
@@ -119,7 +126,7 @@ class Declarations:
             return known
         declared = self._pending.get(name.lower())
         if declared is None:
-            raise SourceError(at, f"found {name}, expected a type")
+            raise SourceError(at, f"found {name}, expected {advice(name) or 'a type'}")
         key = name.lower()
         if key in self._open:
             raise SourceError(at, f"found {name} inside of itself, expected another type")
@@ -152,6 +159,8 @@ class Declarations:
 
     def _type(self, spec: tree.TypeSpec, known: Expressions, name: str = "") -> Type:
         if isinstance(spec, tree.NamedType):
+            if spec.prefix:
+                known.scope.require_prefix(spec.at, spec.prefix, spec.name)
             kind = self.named(spec.at, spec.name)
             if spec.length is None:
                 return kind
@@ -195,6 +204,10 @@ class Declarations:
             require_small(elements, 0, spec.at)
             ranges.append((low, high))
         element = self._type(spec.element, known)
+        _require_closed(element, spec.element.at, "an ARRAY")
+        if spec.dimensions:
+            shown = ", ".join("*" * spec.dimensions)
+            return OpenArray(f"ARRAY [{shown}] OF {element.name}", "array", element=element, dimensions=spec.dimensions)
         require_small(elements * element.size, elements * element.characters, spec.at)
         shown = ", ".join(f"{low}..{high}" for low, high in ranges)
         return Array(f"ARRAY [{shown}] OF {element.name}", "array", ranges=tuple(ranges), element=element)
@@ -236,6 +249,7 @@ class Declarations:
     def _declared(self, declared: tree.TypeDeclaration) -> Type:
         known = Expressions(self.scope(None), self._calls)
         kind = self._type(declared.type, known, declared.name)
+        _require_closed(kind, declared.type.at, "a TYPE")
         if declared.initial is None:
             return kind
         return replace(kind, start=self._initial(declared.initial, kind, known))
@@ -243,17 +257,26 @@ class Declarations:
     def _unit(self, unit: tree.ProgramUnit) -> BlockType:
         prefix = {"FUNCTION": "_F_", "FUNCTION_BLOCK": "_B_", "PROGRAM": "_P_"}[unit.kind]
         result = self.type(unit.result) if unit.result is not None else None
+        if unit.result is not None and result is not None:
+            _require_closed(result, unit.result.at, "a result")
         kind = BlockType(
-            unit.name, "block", python=prefix + unit.name.lower(), function=unit.kind == "FUNCTION", result=result
+            unit.name,
+            "block",
+            python=prefix + unit.name.lower(),
+            function=unit.kind == "FUNCTION",
+            result=result,
+            actions=frozenset(one.name.lower() for one in unit.actions),
         )
         self._members(kind, unit.sections, unit.kind)
+        require_apart(unit, kind)
         if result is not None:
             name = unit.name.lower()
             if name in kind.members:
                 raise SourceError(unit.at, f"found a variable {unit.name} in the function of that name")
             kind.members[name] = Member(unit.name, result, result.initial, "RESULT")
         for member in kind.members.values():
-            if kind.function and isinstance(member.type, BlockType) and member.section != "VAR_IN_OUT":
+            passing = member.section == "VAR_IN_OUT" or member.name.lower() in kind.statics
+            if kind.function and isinstance(member.type, BlockType) and not passing:
                 at = Position(*member.at)
                 raise SourceError(at, f"found {member.name}, a block, in a function, expected it in a block or program")
         self._bound(kind, unit.at)
@@ -265,10 +288,51 @@ class Declarations:
         unit: its kind, as in `sections.py`.
         """
         known = Expressions(self.scope(None if kind is self.names.globals else kind), self._calls)
+        open_: dict[int, tuple[tree.VariableDeclaration, tree.VariableSection, tuple[str, ...]]] = {}
+        constants: dict[str, int] = {}
         for section in sections:
-            qualifiers = meaning(section, unit)
+            static = section.section == "VAR_STAT"
+            if static:
+                self.names.dialect.require("static_variables", section.at, "VAR_STAT", "another section")
+            qualifiers = meaning(replace(section, section="VAR") if static else section, unit)
             for declared in section.declarations:
-                self._add(kind, declared, section.section, qualifiers, known)
+                if section.section == "VAR" and "CONSTANT" in qualifiers:
+                    constants.setdefault(declared.name.lower(), len(open_))
+                open_[len(open_)] = declared, section, qualifiers
+        order = list(open_.values())
+
+        def declare(number: int) -> None:
+            if (one := open_.pop(number, None)) is not None:
+                declared, section, qualifiers = one
+                add = self._add_static if section.section == "VAR_STAT" else self._add
+                add(kind, declared, section.section, qualifiers, known)
+
+        known.scope.late = lambda key: declare(constants.get(key, -1))
+        for number in range(len(order)):
+            declare(number)
+        known.scope.late = None
+        if constants:
+            for declared, *_ in order:
+                kind.members[declared.name.lower()] = kind.members.pop(declared.name.lower())
+
+    def _add_static(
+        self,
+        kind: BlockType,
+        declared: tree.VariableDeclaration,
+        section: str,
+        qualifiers: tuple[str, ...],
+        known: Expressions,
+    ) -> None:
+        """Add a variable of VAR_STAT as a global one with the name of the unit before its name."""
+        key, shared = declared.name.lower(), self.names.globals
+        if key in kind.members:
+            raise SourceError(declared.at, f"found {declared.name} again, expected another name")
+        name = f"{kind.name}.{declared.name}"
+        python = f"s_{len(shared.members)}"
+        self._add(shared, replace(declared, name=name), "VAR_GLOBAL", qualifiers, known, python)
+        kind.statics[key] = name.lower()
+        member = shared.members[name.lower()]
+        kind.members[key] = replace(member, name=declared.name, section="VAR_EXTERNAL", address="", tag="")
 
     def _add(
         self,
@@ -277,19 +341,28 @@ class Declarations:
         section: str,
         qualifiers: tuple[str, ...],
         known: Expressions,
+        python: str = "",
     ) -> None:
         key = declared.name.lower()
         if key in kind.members:
             raise SourceError(declared.at, f"found {declared.name} again, expected another name")
+        declared = self._with_arguments(declared)
         unit = OUTSIDE if kind is self.names.globals else "PROGRAM" if kind.python.startswith("_P_") else ""
-        if (declared.tag or declared.address) and section not in LOCATED.get(unit, ()):
+        if is_incomplete(declared.address) and not declared.tag:
+            own = unit or ("FUNCTION_BLOCK" if kind.python.startswith("_B_") else "")
+            if section not in INCOMPLETE.get(own, ()):
+                where = "VAR, VAR_INPUT, VAR_OUTPUT of a PROGRAM or FUNCTION_BLOCK, or VAR_GLOBAL"
+                raise SourceError(declared.at, f"found {declared.address} in {section}, expected it in {where}")
+        elif (declared.tag or declared.address) and section not in LOCATED.get(unit, ()):
             written = declared.address or f"{{tag: {declared.tag}}}"
             where = f"{', '.join(LOCATED[unit])} of a PROGRAM" if unit else "a PROGRAM or VAR_GLOBAL only"
             raise SourceError(declared.at, f"found {written}, expected it in {where}")
         type_ = self._type(declared.type, known)
+        if section != "VAR_IN_OUT" and not (section == "VAR_INPUT" and isinstance(kind, BlockType) and kind.function):
+            _require_closed(type_, declared.type.at, section)
         if isinstance(type_, BlockType) and (type_.function or type_.python.startswith("_P_")):
             raise SourceError(declared.at, f"found {type_.name}, expected a type or a function block")
-        constant = "CONSTANT" in qualifiers
+        constant = "CONSTANT" in qualifiers and section != "VAR_INPUT"  # of an input the caller's value counts
         code, value = type_.initial, None
         if declared.initial is not None:
             if section in ("VAR_IN_OUT", "VAR_EXTERNAL"):
@@ -315,13 +388,40 @@ class Declarations:
             value,
             declared.address,
             declared.tag,
+            "CONSTANT" in qualifiers and section == "VAR_INPUT",
+            python,
             declared.at,
         )
-        if declared.address:
-            address = address_of(declared.at, declared.address)
+        if is_incomplete(declared.address):
+            require_fit(declared.at, declared.name, type_, incomplete(declared.address), constant)
+        elif declared.address:
+            address = address_of(declared.at, declared.address, self.names.dialect.byte_addresses)
             require_fit(declared.at, declared.name, type_, address, constant)
             initial = declared.initial is not None or bool(type_.start)
             self.located.append(Located(kind.python, member, address, initial))
+
+    def _with_arguments(self, declared: tree.VariableDeclaration) -> tree.VariableDeclaration:
+        """Return a declaration with the arguments of its block or structure, TON (PT := T#1s), as initial values."""
+        spec = declared.type
+        if not isinstance(spec, tree.EnumType) or not spec.prefixed:
+            return declared
+        kind = self.named(spec.at, spec.base)
+        if not isinstance(kind, Structure):
+            return declared
+        expected = f"{declared.name} : {spec.base} := ( and the values"
+        self.names.dialect.require("instance_arguments", spec.at, f"arguments of {spec.base}", expected)
+        if declared.initial is not None:
+            raise SourceError(declared.initial.at, f"found a second initial value of {declared.name}, expected one")
+        fields = []
+        for at, name, value in spec.values:
+            if value is None:
+                raise SourceError(at, f"found {name}, expected {name} := and a value")
+            fields.append((at, name, value))
+        return replace(
+            declared,
+            type=tree.NamedType(spec.at, spec.base),
+            initial=tree.InitialStructure(spec.at, tuple(fields)),
+        )
 
     def _initial(self, node: tree.Expression, kind: Type, known: Expressions) -> str:
         """Code of an initial value, made of constants."""
@@ -329,7 +429,7 @@ class Declarations:
             return self._initial_array(node, kind, known)
         if isinstance(node, tree.InitialStructure):
             return self._initial_structure(node, kind, known)
-        value = known.value(node, kind)
+        value = adapted(known.value(node, kind), kind, self.names)
         if value.constant is None:
             raise SourceError(node.at, f"found {described(value)}, expected a constant as an initial value")
         code = converted(value, kind)
@@ -372,6 +472,13 @@ class Declarations:
                 )
             fields.append(f"{member.slot}={self._initial(value, member.type, known)}")
         return f"_with({kind.python}(), {', '.join(fields)})"
+
+
+def _require_closed(kind: Type, at: Position, where: str) -> None:
+    """Raise SourceError for ARRAY [*] in a place where no call gives it bounds."""
+    if isinstance(kind, OpenArray):
+        expected = "expected it in VAR_IN_OUT, or in VAR_INPUT of a FUNCTION"
+        raise SourceError(at, f"found {kind.name} in {where}, {expected}")
 
 
 def require_small(elements: int, characters: int, at: Position, of: str = "") -> None:

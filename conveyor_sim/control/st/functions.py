@@ -4,20 +4,23 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 
 from conveyor_sim.control.st import tree
+from conveyor_sim.control.st.application import Application, Build, Standard, standard
+from conveyor_sim.control.st.bcd import BCD
 from conveyor_sim.control.st.conversions import conversion, convert
+from conveyor_sim.control.st.date_functions import DATES
 from conveyor_sim.control.st.errors import Position, SourceError
 from conveyor_sim.control.st.expressions import Expressions
+from conveyor_sim.control.st.implicit import adapted, as_number
 from conveyor_sim.control.st.integers import intermediate, reach
 from conveyor_sim.control.st.types import (
     BOOL,
     INT,
     LREAL,
+    LTIME,
     MOST_CHARACTERS,
-    NUMBERS,
     REAL,
     STRING,
     TIME,
@@ -27,63 +30,12 @@ from conveyor_sim.control.st.types import (
     Type,
     fits,
 )
-from conveyor_sim.control.st.values import Value, converted, described, folded, operand, unified
+from conveyor_sim.control.st.values import Place, Value, converted, described, folded, operand
 from conveyor_sim.control.st.work import MANY, MANY_SEARCHED
 from conveyor_sim.control.st.work import conversion as conversion_work
 
-Build = Callable[["Application"], Value]
-
-
-@dataclass(frozen=True)
-class Application:
-    """Call of a standard function."""
-
-    at: Position
-    name: str
-    """Name in capitals."""
-    values: Sequence[Value]
-    expressions: Expressions
-    hint: Type | None
-
-    def joined(self, values: Sequence[Value]) -> Type:
-        """Return the common type of values."""
-        first, *others = values
-        for other in others:
-            kind = unified(first, other, self.hint)
-            if kind is None:
-                found = f"{described(first)} and {described(other)}"
-                raise SourceError(other.at, f"found {found} in {self.name}, expected values of one type")
-            literal = first.literal if first.literal and other.literal else ""
-            known = first.constant if first.literal and not other.literal else other.constant
-            first = Value(first.at, kind, "", known if literal else None, literal)
-        if first.literal and self.hint is not None and self.hint.base in NUMBERS:
-            return self.hint.base if first.literal == "int" or self.hint.base.kind == "real" else LREAL
-        return first.type.base
-
-    def result(self, code: str, kind: Type, values: Sequence[Value] = ()) -> Value:
-        """Return the result.
-
-        values: candidates of a result that is one of them. The result is as wide as they are.
-        """
-        reached = [reach(one, kind) for one in values] if kind.kind == "int" else []
-        span = (min(low for low, _ in reached), max(high for _, high in reached)) if reached else None
-        return folded(Value(self.at, kind, code, span=span), *self.values)
-
-    def refuse(self, value: Value, expected: str) -> SourceError:
-        """Return the error of a wrong argument."""
-        return SourceError(value.at, f"found {described(value)} in {self.name}, expected {expected}")
-
-    def whole(self, value: Value) -> str:
-        """Return the code of a whole number."""
-        if value.type.base.kind != "int" or value.literal == "real":
-            raise self.refuse(value, "a whole number")
-        return value.code
-
-    def text(self, value: Value) -> str:
-        """Return the code of a text."""
-        if value.type.kind != "string":
-            raise self.refuse(value, "a STRING")
-        return value.code
+_NUMERIC = {"ABS", "SQRT", "LN", "LOG", "EXP", "SIN", "COS", "TAN", "ASIN", "ACOS", "ATAN", "ATAN2", "EXPT"}
+"""Functions of numbers only."""
 
 
 def _real(call: Application) -> Value:
@@ -154,6 +106,9 @@ def _pick(python: str, ordered: bool, before: int = 0) -> Build:
 def _shift(call: Application) -> Value:
     value, by = call.values
     kind = value.type.base
+    if kind.kind == "int" and not value.literal and call.expressions.scope.names.dialect.integer_logic:
+        code = f"_shift_signed({converted(value, kind)}, {call.whole(by)}, {kind.width}, {call.name!r})"
+        return call.result(code if kind.low else code.replace("_signed", ""), kind)
     if value.literal and call.hint is not None:
         kind = call.hint.base
     if kind.kind != "bits":
@@ -189,7 +144,10 @@ def _texts(parameters: str, result: str) -> Build:
 
 def _convert(call: Application, name: str) -> Value:
     (value,) = call.values
-    result = convert(call.at, name, value, call.hint)
+    types = conversion(name, call.hint)
+    if types is not None and types[0] is not None:
+        value = adapted(value, types[0], call.expressions.scope.names)
+    result = convert(call.at, name, value, call.hint, call.expressions.scope.names.dialect)
     call.expressions.work += conversion_work(value.type, result.type)
     return result
 
@@ -199,56 +157,45 @@ def _move(call: Application) -> Value:
 
 
 def _now(call: Application) -> Value:
-    return Value(call.at, TIME, "_rt.now")
-
-
-@dataclass(frozen=True)
-class Standard:
-    """Standard function. The last parameter ends in "..." if it may be repeated."""
-
-    parameters: tuple[str, ...]
-    build: Build
-
-
-def _standard(parameters: str, build: Build) -> Standard:
-    return Standard(tuple(parameters.split()), build)
+    return Value(call.at, LTIME if call.name == "LTIME" else TIME, "_rt.now")
 
 
 FUNCTIONS: dict[str, Standard] = {
     **{
-        name: _standard("IN", _real)
+        name: standard("IN", _real)
         for name in ["SQRT", "LN", "LOG", "EXP", "SIN", "COS", "TAN", "ASIN", "ACOS", "ATAN"]
     },
-    "ATAN2": _standard("Y X", _real),
-    "ABS": _standard("IN", _abs),
-    "EXPT": _standard("IN1 IN2", _operator("**")),
-    "ADD": _standard("IN1 IN2...", _operator("+")),
-    "MUL": _standard("IN1 IN2...", _operator("*")),
-    "SUB": _standard("IN1 IN2", _operator("-")),
-    "DIV": _standard("IN1 IN2", _operator("/")),
-    "ADD_TIME": _standard("IN1 IN2", _operator("+")),
-    "SUB_TIME": _standard("IN1 IN2", _operator("-")),
-    "MUL_TIME": _standard("IN1 IN2", _operator("*")),
-    "DIV_TIME": _standard("IN1 IN2", _operator("/")),
-    "MOVE": _standard("IN", _move),
-    "SEL": _standard("G IN0 IN1", _pick("SEL", False, 1)),
-    "MUX": _standard("K IN0 IN1...", _pick("_mux", False, 1)),
-    "MAX": _standard("IN1 IN2...", _pick("max", True)),
-    "MIN": _standard("IN1 IN2...", _pick("min", True)),
-    "LIMIT": _standard("MN IN MX", _pick("_limit", True)),
-    **{name: _standard("IN1 IN2...", _compare) for name in ["GT", "GE", "EQ", "LE", "LT"]},
-    "NE": _standard("IN1 IN2", _operator("<>")),
-    **{name: _standard("IN N", _shift) for name in ["SHL", "SHR", "ROL", "ROR"]},
-    "LEN": _standard("IN", _texts("s", "n")),
-    "LEFT": _standard("IN L", _texts("sn", "s")),
-    "RIGHT": _standard("IN L", _texts("sn", "s")),
-    "MID": _standard("IN L P", _texts("snn", "s")),
-    "CONCAT": _standard("IN1 IN2...", _texts("s", "s")),
-    "INSERT": _standard("IN1 IN2 P", _texts("ssn", "s")),
-    "DELETE": _standard("IN L P", _texts("snn", "s")),
-    "REPLACE": _standard("IN1 IN2 L P", _texts("ssnn", "s")),
-    "FIND": _standard("IN1 IN2", _texts("ss", "n")),
-    "TIME": _standard("", _now),
+    "ATAN2": standard("Y X", _real),
+    "ABS": standard("IN", _abs),
+    "EXPT": standard("IN1 IN2", _operator("**")),
+    "ADD": standard("IN1 IN2...", _operator("+")),
+    "MUL": standard("IN1 IN2...", _operator("*")),
+    "SUB": standard("IN1 IN2", _operator("-")),
+    "DIV": standard("IN1 IN2", _operator("/")),
+    **{name: standard("IN1 IN2...", _operator(name)) for name in ["AND", "OR", "XOR"]},
+    "MOD": standard("IN1 IN2", _operator("MOD")),
+    "MOVE": standard("IN", _move),
+    "SEL": standard("G IN0 IN1", _pick("SEL", False, 1)),
+    "MUX": standard("K IN0 IN1...", _pick("_mux", False, 1)),
+    "MAX": standard("IN1 IN2...", _pick("max", True)),
+    "MIN": standard("IN1 IN2...", _pick("min", True)),
+    "LIMIT": standard("MN IN MX", _pick("_limit", True)),
+    **{name: standard("IN1 IN2...", _compare) for name in ["GT", "GE", "EQ", "LE", "LT"]},
+    "NE": standard("IN1 IN2", _operator("<>")),
+    **{name: standard("IN N", _shift) for name in ["SHL", "SHR", "ROL", "ROR"]},
+    "LEN": standard("IN", _texts("s", "n")),
+    "LEFT": standard("IN L", _texts("sn", "s")),
+    "RIGHT": standard("IN L", _texts("sn", "s")),
+    "MID": standard("IN L P", _texts("snn", "s")),
+    "CONCAT": standard("IN1 IN2...", _texts("s", "s")),
+    "INSERT": standard("IN1 IN2 P", _texts("ssn", "s")),
+    "DELETE": standard("IN L P", _texts("snn", "s")),
+    "REPLACE": standard("IN1 IN2 L P", _texts("ssnn", "s")),
+    "FIND": standard("IN1 IN2", _texts("ss", "n")),
+    "TIME": standard("", _now),
+    "LTIME": standard("", _now),
+    **DATES,
+    **BCD,
 }
 """Standard functions by name."""
 
@@ -258,13 +205,26 @@ def is_standard(name: str) -> bool:
     return name.upper() in FUNCTIONS or conversion(name, None) is not None
 
 
+def function_of(name: str) -> Standard:
+    """Return a standard function, or a conversion."""
+    return FUNCTIONS.get(name.upper()) or standard("IN", lambda call: _convert(call, name))
+
+
 def apply(
-    at: Position, name: str, given: Sequence[tuple[str | None, Value]], expressions: Expressions, hint: Type | None
+    at: Position,
+    name: str,
+    given: Sequence[tuple[str | None, Value]],
+    expressions: Expressions,
+    hint: Type | None,
+    outputs: Mapping[str, Place],
 ) -> Value:
-    """Compile a call of a standard function, with values by position or by name. Raise SourceError."""
-    standard = FUNCTIONS.get(name.upper()) or _standard("IN", lambda call: _convert(call, name))
-    plain = tuple(one.removesuffix("...") for one in standard.parameters)
-    more = plain != standard.parameters
+    """Compile a call of a standard function, with values by position or by name. Raise SourceError.
+
+    outputs: variables by the names of the function's outputs.
+    """
+    function = function_of(name)
+    plain = tuple(one.removesuffix("...") for one in function.parameters)
+    more = plain != function.parameters
     if given and given[0][0] is not None:
         values = _by_name(at, name, given, plain, more)
     else:
@@ -273,10 +233,13 @@ def apply(
         expected = f"{len(plain)}{' or more' if more else ''}: {', '.join(plain)}" if plain else "none"
         raise SourceError(at, f"found {len(values)} arguments of {name}, expected {expected}")
     expressions.work += 1
+    kinds = {one.type.base.kind for one in values if not one.literal} - {"bool"}  # G of SEL
+    if name.upper() in _NUMERIC or (len(kinds) > 1 and kinds <= {"bits", "int", "real", "enum"}):
+        values = [as_number(one, expressions.scope.names.dialect) for one in values]
     for one in values:
         if one.type.kind in ("block", "void"):
             raise SourceError(one.at, f"found {described(one)} in {name}, expected a value")
-    return standard.build(Application(at, name.upper(), values, expressions, hint))
+    return function.build(Application(at, name.upper(), values, expressions, hint, outputs))
 
 
 def _by_name(

@@ -83,13 +83,16 @@ def _require_short(at: Position, text: str) -> None:
 def characters(at: Position, text: str, wide: bool) -> str:
     """Return the text between quotes.
 
-    $$, $', $N, $0A (two digits; four in a wide text) stand for one character.
+    $$, $', $N, $0A (two digits; four in a wide text) stand for one character, and '' between single quotes for a quote.
     """
     digits = 4 if wide else 2
     body, read, index = text[1:-1], [], 0
     while index < len(body):
         char = body[index]
-        if char != "$":
+        if char == "'" and not wide:
+            read.append(char)
+            index += 2
+        elif char != "$":
             if not wide and ord(char) > 255:
                 raise SourceError(at, f"found {char!r} in a STRING, expected characters up to $FF; a WSTRING has all")
             read.append(char)

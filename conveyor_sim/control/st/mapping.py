@@ -5,14 +5,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import product
 from pathlib import Path
 
 from conveyor_sim.control.scan import ALARMS, LineTags
 from conveyor_sim.control.st.compile import Compiled
 from conveyor_sim.control.st.errors import Position, StructuredTextError
-from conveyor_sim.control.st.located import address_of, overlapping
-from conveyor_sim.control.st.types import ELEMENTARY, Member, Type
+from conveyor_sim.control.st.located import address_of, is_incomplete, overlapping
+from conveyor_sim.control.st.types import ELEMENTARY, Array, Member, Structure, Type
+from conveyor_sim.control.st.variables import leaves
 from conveyor_sim.support.modbus_rows import GONE, WORDS, read_map
 
 _TABLES = {
@@ -21,6 +23,9 @@ _TABLES = {
     ("I", False): "input register",
     ("Q", False): "holding register",
 }
+
+_STORED = ("VAR", "VAR_INPUT", "VAR_OUTPUT")
+"""Sections of the variables that an instance stores, and that may have an address."""
 
 _LISTED = 20
 """Largest number of names in a sentence."""
@@ -86,24 +91,25 @@ def mapped(compiled: Compiled, tags: LineTags, chosen: Mapping[str, str], addres
     """
     file = compiled.file
     candidates = list(_candidates(compiled))
-    known = {one.name for one in candidates}
+    known = dict.fromkeys(one.name for one in candidates)
     groups = {one.name: one.group for one in candidates if one.group is not None}
     for name in chosen:
         if name.lower() not in known:
             raise StructuredTextError(
-                f"{file}: found {name} among the tags, expected one of {', '.join(known) or 'none'}"
+                f"{file}: found {name} among the tags, expected one of {_listed(tuple(known)) or 'none'}"
             )
     wanted = {name.lower(): tag for name, tag in chosen.items()}
     by_identifier = _by_identifier(tags)
     bound: list[TagBinding] = []
     left: list[str] = []
     for name, member, shared in ((one.name, one.member, one.is_global) for one in candidates):
-        where = f"{file}:{member.at[0]}:{member.at[1]}: {member.name}"
+        where = f"{compiled.files.place(Position(*member.at))}: {member.name}"
         tag, how = wanted.get(name) or member.tag, "tag"
         if not tag and member.address:
             tag, how = _located(where, member, addresses), "address"
-        if not tag and (member.section in ("VAR_INPUT", "VAR_OUTPUT") or shared) and not member.constant:
-            tag, how = by_identifier.get(member.name.lower(), ""), "name"
+        is_outer = member.section in ("VAR_INPUT", "VAR_OUTPUT") or is_incomplete(member.address)
+        if not tag and (shared or (is_outer and name.count("/") == 1)) and not member.constant:
+            tag, how = by_identifier.get(name.rpartition("/")[2], ""), "name"
         if tag:
             bound.append(_checked(where, name, member, tag, how, tags))
         elif member.address or member.section in ("VAR_INPUT", "VAR_OUTPUT"):
@@ -137,12 +143,48 @@ class Candidate:
 def _candidates(compiled: Compiled) -> Iterator[Candidate]:
     for member in compiled.globals.members.values():
         group = compiled.shared.get((compiled.globals.python, member.slot))
-        yield Candidate(member.name.lower(), member, True, group)
+        yield from _of_member(member, member.name.lower(), True, group, True)
     for program in compiled.programs:
         for member in program.type.members.values():
             if member.section != "VAR_EXTERNAL":
                 group = compiled.shared.get((program.type.python, member.slot))
-                yield Candidate(f"{program.name.lower()}/{member.name.lower()}", member, False, group)
+                yield from _of_member(member, f"{program.name.lower()}/{member.name.lower()}", False, group, True)
+
+
+def _inside(kind: Type, name: str) -> Iterator[Candidate]:
+    """Yield variables with an address without a number inside a block, a structure or an array of them.
+
+    name: full name of the value.
+    """
+    if isinstance(kind, Array):
+        indices = product(*(range(low, high + 1) for low, high in kind.ranges)) if _has_incomplete(kind) else ()
+        for index in indices:
+            yield from _inside(kind.element, f"{name}[{','.join(map(str, index))}]")
+    elif isinstance(kind, Structure):
+        for member in kind.members.values():
+            if member.section in _STORED:
+                yield from _of_member(member, f"{name}/{member.name.lower()}", False, None)
+
+
+def _of_member(member: Member, name: str, is_global: bool, group: int | None, top: bool = False) -> Iterator[Candidate]:
+    """Yield a variable with an address, and those inside. An array AT %I* is one variable for each element.
+
+    top: True for a variable of a program and a global one, which may have a tag without an address.
+    """
+    if is_incomplete(member.address):
+        for leaf, _, kind in leaves(member.type, name):
+            yield Candidate(leaf, replace(member, type=kind), is_global, group)
+        return
+    if top:
+        yield Candidate(name, member, is_global, group)
+    yield from _inside(member.type, name)
+
+
+def _has_incomplete(kind: Type) -> bool:
+    while isinstance(kind, Array):
+        kind = kind.element
+    members = kind.members.values() if isinstance(kind, Structure) else ()
+    return any(is_incomplete(one.address) or _has_incomplete(one.type) for one in members if one.section in _STORED)
 
 
 def _by_identifier(tags: LineTags) -> dict[str, str]:
@@ -155,9 +197,9 @@ def _by_identifier(tags: LineTags) -> dict[str, str]:
 
 
 def _located(where: str, member: Member, addresses: Addresses) -> str:
-    address = address_of(Position(*member.at), member.address)
-    if address.area == "M":
+    if member.address.startswith("%M") or is_incomplete(member.address):
         return ""
+    address = address_of(Position(*member.at), member.address)
     table = _TABLES[address.area, address.size == "X"]
     if (row := addresses.get((table, address.number))) is None:
         return ""
@@ -184,10 +226,11 @@ def _require_apart(file: str, candidates: Iterable[Candidate], bound: list[TagBi
     tagged = {one.variable for one in bound}
     spans = []
     for one in candidates:
-        if one.member.address and not one.member.address.startswith("%M"):
-            address = address_of(Position(*one.member.at), one.member.address)
-            start = address.number * address.bits
-            spans.append((address.area, start, start + address.bits, one))
+        address = one.member.address
+        if address and not address.startswith("%M") and not is_incomplete(address):
+            place = address_of(Position(*one.member.at), address)
+            start = place.number * place.bits
+            spans.append((place.area, start, start + place.bits, one))
     for group in overlapping(spans):
         own = {one.group if one.group is not None else one.name for one in group}
         free = [one for one in group if one.name not in tagged]

@@ -53,6 +53,53 @@ class Element:
         self._list[self._index] = value
 
 
+class Bounded:
+    """Reference to an array with its bounds, passed as ARRAY [*]."""
+
+    __slots__ = ("_reference", "bounds")
+
+    def __init__(self, reference: Attribute | Element | Held, bounds: tuple[tuple[int, int], ...]) -> None:
+        self._reference, self.bounds = reference, bounds
+
+    @property
+    def root(self) -> Root:
+        """Variable that contains the array."""
+        return self._reference.root
+
+    def get(self) -> Any:
+        """Return the array."""
+        return self._reference.get()
+
+    def place(self, index: int, dimension: int) -> int:
+        """Return the place of an index in a dimension, from 0. Raise Fault for an index beyond the bounds."""
+        low, high = self.bounds[dimension]
+        return index - low if low <= index <= high else outside(index, low, high)
+
+    def bound(self, dimension: int, end: int) -> int:
+        """Return the lower (end 0) or upper (end 1) bound of a dimension, which counts from 1. Raise Fault."""
+        if not 1 <= dimension <= len(self.bounds):
+            raise Fault(f"found dimension {dimension} of an array, expected 1 to {len(self.bounds)}")
+        return self.bounds[dimension - 1][end]
+
+
+class Held:
+    """Copy of an array, passed as VAR_INPUT ARRAY [*]."""
+
+    __slots__ = ("_value",)
+
+    def __init__(self, value: Any) -> None:
+        self._value = value
+
+    @property
+    def root(self) -> Root:
+        """Variable that contains the array: none but the copy itself."""
+        return self, "_value"
+
+    def get(self) -> Any:
+        """Return the array."""
+        return self._value
+
+
 class Traced:
     """Reference to a variable that receives a function's output. The write is recorded."""
 
@@ -104,9 +151,21 @@ def power(a: float, b: float) -> float:
     return result
 
 
-def set_bit(word: Attribute | Element, bit: int, on: bool) -> None:
-    """Set one bit of a bit string."""
-    word.set(word.get() | bit if on else word.get() & ~bit)
+def set_bit(word: Attribute | Element, bit: int, rest: int, on: bool) -> None:
+    """Set one bit of a whole number.
+
+    rest: mask of all others.
+    """
+    word.set(word.get() | bit if on else word.get() & rest)
+
+
+def set_part(word: Attribute | Element, rest: int, value: int, low: int, high: int) -> None:
+    """Set some bits of a whole number from low to high, in two's complement.
+
+    rest: mask of all others; value: shifted to its place.
+    """
+    new = word.get() & rest | value
+    word.set((new - low) % (high - low + 1) + low)
 
 
 def outside(index: int, low: int, high: int) -> int:
@@ -304,6 +363,14 @@ def shift(value: int, by: int, width: int, name: str) -> int:
     return (value << by | value >> (width - by)) & mask
 
 
+def shift_signed(value: int, by: int, width: int, name: str) -> int:
+    """Shift or rotate a signed integer; SHR keeps the sign (CODESYS, TwinCAT)."""
+    if name == "SHR":
+        return value >> by if by >= 0 else shift(value, by, width, name)
+    rotated = shift(value & (1 << width) - 1, by, width, name)
+    return rotated - (1 << width) if rotated >> width - 1 else rotated
+
+
 def chain(compare: Callable[[Any, Any], bool], *values: Any) -> bool:
     """Compare several values, each with the next (GT, GE, EQ, LE, LT)."""
     return all(compare(a, b) for a, b in pairwise(values))
@@ -315,6 +382,7 @@ NAMES: dict[str, Any] = {
     "_quotient": quotient,
     "_power": power,
     "_set_bit": set_bit,
+    "_set_part": set_part,
     "_outside": outside,
     "_in_range": in_range,
     "_rounds": rounds,
@@ -329,6 +397,8 @@ NAMES: dict[str, Any] = {
     "_Record": StructureValue,
     "_Attribute": Attribute,
     "_Element": Element,
+    "_Bounded": Bounded,
+    "_Held": Held,
     "_Traced": Traced,
     "_left": left,
     "_right": right,
@@ -343,6 +413,7 @@ NAMES: dict[str, Any] = {
     "_mux": mux,
     "_sel": sel,
     "_shift": shift,
+    "_shift_signed": shift_signed,
     "_chain": chain,
     "_gt": operator.gt,
     "_ge": operator.ge,

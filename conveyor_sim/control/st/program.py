@@ -9,7 +9,7 @@ from types import TracebackType
 from typing import Any
 
 from conveyor_sim.control.st.compile import Compiled
-from conveyor_sim.control.st.errors import Fault, StructuredTextError
+from conveyor_sim.control.st.errors import Fault, Position, StructuredTextError
 from conveyor_sim.control.st.located import identity
 from conveyor_sim.control.st.operations import Root, copied, find, overwrite
 from conveyor_sim.control.st.types import Type
@@ -118,13 +118,14 @@ class Program:
 
     def _place(self, traceback: TracebackType | None) -> str:
         """Return file, line and column of the innermost statement that was being executed."""
-        place, file = "", self.compiled.file
+        file = self.compiled.file
+        place = file
         while traceback is not None:
             if traceback.tb_frame.f_code.co_filename == f"<{file}>":
                 at = self.compiled.positions[traceback.tb_lineno - 1]
-                place = f":{at.line}:{at.column}" if at is not None else place
+                place = self.compiled.files.place(at) if at is not None else place
             traceback = traceback.tb_next
-        return f"{file}{place}"
+        return place
 
     @property
     def variables(self) -> Mapping[str, Variable]:
@@ -148,7 +149,7 @@ class Program:
         if not self.compiled.trace:
             raise StructuredTextError(f"{self.compiled.file}: found a program without a trace, expected trace=True")
         at = self._written.get(variable.root())
-        return f"{self.compiled.file}:{at[0]}:{at[1]}" if at else ""
+        return self.compiled.files.place(Position(*at)) if at else ""
 
     def snapshot(self) -> dict[str, Any]:
         """Return all state as plain data (JSON)."""
@@ -196,7 +197,7 @@ def python_value(kind: Type, number: float) -> Any:
         return number >= 0.5
     if base.kind == "real":
         return NAMESPACE["_single"](number) if base.name == "REAL" else float(number)
-    whole = round(number * 1e9) if base.kind == "time" else round(number)
+    whole = round(number * 1e9) if base.kind in ("time", "date") else round(number)
     if not kind.low <= whole <= kind.high:
         raise StructuredTextError(f"found {number:g}, expected {kind.name}, {kind.low} to {kind.high}")
     return whole

@@ -42,6 +42,9 @@ TAKES: Mapping[str, Mapping[str, tuple[str, ...]]] = {
 LOCATED: Mapping[str, tuple[str, ...]] = {"PROGRAM": ("VAR", "VAR_INPUT", "VAR_OUTPUT"), OUTSIDE: ("VAR_GLOBAL",)}
 """Sections whose variables may have an address (AT) or a tag, without CONSTANT, by kind of unit."""
 
+INCOMPLETE: Mapping[str, tuple[str, ...]] = {**LOCATED, "FUNCTION_BLOCK": ("VAR", "VAR_INPUT", "VAR_OUTPUT")}
+"""Sections whose variables may have an address without a number (AT %I*), which each instance of a block has."""
+
 _PAIRS = ({"RETAIN", "PERSISTENT"},)
 """Qualifiers that go together."""
 
@@ -49,8 +52,7 @@ _PAIRS = ({"RETAIN", "PERSISTENT"},)
 def meaning(section: tree.VariableSection, unit: str) -> tuple[str, ...]:
     """Return the qualifiers that apply to the variables of a section in a kind of unit.
 
-    PERSISTENT is RETAIN. CONSTANT of an input has no effect, because no unit writes its inputs: the caller's value
-    counts. Raise SourceError for a section or qualifier that the unit does not take.
+    PERSISTENT is RETAIN. Raise SourceError for a section or qualifier that the unit does not take.
     """
     allowed = TAKES[unit]
     name, qualifiers = section.section, section.qualifiers
@@ -68,6 +70,4 @@ def meaning(section: tree.VariableSection, unit: str) -> tuple[str, ...]:
     applied = set(qualifiers)
     if "PERSISTENT" in applied:
         applied.add("RETAIN")
-    if name == "VAR_INPUT":
-        applied.discard("CONSTANT")
     return tuple(sorted(applied))

@@ -2,8 +2,8 @@
 """Types of the standard: ranges, implicit conversions, and code that keeps values in range.
 
 Values are Python's: BOOL a bool; integers, bit strings and enumerations an int; REAL and LREAL a float, a REAL rounded
-to 32 bits; TIME and LTIME an int, ns; STRING a str; an array a list, nested by dimension; a structure or a block an
-object.
+to 32 bits; TIME, LTIME, dates and times of day an int, ns; STRING a str; an array a list, nested by dimension; a
+structure or a block an object.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import Any, Literal
 MOST_CHARACTERS = 32767
 """Longest text of any kind, intermediate results included: INT, the result type of LEN, holds this length."""
 
-Kind = Literal["bool", "int", "bits", "real", "time", "string", "enum", "array", "structure", "block", "void"]
+Kind = Literal["bool", "int", "bits", "real", "time", "date", "string", "enum", "array", "structure", "block", "void"]
 
 _LIST, _OBJECT, _MEMBER, _ELEMENTS = 4, 6, 2, 16
 """Work of building one list, one object and one of its members; number of list elements that count as 1 together
@@ -127,6 +127,25 @@ class String(Type):
 
 
 @dataclass(frozen=True)
+class Moment(Type):
+    """Date, time of day, or both, in ns."""
+
+    part: Literal["DATE", "TOD", "DT"] = "DT"
+    """Name of the short type with the same values."""
+    unit: int = 1
+    """Nanoseconds per unit of a number that is converted."""
+
+    @property
+    def width(self) -> int:
+        """Number of bits in memory."""
+        return 64
+
+    def wrapped(self, code: str) -> str:
+        """Return the code of a sum: at midnight a time of day begins again at 0."""
+        return f"(({code}) % {self.high + 1})" if self.part == "TOD" else super().wrapped(code)
+
+
+@dataclass(frozen=True)
 class Array(Type):
     """Array with an index range per dimension, and its element type."""
 
@@ -163,6 +182,38 @@ class Array(Type):
         return _LIST * lists + elements // _ELEMENTS + elements * self.element.work
 
 
+@dataclass(frozen=True)
+class OpenArray(Array):
+    """Parameter ARRAY [*], whose bounds are those of the argument."""
+
+    dimensions: int = 1
+
+    @property
+    def initial(self) -> str:
+        """Code of a parameter before a call."""
+        return "None"
+
+    @property
+    def size(self) -> int:
+        """Number of elementary variables that it stores itself."""
+        return 0
+
+    @property
+    def characters(self) -> int:
+        """Sum of the declared lengths of the texts that it stores itself."""
+        return 0
+
+    @property
+    def work(self) -> int:
+        """Work of building it; the copy of an argument counts at the call."""
+        return 0
+
+    def takes(self, argument: Type) -> bool:
+        """Return True if an array may be passed as this parameter."""
+        dimensions = argument.dimensions if isinstance(argument, OpenArray) else len(getattr(argument, "ranges", ()))
+        return isinstance(argument, Array) and dimensions == self.dimensions and argument.element == self.element
+
+
 def repeated(kind: Type, code: str, count: int) -> str:
     """Return the code of `count` elements of a list, each with a separate value.
 
@@ -195,12 +246,16 @@ class Member:
     """Value of a constant."""
     address: str = ""
     tag: str = ""
+    read_only: bool = False
+    """VAR_INPUT CONSTANT."""
+    python: str = ""
+    """Name in Python, if it is not made of the name."""
     at: tuple[int, int] = (1, 1)
 
     @property
     def slot(self) -> str:
         """Name in Python."""
-        return f"v_{self.name.lower()}"
+        return self.python or f"v_{self.name.lower()}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -253,6 +308,10 @@ class BlockType(Structure):
     standard: bool = False
     function: bool = False
     result: Type | None = None
+    actions: frozenset[str] = frozenset()
+    """Names of its actions, in small letters."""
+    statics: dict[str, str] = field(default_factory=dict)
+    """Names of the global variables that its VAR_STAT are, by name in small letters."""
 
     def of(self, *sections: str) -> list[Member]:
         """Return the variables of some sections, in their order."""
@@ -273,13 +332,20 @@ BYTE, WORD, DWORD, LWORD = (
 )
 REAL, LREAL = Type("REAL", "real"), Type("LREAL", "real")
 TIME, LTIME = (Type(name, "time", -(2**63), 2**63 - 1) for name in ("TIME", "LTIME"))
+_NS = 2**63
+DATE, DT = (Moment(name, "date", -_NS, _NS - 1, part=name, unit=10**9) for name in ("DATE", "DT"))
+LDATE, LDT = (Moment(f"L{name}", "date", -_NS, _NS - 1, part=name) for name in ("DATE", "DT"))
+TOD = Moment("TOD", "date", 0, 86_400 * 10**9 - 1, part="TOD", unit=10**6)
+LTOD = Moment("LTOD", "date", 0, 86_400 * 10**9 - 1, part="TOD")
 STRING, WSTRING = String("STRING", "string", 0, 80), String("WSTRING", "string", 0, 80)
 VOID = Type("nothing", "void")
 
 INTEGERS = (SINT, USINT, INT, UINT, DINT, UDINT, LINT, ULINT)
 BITS = (BYTE, WORD, DWORD, LWORD)
 NUMBERS = (*INTEGERS, REAL, LREAL)
-ELEMENTARY = {t.name: t for t in (BOOL, *NUMBERS, *BITS, TIME, LTIME, STRING, WSTRING)}
+MOMENTS = (DATE, TOD, DT, LDATE, LTOD, LDT)
+ELEMENTARY: dict[str, Type] = {t.name: t for t in (BOOL, *NUMBERS, *BITS, TIME, LTIME, *MOMENTS, STRING, WSTRING)}
+ELEMENTARY |= {"TIME_OF_DAY": TOD, "LTIME_OF_DAY": LTOD, "DATE_AND_TIME": DT, "LDATE_AND_TIME": LDT}
 
 
 def register(kind: Type) -> Type:
@@ -297,11 +363,18 @@ def is_wide(kind: Type) -> bool:
     return kind.name.startswith("WSTRING")
 
 
+def is_long(kind: Type) -> bool:
+    """Return True for LTIME, LDATE, LTOD and LDT."""
+    return kind.name.startswith("L") and kind.kind in ("time", "date")
+
+
 def fits(source: Type, target: Type) -> bool:
     """Return True if a type converts implicitly to another one, without loss (IEC 61131-3:2013, figure 12)."""
     source, into = source.base, target.base
     if source == into or source.kind == into.kind == "time":
         return True
+    if isinstance(source, Moment) and isinstance(into, Moment):
+        return source.part == into.part
     if source.kind == into.kind == "string":
         return is_wide(source) == is_wide(into)
     if source.kind == "int" and into.kind == "int":
@@ -319,6 +392,8 @@ def common(left: Type, right: Type) -> Type | None:
     """Return the smallest type that both types fit, for comparison and arithmetic; None if there is none."""
     if left.base.kind == right.base.kind == "time":
         return LTIME if LTIME in (left.base, right.base) else TIME
+    if isinstance(left.base, Moment) and fits(left, right):
+        return left.base if is_long(left.base) else right.base
     if fits(left, right):
         return right.base
     if fits(right, left):

@@ -8,11 +8,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from conveyor_sim.control.st.blocks import CLASSES
+from conveyor_sim.control.st.dates import moment_text
 from conveyor_sim.control.st.errors import Fault, Position, SourceError
 from conveyor_sim.control.st.literals import long_time_text, time_text
 from conveyor_sim.control.st.located import Cell, Memory
 from conveyor_sim.control.st.operations import NAMES
+from conveyor_sim.control.st.tia_blocks import CLASSES
 from conveyor_sim.control.st.types import (
     BOOL,
     DINT,
@@ -25,6 +26,8 @@ from conveyor_sim.control.st.types import (
     ULINT,
     Array,
     BlockType,
+    Moment,
+    OpenArray,
     String,
     Structure,
     Subrange,
@@ -83,6 +86,8 @@ class Place(Value):
     """Code that passes the variable as VAR_IN_OUT; "" if that is impossible."""
     fixed: str = ""
     """Reason why it can't be written; "" if it can."""
+    lacks: str = ""
+    """Flag of a `Dialect` in which it can be written."""
     root: str = ""
     """Code of the variable that contains it: the object that it belongs to, and its slot."""
 
@@ -130,6 +135,8 @@ def described(value: Value) -> str:
         return f"the number {value.constant}"
     if value.constant is None:
         return value.type.name
+    if isinstance(value.type.base, Moment):
+        return moment_text(value.constant, value.type.base.name)
     texts = {TIME: time_text, LTIME: long_time_text}
     text = texts.get(value.type.base)
     return text(value.constant) if text else f"{value.type.name} {value.constant}"
@@ -191,6 +198,8 @@ def converted(value: Value, target: Type, what: str = "") -> str:
         return f"{value.code}[:{target.high}]"
     if isinstance(target, BlockType):
         raise SourceError(value.at, f"found a block, {target.name}, expected a value: blocks are not copied")
+    if isinstance(target, OpenArray):
+        raise SourceError(value.at, f"found {target.name}, expected one of its elements: it is passed on, not copied")
     if isinstance(target, (Array, Structure)):
         if _has_blocks(target):
             raise SourceError(
@@ -224,7 +233,7 @@ def _has_blocks(kind: Type) -> bool:
 
 def _advice(value: Value, target: Type) -> str:
     source, into = value.type.base, target.base
-    kinds = {"int", "real", "bits", "bool", "time", "string"}
+    kinds = {"int", "real", "bits", "bool", "time", "date", "string"}
     if value.literal or source.kind not in kinds or into.kind not in kinds:
         return ""
     return f"; {source.name.partition('[')[0]}_TO_{into.name.partition('[')[0]} converts"

@@ -9,7 +9,7 @@ from typing import Any
 
 from conveyor_sim.control.st.errors import StructuredTextError
 from conveyor_sim.control.st.located import identity
-from conveyor_sim.control.st.operations import Attribute, Element, StructureValue
+from conveyor_sim.control.st.operations import Attribute, Bounded, Element, StructureValue
 from conveyor_sim.control.st.types import Array, BlockType, Structure, Type
 
 Step = str | int
@@ -47,9 +47,9 @@ class Variable:
         return root
 
     def number(self) -> float:
-        """Return the value as a number: a bool is 0 or 1, a TIME is in s, a text is its length."""
+        """Return the value as a number: a bool is 0 or 1, a TIME or a date is in s, a text is its length."""
         value = self.read()
-        if self.type.base.kind == "time":
+        if self.type.base.kind in ("time", "date"):
             return float(value) * 1e-9
         return float(len(value)) if isinstance(value, str) else float(value)
 
@@ -93,6 +93,10 @@ def _slots(thing: Any) -> list[str]:
     return [slot for one in type(thing).__mro__ for slot in getattr(one, "__slots__", ())]
 
 
+_REFERENCES = (Attribute, Bounded, Element, type(None))
+"""Variables passed by reference, which the next call passes again."""
+
+
 def dump(value: Any) -> Any:
     """Return a value, or an object with all its content, as lists, mappings and plain values."""
     if isinstance(value, list):
@@ -100,7 +104,7 @@ def dump(value: Any) -> Any:
     if isinstance(value, (bool, int, float, str)):
         return value
     values = {slot: getattr(value, slot) for slot in _slots(value)}
-    return {slot: dump(one) for slot, one in values.items() if not isinstance(one, (Attribute, Element, type(None)))}
+    return {slot: dump(one) for slot, one in values.items() if not isinstance(one, _REFERENCES)}
 
 
 def load(value: Any, data: Any) -> Any:

@@ -19,7 +19,7 @@ CALL = STATEMENT
 _COPIED, _READ = 1024, 32
 """Characters that count 1 where a text is copied or compared, and where it is read as a number."""
 
-_TEXTS = {"real": 48, "time": 8, "enum": 4}
+_TEXTS = {"real": 48, "time": 8, "date": 8, "enum": 4}
 """Work of writing a value as a text; others count as a call of a standard function."""
 
 MANY, MANY_SEARCHED = 4096, 256

@@ -42,6 +42,7 @@ MAY: Mapping[str, Right] = {
     FORCE: Right((*PEOPLE, "test"), "Forces signals to values."),
     UNFORCE: Right((*PEOPLE, "test"), "Ends forcing of the named signals; of all if no names are given."),
     "acknowledge": Right((*PEOPLE, "test"), "Acknowledges the named alarms; all if no names are given."),
+    "confirm": Right((*PEOPLE, "test"), "Confirms the named acknowledged alarms; all that wait if no names are given."),
     "reset": Right((*PEOPLE, "test"), "Clears the named latched alarms; all if no names are given."),
     "shelve": Right((*PEOPLE, "test"), "Shelves alarms for a time in seconds (values), or once."),
     "unshelve": Right((*PEOPLE, "test"), "Ends shelving of the named alarms; of all if no names are given."),
@@ -70,6 +71,9 @@ IN_CONTROL: Mapping[int, tuple[WriterKind, ...]] = {
     MANUAL: (*PEOPLE, "test"),
 }
 """Kinds of writer whose commands a device accepts, by its mode."""
+
+AT_PANEL: tuple[WriterKind, ...] = (*PEOPLE, "test")
+"""Kinds of writer that use the inputs of the panel, in every control mode and whichever controller owns the line."""
 
 OPERATORS_MODES = (AUTOMATIC, MANUAL)
 """Modes between which an operator may switch. Engineers and tests may switch between all modes."""
@@ -100,6 +104,20 @@ def advice(kind: WriterKind) -> str:
 def reserved(device: str, kind: str, mode: float) -> str:
     """Return why a kind of writer may not switch a device to or from a mode."""
     return f"{device}: {MODES[int(mode)]} is not for {kind}s, expected an engineer"
+
+
+def panel_problem(request: Input, panel: Collection[str]) -> str:
+    """Return why this kind of writer may not set the inputs of the panel in a request; "" if it may.
+
+    panel: names of these inputs.
+    """
+    if request.writer_kind in AT_PANEL:
+        return ""
+    name = next((name for name in request.names if name in panel), None)
+    if name is None:
+        return ""
+    expected = f"expected one of the kind {' or '.join(AT_PANEL)}"
+    return f"{name}: is an input of the panel, given by {who(request)}, {expected}"
 
 
 def covers(pattern: str, device: str, where: str) -> bool:

@@ -24,7 +24,7 @@ from conveyor_sim.line.commands.inputs import DISOWN, MODE, OWN, SET, WRITER_KIN
 from conveyor_sim.line.commands.operation import Operation
 from conveyor_sim.line.commands.refusal import moved_belts, refusal
 from conveyor_sim.line.device import Device, ScanContext
-from conveyor_sim.line.tag import Tag, choice
+from conveyor_sim.line.tag import CONTROLLED, Tag, choice, of_roles
 from conveyor_sim.support.printable import SENTENCE, printable
 
 _REASONS = 3
@@ -56,12 +56,13 @@ class Modes:
         devices: all devices of the line. where: the line's place in the plant. waiting: returns inputs that will be
         applied first. note: as EventLog.note.
         """
-        commanded = [device for device in devices if device.commands]
+        controlled = {device.name: of_roles(device.commands, CONTROLLED) for device in devices}
+        commanded = [device for device in devices if controlled[device.name]]
         self._devices = {device.name: device for device in commanded}
         self._where = where
         self._waiting = waiting
         self._note = note
-        self._device_of = {command.name: device.name for device in commanded for command in device.commands}
+        self._device_of = {command.name: device.name for device in commanded for command in controlled[device.name]}
         self._tags = tuple(_tag(device) for device in commanded)
         self._table = {tag.device: tag for tag in self._tags}
         self._moved = moved_belts([tag for device in devices for tag in device.tags])

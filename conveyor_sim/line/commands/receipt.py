@@ -15,6 +15,7 @@ from conveyor_sim.line.alarms.operations import argument_problem
 from conveyor_sim.line.commands.authority import (
     MAY,
     hand_over_problem,
+    panel_problem,
     pattern_problem,
     reserved,
     reserved_mode,
@@ -22,7 +23,7 @@ from conveyor_sim.line.commands.authority import (
 )
 from conveyor_sim.line.commands.inputs import DISOWN, FORCE, INJECT, MODE, OWN, SET, UNFORCE, Input
 from conveyor_sim.line.commands.refusal import ALARMS, moved_belts, refusal
-from conveyor_sim.line.tag import COMMANDS, SIGNALS, Tag
+from conveyor_sim.line.tag import COMMANDS, PANEL, SIGNALS, Tag
 from conveyor_sim.support.printable import printable
 
 Cause = Literal["operation", "role", "name", "value", "form"]
@@ -59,6 +60,7 @@ class Receipt:
         }
         """Tags that an operation may name, with the word for one of them, by operation."""
         self._moved = moved_belts(tags)
+        self._panel = frozenset(tag.name for tag in tags if tag.role == PANEL)
         self._counting = {LINE, *(tag.device for tag in tags if tag.device_class in COUNTING)}
 
     def refusal(self, request: Input) -> Refusal | None:
@@ -88,6 +90,8 @@ class Receipt:
         names, values = request.names, request.values
         if reason := refusal(known, what, names, values, self._moved):
             return Refusal(_cause(known, what, names, values), reason)
+        if request.operation == SET and (reason := panel_problem(request, self._panel)):
+            return Refusal("role", reason)
         for device, mode in zip(names, values, strict=True) if request.operation == MODE else ():
             if reserved_mode(request.writer_kind, [mode]) is not None:
                 return Refusal("role", reserved(device, request.writer_kind, mode))

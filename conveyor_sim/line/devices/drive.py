@@ -63,8 +63,11 @@ class Ramp:
 class DriveDevice(SetpointDevice):
     """Belt with a separate drive, or named drive. It runs at the start, at the speed of the scene.
 
-    A trip ramps it down; it runs again after the fault has ended and `reset` has had a rising edge.
+    A trip ramps it down; it runs again after the fault has ended and `reset` has had a rising edge. Without power it
+    coasts, and it runs again after power has returned and `run` has had a rising edge.
     """
+
+    _starts_by_speed = False
 
     def __init__(
         self,
@@ -117,6 +120,8 @@ class DriveDevice(SetpointDevice):
             return
         what = name.removeprefix(f"{self.name}/")
         if what == "run":
+            if value != 0.0 and not self.run:
+                self.start()
             self.run = value != 0.0
         elif what == "reverse":
             self.reverse = value != 0.0
@@ -132,6 +137,10 @@ class DriveDevice(SetpointDevice):
     def begin(self, now: ScanContext) -> None:
         """Ramp for one tick."""
         drive, ramp, wanted = self._drive, self.ramp, self.wanted(now)
+        if self._power is not None and self._power.holds(self.name):
+            ramp.value, ramp.acceleration = self._power.coast(ramp.value, now.length), 0.0
+            now.speeds[self._index] = ramp.value
+            return
         if ramp.value != wanted or ramp.acceleration != 0.0:
             now.speeds[self._index] = ramp.approach(wanted, drive.acceleration, drive.jerk, now.length)
 
@@ -144,18 +153,22 @@ class DriveDevice(SetpointDevice):
         """Return the speed and the bottles of a belt, then running, at_speed, fault, and pulses."""
         tripped = self.tripped
         at_speed = abs(self.ramp.value - self.wanted(now)) <= AT_SPEED
-        values = [*super().values(now), self.run and not tripped, at_speed, tripped]
+        values = [*super().values(now), self._runs, at_speed, tripped]
         if self._drive.pulses_per_metre is not None:
             values.append(math.floor(self.travel * self._drive.pulses_per_metre + 1e-9))
         return values
 
     def states(self, now: ScanContext) -> list[float]:
         """Return running and fault."""
-        return [self.run and not self.tripped, self.tripped]
+        return [self._runs, self.tripped]
+
+    @property
+    def _runs(self) -> bool:
+        return self.run and not self.tripped and not self.is_locked
 
     def wanted(self, now: ScanContext) -> float:
-        """Return the commanded speed, m/s; 0 while stopped or tripped."""
-        if not self.run or self.tripped:
+        """Return the commanded speed, m/s; 0 while stopped, tripped or without power."""
+        if not self._runs:
             return 0.0
         setpoint = float(now.setpoints[self._index])
         return -setpoint if self.reverse else setpoint

@@ -32,6 +32,7 @@ class RejectDevice(Device):
         )
         self._reject = reject
         self._region = Region(reject.region)
+        self._power = setup.power("machines", self)
         self.fire = RisingEdge()
         self.stop = False
         self.strokes = ()
@@ -43,8 +44,16 @@ class RejectDevice(Device):
         """Apply `fire` at its rising edge, or the fault `stop`."""
         if name.endswith("/stop"):
             self.stop = value != 0.0
-        elif self.fire.rises(value) and not self.stop:
+        elif self.fire.rises(value) and self._responds:
             self.strokes = (*self.strokes, now.time + self._reject.delay)
+
+    def cut_power(self, now: ScanContext) -> None:
+        """Drop the strokes that have not hit yet."""
+        self.strokes = ()
+
+    @property
+    def _responds(self) -> bool:
+        return not self.stop and not (self._power is not None and self._power.is_off("machines"))
 
     def rehearse(self, now: ScanContext) -> None:
         """Search the region."""
@@ -71,7 +80,7 @@ class RejectDevice(Device):
 
     def states(self, now: ScanContext) -> list[float]:
         """Return running."""
-        return [not self.stop]
+        return [self._responds]
 
     def counts(self) -> tuple[int, int, int]:
         """Return rejected bottles, and bad ones among them."""
@@ -79,4 +88,4 @@ class RejectDevice(Device):
 
     def values(self, now: ScanContext) -> Sequence[float]:
         """Return running, rejected, bad and good ones among them, and strokes without a bottle."""
-        return not self.stop, self.removed, self.removed_bad, self.removed - self.removed_bad, self.missed
+        return self._responds, self.removed, self.removed_bad, self.removed - self.removed_bad, self.missed

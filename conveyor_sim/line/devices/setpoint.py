@@ -61,6 +61,9 @@ class SpeedDevice(Device):
 class SetpointDevice(SpeedDevice):
     """Belt or named drive with a speed setpoint. The speed follows at once."""
 
+    _starts_by_speed = True
+    """True if a setpoint that changes from 0 to another value is a start command."""
+
     def __init__(
         self,
         name: str,
@@ -93,6 +96,7 @@ class SetpointDevice(SpeedDevice):
             ],
         )
         self._carries = bottles is not None
+        self._power = setup.power("drives", self)
         timeout = part.watchdog
         self.watchdog = None if timeout is None else Watchdog(max(1, setup.ticks(timeout)))
 
@@ -104,8 +108,20 @@ class SetpointDevice(SpeedDevice):
         text = f"{self.name} stopped: its watchdog received no command"
         return (error(f"{self.name}/watchdog", text, f"{self.name}/speed"),)
 
+    @property
+    def is_locked(self) -> bool:
+        """True without power, and until the start command after that."""
+        return self._power is not None and self._power.holds(self.name)
+
+    def start(self) -> None:
+        """Take a start command, which unlocks a drive whose power was taken."""
+        if self._power is not None:
+            self._power.start(self.name)
+
     def command(self, name: str, value: float, now: ScanContext) -> None:
         """Apply a setpoint, m/s."""
+        if self._starts_by_speed and value != 0.0 and now.setpoints[self._index] == 0.0:
+            self.start()
         self.take_setpoint(value, now)
         if self.watchdog is not None:
             if self.watchdog.tripped:
@@ -130,8 +146,15 @@ class SetpointDevice(SpeedDevice):
         return self._speed_command
 
     def begin(self, now: ScanContext) -> None:
-        """Set the speed to the setpoint."""
-        now.speeds[self._index] = now.setpoints[self._index]
+        """Set the speed to the setpoint, or coast without power."""
+        if self._power is not None and self._power.holds(self.name):
+            now.speeds[self._index] = self._power.coast(float(now.speeds[self._index]), now.length)
+        else:
+            now.speeds[self._index] = now.setpoints[self._index]
+
+    def wanted(self, now: ScanContext) -> float:
+        """Return the commanded speed, m/s; 0 without power, and until the start command after that."""
+        return 0.0 if self.is_locked else super().wanted(now)
 
     def values(self, now: ScanContext) -> Sequence[float]:
         """Return the speed, m/s, and the number of bottles on a belt."""

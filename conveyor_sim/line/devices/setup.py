@@ -13,13 +13,16 @@ import numpy as np
 
 from conveyor_sim.line.device import Device
 from conveyor_sim.line.devices.entry import BottleEntry
+from conveyor_sim.line.devices.power import PowerSupply
 from conveyor_sim.physics.model import Model
 from conveyor_sim.scene.driven import speed_limits
 from conveyor_sim.scene.geometry import shapes_of_belt
+from conveyor_sim.scene.parts.panel import Load
 from conveyor_sim.scene.schema import Scene
 
-JITTER, BAD, CHATTER = "jitter", "bad", "chatter"
-"""Purposes of random streams: times, places and directions of new bottles, bad bottles, chatter of photo-eyes."""
+JITTER, BAD, CHATTER, BOUNCE = "jitter", "bad", "chatter", "bounce"
+"""Purposes of random streams: times, places and directions of new bottles, bad bottles, chatter of photo-eyes, bounce
+of contacts."""
 
 BRANCHES = {(JITTER, "infeeds"): (), (BAD, "infeeds"): (1,), (BAD, "machines"): (2,), (CHATTER, "photo_eyes"): (3,)}
 """Prefixes of the spawn keys in recordings from before streams were named, by purpose and field of the scene. The index
@@ -50,6 +53,11 @@ class DeviceSetup:
         made = make()
         self.devices[made.name] = made
         return made
+
+    def power(self, load: Load, device: Device) -> PowerSupply | None:
+        """Connect a consumer to the power supply. Return None if no emergency stop can take its power."""
+        supply = self.devices.get("power")
+        return supply if isinstance(supply, PowerSupply) and supply.feeds(load, device) else None
 
     def index(self, field: str, name: str) -> int:
         """Return the index of a part in its field of the scene, from 0."""

@@ -126,6 +126,7 @@ class MachineDevice(Device):
             }
         )
         self._clocks: list[FailureClock] = list(vars(self.clocks).values())
+        self._power = setup.power("machines", self)
         self.restored(0)
 
     @property
@@ -166,7 +167,14 @@ class MachineDevice(Device):
             return f"{name}: {COMMAND_TEXTS[command]} given while {self.name}/run is 0, expected 1 before"
         if self._failed and command == Command.UNHOLD:
             return f"{name}: Unhold given while it is not repaired, expected {self.name}/fault to be off"
+        if command == Command.CLEAR and self._power is not None and self._power.is_off("machines"):
+            return f"{name}: Clear given without power, expected {' and '.join(self._power.latched)} to be reset before"
         return ""
+
+    def cut_power(self, now: ScanContext) -> None:
+        """Abort."""
+        self._take(Command.ABORT, by_hand=True)
+        self._settle_state()
 
     def mode_objection(self) -> str:
         """Return why the control mode can't change in the present state, "" if it can."""

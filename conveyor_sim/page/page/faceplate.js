@@ -6,8 +6,8 @@ import { controlsOf } from "./controls.js";
 import { element, seconds, shown, titled, warn } from "./dom.js";
 import { restrict } from "./rights.js";
 
-const ORDER = ["status", "actual", "counter", "alarm", "command", "setpoint", "fault"];
-const TITLES = { status: "Status", actual: "Values", counter: "Counters", alarm: "Alarm counts", command: "Commands", setpoint: "Setpoints", fault: "Faults" };
+const ORDER = ["status", "actual", "counter", "alarm", "panel", "command", "setpoint", "fault"];
+const TITLES = { status: "Status", actual: "Values", counter: "Counters", alarm: "Alarm counts", panel: "Panel", command: "Commands", setpoint: "Setpoints", fault: "Faults" };
 
 export class Faceplate {
   constructor(view) {

@@ -30,7 +30,9 @@ export class Rights {
   }
 
   _command(name, value, role) {
-    const { rights, desk } = this, device = desk.view.recording.tags.get(name)?.device ?? "", now = this._now(device);
+    const { rights, desk } = this;
+    if (desk.view.recording.tags.get(name)?.role === "panel") return rights.panel.includes(role) ? "" : `The panel is for ${anyOf(rights.panel)}.`;
+    const device = desk.view.recording.tags.get(name)?.device ?? "", now = this._now(device);
     const isStop = rights.people.includes(role) && name.endsWith(rights.stop.name);
     if (rights.commands[role].includes(now) || (isStop && rights.stop.values.includes(value))) return "";
     const other = rights.commands[role].filter((mode) => this._may(role, now, mode)).pop();

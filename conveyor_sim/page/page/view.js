@@ -21,6 +21,7 @@ import { Kpi } from "./kpi.js";
 import { Link } from "./link.js";
 import { LiveClock } from "./live_clock.js";
 import { Minimap } from "./minimap.js";
+import { OperatorPanel } from "./operator.js";
 import { Plan } from "./plan.js";
 import { Scrubber } from "./scrubber.js";
 import { boxOf, deviceAt, outlinesOf } from "./selection.js";
@@ -65,6 +66,7 @@ export class View {
     }
     this.banner = new Banner(this);
     this.kpi = new Kpi(this);
+    this.operator = new OperatorPanel(this);
     this.scrubber = new Scrubber(this);
     this.trends = new Trends(this);
     this.faceplate = new Faceplate(this);
@@ -380,6 +382,7 @@ export class View {
     expire();
     this.banner.draw();
     this.kpi.draw();
+    this.operator.draw();
     for (const alarms of this.alarms) alarms.draw();
     this.tabs.draw();
     this.trends.draw();

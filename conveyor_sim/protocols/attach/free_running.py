@@ -18,8 +18,9 @@ from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.commands.inputs import SET, Input
 from conveyor_sim.line.commands.refusal import ALARMS, refusal
 from conveyor_sim.line.tag import COMMANDS
-from conveyor_sim.protocols.attach.links import plc_link
-from conveyor_sim.protocols.attach.plc_link import PlcLink, PlcLinkError, read_answer
+from conveyor_sim.protocols.attach.access import PlcAccess
+from conveyor_sim.protocols.attach.links import LIBRARIES, plc_link
+from conveyor_sim.protocols.attach.plc_link import PlcLink, PlcLinkError, PlcRefusedError, read_answer, write_signals
 from conveyor_sim.protocols.attach.tag_map import TagMap, read_tag_map
 from conveyor_sim.protocols.hosting.server_kinds import ServerKind
 from conveyor_sim.protocols.server.interface import ProtocolServer, Status
@@ -96,7 +97,8 @@ class FreeRunningPlc:
             except Exception as error:
                 text = str(error) if isinstance(error, ConveyorError) else f"{type(error).__name__}: {error}"
                 # A failed attempt is reported unless its only reason is that there is no PLC.
-                if text != reported and (self._link is not None or not isinstance(error, PlcLinkError)):
+                absent = isinstance(error, PlcLinkError) and not isinstance(error, PlcRefusedError)
+                if text != reported and (self._link is not None or not absent):
                     reported = text
                     self._say(f"{printable(text, SENTENCE)}; it commands nothing until it is connected again")
                 await self._leave()
@@ -110,10 +112,7 @@ class FreeRunningPlc:
         last = {} if before is None else before.values
         names = [each.tag.name for each in self._tags.written]
         changed = {name: shown.values[name] for name in names if shown.values[name] != last.get(name)}
-        if self._tags.tick is not None:
-            changed[self._tags.tick.tag.name] = float(shown.tick)
-        if changed:
-            await link.write(changed)
+        await write_signals(link, changed, None if self._tags.tick is None else shown.tick)
         self._written = shown
         answer, own = await read_answer(link, self._tags)
         if own:
@@ -164,23 +163,20 @@ class FreeRunningPlc:
 def plc_kind(
     url: str,
     tags: Path,
-    user: str,
-    password: str,
+    access: PlcAccess,
     period: float,
     say: Callable[[str], object],
     observe: Callable[[Mapping[str, float]], object],
 ) -> ServerKind:
     """Return the kind of protocol server that attaches a PLC.
 
-    url, user, password: as for `plc_link`. tags: file of the map. Other parameters: as for `FreeRunningPlc`.
+    url, access: as for `plc_link`. tags: file of the map. Other parameters: as for `FreeRunningPlc`.
     """
 
     def make(source: TagProvider, *_: object) -> ProtocolServer:
         mapped = read_tag_map(tags, source.info.tags)
-        return FreeRunningPlc(
-            source, url, mapped, lambda: plc_link(url, mapped.all, user, password), period, say, observe
-        )
+        return FreeRunningPlc(source, url, mapped, lambda: plc_link(url, mapped.all, access, say), period, say, observe)
 
-    library = "pymodbus" if url.startswith("modbus") else "asyncua"
+    library, extra = LIBRARIES.get(url.partition(":")[0], LIBRARIES["opc.tcp"])
     # Not isolated in a child process, because it needs functions of this one.
-    return ServerKind(PLC, 0, (library,), __name__, make, lambda _: "command it", isolated=False)
+    return ServerKind(PLC, 0, (library,), __name__, make, lambda _: "command it", extra=extra, isolated=False)

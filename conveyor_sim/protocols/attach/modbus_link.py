@@ -11,15 +11,13 @@ from typing import Any, get_args
 from pymodbus.client import AsyncModbusTcpClient
 from pymodbus.exceptions import ModbusException
 
-from conveyor_sim.line.tag import SIGNALS
 from conveyor_sim.protocols.attach.plc_link import PATIENCE, PlcLinkError
-from conveyor_sim.protocols.attach.tag_map import OWN, MappedTag, TagMapError
-from conveyor_sim.protocols.tags.handshake import TICK
+from conveyor_sim.protocols.attach.tag_map import MappedTag, TagMapError
 from conveyor_sim.support.modbus_rows import MOST_ADDRESSES, Row, Table, Type, WordOrder, decode, encode
 from conveyor_sim.support.printable import printable
 
-MOST_WORDS = 100
-"""Largest number of words of one request. The protocol allows 125 to read and 123 to write."""
+MOST_WORDS, MOST_BITS = 120, 1920
+"""Largest numbers of words and bits of one request. The protocol allows 123 and 1968 to write, 125 and 2000 to read."""
 
 _BITS: tuple[Table, ...] = ("coil", "discrete input")
 _WRITABLE: tuple[Table, ...] = ("coil", "holding register")
@@ -49,6 +47,8 @@ class ModbusLink:
         """Set coils and holding registers, in the order of the values."""
         client = self._connected()
         for rows in _runs(self._rows[name] for name in values):
+            if rows[0].table not in _WRITABLE:
+                raise PlcLinkError(f"{self._url}: {rows[0].name} can't be written, expected {_WRITABLE_TEXT}")
             words = [word for row in rows for word in encode(row, values[row.name])]
             if rows[0].table == "coil":
                 await self._ask(rows, client.write_coils, rows[0].address, [bool(word) for word in words])
@@ -102,7 +102,7 @@ def _runs(rows: Iterable[Row]) -> Iterator[list[Row]]:
         last = run[-1] if run else None
         if last is not None and (
             (last.table, last.addresses.stop) != (row.table, row.address)
-            or row.addresses.stop - run[0].address > MOST_WORDS
+            or row.addresses.stop - run[0].address > (MOST_BITS if row.table in _BITS else MOST_WORDS)
         ):
             yield run
             run = []
@@ -125,7 +125,6 @@ def _row(mapped: MappedTag) -> Row:
     if (kind == "bool") != (table in _BITS):
         raise TagMapError(f"{mapped.where}: {kind} given in a {table}, {expected}")
     tag = mapped.tag
-    written = tag.name == TICK or (tag.role in SIGNALS and not tag.name.startswith(OWN))
-    if written and table not in _WRITABLE:
+    if mapped.is_written and table not in _WRITABLE:
         raise TagMapError(f"{mapped.where}: {tag.name} is written, but {table}s can't be, expected {_WRITABLE_TEXT}")
     return Row(tag.name, table, int(rest[0]), kind, order, tag.unit, "read", tag.low, tag.high, "")

@@ -3,22 +3,20 @@
 
 from __future__ import annotations
 
-import asyncio
-import logging
 import math
-from collections.abc import Awaitable, Mapping, Sequence
-from contextlib import suppress
-from typing import TypeVar
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
 
 from asyncua import Client, ua
 from asyncua.ua.uaerrors import UaError
 
-from conveyor_sim.protocols.attach.plc_link import PATIENCE, PlcLinkError
+from conveyor_sim.protocols.attach.access import ANONYMOUS, PlcAccess
+from conveyor_sim.protocols.attach.opcua_client import close_client, open_client
+from conveyor_sim.protocols.attach.opcua_requests import OpcUaRequests, is_writable
+from conveyor_sim.protocols.attach.plc_link import PlcLinkError
 from conveyor_sim.protocols.attach.tag_map import MappedTag, TagMapError
 from conveyor_sim.support.printable import printable
 from conveyor_sim.support.rounded_limit import at_limit
-
-T = TypeVar("T")
 
 _INTEGERS = {
     kind: (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) if signed else (0, 2**bits - 1)
@@ -37,49 +35,63 @@ _REAL = (ua.VariantType.Float, ua.VariantType.Double)
 
 
 class OpcUaLink:
-    """Link by OPC UA. All values of one call are one request."""
+    """Link by OPC UA. Values of one call are one request, or as many as the limits of the server require."""
 
-    def __init__(self, url: str, mapped: Sequence[MappedTag], user: str, password: str) -> None:
-        """Read the node IDs of the mapped tags. user: "" for anonymous. Raises TagMapError for an invalid ID."""
+    def __init__(
+        self,
+        url: str,
+        mapped: Sequence[MappedTag],
+        access: PlcAccess = ANONYMOUS,
+        say: Callable[[str], object] = lambda _: None,
+    ) -> None:
+        """Read the node IDs of the mapped tags. access, say: as for `open_client`.
+
+        Raises TagMapError for an invalid ID.
+        """
         self._url, self._mapped = url, {each.tag.name: each for each in mapped}
-        self._user, self._password = user, password
-        self._ids = {each.tag.name: _node_id(each) for each in mapped}
+        self._access, self._say = access, say
+        self._places = {each.tag.name: _Place.read(each) for each in mapped}
+        self._ids: dict[str, ua.NodeId] = {}
         self._types: dict[str, ua.VariantType] = {}
+        self._requests: OpcUaRequests | None = None
         self._client: Client | None = None
 
     async def connect(self) -> None:
-        """Connect, and read the type of each variable."""
-        logging.getLogger("asyncua.client").setLevel(logging.CRITICAL)  # PlcLinkError reports the same
-        # By default it disconnects from a server that has not answered for a second.
-        client = Client(self._url, timeout=PATIENCE, watchdog_intervall=PATIENCE)
-        if self._user:
-            client.set_user(self._user)
-            client.set_password(self._password)
-        await self._ask(client.connect())
-        self._client = client
-        for name, node in self._ids.items():
-            mapped = self._mapped[name]
-            try:
-                value = await self._ask(client.get_node(node).read_data_value(raise_on_bad_status=False))
-            except PlcLinkError as error:
-                raise TagMapError(f"{mapped.where}: {printable(mapped.theirs)}: {error}") from error
-            if (bad := _problem(value)) is not None:
-                raise TagMapError(f"{mapped.where}: {printable(mapped.theirs)} is {bad}, expected a number or a bool")
+        """Connect, resolve namespaces, and read type and access of each variable."""
+        self._client = client = await open_client(self._url, self._access, self._say)
+        self._requests = requests = OpcUaRequests(self._url, client)
+        await requests.read_limits()
+        uris = await requests.namespaces() if any(place.uri for place in self._places.values()) else []
+        self._ids = {name: place.node(uris) for name, place in self._places.items()}
+        ids = list(self._ids.values())
+        values = await requests.read([(node, ua.AttributeIds.Value) for node in ids])
+        rights = await requests.read([(node, ua.AttributeIds.UserAccessLevel) for node in ids])
+        for (name, mapped), value, right in zip(self._mapped.items(), values, rights, strict=True):
+            theirs = printable(mapped.theirs)
+            if (bad := problem(value)) is not None:
+                raise TagMapError(f"{mapped.where}: {theirs} is {bad}, expected a number or a bool")
+            if mapped.is_written and not is_writable(right):
+                raise TagMapError(
+                    f"{mapped.where}: {theirs} is read-only, but {name} is written, expected write access"
+                )
             self._types[name] = value.Value.VariantType
 
     async def write(self, values: Mapping[str, float]) -> None:
         """Write variables, by our names."""
-        client = self._connected()
-        nodes = [client.get_node(self._ids[name]) for name in values]
-        variants = [ua.DataValue(_variant(self._types[name], value)) for name, value in values.items()]
-        await self._ask(client.write_values(nodes, variants))
+        # Without a status, because servers may refuse to write one.
+        variants = [ua.DataValue(_variant(self._types[name], value), StatusCode=None) for name, value in values.items()]
+        codes = await self._connected().write([self._ids[name] for name in values], variants)
+        for name, code in zip(values, codes, strict=True):
+            if not code.is_good():
+                theirs = printable(self._mapped[name].theirs)
+                raise PlcLinkError(f"{self._url}: refuses {theirs} ({name}) with {printable(code.name)}")
 
     async def read(self, names: Sequence[str]) -> dict[str, float]:
         """Return values, by our names. Raise PlcLinkError for a value with a bad status as well."""
-        client, values = self._connected(), {}
-        nodes = [client.get_node(self._ids[name]) for name in names]
-        for name, data in zip(names, await self._ask(client.read_attributes(nodes)), strict=True):
-            if (bad := _problem(data)) is not None:
+        values = {}
+        answer = await self._connected().read([(self._ids[name], ua.AttributeIds.Value) for name in names])
+        for name, data in zip(names, answer, strict=True):
+            if (bad := problem(data)) is not None:
                 raise PlcLinkError(f"{self._url}: {printable(self._mapped[name].theirs)} ({name}) is {bad}")
             value, tag = float(data.Value.Value), self._mapped[name].tag
             is_single = data.Value.VariantType is ua.VariantType.Float
@@ -88,39 +100,62 @@ class OpcUaLink:
 
     async def close(self) -> None:
         """Disconnect."""
-        client, self._client = self._client, None
+        client, self._client, self._requests = self._client, None, None
         if client is not None:
-            with suppress(PlcLinkError):  # the server has disconnected
-                await self._ask(client.disconnect())
+            await close_client(self._url, client)
 
-    def _connected(self) -> Client:
-        if self._client is None:
+    def _connected(self) -> OpcUaRequests:
+        if self._requests is None:
             raise PlcLinkError(f"{self._url}: is not connected")
-        return self._client
+        return self._requests
 
-    async def _ask(self, request: Awaitable[T]) -> T:
+
+class _Place(NamedTuple):
+    """Node of a map; its namespace is an index of the server, or a URI of which the index may change."""
+
+    mapped: MappedTag
+    uri: str
+    node_id: ua.NodeId
+
+    @classmethod
+    def read(cls, mapped: MappedTag) -> _Place:
+        """Read `theirs`. Raise TagMapError."""
+        text, uri = mapped.theirs.strip(), ""
+        if text.startswith("nsu="):
+            uri, _, text = text.removeprefix("nsu=").partition(";")
+            # OPC 10000-6, 5.1.12: ";" and "%" within a URI are escaped.
+            uri = uri.replace("%3B", ";").replace("%3b", ";").replace("%25", "%")
         try:
-            return await asyncio.wait_for(request, 2.0 * PATIENCE)
-        except (UaError, OSError, asyncio.TimeoutError) as error:
-            raise PlcLinkError(f"{self._url}: {printable(error) or type(error).__name__}") from error
+            node = ua.NodeId.from_string(text)
+            if isinstance(node, ua.ExpandedNodeId) or (uri and node.NamespaceIndex) or text == mapped.theirs == "":
+                raise ValueError(text)
+        except (UaError, ValueError) as error:
+            expected = "expected a NodeId such as ns=4;s=GVL.Speed1 or nsu=urn:plc;s=GVL.Speed1"
+            raise TagMapError(f"{mapped.where}: {printable(mapped.theirs)} given, {expected}") from error
+        return cls(mapped, uri, node)
+
+    def node(self, uris: Sequence[str]) -> ua.NodeId:
+        """Return the node ID for the namespaces of a server. Raise TagMapError if it lacks the URI."""
+        if not self.uri:
+            return self.node_id
+        if self.uri not in uris:
+            listed = printable(", ".join(map(str, uris)))
+            raise TagMapError(
+                f"{self.mapped.where}: namespace {printable(self.uri)} given, expected one of the PLC's: {listed}"
+            )
+        return ua.NodeId(self.node_id.Identifier, uris.index(self.uri), self.node_id.NodeIdType)
 
 
-def _problem(data: ua.DataValue) -> str | None:
+def problem(data: ua.DataValue) -> str | None:
     """Return why a value is no number or bool, in words; None if it is one."""
-    if data.StatusCode.is_bad():
+    if data.StatusCode is not None and data.StatusCode.is_bad():
         return printable(data.StatusCode.name)
-    if data.Value.is_array:
+    if data.Value is None or data.Value.Value is None:
+        return "without a value"
+    if data.Value.is_array or isinstance(data.Value.Value, list):
         return "an array"
     kind = data.Value.VariantType
     return None if kind in (*_INTEGERS, *_REAL, ua.VariantType.Boolean) else printable(kind.name)
-
-
-def _node_id(mapped: MappedTag) -> ua.NodeId:
-    try:
-        return ua.NodeId.from_string(mapped.theirs)
-    except (UaError, ValueError) as error:
-        expected = "expected a NodeId such as ns=4;s=GVL.Speed1"
-        raise TagMapError(f"{mapped.where}: {printable(mapped.theirs)} given, {expected}") from error
 
 
 def _variant(kind: ua.VariantType, value: float) -> ua.Variant:

@@ -8,6 +8,7 @@ from typing import Protocol
 
 from conveyor_sim.protocols.attach.tag_map import TagMap
 from conveyor_sim.protocols.server.interface import ServerError
+from conveyor_sim.protocols.tags.handshake import TICK
 
 PATIENCE = 5.0
 """Longest time of a PLC for each request, s of wall time."""
@@ -15,6 +16,10 @@ PATIENCE = 5.0
 
 class PlcLinkError(ServerError):
     """A PLC that can't be reached, or does not answer correctly."""
+
+
+class PlcRefusedError(PlcLinkError):
+    """A PLC that is there, but is not trusted or does not admit the line. It stays so until somebody changes it."""
 
 
 class PlcLink(Protocol):
@@ -31,6 +36,14 @@ class PlcLink(Protocol):
 
     async def close(self) -> None:
         """Disconnect. Harmless without a connection."""
+
+
+async def write_signals(link: PlcLink, signals: Mapping[str, float], tick: int | None) -> None:
+    """Write signals, then `run/tick` if there is one, in a separate request. Raise PlcLinkError."""
+    if signals:
+        await link.write(signals)
+    if tick is not None:
+        await link.write({TICK: float(tick)})
 
 
 async def read_answer(link: PlcLink, tags: TagMap) -> tuple[dict[str, float], dict[str, float]]:

@@ -10,7 +10,8 @@ Signals are written to the PLC. Commands, and alarms that the PLC raises, are re
 such as a state or a counter, have names that begin with `plc/`; conditions of a test may read them.
 
 `theirs` is a NodeId of OPC UA, or a place in Modbus: table, address, type, word order ("holding register 12 float32
-big").
+big"), a place in a Siemens PLC ("DB1.DBD4 REAL"), a tag of a Rockwell PLC, or a symbol of a Beckhoff PLC.
+A third column, `note`, is for the reader. Rows without a tag are ignored: `attach URL --browse` writes them.
 """
 
 from __future__ import annotations
@@ -23,12 +24,13 @@ from typing import NamedTuple
 
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.commands.refusal import ALARMS
-from conveyor_sim.line.tag import COMMANDS, SIGNALS, Tag, count, switch
+from conveyor_sim.line.tag import CONTROLLED, SIGNALS, Tag, count, switch
 from conveyor_sim.protocols.tags.handshake import TARGET, TICK
 from conveyor_sim.support.files import MB, FileError, read_file
 from conveyor_sim.support.printable import printable
 
 COLUMNS = ("tag", "theirs")
+NOTE = "note"
 
 OWN = "plc/"
 """Prefix of the names of values that only the PLC has."""
@@ -45,6 +47,12 @@ class MappedTag(NamedTuple):
     theirs: str
     where: str
     """File and line, for errors."""
+
+    @property
+    def is_written(self) -> bool:
+        """True for signals and `run/tick`, which are written to the PLC."""
+        name = self.tag.name
+        return name == TICK or (self.tag.role in SIGNALS and not name.startswith(OWN))
 
 
 class TagMap(NamedTuple):
@@ -77,18 +85,21 @@ def read_tag_map(path: Path, tags: Sequence[Tag]) -> TagMap:
         raise TagMapError(f"{path}: {error}, expected a CSV file of tags") from error
     except UnicodeDecodeError as error:
         raise TagMapError(f"{path}: is not UTF-8, expected a CSV file of tags") from error
-    if not rows or tuple(rows[0]) != COLUMNS:
+    columns = tuple(rows[0]) if rows else ()
+    if columns not in (COLUMNS, (*COLUMNS, NOTE)):
         header = printable(",".join(rows[0])) if rows else "nothing"
         raise TagMapError(f"{path}: line 1: {header} given, expected {','.join(COLUMNS)}")
-    known = {tag.name: tag for tag in tags if tag.role in (*SIGNALS, *COMMANDS)} | _HANDSHAKE
+    known = mappable(tags)
     mapped: dict[str, MappedTag] = {}
     for number, cells in enumerate(rows[1:], start=2):
         if not cells:
             continue
         where = f"{path}: line {number}"
-        if len(cells) != len(COLUMNS) or not cells[1]:
+        if len(cells) != len(columns) or not cells[1]:
             raise TagMapError(f"{where}: {printable(','.join(cells))} given, expected a tag and its place in the PLC")
-        name, theirs = cells
+        name, theirs = cells[:2]
+        if not name and len(cells) > len(COLUMNS):
+            continue
         tag = known.get(name) or _of_the_plc(name)
         if tag is None:
             expected = "expected a signal or command of the line, alarms/<name> or plc/<name>"
@@ -103,6 +114,11 @@ def read_tag_map(path: Path, tags: Sequence[Tag]) -> TagMap:
     written = tuple(each for each in mapped.values() if each.tag.role in SIGNALS and each not in own)
     read = tuple(each for each in mapped.values() if each not in (*written, *own))
     return TagMap(written, read, own, tick, target)
+
+
+def mappable(tags: Sequence[Tag]) -> dict[str, Tag]:
+    """Return the tags of a line that a map may name, and those of the handshake, by name."""
+    return {tag.name: tag for tag in tags if tag.role in (*SIGNALS, *CONTROLLED)} | _HANDSHAKE
 
 
 def _of_the_plc(name: str) -> Tag | None:

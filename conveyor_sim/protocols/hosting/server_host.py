@@ -19,6 +19,7 @@ from multiprocessing.connection import Connection
 from typing import Any
 from urllib.parse import urlsplit
 
+from conveyor_sim.line.commands.inputs import Input
 from conveyor_sim.protocols.hosting.frames import Frames
 from conveyor_sim.protocols.hosting.server_child import ServerChild
 from conveyor_sim.protocols.hosting.server_kinds import ServerKind
@@ -37,6 +38,7 @@ from conveyor_sim.protocols.hosting.settings import ServerSettings
 from conveyor_sim.protocols.server.interface import Health, ServerError, Status
 from conveyor_sim.protocols.server.users import Logins
 from conveyor_sim.protocols.tags.control_mode import Holding
+from conveyor_sim.protocols.tags.held_buttons import HeldButtons
 from conveyor_sim.protocols.tags.line_mirror import DrawableProvider
 from conveyor_sim.protocols.tags.tag_provider import WEB
 from conveyor_sim.support.child_process import how_it_ended
@@ -89,6 +91,7 @@ class ServerHost:
         self._place, self._settings, self._view, self._logins, self._say = place, settings, view, logins, say
         self._everyone = everyone if kind.name == WEB else None
         self._holding = Holding(view, kind.name)
+        self._held = HeldButtons(view)  # by a process that may be killed
         self._passwords = ThreadPoolExecutor(1, f"passwords of {kind.name}")
         self._sending = threading.Lock()
         self._ending = threading.Event()
@@ -176,6 +179,7 @@ class ServerHost:
             except Exception as error:  # the user must know of any error
                 reason = f"{self.kind.name}: {type(error).__name__}: {error}"
             self._account()
+            self._held.leave_all()
             if self._ending.is_set():
                 break
             if not self._settled.is_set():
@@ -197,6 +201,7 @@ class ServerHost:
         while (left := began + seconds - time.monotonic()) > 0.0 and not self._ending.wait(min(LOOK, left)):
             self._silent = time.monotonic() - began
             self._holding.look()
+            self._held.look()
 
     def _account(self) -> None:
         """Add the counts of a process that has ended to those before it."""
@@ -279,6 +284,7 @@ class ServerHost:
                     return message.reason
             if message is None:
                 self._holding.look()
+                self._held.look()
             if self._silent > (STALLED if started else START):
                 process.kill()
                 what = f"has not answered for {STALLED:g} s" if started else f"has not started within {START:g} s"
@@ -309,7 +315,7 @@ class ServerHost:
         if time.monotonic() > call.deadline:
             return  # it has been refused already
         todo: dict[ParentService, Callable[..., Any]] = {
-            "give": self._view.give,
+            "give": self._give,
             "control": self._view.control,
             "holder": lambda: self._holding.holder,
             "judged_as": self._holding.judged_as,
@@ -324,6 +330,13 @@ class ServerHost:
             answer = f"{type(error).__name__}: {error}"
         if call.number:
             self._send(ParentAnswer(call.number, answer))
+
+    def _give(self, request: Input) -> str:
+        """Pass an input on. Return the reason for a refusal, "" if it was queued."""
+        if reason := self._view.give(request):
+            return reason
+        self._held.note(self.kind.name, request)
+        return ""
 
     def _enter(self, call: ParentCall, pipe: Connection | None) -> None:
         if time.monotonic() > call.deadline:

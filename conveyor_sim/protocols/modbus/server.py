@@ -37,6 +37,7 @@ from conveyor_sim.protocols.server.interface import HERE, ServerError, Status, r
 from conveyor_sim.protocols.server.quotas import GUEST, QUOTA, ConnectionSlot, ConnectionSlots, Quota
 from conveyor_sim.protocols.tags.control_mode import Holding, HoldingService, objection, refused_for_good
 from conveyor_sim.protocols.tags.handshake import MAY_GO_ON, TARGET, TICK
+from conveyor_sim.protocols.tags.held_buttons import HeldButtons
 from conveyor_sim.protocols.tags.tag_provider import MODBUS, TagProvider
 from conveyor_sim.support.modbus_rows import Row, Table, decode, encode
 
@@ -208,6 +209,7 @@ class _Handler(ServerRequestHandler):
         if self.place is not None:
             self.server.places.leave(self.place)
         self.server.holding.leave(self.writer)
+        self.server.image.held.leave(self.writer)
         super().callback_disconnected(exc)
 
     @property
@@ -292,6 +294,7 @@ class _Image:
         self._source, self._role, self.holding = source, role, holding
         self._receipt = Receipt(source.info.tags, source.info.where)
         self._commands = {tag.name: tag for tag in source.info.tags if tag.role in COMMANDS}
+        self.held = HeldButtons(source)
         self._rows: Mapping[tuple[Table, int], Row] = {(row.table, at): row for row in rows for at in row.addresses}
         self.writes = self.refused = 0
 
@@ -358,6 +361,7 @@ class _Image:
             return ExcCodes.DEVICE_BUSY
         if names and self._source.give(request):
             return ExcCodes.DEVICE_BUSY
+        self.held.note(writer, request)
         if target is None:
             return None
         return ExcCodes.ILLEGAL_VALUE if self._source.control("target", target, writer) else None

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 import socket
 import ssl
@@ -12,8 +11,8 @@ from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 from conveyor_sim.protocols.server.interface import ServerError
+from conveyor_sim.protocols.server.password_file import read_password
 from conveyor_sim.protocols.tags.tag_provider import LineInfo
-from conveyor_sim.support.files import MB, FileError, read_file
 from conveyor_sim.support.printable import printable
 
 PASSWORD = "CONVEYOR_SIM_MQTT_PASSWORD"
@@ -112,7 +111,7 @@ def broker_of(
     user = unquote(parts.username or "")
     if password_file is not None and not user:
         raise ServerError("--mqtt-password-file: given without a user, expected mqtt://USER@HOST")
-    password = _password(password_file) if user else ""
+    password = read_password(password_file, PASSWORD, "the broker") if user else ""
     group, node = (*names, "", "")[:2]
     return Broker(
         parts.hostname,
@@ -125,17 +124,6 @@ def broker_of(
         node,
         primary_host,
     )
-
-
-def _password(path: Path | None) -> str:
-    if path is None:
-        return os.environ.get(PASSWORD, "")
-    try:
-        return read_file(path, MB).decode().partition("\n")[0].rstrip("\r")
-    except FileError as error:
-        raise ServerError(f"{path}: {error}, expected a file with the password of the broker") from error
-    except UnicodeDecodeError as error:
-        raise ServerError(f"{path}: is not UTF-8, expected a file with the password of the broker") from error
 
 
 def _reason(error: Exception) -> str:

@@ -23,6 +23,7 @@ from conveyor_sim.protocols.tags.control_mode import (
     objection,
     refused_for_good,
 )
+from conveyor_sim.protocols.tags.held_buttons import HeldButtons
 from conveyor_sim.protocols.tags.tag_provider import MQTT, TagProvider
 from conveyor_sim.support.printable import SENTENCE, printable
 
@@ -55,6 +56,7 @@ class HostCommands:
         self._writer = f"{MQTT} {broker}"
         self._receipt = Receipt(source.info.tags, source.info.where)
         self._holding = holding or Holding(source, MQTT)
+        self._held = HeldButtons(source)
         self._last = 0.0  # wall time of the latest accepted command, s
         self._commands: Mapping[str, Tag] = {tag.name: tag for tag in source.info.tags if tag.role in COMMANDS}
         self._modes: Mapping[str, Tag] = {tag.name: tag for tag in source.info.tags if is_mode(tag)}
@@ -92,14 +94,16 @@ class HostCommands:
             self.writes += 1
 
     def leave(self) -> None:
-        """Release the line if it is held, because commands can't arrive any more."""
+        """Release the line and all buttons that are held, because commands can't arrive any more."""
         self._holding.leave(self._writer)
+        self._held.leave_all()
 
     def look(self) -> None:
-        """Release the line after a silence. Call this regularly."""
-        if self._holding.holder and time.monotonic() > self._last + self._silence:
+        """Release the line and all held buttons after a silence. Call this regularly."""
+        if time.monotonic() > self._last + self._silence:
             self.leave()
         self._holding.look()
+        self._held.look()
 
     def _metrics(self, data: bytes) -> Any:
         """Return the metrics of a command, or the reason for its refusal."""
@@ -144,11 +148,14 @@ class HostCommands:
             if reason := objection(self._source, self._commands[name], number, role, self._writer):
                 return reason
         # In lockstep, the attached PLC owns the line.
-        if role == "controller" and "target" not in self._source.controls:
-            if reason := self._holding.take(self._writer):
-                return reason
-            self._last = time.monotonic()
-        return self._source.give(request)
+        takes = role == "controller" and "target" not in self._source.controls
+        if takes and (reason := self._holding.take(self._writer)):
+            return reason
+        self._last = time.monotonic()
+        if reason := self._source.give(request):
+            return reason
+        self._held.note(self._writer, request)
+        return ""
 
     def _set_modes(self, role: WriterKind, names: list[str], numbers: list[float]) -> str:
         devices = tuple(self._modes[name].device for name in names)

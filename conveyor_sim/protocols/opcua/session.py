@@ -178,6 +178,10 @@ class OpcUaSession(InternalSession):
             if moved and self.user != user:
                 self.user, self.nonce = user, nonce
                 raise ServiceError(Codes.BadIdentityTokenRejected)
+            if self.user == user:
+                self.user = user  # its identity stands for the session
+            elif self.iserver.requests is not None:
+                self.iserver.requests.leave(user)
         except BaseException:
             if connection is not None and connection is not self._connection:
                 connection.leave()
@@ -190,6 +194,12 @@ class OpcUaSession(InternalSession):
         if connection is not None:
             connection.require_place(self.user.name)
         return result
+
+    async def close_session(self, delete_subs: bool = True) -> None:
+        """End the session, and release the buttons that its client holds."""
+        if self.iserver.requests is not None:
+            self.iserver.requests.leave(self.user)
+        await super().close_session(delete_subs)
 
     async def write(self, params: ua.WriteParameters) -> list[ua.StatusCode]:
         """Write commands. `Requests.write` describes the status codes."""

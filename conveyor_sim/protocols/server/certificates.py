@@ -12,6 +12,7 @@ from ipaddress import ip_address
 from pathlib import Path
 from tempfile import NamedTemporaryFile
 from typing import NamedTuple
+from urllib.parse import quote
 
 from cryptography import x509
 from cryptography.hazmat.primitives import hashes, serialization
@@ -23,8 +24,10 @@ from conveyor_sim.protocols.server.interface import ServerError
 from conveyor_sim.support.file_lock import locked
 from conveyor_sim.support.files import MB, FileError, read_file, write_file
 
-CERTIFICATE, KEY, TRUSTED = "certificate.der", "key.pem", "trusted"
-"""Names in the folder. TRUSTED: folder of clients' certificates; if it holds any, all others are refused."""
+CERTIFICATE, KEY, TRUSTED, PLCS = "certificate.der", "key.pem", "trusted", "plcs"
+"""Names in the folder. TRUSTED: folder of clients' certificates; if it holds any, all others are refused. PLCS: folder
+of trusted certificates of PLCs that are servers, one per address.
+"""
 
 YEARS = 10
 
@@ -67,11 +70,11 @@ def identity(folder: Path) -> Identity:
             with locked(folder, _PATIENCE):  # the servers of a line start at the same time
                 if not (folder / KEY).exists():
                     _make(folder)
-        trusted = frozenset(_der(path) for path in sorted((folder / TRUSTED).iterdir()) if path.is_file())
+        trusted = frozenset(read_certificate(path) for path in sorted((folder / TRUSTED).iterdir()) if path.is_file())
     except OSError as error:
         where = error.filename or folder
         raise CertificateError(f"{where}: {error.strerror}, expected a folder for certificates") from error
-    certificate = _der(folder / CERTIFICATE)
+    certificate = read_certificate(folder / CERTIFICATE)
     names = x509.load_der_x509_certificate(certificate).extensions
     try:
         (uri,) = names.get_extension_for_class(x509.SubjectAlternativeName).value.get_values_for_type(
@@ -81,7 +84,7 @@ def identity(folder: Path) -> Identity:
         raise CertificateError(
             f"{folder / CERTIFICATE}: no application URI, expected one as subject alternative name"
         ) from error
-    return Identity(certificate, _read(folder / KEY), uri, trusted)
+    return Identity(certificate, read_private(folder / KEY), uri, trusted)
 
 
 def _make(folder: Path) -> None:
@@ -139,15 +142,17 @@ def _write(path: Path, content: bytes) -> None:
         raise CertificateError(f"{path}: {error}, expected a folder for certificates") from error
 
 
-def _read(path: Path) -> bytes:
+def read_private(path: Path) -> bytes:
+    """Return the content of a file with a certificate or key. Raise CertificateError."""
     try:
         return read_file(path, MB)
     except FileError as error:
         raise CertificateError(f"{path}: {error}, expected a certificate or key") from error
 
 
-def _der(path: Path) -> bytes:
-    content = _read(path)
+def read_certificate(path: Path) -> bytes:
+    """Return the certificate in a file (DER or PEM) as DER. Raise CertificateError."""
+    content = read_private(path)
     try:
         certificate = (
             x509.load_pem_x509_certificate(content)
@@ -157,6 +162,33 @@ def _der(path: Path) -> bytes:
     except ValueError as error:
         raise CertificateError(f"{path}: can't be read, expected a certificate (DER or PEM)") from error
     return certificate.public_bytes(serialization.Encoding.DER)
+
+
+def trusted_plc(folder: Path, address: str) -> bytes | None:
+    """Return the certificate (DER) that is trusted for a PLC at an address (host:port); None without one.
+
+    Raise CertificateError.
+    """
+    path = _plc(folder, address)
+    return read_certificate(path) if path.exists() else None
+
+
+def trust_plc(folder: Path, address: str, certificate: bytes) -> None:
+    """Trust a certificate (DER) for a PLC at an address (host:port), instead of the one before.
+
+    folder: exists already. Raise CertificateError.
+    """
+    path = _plc(folder, address)
+    try:
+        path.parent.mkdir(mode=0o700, exist_ok=True)
+    except OSError as error:
+        raise CertificateError(f"{path.parent}: {error.strerror}, expected a folder for certificates") from error
+    _write(path, certificate)
+
+
+def _plc(folder: Path, address: str) -> Path:
+    host, _, port = address.rpartition(":")
+    return folder / PLCS / f"{quote(host, safe='')}_{port}.der"
 
 
 CHAIN = "certificate.pem"

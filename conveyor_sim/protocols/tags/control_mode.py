@@ -15,7 +15,7 @@ from conveyor_sim.line.commands.inputs import DISOWN, OWN, SET, Input, WriterKin
 from conveyor_sim.line.commands.receipt import Receipt, Refusal
 from conveyor_sim.line.machines.packml import stops
 from conveyor_sim.line.run_state import ENDED, REPLAYING, STOPPED
-from conveyor_sim.line.tag import Tag
+from conveyor_sim.line.tag import PANEL, Tag
 from conveyor_sim.protocols.tags.tag_provider import Control, LineSnapshot, TagProvider
 
 GRACE = 30.0
@@ -153,6 +153,8 @@ def is_mode(tag: Tag) -> bool:
 
 def objection(source: TagProvider, command: Tag, value: float, kind: WriterKind, writer: str) -> str:
     """Return why a command of a writer would be refused in the latest state of the line; "" if it would not."""
+    if command.role == PANEL:
+        return ""
     snapshot, device = source.snapshot, command.device
     if kind in PEOPLE and stops(command.name, value):
         return ""

@@ -9,13 +9,22 @@ import logging
 import ssl
 import sys
 import time
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable, Hashable, Mapping
 from functools import partial
 from typing import Any, NamedTuple
 
 from aiohttp import WSCloseCode, WSMsgType, web
 
-from conveyor_sim.line.commands.authority import AUTOMATIC, IN_CONTROL, MAY, MAY_SET, MODES, PEOPLE, unauthorized
+from conveyor_sim.line.commands.authority import (
+    AT_PANEL,
+    AUTOMATIC,
+    IN_CONTROL,
+    MAY,
+    MAY_SET,
+    MODES,
+    PEOPLE,
+    unauthorized,
+)
 from conveyor_sim.line.commands.inputs import DECLARE, SET, Input, WriterKind
 from conveyor_sim.line.commands.receipt import Receipt
 from conveyor_sim.line.machines.packml import CNTRL_CMD, Command, PackMLState, mode_objection, stops
@@ -27,6 +36,7 @@ from conveyor_sim.protocols.server.interface import HERE, ServerError, Status, r
 from conveyor_sim.protocols.server.quotas import GUEST, QUOTA, Budget, ConnectionSlot, ConnectionSlots, Quota
 from conveyor_sim.protocols.server.users import ROLES, Logins, LoginService, Role, User
 from conveyor_sim.protocols.tags.control_mode import MAY_CONTROL, TAKES_NO_INPUT, objection, refused_for_good
+from conveyor_sim.protocols.tags.held_buttons import HeldButtons
 from conveyor_sim.protocols.tags.line_mirror import DrawableProvider
 from conveyor_sim.protocols.tags.tag_provider import WEB
 from conveyor_sim.protocols.web.feed import Feed, Viewer, text_message
@@ -69,6 +79,7 @@ def page_rights() -> dict[str, Any]:
         "texts": MODES,
         "automatic": AUTOMATIC,
         "people": PEOPLE,
+        "panel": AT_PANEL,
         "stop": {"name": CNTRL_CMD, "values": [value for value in Command if stops(CNTRL_CMD, value)]},
         "over": [STATES[state] for state in TAKES_NO_INPUT],
     }
@@ -88,18 +99,20 @@ class PageCommands:
         self._receipt = Receipt(tags, source.info.where)
         self.controls = source.controls - {"target"}  # the controller sets the target of a line in lockstep
         """Requests to control the run that pages may make."""
+        self.held = HeldButtons(source)
+        """Buttons that pages hold."""
         self.writes = self.refused = 0
         """Requests that were passed on to the line, and requests that were refused."""
 
-    def do(self, person: PageUser, request: Mapping[str, Any]) -> str:
+    def do(self, person: PageUser, request: Mapping[str, Any], page: Hashable = "") -> str:
         """Carry out a request of a page, which may be malformed. Return the reason for a refusal, "" if it was
         accepted.
         """
-        reason = self._do(person, request)
+        reason = self._do(person, request, page)
         self.writes, self.refused = self.writes + (not reason), self.refused + bool(reason)
         return reason
 
-    def _do(self, person: PageUser, request: Mapping[str, Any]) -> str:
+    def _do(self, person: PageUser, request: Mapping[str, Any], page: Hashable) -> str:
         if person.kind is None:
             who = f"{person.name} is a viewer, who only reads" if person.name else "not signed in"
             return f"{who}: sign in as an operator, engineer, controller or test user"
@@ -112,7 +125,11 @@ class PageCommands:
             return self._control(person, person.kind, names, values)
         if not isinstance(what, str):
             return f"expected one of {', '.join(OPERATIONS)}"
-        return self._give(Input(WEB, person.writer, person.kind, what, tuple(names), tuple(map(float, values))))
+        given = Input(WEB, person.writer, person.kind, what, tuple(names), tuple(map(float, values)))
+        if reason := self._give(given):
+            return reason
+        self.held.note(page, given)
+        return ""
 
     def _control(self, person: PageUser, kind: WriterKind, names: list[str], values: list[float]) -> str:
         if kind not in MAY_CONTROL:
@@ -339,6 +356,7 @@ class WebServer:
             pass
         finally:
             self._places.leave(place)
+            self._commands.held.leave(viewer)
             self._sockets.discard(socket)
             self._pages.discard(request.protocol)
             self._feed.leave(viewer)
@@ -420,13 +438,14 @@ class WebServer:
                         self._feed.join(viewer)
                 case "sign_out":
                     person = ANONYMOUS
+                    self._commands.held.leave(viewer)
                     self._sign_out(socket, place)
                     viewer.tell(_reply(request, "", person))
                     if not self._anonymous:
                         self._feed.leave(viewer)
                         viewer.tell(text_message("locked"))
                 case _:
-                    viewer.tell(_reply(request, self._commands.do(person, request), person))
+                    viewer.tell(_reply(request, self._commands.do(person, request, viewer), person))
 
     async def _sign_in(self, request: Mapping[str, Any], origin: str) -> PageUser:
         name, password = request.get("name"), request.get("password")

@@ -11,26 +11,29 @@ one of:
 - `matrix`: a table of conversions, a row for what is converted, a column for a type; each is computed twice likewise.
   `=` is the type itself, `!` has no value and stops the program, `x` is no conversion, which the compiler says;
 - `error`: what the compiler says of it; `stops`: what the program says as it stops.
+`dialects`: those that have it, else iec. `lacking`: what the compiler says in all other dialects.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
 from ruamel.yaml import YAML
 
 from conveyor_sim.control.st.compile import compile_text
+from conveyor_sim.control.st.dialect import DIALECTS
 from conveyor_sim.control.st.program import Program
 
 CASES = Path(__file__).parent / "cases"
 TICK = 10_000_000  # ns
 TYPED = re.compile(
-    r"\b(?!16#|8#|2#|T#|LTIME#)[A-Z]+#(?:16#[0-9A-F]+|-?[0-9][0-9_.]*(?:[eE][+-]?\d+)?|TRUE|FALSE|'[^']*')"
-    r"|\b(?:T|LTIME)#-?[\w.]+"
+    r"\b(?!16#|8#|2#|T#|LTIME#|L?(?:DT?|LD|DATE|TOD|TIME_OF_DAY|DATE_AND_TIME)#)[A-Z]+#(?:16#[0-9A-F]+|-?[0-9][0-9_.]*(?:[eE][+-]?\d+)?|TRUE|FALSE|'[^']*')"
+    r"|\b(?:T|LTIME)#-?[\w.]+|(?<!')\bL?(?:DATE|TOD|DT)#[\d:.-]*\d"
 )
 
 
@@ -42,6 +45,7 @@ class Case:
     scans: str = ""
     error: str = ""
     stops: str = ""
+    dialect: str = "iec"
 
     @property
     def id(self) -> str:
@@ -51,7 +55,17 @@ class Case:
 def cases() -> Iterator[Case]:
     for path in sorted(CASES.glob("*.yaml")):
         for given in YAML(typ="safe").load(path.read_text()):
-            yield from _read(path.stem, given)
+            dialects = given.get("dialects", ["iec"])
+            for dialect in dialects:
+                for case in _read(path.stem, given):
+                    name = case.name if dialect == "iec" else f"{case.name}, {dialect}"
+                    yield replace(case, name=name, dialect=dialect)
+            if "lacking" in given:
+                for dialect in DIALECTS:
+                    if dialect not in dialects:
+                        case = next(_read(path.stem, given))
+                        name = f"{case.name}, not in {dialect}"
+                        yield replace(case, name=name, dialect=dialect, error=given["lacking"], scans="", stops="")
 
 
 def _read(group: str, given: dict[str, Any]) -> Iterator[Case]:
@@ -112,7 +126,7 @@ def in_variables(expression: str) -> tuple[str, str]:
 
 def play(case: Case) -> None:
     """Run the scans of a case, and compare."""
-    running = Program(compile_text(case.text))
+    running = Program(compile_text(case.text, dialect=DIALECTS[case.dialect]))
     header, *rows = [line for line in (case.scans or "|\n|").splitlines() if line.strip()]
     given, expected = (part.split() for part in header.split("|"))
     for number, row in enumerate(rows):
@@ -135,13 +149,25 @@ def variable(running: Program, name: str) -> Any:
 
 
 def value(word: str) -> Any:
-    """Return T and F; times in ms as 30ms; numbers; texts in quotes, with _ for a blank."""
+    """Return T and F; times in ms as 30ms; dates as literals; numbers; texts in quotes, with _ for a blank."""
     if word in ("T", "F"):
         return word == "T"
     if word.endswith("ms"):
         return round(float(word[:-2]) * 1e6)
     if word.endswith("ns"):
         return int(word[:-2])
-    if word.startswith("'"):
+    if re.match(r"L?(DATE|TOD|DT)#", word):
+        return moment(word)
+    if word[0] in "'\"":
         return word[1:-1].replace("_", " ")
     return float(word) if any(letter in word for letter in ".ein") else int(word, 0)
+
+
+def moment(word: str) -> int:
+    """Return a date, a time of day, or both, in ns, by Python's calendar. Fractions have at most 9 digits."""
+    kind, _, text = word.partition("#")
+    whole, _, fraction = text.partition(".")
+    form = {"DATE": "%Y-%m-%d", "TOD": "%H:%M:%S", "DT": "%Y-%m-%d-%H:%M:%S"}[kind.removeprefix("L")]
+    start = datetime(1900, 1, 1) if "TOD" in kind else datetime(1970, 1, 1)
+    seconds = (datetime.strptime(whole, form) - start) // timedelta(seconds=1)
+    return seconds * 10**9 + int(fraction.ljust(9, "0"))

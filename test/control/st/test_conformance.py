@@ -7,6 +7,7 @@ import pytest
 from control.st.conformance import Case, cases, play
 
 from conveyor_sim.control.st.compile import compile_text
+from conveyor_sim.control.st.dialect import DIALECTS
 from conveyor_sim.control.st.errors import StructuredTextError
 
 CASES = list(cases())
@@ -17,7 +18,7 @@ def test_a_program_does_what_the_standard_says(case: Case) -> None:
     assert case.source
     if case.error:
         with pytest.raises(StructuredTextError) as caught:
-            compile_text(case.text)
+            compile_text(case.text, dialect=DIALECTS[case.dialect])
         assert case.error in str(caught.value)
     elif case.stops:
         with pytest.raises(StructuredTextError) as caught:

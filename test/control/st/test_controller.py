@@ -10,10 +10,12 @@ from pathlib import Path
 import pytest
 from facts import missing, stating
 
-from conveyor_sim.control.scan import Inputs, LineTags, together
+from conveyor_sim.control.scan import Controller, Inputs, LineTags, together
 from conveyor_sim.control.st.controller import StructuredText
 from conveyor_sim.control.st.errors import StructuredTextError
+from conveyor_sim.control.st.load import load
 from conveyor_sim.protocols.modbus.address_map import modbus_map
+from conveyor_sim.run.controller_parameters import controller_parameters
 from conveyor_sim.support.modbus_rows import to_csv
 from conveyor_sim.testing import Scenario
 from conveyor_sim.testing.evidence import draw_moment, traced
@@ -94,6 +96,10 @@ def test_located_variables_are_tags_by_their_address_in_the_modbus_map(tmp_path:
     assert plant.history["belts/table/cmd_speed"][-1] == 0.25
     assert plant.history["machines/packer/run"][-1] == 1.0
     assert plant.signals["plc/main/actual"] == plant.signals["belts/table/speed"] == 0.25
+    plant.always(lambda s: s["PLC/Main/Actual"] == s["plc/main/actual"], for_=0.05)
+    assert plant.history["plc/main/actual"][-1] == 0.25
+    with pytest.raises(KeyError, match="plc/main/absent"):
+        plant.signals["PLC/Main/Absent"]
     assert "main/eye <- photo_eyes/high/blocked (by address)" in str(plc.mapping)
     wrong = controller(tmp_path, f"VAR speed AT %QW{speed.address} : INT; END_VAR", modbus_map=kept)
     with pytest.raises(StructuredTextError, match=stating(f"%QW{speed.address}", "belts/table/cmd_speed", "32 bits")):
@@ -315,8 +321,8 @@ def test_conditions_read_variables_and_the_picture_shows_them(tmp_path: Path) ->
     assert draw_moment(plant, tmp_path / "line.png").stat().st_size > 0
 
 
-def fill(plant: Scenario, program: Path) -> None:
-    plant.attach(StructuredText(program))
+def fill(plant: Scenario, program: Controller) -> None:
+    plant.attach(program)
     plant.inject("machines/packer/stop")
     plant.eventually(lambda s: s["alarms/table full"], within=40)
 
@@ -327,7 +333,7 @@ def test_the_documented_line_and_its_fault(tmp_path: Path) -> None:
     faulty.write_text((PROGRAMS / "table.st").read_text().replace("table_speed := 0.4", "table_speed := feeder_speed"))
     for program, goes_on in ((PROGRAMS / "table.st", True), (faulty, False)):
         plant = Scenario(TABLE)
-        fill(plant, program)
+        fill(plant, StructuredText(program))
         plant.always(lambda s: s["belts/table/bottles"] <= 45, for_=5)
         plant.inject("machines/packer/stop", 0)
         if goes_on:
@@ -421,8 +427,7 @@ def test_units_one_within_the_other_are_bounded(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("data", "said"),
     [
-        ("PROGRAM p ; END_PROGRAM (* ü *)".encode("latin-1"), "is not UTF-8"),
-        ("PROGRAM p ; END_PROGRAM".encode("utf-16"), "is not UTF-8"),
+        ("PROGRAM p ; END_PROGRAM".encode("utf-16"), "is UTF-16"),
         (b"", ":1:1: found no PROGRAM, expected one or more"),
         (b"\0" * 1000, r":1:1: found '\\x00', expected Structured Text"),
         (b"PROGRAM p\rVAR n : INT; END_VAR\rn := m;\rEND_PROGRAM", "found m, which is not declared"),
@@ -444,14 +449,21 @@ def test_what_is_no_file_is_said_to_be_none(tmp_path: Path) -> None:
             StructuredText(tmp_path / f"{name}.st")
 
 
-def test_a_program_brought_over_from_codesys_runs_the_line(tmp_path: Path) -> None:
-    """docs/structured_text.md, A program carried through: refusals and their solutions."""
-    with pytest.raises(StructuredTextError, match=stating("codesys.st:111:17", "GVL", "not declared")):
-        StructuredText(PROGRAMS / "brought_over" / "codesys.st")
-    plant = Scenario(TABLE)
-    fill(plant, PROGRAMS / "brought_over" / "table.st")
-    plant.always(lambda s: s["belts/table/bottles"] <= 45, for_=5)
-    plant.inject("machines/packer/stop", 0)
-    plant.eventually(lambda s: s["belts/feeder/speed"] > 0, within=15)
-    assert plant.signals["plc/plc_prg/fbfeeder/nstops"] == 1
-    assert plant.signals["plc/plc_prg/wstatus"] == 0x0102
+def test_a_program_brought_over_from_codesys_runs_the_line() -> None:
+    """docs/structured_text.md, A program carried through: unedited in its dialect, and with its changes in iec."""
+    folder = PROGRAMS / "brought_over"
+    with pytest.raises(StructuredTextError, match=stating("codesys.st:111:17", "GVL.xEyeHigh", "codesys")):
+        StructuredText(folder / "codesys.st")
+    unedited = load(str(folder / "codesys.st"), controller_parameters(str(folder / "codesys.yaml"), "--parameters"))
+    hashes = []
+    for program in (unedited, StructuredText(folder / "table.st")):
+        plant = Scenario(TABLE)
+        fill(plant, program)
+        plant.always(lambda s: s["belts/table/bottles"] <= 45, for_=5)
+        plant.inject("machines/packer/stop", 0)
+        plant.eventually(lambda s: s["belts/feeder/speed"] > 0, within=15)
+        assert plant.signals["plc/plc_prg/fbfeeder/nstops"] == 1
+        assert plant.signals["plc/plc_prg/wstatus"] == 0x0102
+        hashes.append(plant.simulation.state_hash())
+    assert hashes[0] == hashes[1]
+    assert any(not missing(sentence, "codesys.st:133:34", "DINT", "INT") for sentence in unedited.left_over)

@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 
 import pytest
-from facts import stating
+from facts import missing, stating
 
 from conveyor_sim.control.scan import Inputs, LineTags
 from conveyor_sim.control.st.controller import StructuredText
@@ -183,3 +183,60 @@ def test_tags_that_can_not_be_are_refused_before_the_first_scan(tmp_path: Path, 
 )
 def test_places_that_are_apart_or_have_tags_are_taken(tmp_path: Path, declare: str) -> None:
     assert bound(tmp_path, program(declare)).mapping is not None
+
+
+PLANT = """FUNCTION_BLOCK Gate
+VAR eye AT %I* : BOOL; go AT %Q* : BOOL; END_VAR
+go := NOT eye;
+END_FUNCTION_BLOCK
+TYPE Station : STRUCT gate : Gate; END_STRUCT; END_TYPE
+VAR_GLOBAL speed AT %Q* : LREAL; END_VAR
+PROGRAM main
+VAR one : Gate; more : ARRAY [0..1] OF Station; bits AT %I* : ARRAY [1..2] OF BOOL; END_VAR
+one(); more[1].gate(); speed := 1.5;
+IF bits[2] THEN speed := 2.5; END_IF
+END_PROGRAM
+"""
+MAP = {
+    "main/one/eye": "eye",
+    "MAIN/One/Go": "run",
+    "main/more[1]/gate/eye": "other_eye",
+    "main/more[1]/gate/go": "turn",
+    "main/bits[2]": "other_eye",
+}
+
+
+def test_each_instance_has_its_own_inputs_and_outputs(tmp_path: Path) -> None:
+    plc = bound(tmp_path, PLANT, tags=MAP)
+    assert scan(plc, 0, eye=1.0) == {"run": 0.0, "turn": 1.0, "speed": 1.5}
+    assert scan(plc, 1, other_eye=1.0) == {"run": 1.0, "turn": 0.0, "speed": 2.5}
+
+
+def test_the_mapping_lists_what_has_no_tag(tmp_path: Path) -> None:
+    plc = bound(tmp_path, PLANT, tags=MAP)
+    assert plc.mapping is not None
+    assert plc.mapping.variables == ("main/more[0]/gate/eye", "main/more[0]/gate/go", "main/bits[1]")
+    assert not missing(str(plc.mapping), "main/one/eye <- eye (by tag)", "speed -> speed (by name)")
+
+
+@pytest.mark.parametrize(
+    ("tags", "words"),
+    [
+        ({"main/one/eye": "run"}, ("eye", "run", "a signal")),
+        ({"main/one/go": "eye"}, ("go", "eye", "a command")),
+        ({"main/one/go": "speed"}, ("BOOL", "speed", "REAL or LREAL")),
+        ({"main/more[2]/gate/go": "run"}, ("main/more[2]/gate/go", "expected one of", "main/one/eye")),
+        ({"main/one/go": "run", "main/more[0]/gate/go": "run"}, ("run", "main/one/go and main/more[0]/gate/go")),
+        ({"main/one": "run"}, ("Gate", "run")),
+    ],
+)
+def test_wrong_maps_are_refused(tmp_path: Path, tags: dict[str, str], words: tuple[str, ...]) -> None:
+    with pytest.raises(StructuredTextError, match=stating(*words)):
+        bound(tmp_path, PLANT, tags=tags)
+
+
+def test_a_snapshot_holds_them(tmp_path: Path) -> None:
+    plc, other = bound(tmp_path, PLANT, tags=MAP), bound(tmp_path, PLANT, tags=MAP)
+    scan(plc, 0, eye=1.0)
+    other.restore(plc.snapshot())
+    assert other.variables["plc/main/one/eye"] == plc.variables["plc/main/one/eye"] == 1.0

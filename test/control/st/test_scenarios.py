@@ -49,6 +49,10 @@ def reject(controller: StructuredText) -> None:
     assert signals["machines/rejecter/rejected_good"] == signals["machines/after/bad"] == 0
 
 
+def emergency_stop(controller: StructuredText) -> None:
+    scenario("emergency_stop").check_emergency_stop(Scenario("scenarios/panel_line"), controller)
+
+
 @pytest.mark.parametrize(
     ("program", "check", "right", "wrong"),
     [
@@ -56,6 +60,7 @@ def reject(controller: StructuredText) -> None:
         ("v_curve", v_curve, "1.0 + MARGIN", "1.0"),
         ("jam", jam, "BACK_TIME : TIME := T#1.3s", "BACK_TIME : TIME := T#0.5s"),
         ("reject", reject, "LREAL := 1.2", "LREAL := 1.1"),
+        ("panel", emergency_stop, "powered AND (ready OR resets)", "powered"),
     ],
 )
 def test_a_program_passes_the_scenario_of_its_twin(

@@ -18,6 +18,7 @@ from conveyor_sim.control.level import Count, table_level
 from conveyor_sim.control.reject import TrackedReject
 from conveyor_sim.control.scan import Constant, Controller, priority
 from conveyor_sim.control.st.controller import StructuredText
+from conveyor_sim.control.start_stop import panel_line
 from conveyor_sim.control.v_curve import Neighbour, VCurve
 from conveyor_sim.testing import Scenario
 
@@ -92,6 +93,22 @@ def stop_filler(plant: Scenario) -> None:
     plant.inject("machines/filler/stop", 0.0)
 
 
+def restart(plant: Scenario) -> None:
+    """Start the line, press and reset the emergency stop, and start it again after the reset button and before it."""
+    for seconds, act in (
+        (1.0, lambda: plant.panel.press("start")),
+        (8.0, lambda: plant.panel.release("start")),
+        (0.5, lambda: plant.panel.press("estop")),
+        (2.0, lambda: plant.panel.reset("estop")),
+        (0.5, lambda: plant.panel.press("start")),
+        (3.0, lambda: plant.panel.release("start")),
+        (0.5, lambda: plant.panel.press("reset")),
+        (0.5, lambda: plant.panel.press("start")),
+    ):
+        plant.run_for(seconds)
+        act()
+
+
 def wedged() -> Scenario:
     wedge = [(0.3384, 0.026), (0.3104, -0.034)]
     return Scenario("scenarios/funnel_mouth", {"bottles": [{"type": "bottle", "position": list(at)} for at in wedge]})
@@ -119,6 +136,9 @@ TWINS = {
     "gap": Twins(metered, gap, nothing, 20, "measured - GAP", "GAP - measured", gap_holds),
     "jam": Twins(wedged, jam, nothing, 25, "BACK_TIME : TIME := T#1.3s", "BACK_TIME : TIME := T#0.5s"),
     "reject": Twins(lambda: Scenario("scenarios/reject_line"), reject, nothing, 40, "LREAL := 1.2", "LREAL := 1.1"),
+    "panel": Twins(
+        lambda: Scenario("scenarios/panel_line"), panel_line, restart, 6, "powered AND (ready OR resets)", "powered"
+    ),
 }
 
 
