@@ -115,7 +115,7 @@ def test_contact_friction_from_bottles_pulled_along_a_rail(tmp_path: Path) -> No
     pull = normal * (speed * math.cos(angle) - bottles.vx) / (speed * math.sin(angle))
     rows = [
         {"quantity": "contact_friction", **PAIR, "force": force, "normal_force": pressing}
-        for force, pressing in zip(read_with_error(pull, 8), normal, strict=True)
+        for force, pressing in zip(read_with_error(pull, 11), normal, strict=True)
     ]
     estimate = only_contact(write(tmp_path / "data.csv", rows)).friction
     assert estimate is not None
