@@ -54,7 +54,9 @@ class Dialect:
     bare_arrays: bool = _flag("`v : ARRAY [1..3] OF INT := 1, 2(0);`")
     byte_addresses: bool = _flag("`%MW2` begins at byte 2 (else `%MW2` is bytes 4 and 5)")
     program_calls: bool = _flag("a unit calls a PROGRAM: `Outputs();`, which then does not run by itself")
-    open_units: bool = _flag("FUNCTIONBLOCK; a file may end without the END of its last unit")
+    open_units: bool = _flag(
+        "FUNCTIONBLOCK; a file may end without the END of its last unit; TYPE as the name of a field"
+    )
     written_inputs: bool = _flag("a unit writes its VAR_INPUT")
     bcd_marks: bool = _flag("BCD_TO_INT of no BCD is -1, INT_TO_BCD of more than 99 is 255 (else the program stops)")
 
