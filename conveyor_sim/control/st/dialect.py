@@ -98,11 +98,10 @@ DIALECTS: dict[str, Dialect] = {
 
 SUFFIXES = {
     ".st": "iec",
-    **dict.fromkeys((".typ", ".var", ".fun"), "iec"),
-    ".exp": "codesys",
+    **dict.fromkeys((".typ", ".var", ".fun", ".exp"), "codesys"),
     **dict.fromkeys((".scl", ".udt", ".db"), "tia"),
 }
-"""Default dialect by the file's type: text, B&R, CODESYS 2.3 and TIA Portal."""
+"""Default dialect by the file's type: text, B&R (next to CODESYS), CODESYS 2.3 and TIA Portal."""
 
 
 def dialect_of(paths: Sequence[str], name: str = "") -> Dialect:
