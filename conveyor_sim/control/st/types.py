@@ -315,6 +315,16 @@ class BlockType(Structure):
     statics: dict[str, str] = field(default_factory=dict)
     """Names of the global variables that its VAR_STAT are, by name in small letters."""
 
+    @property
+    def is_program(self) -> bool:
+        """True for a PROGRAM."""
+        return self.python.startswith("_P_")
+
+    @property
+    def instance(self) -> str:
+        """Code of the only instance of a program that other units use."""
+        return f"_i{self.python}"
+
     def of(self, *sections: str) -> list[Member]:
         """Return the variables of some sections, in their order."""
         return [member for member in self.members.values() if member.section in sections]
