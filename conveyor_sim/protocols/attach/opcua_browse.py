@@ -46,7 +46,7 @@ class PlcVariable(NamedTuple):
 async def browse(
     url: str, access: PlcAccess, say: Callable[[str], object], progress: Callable[[int, int], object]
 ) -> list[PlcVariable]:
-    """Return the variables below the folder Objects of a server, without those of the object Server.
+    """Return the variables below the folder Objects of a server, without those that all servers have.
 
     access, say: as for `open_client`. progress: takes the numbers of nodes and of variables so far. If the server has
     more nodes than `MOST_NODES`, `say` reports it and the others are left out. Raise PlcLinkError, CertificateError.
@@ -72,7 +72,7 @@ async def browse(
                     known.add(node)
                     here = (*path, str(child.BrowseName.Name or ""))
                     waiting.append((node, here))
-                    if child.NodeClass == ua.NodeClass.Variable:
+                    if child.NodeClass == ua.NodeClass.Variable and node.NamespaceIndex:
                         below.append((node, here))
             variables += await _described(requests, below, uris)
             progress(len(known), len(variables))
