@@ -22,6 +22,9 @@ from conveyor_sim.support.printable import printable
 MOST_NODES = 250_000
 """Largest number of nodes to look at. Servers may have endless trees."""
 
+PATIENCE = 60.0
+"""Longest time for each request, s of wall time. Servers are slow at folders with many nodes."""
+
 _PART = 1000
 """Number of nodes between two reports of the progress."""
 
@@ -51,9 +54,9 @@ async def browse(
     access, say: as for `open_client`. progress: takes the numbers of nodes and of variables so far. If the server has
     more nodes than `MOST_NODES`, `say` reports it and the others are left out. Raise PlcLinkError, CertificateError.
     """
-    client = await open_client(url, access, say)
+    client = await open_client(url, access, say, PATIENCE)
     try:
-        requests = OpcUaRequests(url, client)
+        requests = OpcUaRequests(url, client, PATIENCE)
         await requests.read_limits()
         uris = await requests.namespaces()
         root = ua.NodeId(ua.ObjectIds.ObjectsFolder)
