@@ -18,6 +18,7 @@ Kind = Literal[
     "alarm_cleared",
     "alarm_latched",
     "alarm_acknowledged",
+    "alarm_confirmed",
     "alarm_reset",
     "alarm_shelved",
     "alarm_unshelved",

@@ -152,6 +152,10 @@ class PanelUser:
         """Acknowledge alarms by ID; without IDs: all unacknowledged alarms."""
         self.operate("acknowledge", alarms)
 
+    def confirm(self, *alarms: str) -> None:
+        """Confirm acknowledged alarms by ID; without IDs: all that wait to be confirmed."""
+        self.operate("confirm", alarms)
+
     def reset(self, *alarms: str) -> None:
         """Reset latched alarms whose condition has ended, by ID; without IDs: all of them."""
         self.operate("reset", alarms)

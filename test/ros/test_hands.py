@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -16,8 +17,11 @@ from ros.line_client import LineClient, until
 
 from conveyor_sim.bag.replay import replay
 from conveyor_sim.line.commands.inputs import MODE, OWN, SET, Input
+from conveyor_sim.line.line import image_of
 from conveyor_sim.ros.child import Child
 from conveyor_sim.run.stepper import Stepper
+from conveyor_sim.scene import load_scene
+from conveyor_sim.support.resources import scene_path
 
 FEEDER, TABLE = "belts/feeder/cmd_speed", "belts/table/cmd_speed"
 EYE = "photo_eyes/entry/blocked"
@@ -87,6 +91,23 @@ def test_an_operator_takes_a_belt_forces_a_signal_and_all_of_it_replays(
     node.stop()
     report = replay(tmp_path / "bag")
     assert report.difference is None and report.compared["outcomes"] >= 7
+
+
+def test_an_operator_uses_the_panel_and_a_controller_does_not(
+    start_node: Callable[..., Child], client: LineClient
+) -> None:
+    node = start_node(scene="scenarios/panel_line")
+    press = ("panel/start/press", 1.0)
+    for kind, facts in (("controller", ["controller", "operator"]), ("line", ["line"])):
+        refused = operate(client, SET, press, writer_kind=kind)
+        assert not refused.accepted and missing(refused.reason, *facts) == []
+    assert operate(client, SET, press, ("panel/speed/set", 0.4)).accepted
+    refused = operate(client, SET, ("panel/speed/set", math.nan))
+    assert not refused.accepted and missing(refused.reason, "panel/speed/set", "nan given") == []
+    values = client.lockstep(1, run_id="looks").signals.values
+    names = image_of(load_scene(scene_path("scenarios/panel_line"))).signal_names
+    assert (values[names.index("panel/start/contact")], values[names.index("panel/speed/value")]) == (1.0, 0.4)
+    node.stop()
 
 
 def test_a_checkpoint_of_an_owned_line_is_loaded_without_its_owner(

@@ -37,7 +37,7 @@ def test_an_operator_takes_a_belt_in_hand_and_the_recording_replays(opcua: Any, 
         client.set_password("geheim")
         with client:
             line.run_for(0.5)
-            with pytest.raises(ua.UaStatusCodeError, match="BadInvalidState"):
+            with pytest.raises(ua.UaStatusCodeError, match="BadUserAccessDenied"):
                 client.get_node(SETPOINT).write_value(0.125)  # the controller has it
             of_line = client.get_node("ns=2;s=line")
             of_line.call_method("2:set_mode", "belts/zone1", ua.Variant(3, ua.VariantType.UInt32))

@@ -3,8 +3,12 @@
 
 from __future__ import annotations
 
+import asyncio
+import random
+import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 
@@ -12,21 +16,26 @@ import numpy as np
 import pytest
 from facts import missing, stating
 from testing.conftest import LINE
+from testing.faults import RIGHT_VALUES, WRONG_VALUES
+from testing.faulty_proxy import FaultyProxy, healthy
 from testing.plc_servers import ALARM, OWN, write_map
 from testing.soft_plc import BOTTLES, SETPOINT
-from testing.vendor_servers import VENDORS, VendorPlc, program
+from testing.vendor_servers import FILL, VENDORS, VendorPlc, program
 
 from conveyor_sim.bag.replay import replay
 from conveyor_sim.control.scan import ControlError, Inputs
+from conveyor_sim.line.tag import count as tag_count
+from conveyor_sim.protocols.attach import isolated_link
 from conveyor_sim.protocols.attach.free_running import FreeRunningPlc
 from conveyor_sim.protocols.attach.links import plc_link
-from conveyor_sim.protocols.attach.plc_link import PlcLinkError
-from conveyor_sim.protocols.attach.tag_map import TagMapError, read_tag_map
+from conveyor_sim.protocols.attach.plc_link import PlcLinkError, write_signals
+from conveyor_sim.protocols.attach.tag_map import MappedTag, TagMapError, read_tag_map
 from conveyor_sim.protocols.hosting.server_thread import ServerThread
+from conveyor_sim.protocols.tags.handshake import TARGET, TICK
 from conveyor_sim.support.rounded_limit import single
 from conveyor_sim.testing.scenario import Scenario
 
-SECONDS = 1.0
+SECONDS = 0.5
 """Simulated time of a comparison. A request to cpppo takes several milliseconds."""
 
 
@@ -97,10 +106,10 @@ def plc(request: pytest.FixtureRequest, start: Start) -> Iterator[Plc]:
 
 @pytest.fixture(scope="module")
 def loaded(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A checkpoint of LINE half a second before the program stops the first zone."""
+    """A checkpoint of LINE shortly before the program stops the first zone."""
     path = tmp_path_factory.mktemp("loaded") / "start.npz"
     with Scenario(LINE) as line:
-        line.run_for(5.5)
+        line.run_for(5.6)
         line.simulation.save(path)
     return path
 
@@ -156,6 +165,51 @@ def test_a_plc_that_is_not_there_is_said(plc: Plc) -> None:
         plant.attach_plc(url, plc.tags)
 
 
+HALF = FILL // 2
+"""Numbers of written and of read values of a map of more tags than one request holds."""
+TICKS = {"s7": 30, "eip": 2, "ads": 30}
+
+
+async def _scan_all(made: VendorPlc, count: int, over: threading.Event) -> list[set[float]]:
+    """Run a program that copies all written values; return those that it saw in each scan."""
+    seen: list[set[float]] = []
+    for tick in range(count):
+        while await made.get("tick") != tick:
+            if over.is_set():
+                return seen
+            await asyncio.sleep(0)
+        values = await made.get_all([f"fill{number}" for number in range(HALF)])
+        seen.append(set(values))
+        await made.put({f"fill{HALF + number}": value + 0.5 for number, value in enumerate(values)})
+        await made.put({"target": tick + 1})
+    return seen
+
+
+def test_a_map_of_several_requests_is_written_before_the_tick_and_read_after_the_target(
+    plc: Plc, request: pytest.FixtureRequest
+) -> None:
+    made, count = plc.made, TICKS[request.node.callspec.params["plc"]]
+    plc.thread.run(made.halt())
+    names = {f"plc/{number}": f"fill{number}" for number in range(FILL)} | {TICK: "tick", TARGET: "target"}
+    mapped = [MappedTag(tag_count(ours, "status", ""), made.place(theirs), "") for ours, theirs in names.items()]
+    link = plc_link(plc.url, mapped)
+    with ServerThread() as thread, ThreadPoolExecutor(1) as pool:
+        over = threading.Event()
+        thread.run(link.connect())
+        task = pool.submit(plc.thread.run, _scan_all(made, count, over))
+        try:
+            for tick in range(count):
+                thread.run(write_signals(link, {f"plc/{number}": float(tick) for number in range(HALF)}, tick))
+                while thread.run(link.read([TARGET]))[TARGET] <= tick:
+                    pass
+                answer = thread.run(link.read([f"plc/{HALF + number}" for number in range(HALF)]))
+                assert set(answer.values()) == {tick + 0.5}
+        finally:
+            over.set()
+        thread.run(link.close())
+        assert task.result() == [{float(tick)} for tick in range(count)]
+
+
 LACKING = {"s7": "DB7.DBD0 REAL", "eip": "Nothing", "ads": "GVL.nothing"}
 
 
@@ -171,6 +225,15 @@ def test_a_tick_that_would_overflow_is_refused(plc: Plc, tmp_path: Path) -> None
     tags = write_map(tmp_path / "tags.csv", plc.made.places() | {"run/tick": plc.made.place("fill1")})
     with Scenario(LINE) as plant, pytest.raises(TagMapError, match=stating("line 5", "run/tick", "REAL", "DINT")):
         plant.attach_plc(plc.url, tags)
+
+
+def test_a_target_of_an_earlier_test_is_no_answer(plc: Plc) -> None:
+    """Otherwise the line would run up to it without the PLC."""
+    plc.thread.run(plc.made.put({"target": 500}))
+    with Scenario(LINE) as plant:
+        plant.attach_plc(plc.url, plc.tags)
+        plant.run_for(0.05)
+        assert plc.made.scans == 6
 
 
 def test_a_target_beyond_reach_fails_the_test(plc: Plc) -> None:
@@ -222,6 +285,33 @@ def test_a_free_running_plc_commands_a_line_and_is_reached_again(plc: Plc) -> No
         free.until(lambda: free.server.status().clients == 1 and free.server.status().writes > writes)
         assert free.said[-1] == f"{plc.url}: connected again"
         free.stop()
+
+
+FAULTS = {"silent": RIGHT_VALUES["silent"], "garbage": WRONG_VALUES["garbage"]}
+
+
+@pytest.mark.parametrize("fault", [*FAULTS])
+def test_a_free_running_line_survives_a_faulty_plc(plc: Plc, fault: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It reports the fault in one sentence, gives no command until it has reached the PLC again, and runs on."""
+    proxy = FaultyProxy(plc.port)
+    with Scenario(LINE) as plant, ServerThread() as thread:
+        free = FreeRunning(plant, plc.url.replace(f":{plc.port}", f":{proxy.port}"), plc.tags, thread)
+        free.until(lambda: free.server.status().writes > 0)
+        monkeypatch.setattr(isolated_link, "LIMIT", 2.0)
+        proxy.fault = partial(FAULTS[fault], random.Random(0))
+        free.until(lambda: free.said)
+        assert free.said[0].endswith("it commands nothing until it is connected again")
+        assert "Traceback" not in free.said[0]
+        monkeypatch.undo()
+        speed, lost = plant.signals["belts/zone1/speed"], plant.simulation.tick
+        free.until(lambda: plant.simulation.tick > lost + 50)
+        assert plant.signals["belts/zone1/speed"] == speed
+        proxy.fault = healthy
+        proxy.cut()
+        free.until(lambda: free.said[-1].endswith(": connected again"))
+        free.until(lambda: free.server.status().clients == 1)
+        free.stop()
+    proxy.close()
 
 
 @pytest.mark.parametrize(

@@ -7,17 +7,21 @@ cpppo is under the GPL 3: it is started as a command and reached over TCP, and n
 from __future__ import annotations
 
 import asyncio
+import os
 import re
 import struct
-import subprocess
 import sys
+import tempfile
 import time
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from testing.plc_servers import ALARM, OWN, SoftPlc
 from testing.soft_plc import BOTTLES, MOST, SETPOINT
+
+from conveyor_sim.support.child_process import Process
 
 SPEED = 0.43
 """m/s. No number of 32 bits."""
@@ -45,6 +49,9 @@ class VendorPlc(SoftPlc):
 
     @abstractmethod
     async def get(self, name: str) -> float: ...
+
+    async def get_all(self, names: Sequence[str]) -> list[float]:
+        return [await self.get(name) for name in names]
 
     @abstractmethod
     async def put(self, values: Mapping[str, float]) -> None: ...
@@ -138,7 +145,7 @@ class S7Plc(VendorPlc):
         return self.real if name == "speed" else name
 
     async def _close(self) -> None:
-        await asyncio.to_thread(self._server.stop)
+        self._server.stop()
 
 
 EIP_TYPES = {"tick": "DINT", "target": "DINT", "bottles": "INT", "full": "BOOL"}
@@ -156,21 +163,26 @@ class EipPlc(VendorPlc):
         types = {**EIP_TYPES, "speed": self.real}
         tags = [*(f"{name}={kind}" for name, kind in types.items()), f"fill=REAL[{FILL}]"]
         server = [sys.executable, "-m", "cpppo.server.enip", "--no-config", "-A", "--no-udp", "--no-print"]
-        self._process = subprocess.Popen(
-            [*server, "-a", f"127.0.0.1:{port}", *tags], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
-        )
-        assert self._process.stdout is not None
-        line = await asyncio.to_thread(self._process.stdout.readline)
-        port = int(re.search(r"(\d+)\)", line)[1])  # type: ignore[index]
+        self._folder = tempfile.TemporaryDirectory()
+        command = [*server, "-a", f"127.0.0.1:{port}", *tags]
+        self._process = Process("cpppo", command, {**os.environ, "PYTHONUNBUFFERED": "1"}, Path(self._folder.name))
+        while (line := re.search(r"address = .*, (\d+)\)", self._process.log.read_text())) is None:
+            assert self._process.exit_code is None, self._process.obituary()
+            await asyncio.sleep(0.01)
+        port = int(line[1])
         self._client = PLC("127.0.0.1", 0, 60.0, port=port)
         return f"eip://127.0.0.1:{port}"
 
     async def get(self, name: str) -> float:
-        return float((await asyncio.to_thread(self._client.Read, name)).Value)
+        return float((await asyncio.to_thread(self._client.Read, self.place(name))).Value)
+
+    async def get_all(self, names: Sequence[str]) -> list[float]:
+        answers = await asyncio.to_thread(self._client.Read, [self.place(name) for name in names])
+        return [float(answer.Value) for answer in answers]
 
     async def put(self, values: Mapping[str, float]) -> None:
-        types = {"speed": float, "full": bool}
-        pairs = [(name, types.get(name, int)(value)) for name, value in values.items()]
+        types = {"tick": int, "target": int, "bottles": int, "full": bool}
+        pairs = [(self.place(name), types.get(name, float)(value)) for name, value in values.items()]
         await asyncio.to_thread(self._client.Write, pairs)
 
     def place(self, name: str) -> str:
@@ -178,9 +190,8 @@ class EipPlc(VendorPlc):
 
     async def _close(self) -> None:
         self._client.Close()
-        self._process.kill()
-        self._process.wait()
-        self._process.stdout.close()  # type: ignore[union-attr]
+        self._process.stop()
+        self._folder.cleanup()
 
 
 ADS_TYPES = {"tick": "UDINT", "target": "UDINT", "bottles": "INT", "full": "BOOL"}
@@ -243,7 +254,7 @@ class AdsPlc(VendorPlc):
         return f"GVL.{name}"
 
     async def _close(self) -> None:
-        await asyncio.to_thread(self._server.close)
+        self._server.close()
 
 
 VENDORS: dict[str, type[VendorPlc]] = {"s7": S7Plc, "eip": EipPlc, "ads": AdsPlc}

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from conveyor_sim.control.st.errors import Position, SourceError
+from conveyor_sim.control.st.implicit import as_number
 from conveyor_sim.control.st.integers import reach
 from conveyor_sim.control.st.types import LREAL, NUMBERS, Type
 from conveyor_sim.control.st.values import Place, Value, described, folded, unified
@@ -61,6 +62,7 @@ class Application:
 
     def whole(self, value: Value) -> str:
         """Return the code of a whole number."""
+        value = as_number(value, self.expressions.scope.names.dialect)
         if value.type.base.kind != "int" or value.literal == "real":
             raise self.refuse(value, "a whole number")
         return value.code

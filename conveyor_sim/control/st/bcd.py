@@ -7,9 +7,11 @@ A value that can't be converted stops the program. In CODESYS, BCD_TO_INT return
 
 from __future__ import annotations
 
+import math
+
 from conveyor_sim.control.st.application import Application, Build, Standard, standard
 from conveyor_sim.control.st.errors import Fault
-from conveyor_sim.control.st.types import BITS, BYTE, DINT, DWORD, INT, INTEGERS, WORD, Type
+from conveyor_sim.control.st.types import BITS, BOOL, BYTE, DINT, DWORD, INT, INTEGERS, WORD, Type
 from conveyor_sim.control.st.values import NAMESPACE, Value, converted
 
 _NEGATIVE = 15
@@ -101,4 +103,19 @@ BCD: dict[str, Standard] = {
 }
 """Functions by name."""
 
+
+def _is_valid(call: Application) -> Value:
+    (value,) = call.values
+    if call.name == "IS_VALID_BCD":
+        if value.literal or value.type.base not in BITS:
+            raise call.refuse(value, "BYTE, WORD, DWORD or LWORD")
+        return call.result(f"_is_bcd({value.code})", BOOL)
+    if value.literal or value.type.base.kind != "real":
+        raise call.refuse(value, "a REAL or LREAL")
+    return call.result(f"_isfinite({value.code})", BOOL)
+
+
+BCD |= {name: standard("IN", _is_valid) for name in ("IS_VALID", "IS_VALID_BCD")}
+
+NAMESPACE.update(_is_bcd=lambda word: f"{word:x}".isdecimal(), _isfinite=math.isfinite)
 NAMESPACE.update(_of_bcd=_number, _to_bcd=_word, _of_signed_bcd=_signed_number, _to_signed_bcd=_signed_word)

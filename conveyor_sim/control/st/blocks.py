@@ -6,10 +6,11 @@ Each is a class with a slot for every variable, and `run(now)`, one call.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from conveyor_sim.control.st.types import BOOL, DINT, INT, LINT, TIME, UDINT, ULINT, BlockType, Member, Type
+from conveyor_sim.control.st.types import BOOL, DINT, INT, LINT, TIME, UDINT, ULINT, WORD, BlockType, Member, Type
 
 
 class _Timer:
@@ -228,7 +229,14 @@ CLASSES: dict[str, Any] = {f"_{one.__name__}": one for one in (TON, TOF, TP, R_T
 """Classes by their names in the code."""
 
 
-for _suffix, _type in (("", INT), ("_DINT", DINT), ("_LINT", LINT), ("_UDINT", UDINT), ("_ULINT", ULINT)):
+for _suffix, _type in (
+    ("", INT),
+    ("_INT", INT),
+    ("_DINT", DINT),
+    ("_LINT", LINT),
+    ("_UDINT", UDINT),
+    ("_ULINT", ULINT),
+):
     for _counter, _in, _out in (
         (CTU, {"CU": BOOL, "R": BOOL, "PV": _type}, {"Q": BOOL, "CV": _type}),
         (CTD, {"CD": BOOL, "LD": BOOL, "PV": _type}, {"Q": BOOL, "CV": _type}),
@@ -241,3 +249,27 @@ for _suffix, _type in (("", INT), ("_DINT", DINT), ("_LINT", LINT), ("_UDINT", U
         _name = f"{_counter.__name__}{_suffix}"
         STANDARD[_name] = _block(_name, f"_{_name}", _in, _out)
         CLASSES[f"_{_name}"] = partial(_counter, _type.low, _type.high)
+
+
+def _renamed(block: BlockType, names: dict[str, str]) -> BlockType:
+    """Return a block with other names of inputs, and with WORD in place of INT."""
+    members = {}
+    for one in block.members.values():
+        name, kind = names.get(one.name, one.name), WORD if one.type == INT else one.type
+        members[name.lower()] = replace(one, name=name, type=kind, python=one.slot)
+    counts = any(one.type == WORD for one in members.values())
+    return replace(block, members=members, python=f"{block.python}_WORD" if counts else block.python)
+
+
+CODESYS: dict[str, BlockType] = {
+    name: _renamed(STANDARD[name], names)
+    for name, names in {
+        "SR": {"S1": "SET1", "R": "RESET"},
+        "RS": {"S": "SET", "R1": "RESET1"},
+        "CTU": {"R": "RESET"},
+        "CTD": {"LD": "LOAD"},
+        "CTUD": {"R": "RESET", "LD": "LOAD"},
+    }.items()
+}
+"""Block types by name, as the library Standard of CODESYS and Tc2_Standard of TwinCAT declare them."""
+CLASSES |= {f"_{one.__name__}_WORD": partial(one, WORD.low, WORD.high) for one in (CTU, CTD, CTUD)}

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import fields, is_dataclass, replace
 from pathlib import PurePath
 
-from conveyor_sim.control.st import tree
+from conveyor_sim.control.st import actions, tree
 from conveyor_sim.control.st.errors import SourceError
 
 VARIABLES = ".var"
@@ -39,6 +39,10 @@ def joined(parts: Sequence[tuple[PurePath, tree.SourceFile]]) -> tree.SourceFile
                 inside[part] = unit
             else:
                 whole.units.append(unit)
+    acting: dict[PurePath, list[tree.Action]] = {folder: [] for folder in folders}
+    elsewhere: list[tree.Action] = []
+    for path, source in parts:
+        acting.get(path.parent, elsewhere).extend(source.actions)
     local: dict[PurePath, list[tree.VariableSection]] = {folder: [] for folder in folders}
     for path, source in parts:
         if path.suffix.lower() != VARIABLES:
@@ -48,8 +52,9 @@ def joined(parts: Sequence[tuple[PurePath, tree.SourceFile]]) -> tree.SourceFile
         else:
             whole.globals.extend(_global(section) for section in source.globals)
     for folder, inside in folders.items():
-        whole.units.append(_program(folder, inside, local[folder]))
+        whole.units.append(_program(folder, inside, local[folder], acting[folder]))
     whole.units[:] = _with_bodies(whole.units)
+    actions.attach_rest(whole, elsewhere)
     return whole
 
 
@@ -58,7 +63,10 @@ def _global(section: tree.VariableSection) -> tree.VariableSection:
 
 
 def _program(
-    folder: PurePath, inside: dict[str, tree.ProgramUnit], local: list[tree.VariableSection]
+    folder: PurePath,
+    inside: dict[str, tree.ProgramUnit],
+    local: list[tree.VariableSection],
+    acting: list[tree.Action],
 ) -> tree.ProgramUnit:
     """Return the program of a folder. _EXIT never runs, because a run stops without one."""
     first = next(iter(inside.values()))
@@ -74,7 +82,9 @@ def _program(
         sections.append(tree.VariableSection(start.at, "VAR", (), (flag,)))
         once = (*start.body, tree.Assignment(start.at, done, tree.Literal(start.at, "TRUE", "bool", True)))
         body = (tree.If(start.at, ((tree.Unary(start.at, "NOT", done), once),), ()), *body)
-    return replace(first, name=name if not name[0].isdigit() else f"_{name}", sections=tuple(sections), body=body)
+    acting = [*acting, *(action for part in inside.values() for action in part.actions)]
+    name = name if not name[0].isdigit() else f"_{name}"
+    return replace(first, name=name, sections=tuple(sections), body=body, actions=tuple(acting))
 
 
 def _returns(node: object) -> Iterator[tree.Jump]:

@@ -18,7 +18,12 @@ def with_instances(source: tree.SourceFile, dialect: Dialect) -> tree.SourceFile
     for configuration in source.configurations:
         for instance in configuration.instances:
             programs.pop(instance.type.lower(), None)
-    called = {name for unit in source.units for name in _called(unit.body) if name in programs}
+    called = {
+        name
+        for unit in source.units
+        for name in _called((*unit.body, *(one.body for one in unit.actions)))
+        if name in programs
+    }
     if not called:
         return source
     units: list[tree.ProgramUnit] = []

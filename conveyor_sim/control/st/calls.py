@@ -12,6 +12,7 @@ from conveyor_sim.control.st.errors import Position, SourceError
 from conveyor_sim.control.st.expressions import Expressions
 from conveyor_sim.control.st.foreign import advice
 from conveyor_sim.control.st.functions import apply, function_of, is_standard
+from conveyor_sim.control.st.implicit import adapted
 from conveyor_sim.control.st.open_arrays import BOUNDS, accepts, bound, passed
 from conveyor_sim.control.st.sizes import size_of
 from conveyor_sim.control.st.tia_blocks import IEC_TIMER, INSTRUCTIONS
@@ -42,13 +43,13 @@ class CallCompiler:
 
     def __call__(self, expressions: Expressions, node: tree.Call, hint: Type | None) -> Value:
         """Compile a call of a function. Raise SourceError."""
-        target = node.target
+        target = expressions.scope.unprefixed(node.target)
         if not isinstance(target, tree.Name):
             block = expressions.place(target)
             raise SourceError(node.at, f"found a call of {described(block)} as a value, expected a function")
         scope = expressions.scope
         own = scope.unit.members.get(target.name.lower()) if scope.unit is not None else None
-        if own is not None and own.section != "RESULT":
+        if own is not None and own.section != "RESULT" and not target.qualified:
             raise SourceError(node.at, f"found a call of {target.name}, a variable, as a value, expected a function")
         function = self.declarations.function(target.name)
         if function is None:
@@ -73,22 +74,27 @@ class CallCompiler:
             elif isinstance(member.type, OpenArray) and member.section == "VAR_INPUT":
                 codes.append(self._open(expressions, argument, member, expressions.place(argument.value)))
             elif member.section == "VAR_INPUT":
-                value = expressions.value(argument.value, member.type)
+                value = adapted(expressions.value(argument.value, member.type), member.type, scope.names)
                 codes.append(converted(value, member.type, f"{member.name} of {function.name}"))
             else:
                 codes.append(self.reference(expressions, argument, member, node.at))
         code = f"_f_{function.name.lower()}({', '.join(codes)})"
         return self._enabled(expressions, Value(node.at, function.result or VOID, code), enabling)
 
-    def block(self, expressions: Expressions, node: tree.Call) -> tuple[Place, list[str]]:
-        """Return the block of a call statement, and the lines of the call."""
-        place, run = self._called(expressions, node.target)
+    def block(self, expressions: Expressions, node: tree.Call, bare: bool) -> list[str]:
+        """Return the lines of the call of a block or its action.
+
+        bare: True without parentheses, as only actions are called.
+        """
+        place, action, run = self._called(expressions, node.target)
         kind = place.type
         if not isinstance(kind, BlockType):
             raise SourceError(node.at, f"found a call of {described(place)}, expected a function or a block")
+        if bare and not action:
+            raise SourceError(node.at, f"found a {kind.name} without (), expected its call with ()")
         enabling = separated(node, kind)
         node = enabling.call
-        self._note(expressions, kind, node)
+        self._note(expressions, kind, node, action)
         lines, after = [f"_o = {place.code}"], []
         written = [one.slot for one in kind.of("VAR_OUTPUT") if kind.standard]
         arguments = self._bound(expressions, node, kind)
@@ -99,6 +105,7 @@ class CallCompiler:
                     raise SourceError(node.at, f"found no {member.name}, expected {member.name} := and a variable")
             elif member.section == "VAR_INPUT":
                 value = expressions.value(argument.value, member.type)
+                value = adapted(value, member.type, expressions.scope.names)
                 lines.append(f"_o.{member.slot} = {converted(value, member.type, f'{member.name} of {kind.name}')}")
                 written.append(member.slot)
             elif member.section == "VAR_IN_OUT":
@@ -108,25 +115,42 @@ class CallCompiler:
         noted = [line for slot in written for line in self.noted(expressions, f"(_o, {slot!r})", node.at)]
         lines += [f"_o.{run}(_rt.now)", *noted, *after]
         if enabling.en is None and enabling.eno is None:
-            return place, lines
+            return lines
         report = enabling.report(expressions)
         ends: list[list[str]] = [[], ["pass"]]
         if report is not None:
             written = self.noted(expressions, report.root, node.at)
             ends = [[report.write(on), *written] for on in ("True", "False")]
         lines = [" " + line for line in (*lines, *ends[0])]
-        return place, [f"if {enabling.condition(expressions)}:", *lines, "else:", *(" " + line for line in ends[1])]
+        return [f"if {enabling.condition(expressions)}:", *lines, "else:", *(" " + line for line in ends[1])]
 
-    def _called(self, expressions: Expressions, target: tree.Expression) -> tuple[Place, str]:
-        """Return the block that a statement calls, and the name of its method: of an IEC_TIMER the instruction."""
-        if isinstance(target, tree.MemberAccess) and (name := target.name.lower()) in INSTRUCTIONS:
-            timer = expressions.place(target.base)
-            if timer.type is IEC_TIMER:
-                return timer, f"run_{name}"
+    def own_action(self, expressions: Expressions, node: tree.Call) -> str:
+        """Return the code that calls an action of the same unit; "" if the call is another one."""
+        unit, target = expressions.scope.unit, node.target
+        if unit is None or not isinstance(target, tree.Name) or target.name.lower() not in unit.actions:
+            return ""
+        if node.arguments:
+            raise SourceError(node.arguments[0].at, f"found an argument of the action {target.name}, expected none")
+        self._note(expressions, unit, node, target.name.lower())
+        return f"self.a_{target.name.lower()}(_rt.now)"
+
+    def _called(self, expressions: Expressions, target: tree.Expression) -> tuple[Place, str, str]:
+        """Return the block that a statement calls, its action in small letters ("" for the body), and its method.
+
+        The method of an IEC_TIMER is that of the instruction.
+        """
+        names = expressions.scope.names
+        if isinstance(target, tree.MemberAccess) and (names.dialect.actions or target.name.lower() in INSTRUCTIONS):
+            name, plain = target.name.lower(), expressions.scope.unprefixed(target)
+            owner = None if isinstance(plain, tree.Name) else expressions.place(target.base)
+            if owner is not None and owner.type is IEC_TIMER and name in INSTRUCTIONS:
+                return owner, "", f"run_{name}"
+            if owner is not None and isinstance(owner.type, BlockType) and name in owner.type.actions:
+                return owner, name, f"a_{name}"
         place = expressions.place(target)
         if place.type is IEC_TIMER:
             raise SourceError(target.at, f"found a call of {place.type.name}, expected .TON, .TOF or .TP before (")
-        return place, "run"
+        return place, "", "run"
 
     def noted(self, expressions: Expressions, root: str, at: Position) -> list[str]:
         """Return the line that records the last write of a variable, if that is traced.
@@ -156,9 +180,12 @@ class CallCompiler:
                 elif called not in done:
                     path.append((called, iter(self.edges.get(called, {}).items())))
 
-    def _note(self, expressions: Expressions, kind: BlockType, node: tree.Call) -> None:
-        if expressions.scope.unit is not None and not kind.standard:
-            self.edges.setdefault(expressions.scope.unit.python, {}).setdefault(kind.python, node)
+    def _note(self, expressions: Expressions, kind: BlockType, node: tree.Call, action: str = "") -> None:
+        unit = expressions.scope.unit
+        if unit is not None and not kind.standard:
+            caller = f"{unit.python}.{expressions.action}" if expressions.action else unit.python
+            called = f"{kind.python}.{action}" if action else kind.python
+            self.edges.setdefault(caller, {}).setdefault(called, node)
 
     def _of_variable(self, expressions: Expressions, node: tree.Call, name: str) -> Value:
         """Compile a call of SIZEOF, LOWER_BOUND or UPPER_BOUND, whose argument is a variable rather than a value."""
@@ -280,5 +307,6 @@ class CallCompiler:
             if member.type != BOOL:
                 raise SourceError(argument.at, f"found NOT of {member.type.name}, expected a BOOL")
             code = f"(not {code})"
-        written = assignment(place, Value(argument.at, member.type, code))
+        value = adapted(Value(argument.at, member.type, code), place.type, expressions.scope.names)
+        written = assignment(place, value)
         return [written, *self.noted(expressions, place.root, at)]

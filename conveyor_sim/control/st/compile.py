@@ -60,6 +60,8 @@ class Compiled:
     """True if assignments record the last write of a variable."""
     shared: Mapping[tuple[str, str], int]
     """Number of the memory that a located variable shares with others, by Python class and slot."""
+    warnings: tuple[str, ...] = ()
+    """Sentences about implicit conversions that may change a value, in the order of the text."""
 
     @property
     def file(self) -> str:
@@ -113,15 +115,20 @@ def _compile(source: tree.SourceFile, files: ProgramFiles, fingerprint: str, tra
     if layout.size:
         lines.add(f"_memory = _Memory({layout.size})")
     for unit, kind in units:
-        _unit(unit, kind, Expressions(declared.scope(kind), calls), lines, calls, layout)
+        _unit(unit, kind, declared, lines, calls, layout)
     calls.require_finite()
     for structure in declared.structures:
         _class(lines, structure.python, "_Record", list(structure.members.values()))
     _class(lines, "_Globals", "", list(declared.names.globals.members.values()), layout)
     lines.add("_g = _Globals()")
-    python = "\n".join(lines.lines) + "\n"
     programs = {unit.name.lower(): kind for unit, kind in units if unit.kind == "PROGRAM"}
     scheduled = _schedule(source, programs, declared, calls)
+    for name, at in declared.names.programs.items():
+        kind = programs[name]
+        if (count := sum(one.type is kind for one in scheduled)) != 1:
+            raise SourceError(at, f"found {kind.name}, which has {count} instances, expected a program with one")
+        lines.add(f"{kind.instance} = {kind.python}()")
+    python = "\n".join(lines.lines) + "\n"
     for key in (program.name.lower() for program in scheduled):
         shared = declared.names.globals.members.get(key)
         if shared is not None and isinstance(shared.type, Structure):
@@ -137,6 +144,7 @@ def _compile(source: tree.SourceFile, files: ProgramFiles, fingerprint: str, tra
         fingerprint,
         trace,
         {place: one.group for place, one in layout.places.items()},
+        tuple(f"{files.place(at)}: {words}" for at, words in sorted(declared.names.warnings.items())),
     )
 
 
@@ -164,12 +172,12 @@ def _type_of(unit: tree.ProgramUnit, declared: Declarations) -> BlockType:
 def _unit(
     unit: tree.ProgramUnit,
     kind: BlockType,
-    expressions: Expressions,
+    declared: Declarations,
     lines: CodeLines,
     calls: CallCompiler,
     layout: Layout,
 ) -> None:
-    """Write the class of a unit. Its method `run` is the body."""
+    """Write the class of a unit. Its method `run` is the body; those of actions are named a_NAME."""
     members = [one for one in kind.members.values() if one.section != "VAR_EXTERNAL"]
     _class(lines, kind.python, "", members, layout)
     with lines.inner():
@@ -178,7 +186,13 @@ def _unit(
         with lines.inner():
             for member in kind.of("VAR_TEMP"):
                 lines.add(f"self.{member.slot} = {member.initial}")
+        expressions = Expressions(declared.scope(kind), calls)
         Statements(lines, expressions, calls).block(unit.body, unit.at, statements(made))
+        for action in unit.actions:
+            expressions = Expressions(declared.scope(kind), calls)
+            expressions.action = action.name.lower()
+            lines.add(f"def a_{expressions.action}(self, now):", action.at)
+            Statements(lines, expressions, calls).block(action.body, action.at)
     if kind.function:
         _function(kind, lines)
 

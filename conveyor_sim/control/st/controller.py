@@ -20,6 +20,8 @@ from conveyor_sim.control.st.variables import Variable, load
 from conveyor_sim.support.rounded_limit import at_limit, single
 
 _NS = 1e9
+MOST_WARNINGS = 20
+"""Largest number of listed warnings of the compiler."""
 
 
 class StructuredText:
@@ -81,9 +83,19 @@ class StructuredText:
 
     @property
     def left_over(self) -> tuple[str, ...]:
-        """Sentences about variables without a tag and commands without a variable, after `bind`."""
-        file = self.program.compiled.file
-        return () if self.mapping is None else tuple(f"{file}: {words}" for words in self.mapping.left_over())
+        """Sentences about implicit conversions, variables without a tag and commands without a variable.
+
+        The latter are available after `bind`.
+        """
+        file, warnings = self.program.compiled.file, self.program.compiled.warnings
+        more = len(warnings) - MOST_WARNINGS
+        listed = (
+            *warnings[:MOST_WARNINGS],
+            *([f"{file}: {more} more conversions that may change a value"] * (more > 0)),
+        )
+        return (
+            listed if self.mapping is None else (*listed, *(f"{file}: {words}" for words in self.mapping.left_over()))
+        )
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
         """Return commands and alarms after this scan. Raise StructuredTextError if the program stops."""

@@ -16,8 +16,10 @@ from dataclasses import replace
 from typing import Any
 
 from conveyor_sim.control.st.date_arithmetic import conversion_code
-from conveyor_sim.control.st.dates import PREFIXES, moment
+from conveyor_sim.control.st.dates import PREFIXES, in_dialect, moment
+from conveyor_sim.control.st.dialect import Dialect
 from conveyor_sim.control.st.errors import Fault, Position, SourceError
+from conveyor_sim.control.st.implicit import as_number
 from conveyor_sim.control.st.literals import duration, long_time_text, time_text
 from conveyor_sim.control.st.types import (
     DINT,
@@ -56,12 +58,14 @@ def conversion(name: str, hint: Type | None) -> tuple[Type | None, Type, bool] |
     return ELEMENTARY[source] if source else None, ELEMENTARY[target], word == "TRUNC"
 
 
-def convert(at: Position, name: str, value: Value, hint: Type | None) -> Value:
+def convert(at: Position, name: str, value: Value, hint: Type | None, dialect: Dialect) -> Value:
     """Compile a call of a conversion function."""
     types = conversion(name, hint)
     assert types is not None
     source, target, cut = types
+    target, value = in_dialect(target, dialect), replace(value, type=in_dialect(value.type, dialect))
     if source is not None:
+        source = in_dialect(source, dialect)
         into = replace(source, high=value.type.high) if isinstance(source, String) else source
         argument = converted(value, into, name)
         known = value.constant
@@ -70,7 +74,10 @@ def convert(at: Position, name: str, value: Value, hint: Type | None) -> Value:
         value = Value(at, value.type if isinstance(source, String) else source, argument, known)
     elif value.literal:
         value = Value(at, value.type, value.code, value.constant)
-    code = _cut(value, target) if cut else _code(value, target)
+    if target.kind == "real":
+        value = as_number(value, dialect)
+    into = as_number(Value(at, target, ""), dialect).type if value.type.base.kind == "real" else target
+    code = _cut(value, into) if cut else _code(value, into)
     if code is None:
         raise SourceError(
             at, f"found {name} of {described(value)}, which is no conversion, expected one of the standard"

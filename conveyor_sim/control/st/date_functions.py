@@ -38,7 +38,7 @@ def _concat_date_tod(call: Application) -> Value:
             raise call.refuse(value, kind.name)
     is_wide = "L" in call.name.removeprefix("CONCAT") or is_long(day.type) or is_long(time.type)
     kind = LDT if is_wide else DT
-    return call.result(f"({day.code} + {time.code})", kind)
+    return call.result(kind.wrapped(f"{day.code} + {time.code}"), kind)
 
 
 def _concat(python: str, kind: Type) -> Build:

@@ -7,14 +7,17 @@ A DATE and a DT are whole ns since 1970-01-01, a TOD is whole ns since midnight.
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from datetime import date
 
+from conveyor_sim.control.st.dialect import Dialect
 from conveyor_sim.control.st.errors import Fault, Position, SourceError
-from conveyor_sim.control.st.types import DATE, DT, LDATE, LDT, LTOD, TOD, Moment
+from conveyor_sim.control.st.types import DATE, DT, LDATE, LDT, LTOD, TOD, Moment, Type
 
 DAY = 86_400_000_000_000
 """Nanoseconds of a day."""
 
+_FIRST = -(2**63 // DAY)
 _EPOCH = date(1970, 1, 1).toordinal()
 _SHORT = {"DATE": "D", "LDATE": "LD"}
 """Names of types as texts have them, where they differ."""
@@ -55,6 +58,14 @@ def moment(at: Position, text: str) -> int:
         pass
     years = "" if part == "TOD" else ", 1678 to 2261"
     raise SourceError(at, f"found {text[:_LONGEST]}, expected {expected_literal(part)}{years}")
+
+
+def in_dialect(kind: Type, dialect: Dialect) -> Type:
+    """Return a type with the begin and the unit of dates in a dialect (S7-1200 System Manual, 5.4.4)."""
+    if not dialect.dates_of_1990 or kind.base not in (DATE, DT):
+        return kind
+    begin = _days(1990, 1, 1)
+    return replace(DATE, start=str(begin), unit=DAY, zero=begin) if kind.base == DATE else replace(DT, start=str(begin))
 
 
 def expected_literal(part: str) -> str:
@@ -115,6 +126,11 @@ def time_of_day(name: str, hour: int, minute: int, second: int, millisecond: int
         found = f"{hour}:{minute}:{second} and {millisecond} ms"
         raise Fault(f"{name}: found {found}, expected a time from 0:0:0 to 23:59:59 and 0 to 999 ms")
     return (((hour * 60 + minute) * 60 + second) * 1000 + millisecond) * 1_000_000
+
+
+def midnight(value: int) -> int:
+    """Return the begin of a day, or of the first whole one that 64 bits hold."""
+    return max(value // DAY, _FIRST) * DAY
 
 
 def date_fields(value: int) -> tuple[int, int, int]:

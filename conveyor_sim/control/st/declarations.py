@@ -7,11 +7,14 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from conveyor_sim.control.st import tree
-from conveyor_sim.control.st.blocks import STANDARD
+from conveyor_sim.control.st.actions import require_apart
+from conveyor_sim.control.st.blocks import CODESYS, STANDARD
+from conveyor_sim.control.st.dates import in_dialect
 from conveyor_sim.control.st.dialect import Dialect
 from conveyor_sim.control.st.errors import Position, SourceError
 from conveyor_sim.control.st.expressions import Expressions
 from conveyor_sim.control.st.foreign import advice
+from conveyor_sim.control.st.implicit import adapted
 from conveyor_sim.control.st.located import Located, address_of, incomplete, is_incomplete, require_fit
 from conveyor_sim.control.st.scope import Names, Scope
 from conveyor_sim.control.st.sections import INCOMPLETE, LOCATED, OUTSIDE, meaning
@@ -56,7 +59,7 @@ class Declarations:
 
         calls: as `Expressions` takes it.
         """
-        blocks = {**STANDARD, **BLOCKS} if dialect.tia_sources else STANDARD
+        blocks = {**STANDARD, **(CODESYS if dialect.standard_names else BLOCKS if dialect.tia_sources else {})}
         self.names = Names(dialect, types={name.lower(): block for name, block in blocks.items()})
         self.structures: list[Structure] = []
         """Declared structures, each after those it contains."""
@@ -120,7 +123,9 @@ class Declarations:
 
     def named(self, at: Position, name: str) -> Type:
         """Return the type of a name. Raise SourceError."""
-        if known := ELEMENTARY.get(name.upper()) or self.names.types.get(name.lower()):
+        if known := ELEMENTARY.get(name.upper()):
+            return in_dialect(known, self.names.dialect)
+        if known := self.names.types.get(name.lower()):
             return known
         declared = self._pending.get(name.lower())
         if declared is None:
@@ -157,6 +162,8 @@ class Declarations:
 
     def _type(self, spec: tree.TypeSpec, known: Expressions, name: str = "") -> Type:
         if isinstance(spec, tree.NamedType):
+            if spec.prefix:
+                known.scope.require_prefix(spec.at, spec.prefix, spec.name)
             kind = self.named(spec.at, spec.name)
             if spec.length is None:
                 return kind
@@ -256,16 +263,23 @@ class Declarations:
         if unit.result is not None and result is not None:
             _require_closed(result, unit.result.at, "a result")
         kind = BlockType(
-            unit.name, "block", python=prefix + unit.name.lower(), function=unit.kind == "FUNCTION", result=result
+            unit.name,
+            "block",
+            python=prefix + unit.name.lower(),
+            function=unit.kind == "FUNCTION",
+            result=result,
+            actions=frozenset(one.name.lower() for one in unit.actions),
         )
         self._members(kind, unit.sections, unit.kind)
+        require_apart(unit, kind)
         if result is not None:
             name = unit.name.lower()
             if name in kind.members:
                 raise SourceError(unit.at, f"found a variable {unit.name} in the function of that name")
             kind.members[name] = Member(unit.name, result, result.initial, "RESULT")
         for member in kind.members.values():
-            if kind.function and isinstance(member.type, BlockType) and member.section != "VAR_IN_OUT":
+            passing = member.section == "VAR_IN_OUT" or member.name.lower() in kind.statics
+            if kind.function and isinstance(member.type, BlockType) and not passing:
                 at = Position(*member.at)
                 raise SourceError(at, f"found {member.name}, a block, in a function, expected it in a block or program")
         self._bound(kind, unit.at)
@@ -277,10 +291,51 @@ class Declarations:
         unit: its kind, as in `sections.py`.
         """
         known = Expressions(self.scope(None if kind is self.names.globals else kind), self._calls)
+        open_: dict[int, tuple[tree.VariableDeclaration, tree.VariableSection, tuple[str, ...]]] = {}
+        constants: dict[str, int] = {}
         for section in sections:
-            qualifiers = meaning(section, unit)
+            static = section.section == "VAR_STAT"
+            if static:
+                self.names.dialect.require("static_variables", section.at, "VAR_STAT", "another section")
+            qualifiers = meaning(replace(section, section="VAR") if static else section, unit)
             for declared in section.declarations:
-                self._add(kind, declared, section.section, qualifiers, known)
+                if section.section == "VAR" and "CONSTANT" in qualifiers:
+                    constants.setdefault(declared.name.lower(), len(open_))
+                open_[len(open_)] = declared, section, qualifiers
+        order = list(open_.values())
+
+        def declare(number: int) -> None:
+            if (one := open_.pop(number, None)) is not None:
+                declared, section, qualifiers = one
+                add = self._add_static if section.section == "VAR_STAT" else self._add
+                add(kind, declared, section.section, qualifiers, known)
+
+        known.scope.late = lambda key: declare(constants.get(key, -1))
+        for number in range(len(order)):
+            declare(number)
+        known.scope.late = None
+        if constants:
+            for declared, *_ in order:
+                kind.members[declared.name.lower()] = kind.members.pop(declared.name.lower())
+
+    def _add_static(
+        self,
+        kind: BlockType,
+        declared: tree.VariableDeclaration,
+        section: str,
+        qualifiers: tuple[str, ...],
+        known: Expressions,
+    ) -> None:
+        """Add a variable of VAR_STAT as a global one with the name of the unit before its name."""
+        key, shared = declared.name.lower(), self.names.globals
+        if key in kind.members:
+            raise SourceError(declared.at, f"found {declared.name} again, expected another name")
+        name = f"{kind.name}.{declared.name}"
+        python = f"s_{len(shared.members)}"
+        self._add(shared, replace(declared, name=name), "VAR_GLOBAL", qualifiers, known, python)
+        kind.statics[key] = name.lower()
+        member = shared.members[name.lower()]
+        kind.members[key] = replace(member, name=declared.name, section="VAR_EXTERNAL", address="", tag="")
 
     def _add(
         self,
@@ -289,10 +344,12 @@ class Declarations:
         section: str,
         qualifiers: tuple[str, ...],
         known: Expressions,
+        python: str = "",
     ) -> None:
         key = declared.name.lower()
         if key in kind.members:
             raise SourceError(declared.at, f"found {declared.name} again, expected another name")
+        declared = self._with_arguments(declared)
         unit = OUTSIDE if kind is self.names.globals else "PROGRAM" if kind.python.startswith("_P_") else ""
         if is_incomplete(declared.address) and not declared.tag:
             own = unit or ("FUNCTION_BLOCK" if kind.python.startswith("_B_") else "")
@@ -335,15 +392,39 @@ class Declarations:
             declared.address,
             declared.tag,
             "CONSTANT" in qualifiers and section == "VAR_INPUT",
+            python,
             declared.at,
         )
         if is_incomplete(declared.address):
             require_fit(declared.at, declared.name, type_, incomplete(declared.address), constant)
         elif declared.address:
-            address = address_of(declared.at, declared.address)
+            address = address_of(declared.at, declared.address, self.names.dialect.byte_addresses)
             require_fit(declared.at, declared.name, type_, address, constant)
             initial = declared.initial is not None or bool(type_.start)
             self.located.append(Located(kind.python, member, address, initial))
+
+    def _with_arguments(self, declared: tree.VariableDeclaration) -> tree.VariableDeclaration:
+        """Return a declaration with the arguments of its block or structure, TON (PT := T#1s), as initial values."""
+        spec = declared.type
+        if not isinstance(spec, tree.EnumType) or not spec.prefixed:
+            return declared
+        kind = self.named(spec.at, spec.base)
+        if not isinstance(kind, Structure):
+            return declared
+        expected = f"{declared.name} : {spec.base} := ( and the values"
+        self.names.dialect.require("instance_arguments", spec.at, f"arguments of {spec.base}", expected)
+        if declared.initial is not None:
+            raise SourceError(declared.initial.at, f"found a second initial value of {declared.name}, expected one")
+        fields = []
+        for at, name, value in spec.values:
+            if value is None:
+                raise SourceError(at, f"found {name}, expected {name} := and a value")
+            fields.append((at, name, value))
+        return replace(
+            declared,
+            type=tree.NamedType(spec.at, spec.base),
+            initial=tree.InitialStructure(spec.at, tuple(fields)),
+        )
 
     def _initial(self, node: tree.Expression, kind: Type, known: Expressions) -> str:
         """Code of an initial value, made of constants."""
@@ -351,7 +432,7 @@ class Declarations:
             return self._initial_array(node, kind, known)
         if isinstance(node, tree.InitialStructure):
             return self._initial_structure(node, kind, known)
-        value = known.value(node, kind)
+        value = adapted(known.value(node, kind), kind, self.names)
         if value.constant is None:
             raise SourceError(node.at, f"found {described(value)}, expected a constant as an initial value")
         code = converted(value, kind)

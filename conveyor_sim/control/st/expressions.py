@@ -12,8 +12,10 @@ from conveyor_sim.control.st import tree
 from conveyor_sim.control.st.date_arithmetic import ALLOWED, combined
 from conveyor_sim.control.st.dates import PREFIXES, expected_literal
 from conveyor_sim.control.st.errors import SourceError
+from conveyor_sim.control.st.implicit import as_number, operands
 from conveyor_sim.control.st.integers import computed, negated
 from conveyor_sim.control.st.operations import divide, modulo
+from conveyor_sim.control.st.parts import part
 from conveyor_sim.control.st.scope import Scope
 from conveyor_sim.control.st.types import (
     BOOL,
@@ -60,6 +62,8 @@ class Expressions:
 
     def __init__(self, scope: Scope, calls: Calls) -> None:
         self.scope = scope
+        self.action = ""
+        """Name of the action that is compiled, in small letters; "" in the body of the unit."""
         self.controls: list[str] = []
         """Code of the control variables of all enclosing FOR loops."""
         self.work = 0
@@ -101,6 +105,8 @@ class Expressions:
     def known(self, node: tree.Expression, what: str, kind: str = "int") -> Any:
         """Return a constant: a bound, a label, ... Raise SourceError if it is none."""
         value = self.value(node)
+        if kind == "int":
+            value = as_number(value, self.scope.names.dialect)
         if value.constant is None or value.type.base.kind != kind:
             raise SourceError(node.at, f"found {described(value)}, expected a constant {kind} for {what}")
         return value.constant
@@ -115,8 +121,9 @@ class Expressions:
     def place(self, node: tree.Expression) -> Place:
         """Return a variable or a part of one."""
         self.work += 1
+        node = self.scope.unprefixed(node)
         if isinstance(node, tree.Name):
-            named = self.scope.find(node.at, node.name)
+            named = self.scope.find(node)
             if isinstance(named, Place):
                 return replace(named, at=node.at)
             raise SourceError(node.at, f"found {node.name}, {named.what}, expected a variable")
@@ -125,7 +132,7 @@ class Expressions:
         if isinstance(node, tree.Item):
             return self._item(node)
         if isinstance(node, tree.Bit):
-            return self._bit(node)
+            return part(self.place(node.base), node, self.scope.names.dialect)
         raise SourceError(node.at, "found an expression, expected a variable")
 
     def target(self, node: tree.Expression) -> Place:
@@ -165,16 +172,19 @@ class Expressions:
 
     def _named(self, node: tree.Name | tree.MemberAccess | tree.EnumValue) -> Value:
         """Return a variable, a constant, or a value of an enumeration in any of its notations."""
-        if isinstance(node, tree.Name):
-            return replace(self.scope.value(node.at, node.name), at=node.at)
+        plain = self.scope.unprefixed(node)
+        if isinstance(plain, tree.Name):
+            return replace(self.scope.value(plain), at=node.at)
         if isinstance(node, tree.EnumValue):
             return self._enum_value(node, node.type, node.name)
-        if isinstance(node.base, tree.Name) and self.scope.enumeration(node.base.name):
-            return self._enum_value(node, node.base.name, node.name)
+        assert isinstance(node, tree.MemberAccess)
+        base = self.scope.unprefixed(node.base)
+        if isinstance(base, tree.Name) and self.scope.enumeration(base.name, base.qualified):
+            return self._enum_value(node, base.name, node.name, base.qualified)
         return self._member(node)
 
-    def _enum_value(self, node: tree.Expression, type_name: str, name: str) -> Value:
-        kind = self.scope.enumeration(type_name)
+    def _enum_value(self, node: tree.Expression, type_name: str, name: str, qualified: bool = False) -> Value:
+        kind = self.scope.enumeration(type_name, qualified)
         if kind is None:
             raise SourceError(node.at, f"found {type_name}, expected the name of an enumeration")
         value = kind.value(name)
@@ -186,6 +196,9 @@ class Expressions:
     def _member(self, node: tree.MemberAccess) -> Place:
         base = self.place(node.base)
         kind = base.type
+        if kind.base.kind in ("int", "bits") and self.scope.names.dialect.integer_bits:
+            number = self.known(tree.Name(node.at, node.name), "a bit")
+            return part(base, tree.Bit(node.at, node.base, number), self.scope.names.dialect)
         if not isinstance(kind, Structure):
             raise SourceError(node.at, f"found .{node.name} of {kind.name}, expected a structure or a block before it")
         member = kind.members.get(node.name.lower())
@@ -250,7 +263,7 @@ class Expressions:
 
     def _whole(self, node: tree.Expression) -> Value:
         """Return the value of an index."""
-        value = self.value(node)
+        value = as_number(self.value(node), self.scope.names.dialect)
         if value.type.base.kind != "int" or value.literal == "real":
             raise SourceError(node.at, f"found {described(value)}, expected a whole number as an index")
         return value
@@ -268,38 +281,21 @@ class Expressions:
         shifted = f"_i - {low}" if low > 0 else f"_i + {-low}" if low else "_i"
         return f"{shifted} if {low} <= (_i := {value.code}) <= {high} else _outside(_i, {low}, {high})"
 
-    def _bit(self, node: tree.Bit) -> Place:
-        base = self.place(node.base)
-        if base.type.kind != "bits":
-            raise SourceError(
-                node.at, f"found a bit of {base.type.name}, expected BYTE, WORD, DWORD or LWORD before it"
-            )
-        if node.number >= base.type.width:
-            raise SourceError(node.at, f"found bit {node.number}, expected 0 to {base.type.width - 1}")
-        bit = 1 << node.number
-        rest = base.type.high - bit
-        return Place(
-            node.at,
-            BOOL,
-            f"({base.code} & {bit} != 0)",
-            write=lambda new: (
-                f"_set_bit({base.reference}, {bit}, {new})"  # calls in it are made once
-                if "(" in base.code
-                else base.write(f"{base.code} | {bit} if {new} else {base.code} & {rest}")
-            ),
-            fixed=base.fixed,
-            lacks=base.lacks,
-            root=base.root,
-        )
-
     def _unary(self, node: tree.Unary, hint: Type | None) -> Value:
         value = self.value(node.operand, hint)
         kind = value.type.base
         if node.operator == "NOT":
+            if kind.kind == "int" and not value.literal:
+                found = f"NOT of {described(value)}"
+                self.scope.names.dialect.require("integer_logic", node.at, found, "a BOOL or a bit string")
+                code = converted(value, kind)
+                return folded(Value(node.at, kind, f"(~{code})" if kind.low else f"({code} ^ {kind.high})"), value)
             if value.literal or kind.kind not in ("bool", "bits"):
                 raise SourceError(node.at, f"found NOT of {described(value)}, expected a BOOL or a bit string")
             code = f"(not {value.code})" if kind == BOOL else f"({value.code} ^ {kind.high})"
             return folded(Value(node.at, kind, code), value)
+        value = as_number(value, self.scope.names.dialect)
+        kind = value.type.base
         if kind.kind not in ("int", "real", "time"):
             raise SourceError(node.at, f"found {node.operator} of {described(value)}, expected a number")
         if node.operator == "+":
@@ -327,6 +323,8 @@ class Expressions:
         """Compile an operator between two values."""
         self.work += 1
         word = node.operator
+        if self.scope.names.dialect.bit_numbers:
+            left, right = operands(word, left, right, self.scope.names.dialect)
         if word in _COMPARED:
             return self._compared(node, left, right)
         if word in _LOGIC or word in _SHORT:
@@ -402,7 +400,11 @@ class Expressions:
         kind, word = unified(left, right, None), node.operator
         allowed = ("bool",) if word in _SHORT else ("bool", "bits")
         if kind is None or kind.kind not in allowed or (left.literal and right.literal):
-            raise self._no_operator(node, left, right, "BOOL" if word in _SHORT else "BOOL or bit strings")
+            error = self._no_operator(node, left, right, "BOOL" if word in _SHORT else "BOOL or bit strings")
+            if kind is None or kind.kind != "int" or word in _SHORT or (left.literal and right.literal):
+                raise error
+            if not self.scope.names.dialect.integer_logic:
+                raise SourceError(error.at, f"{error}{self.scope.names.dialect.advice('integer_logic')}")
         a, b = converted(left, kind), converted(right, kind)
         raw = f"{left.raw if left.kind == word else a} {_SHORT.get(word) or _LOGIC[word]} {b}"
         return folded(Value(node.at, kind, f"({raw})", raw=raw, kind=word), left, right)

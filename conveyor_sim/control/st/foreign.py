@@ -164,7 +164,8 @@ def form_at(text: str, place: int, accepts: set[str]) -> tuple[int, str] | None:
         before = re.search(f"{form.before}\\Z", text[begin:place], re.IGNORECASE)
         if before is not None:
             start = begin + before.start(1)
-            return start, f"found {text[start : at.end()]}, expected {form.expected}"
+            shown = text[start : at.end()].partition("\n")[0].strip()
+            return start, f"found {shown}, expected {form.expected}"
     line = text.rfind("\n", 0, place) + 1
     if (listed := _LIST.match(text, line)) is not None and text[listed.end() : listed.end() + 1] in ("", "\n", "\r"):
         return line, f"found {listed.group().strip()}, expected {_NO_LIST}"

@@ -13,6 +13,7 @@ from conveyor_sim.control.st.conversions import conversion, convert
 from conveyor_sim.control.st.date_functions import DATES
 from conveyor_sim.control.st.errors import Position, SourceError
 from conveyor_sim.control.st.expressions import Expressions
+from conveyor_sim.control.st.implicit import adapted, as_number
 from conveyor_sim.control.st.integers import intermediate, reach
 from conveyor_sim.control.st.types import (
     BOOL,
@@ -32,6 +33,9 @@ from conveyor_sim.control.st.types import (
 from conveyor_sim.control.st.values import Place, Value, converted, described, folded, operand
 from conveyor_sim.control.st.work import MANY, MANY_SEARCHED
 from conveyor_sim.control.st.work import conversion as conversion_work
+
+_NUMERIC = {"ABS", "SQRT", "LN", "LOG", "EXP", "SIN", "COS", "TAN", "ASIN", "ACOS", "ATAN", "ATAN2", "EXPT"}
+"""Functions of numbers only."""
 
 
 def _real(call: Application) -> Value:
@@ -102,6 +106,9 @@ def _pick(python: str, ordered: bool, before: int = 0) -> Build:
 def _shift(call: Application) -> Value:
     value, by = call.values
     kind = value.type.base
+    if kind.kind == "int" and not value.literal and call.expressions.scope.names.dialect.integer_logic:
+        code = f"_shift_signed({converted(value, kind)}, {call.whole(by)}, {kind.width}, {call.name!r})"
+        return call.result(code if kind.low else code.replace("_signed", ""), kind)
     if value.literal and call.hint is not None:
         kind = call.hint.base
     if kind.kind != "bits":
@@ -137,7 +144,10 @@ def _texts(parameters: str, result: str) -> Build:
 
 def _convert(call: Application, name: str) -> Value:
     (value,) = call.values
-    result = convert(call.at, name, value, call.hint)
+    types = conversion(name, call.hint)
+    if types is not None and types[0] is not None:
+        value = adapted(value, types[0], call.expressions.scope.names)
+    result = convert(call.at, name, value, call.hint, call.expressions.scope.names.dialect)
     call.expressions.work += conversion_work(value.type, result.type)
     return result
 
@@ -162,6 +172,8 @@ FUNCTIONS: dict[str, Standard] = {
     "MUL": standard("IN1 IN2...", _operator("*")),
     "SUB": standard("IN1 IN2", _operator("-")),
     "DIV": standard("IN1 IN2", _operator("/")),
+    **{name: standard("IN1 IN2...", _operator(name)) for name in ["AND", "OR", "XOR"]},
+    "MOD": standard("IN1 IN2", _operator("MOD")),
     "MOVE": standard("IN", _move),
     "SEL": standard("G IN0 IN1", _pick("SEL", False, 1)),
     "MUX": standard("K IN0 IN1...", _pick("_mux", False, 1)),
@@ -221,6 +233,9 @@ def apply(
         expected = f"{len(plain)}{' or more' if more else ''}: {', '.join(plain)}" if plain else "none"
         raise SourceError(at, f"found {len(values)} arguments of {name}, expected {expected}")
     expressions.work += 1
+    kinds = {one.type.base.kind for one in values if not one.literal} - {"bool"}  # G of SEL
+    if name.upper() in _NUMERIC or (len(kinds) > 1 and kinds <= {"bits", "int", "real", "enum"}):
+        values = [as_number(one, expressions.scope.names.dialect) for one in values]
     for one in values:
         if one.type.kind in ("block", "void"):
             raise SourceError(one.at, f"found {described(one)} in {name}, expected a value")

@@ -27,6 +27,8 @@ class Address:
     area: str
     size: str
     number: int
+    in_bytes: bool = False
+    """True if the number of a word in %M is that of its first byte."""
 
     @property
     def bits(self) -> int:
@@ -34,8 +36,11 @@ class Address:
         return _BITS[self.size]
 
 
-def address_of(at: Position, text: str) -> Address:
-    """Read an address: %IX0.3 and %IX3 are bit 3. Raise SourceError."""
+def address_of(at: Position, text: str, in_bytes: bool = False) -> Address:
+    """Read an address: %IX0.3 and %IX3 are bit 3. Raise SourceError.
+
+    in_bytes: True if the number of %MW, %MD and %ML is that of its first byte.
+    """
     match = _ADDRESS.fullmatch(text)
     if match is None or (match[4] is not None and (match[2] not in ("X", "") or int(match[4]) > 7)):
         raise SourceError(at, f"found {text}, expected an address such as %IX0.3 (bits 0 to 7), %IW5, %QD2 or %MB4")
@@ -44,7 +49,8 @@ def address_of(at: Position, text: str) -> Address:
         raise SourceError(
             at, f"found {text}, expected %{area}X with a bit from 0 to 7, or %{area}W, %{area}D, %{area}L"
         )
-    return Address(area, size, number * 8 + int(match[4]) if match[4] is not None else number)
+    number = number * 8 + int(match[4]) if match[4] is not None else number
+    return Address(area, size, number, in_bytes and size in "WDL")
 
 
 def is_incomplete(text: str) -> bool:
@@ -85,7 +91,8 @@ class Located:
             return number, number + max(1, bits // 16)
         if self.address.size == "X":
             return number, number + 1
-        return number * bits, number * bits + _size(self.member.type)
+        start = number * (8 if self.address.in_bytes else bits)
+        return start, start + _size(self.member.type)
 
     def __str__(self) -> str:
         return f"{self.member.name} : {self.member.type.name} at {self.member.address}"

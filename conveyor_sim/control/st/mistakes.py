@@ -13,19 +13,18 @@ from conveyor_sim.control.st.errors import Position, SourceError
 from conveyor_sim.control.st.foreign import ASSIGN, form_at
 
 REFUSED: Mapping[str, str] = {
-    **dict.fromkeys(("POINTER", "REF_TO"), "pointers and references"),
-    **dict.fromkeys(("CLASS", "INTERFACE", "EXTENDS", "IMPLEMENTS", "NAMESPACE"), "classes, methods and namespaces"),
-    **dict.fromkeys(("INITIAL_STEP", "END_STEP", "END_TRANSITION", "END_ACTION"), "SFC"),
+    **dict.fromkeys(("END_STEP", "END_TRANSITION"), "SFC"),
     **dict.fromkeys(("VAR_ACCESS", "VAR_CONFIG"), "access paths and VAR_CONFIG"),
-    **dict.fromkeys(("VAR_STAT", "VAR_INST"), "VAR_STAT and VAR_INST; VAR of a block keeps its values"),
+    "VAR_INST": "VAR_INST, which belongs to methods; VAR of a block keeps its values",
 }
 """Words of the standard and of dialects that this interpreter does not support, with the feature they belong to."""
 
 SUSPECT: Mapping[str, str] = {
-    **dict.fromkeys(("REFERENCE", "REF", "ADR"), "pointers and references"),
+    **dict.fromkeys(("POINTER", "REFERENCE", "REF_TO", "REF", "ADR"), "pointers and references"),
+    **dict.fromkeys(("CLASS", "INTERFACE", "EXTENDS", "IMPLEMENTS", "NAMESPACE"), "classes, methods and namespaces"),
     **dict.fromkeys(("METHOD", "PROPERTY", "THIS", "SUPER", "USING"), "classes, methods and namespaces"),
     **dict.fromkeys(("PUBLIC", "PRIVATE", "PROTECTED", "INTERNAL"), "access specifiers"),
-    **dict.fromkeys(("STEP", "TRANSITION", "ACTION"), "SFC"),
+    **dict.fromkeys(("INITIAL_STEP", "STEP", "TRANSITION", "ACTION"), "SFC"),
     **dict.fromkeys(("JMP", "GOTO"), "jumps"),
     **dict.fromkeys(("UNION",), "unions"),
     **dict.fromkeys(("R_EDGE", "F_EDGE"), "R_EDGE and F_EDGE, which R_TRIG and F_TRIG do"),
@@ -127,7 +126,7 @@ def unexpected(error: Any, text: str, terminals: Mapping[str, str]) -> SourceErr
     """
     token = error.token
     place = len(text) if token.type == "$END" else error.pos_in_stream
-    expected = set(error.accepts or error.expected)
+    expected = set(error.accepts or error.expected) - {"ACTION"}
     if (form := form_at(text, place, _accepted(expected, terminals))) is not None:
         return SourceError(place_of(text, form[0]), form[1])
     for match in (*list(_WORD.finditer(text, 0, place))[-1:], *_WORD.finditer(text, place, place + len(token.value))):
@@ -149,7 +148,7 @@ def unexpected(error: Any, text: str, terminals: Mapping[str, str]) -> SourceErr
         expected -= _STATEMENTS | {"NAME", "PREFIX", "SEMICOLON"}
         words.append("a statement")
     if expected >= _VALUES:
-        expected -= _VALUES
+        expected -= {*_VALUES, "AND", "OR", "XOR", "MOD"}  # their calls as functions
         words.append("a value")
     if expected >= _OPERATORS:
         expected -= _OPERATORS

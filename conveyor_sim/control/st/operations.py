@@ -151,9 +151,21 @@ def power(a: float, b: float) -> float:
     return result
 
 
-def set_bit(word: Attribute | Element, bit: int, on: bool) -> None:
-    """Set one bit of a bit string."""
-    word.set(word.get() | bit if on else word.get() & ~bit)
+def set_bit(word: Attribute | Element, bit: int, rest: int, on: bool) -> None:
+    """Set one bit of a whole number.
+
+    rest: mask of all others.
+    """
+    word.set(word.get() | bit if on else word.get() & rest)
+
+
+def set_part(word: Attribute | Element, rest: int, value: int, low: int, high: int) -> None:
+    """Set some bits of a whole number from low to high, in two's complement.
+
+    rest: mask of all others; value: shifted to its place.
+    """
+    new = word.get() & rest | value
+    word.set((new - low) % (high - low + 1) + low)
 
 
 def outside(index: int, low: int, high: int) -> int:
@@ -351,6 +363,14 @@ def shift(value: int, by: int, width: int, name: str) -> int:
     return (value << by | value >> (width - by)) & mask
 
 
+def shift_signed(value: int, by: int, width: int, name: str) -> int:
+    """Shift or rotate a signed integer; SHR keeps the sign (CODESYS, TwinCAT)."""
+    if name == "SHR":
+        return value >> by if by >= 0 else shift(value, by, width, name)
+    rotated = shift(value & (1 << width) - 1, by, width, name)
+    return rotated - (1 << width) if rotated >> width - 1 else rotated
+
+
 def chain(compare: Callable[[Any, Any], bool], *values: Any) -> bool:
     """Compare several values, each with the next (GT, GE, EQ, LE, LT)."""
     return all(compare(a, b) for a, b in pairwise(values))
@@ -362,6 +382,7 @@ NAMES: dict[str, Any] = {
     "_quotient": quotient,
     "_power": power,
     "_set_bit": set_bit,
+    "_set_part": set_part,
     "_outside": outside,
     "_in_range": in_range,
     "_rounds": rounds,
@@ -392,6 +413,7 @@ NAMES: dict[str, Any] = {
     "_mux": mux,
     "_sel": sel,
     "_shift": shift,
+    "_shift_signed": shift_signed,
     "_chain": chain,
     "_gt": operator.gt,
     "_ge": operator.ge,

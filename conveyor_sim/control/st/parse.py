@@ -4,26 +4,26 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import replace
 from functools import cache
 from importlib.resources import files
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar
 
 from lark import Lark, Token
 from lark.exceptions import UnexpectedCharacters, UnexpectedToken
-from lark.lark import PostLex
 from lark.lexer import PatternStr
 from lark.visitors import Transformer
 
-from conveyor_sim.control.st import data_blocks, literals, tree
+from conveyor_sim.control.st import actions, data_blocks, literals, tree
 from conveyor_sim.control.st.attributes import require_listed
 from conveyor_sim.control.st.dates import moment
 from conveyor_sim.control.st.dialect import IEC, Dialect
 from conveyor_sim.control.st.errors import Position, SourceError
-from conveyor_sim.control.st.mistakes import at_of, not_refused, unexpected, unexpected_character
+from conveyor_sim.control.st.foreign import advice
+from conveyor_sim.control.st.mistakes import at_of, unexpected, unexpected_character
 from conveyor_sim.control.st.pragmas import selected
-from conveyor_sim.control.st.unit_ends import with_ends
+from conveyor_sim.control.st.words import TIA_WORDS, WordFilter
 
 _LEVELS = (
     ("OR", "OR_ELSE"),
@@ -37,8 +37,7 @@ _LEVELS = (
 )
 """Operators between two operands, from the lowest precedence; of equal precedence they go from left to right."""
 _PRECEDENCE = {word: level for level, words in enumerate(_LEVELS) for word in words}
-_TIA_WORDS = ("DATA_BLOCK", "BEGIN", "END_DATA_BLOCK")
-"""Words that are names in other dialects."""
+_SIZES = {"X": 1, "B": 8, "W": 16, "D": 32, "L": 64}
 _CHAINS = ({"+", "-"}, {"OR"}, {"AND"}, {"XOR"})
 
 _N = TypeVar("_N", bound=tree.Node)
@@ -46,9 +45,6 @@ _N = TypeVar("_N", bound=tree.Node)
 DEEPEST = 60
 """Largest depth of nested expressions and statements, below the limit of Python's compiler."""
 
-MOST_TOKENS = 300_000
-"""Largest number of words, numbers and signs in a file: about 30 000 statements, which take 6 s to compile and 500
-MB."""
 MOST_OPERANDS = 1000
 """Largest number of operands in an expression without parentheses."""
 
@@ -84,7 +80,7 @@ def _parser() -> tuple[Lark, _Tree]:
         lexer="basic",  # type: ignore[arg-type]  # lark accepts it, its type hints do not
         maybe_placeholders=True,
         transformer=made,
-        postlex=_Checked(made),
+        postlex=WordFilter(lambda: made.dialect),
         lexer_callbacks={"PRAGMA": _listed},
     )
     return parser, made
@@ -99,25 +95,7 @@ def _listed(token: Token) -> Token:
 def terminals(parser: Lark) -> dict[str, str]:
     """Return the texts of the tokens that have only one, by name."""
     fixed = {one.name: one.pattern.value for one in parser.terminals if isinstance(one.pattern, PatternStr)}
-    return {**fixed, **{word: word for word in _TIA_WORDS}}
-
-
-class _Checked(PostLex):
-    """Filter that counts tokens and checks names."""
-
-    always_accept = ()
-
-    def __init__(self, made: _Tree) -> None:
-        self._made = made
-
-    def process(self, stream: Iterator[Token]) -> Iterator[Token]:
-        """Yield the tokens. Raise SourceError for more than MOST_TOKENS, and for words of unsupported features."""
-        for number, token in enumerate(with_ends(stream, self._made.dialect)):
-            if number == MOST_TOKENS:
-                raise SourceError(at_of(token), f"found more than {MOST_TOKENS} words and signs, expected fewer")
-            if token.type == "NAME" and self._made.dialect.tia_sources and token.upper() in _TIA_WORDS:
-                token.type = token.upper()
-            yield not_refused(token) if token.type in ("NAME", "PREFIX") else token
+    return {**fixed, **{word: word for word in (*TIA_WORDS, "ACTION")}}
 
 
 def _of(first: Token | tree.Node) -> Position:
@@ -147,6 +125,8 @@ class _Tree(Transformer[Any]):
         for item in items:
             if isinstance(item, tree.ProgramUnit):
                 source.units.append(item)
+            elif isinstance(item, tree.Action):
+                actions.attach(source, item)
             elif isinstance(item, tree.Configuration):
                 source.configurations.append(item)
             elif isinstance(item, tree.VariableSection):
@@ -171,7 +151,7 @@ class _Tree(Transformer[Any]):
         return tree.TypeDeclaration(at_of(name), str(name), spec, initial[0] if initial else None)
 
     def named(self, items: list[Any]) -> tree.TypeSpec:
-        return tree.NamedType(_of(items[0]), str(items[0]))
+        return tree.NamedType(_of(items[0]), str(items[-1]), prefix=".".join(items[:-1]))
 
     def sized(self, items: list[Any]) -> tree.TypeSpec:
         return tree.NamedType(_of(items[0]), str(items[0]), items[1])
@@ -195,6 +175,12 @@ class _Tree(Transformer[Any]):
     def enumeration(self, items: list[Any]) -> tree.TypeSpec:
         return tree.EnumType(at_of(items[0]), tuple(items[1:-1]), str(items[-1] or ""))
 
+    def typed_enumeration(self, items: list[Any]) -> tree.TypeSpec:
+        return tree.EnumType(at_of(items[0]), tuple(items[1:]), str(items[0]), prefixed=True)
+
+    def unvalued(self, items: list[Any]) -> Any:
+        return at_of(items[0]), str(items[0]), None
+
     def structure(self, items: list[Any]) -> tree.TypeSpec:
         fields = tuple(one for many in items[1:] for one in many)
         return self._deep(tree.StructureType(at_of(items[0]), fields), *(one.type for one in fields))
@@ -205,12 +191,21 @@ class _Tree(Transformer[Any]):
         return tree.ProgramUnit(at_of(name), "FUNCTION", str(name), result, tuple(sections), body)
 
     def block(self, items: list[Any]) -> tree.ProgramUnit:
-        name, *sections, body = items
-        return tree.ProgramUnit(at_of(name), "FUNCTION_BLOCK", str(name), None, tuple(sections), body)
+        return self._acting("FUNCTION_BLOCK", items)
 
     def program(self, items: list[Any]) -> tree.ProgramUnit:
-        name, *sections, body = items
-        return tree.ProgramUnit(at_of(name), "PROGRAM", str(name), None, tuple(sections), body)
+        return self._acting("PROGRAM", items)
+
+    def _acting(self, kind: Literal["FUNCTION_BLOCK", "PROGRAM"], items: list[Any]) -> tree.ProgramUnit:
+        name, *inner = items
+        own = tuple(item for item in inner if isinstance(item, tree.Action))
+        *sections, body = (item for item in inner if not isinstance(item, tree.Action))
+        return tree.ProgramUnit(at_of(name), kind, str(name), None, tuple(sections), body, own)
+
+    def action(self, items: list[Any]) -> tree.Action:
+        word, first, second, body = items
+        self.dialect.require("actions", at_of(word), f"ACTION {first}", "a program without actions")
+        return tree.Action(at_of(word), str(second or first), str(first) if second else "", body)
 
     def variables(self, items: list[Any]) -> tree.VariableSection:
         qualifiers = tuple(item.upper() for item in items[1:] if isinstance(item, Token))
@@ -240,6 +235,13 @@ class _Tree(Transformer[Any]):
     def initial_array(self, items: list[Any]) -> tree.Expression:
         elements = tuple(item if isinstance(item, tuple) else (1, item) for item in items[1:])
         return self._deep(tree.InitialArray(at_of(items[0]), elements), *(element for _, element in elements))
+
+    def bare_array(self, items: list[Any]) -> tree.Expression:
+        first = items[0][1] if isinstance(items[0], tuple) else items[0]
+        at = first.at if first is not None else Position(1, 1)
+        self.dialect.require("bare_arrays", at, "several initial values", "one, or [ ] around them")
+        elements = tuple(item if isinstance(item, tuple) else (1, item) for item in items)
+        return self._deep(tree.InitialArray(at, elements), *(element for _, element in elements))
 
     def initial_field(self, items: list[Any]) -> Any:
         return at_of(items[0]), str(items[0]), items[1]
@@ -286,6 +288,12 @@ class _Tree(Transformer[Any]):
     def call_statement(self, items: list[Any]) -> tree.Statement:
         at = items[0].at
         return tree.CallStatement(at, tree.Call(at, items[0], items[1] or ()))
+
+    def bare_call(self, items: list[Any]) -> tree.Statement:
+        word = items[0].name if isinstance(items[0], tree.Name) else ""
+        if word.upper().startswith("END") and (expected := advice(word)):
+            raise SourceError(items[0].at, f"found {word}, expected {expected}")
+        return tree.CallStatement(items[0].at, tree.Call(items[0].at, items[0], ()), bare=True)
 
     def elsif(self, items: list[Any]) -> Any:
         return [(items[0], items[1])]
@@ -392,6 +400,10 @@ class _Tree(Transformer[Any]):
         arguments = items[1] or ()
         return self._deep(tree.Call(items[0].at, items[0], arguments), *(one.value for one in arguments))
 
+    def operator_call(self, items: list[Any]) -> tree.Expression:
+        name = tree.Name(at_of(items[0]), str(items[0]))
+        return self.call([name, items[1]])
+
     def name(self, items: list[Any]) -> tree.Expression:
         return tree.Name(_of(items[0]), str(items[0]))
 
@@ -402,7 +414,9 @@ class _Tree(Transformer[Any]):
         return self._deep(tree.Item(_of(items[0]), items[0], tuple(items[1:])), *items)
 
     def bit(self, items: list[Any]) -> tree.Expression:
-        return tree.Bit(_of(items[0]), items[0], int(items[1].upper().removeprefix("%X").replace("_", "")))
+        base, written = items
+        size = _SIZES[written[1].upper()] if written.startswith("%") else 1
+        return tree.Bit(_of(base), base, literals.integer(at_of(written), written.lstrip("%XBWDLxbwdl")), size)
 
     def enum_value(self, items: list[Any]) -> tree.Expression:
         return tree.EnumValue(_of(items[0]), items[0].rstrip("#"), str(items[1]))

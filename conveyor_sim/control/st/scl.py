@@ -19,7 +19,7 @@ _PART = re.compile(
        |(?P<comment>\(/\*.*?\*/\))
        |(?P<block>/\*.*?\*/)
        |(?P<name>\#?"(?P<quoted>[^"\n]*)")
-       |(?P<local>\#(?=[a-z_]))
+       |(?P<local>(?<!\w)\#(?=[a-z_]))  # not of 16#FF
        |(?P<word>(?a:[a-z_]\w*))(?P<prefix>\#?)""",
     re.IGNORECASE | re.DOTALL | re.VERBOSE,
 )

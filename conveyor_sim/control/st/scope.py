@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 
+from conveyor_sim.control.st import tree
 from conveyor_sim.control.st.dialect import Dialect
 from conveyor_sim.control.st.errors import Position, SourceError
 from conveyor_sim.control.st.foreign import advice
@@ -26,12 +27,16 @@ class Names:
     """Names known in all units of a file, in small letters. They grow as the file is read."""
 
     dialect: Dialect
+    warnings: dict[Position, str] = field(default_factory=dict)
+    """Implicit conversions that may change a value, by position."""
     types: dict[str, Type] = field(default_factory=dict)
     """Derived types, blocks and programs."""
     functions: dict[str, BlockType] = field(default_factory=dict)
     globals: BlockType = field(default_factory=lambda: BlockType("VAR_GLOBAL", "block", python="_Globals"))
     values: dict[str, list[Enumeration]] = field(default_factory=dict)
     """Enumerations that have a value of a name."""
+    programs: dict[str, Position] = field(default_factory=dict)
+    """First use of the only instance of a program in another unit, by name in small letters."""
     reading: set[str] = field(default_factory=set)
     """Global variables that are being declared."""
     read: Callable[[str], None] = lambda key: None
@@ -50,17 +55,52 @@ class Scope:
     def __init__(self, names: Names, unit: BlockType | None) -> None:
         self.names = names
         self.unit = unit
+        self.late: Callable[[str], None] | None = None
+        """Declares the constant of a name, if it follows later in the unit that is being declared."""
 
-    def find(self, at: Position, name: str) -> Place | Thing:
-        """Return the variable or other meaning of a name. Raise SourceError for an unknown name."""
+    def own(self, key: str) -> Member | None:
+        """Return a variable of the unit by its name in small letters; None if it has none of that name."""
+        if self.unit is None:
+            return None
+        if self.late is not None and key not in self.unit.members:
+            self.late(key)
+        return self.unit.members.get(key)
+
+    def require_prefix(self, at: Position, prefix: str, name: str) -> None:
+        """Raise SourceError if a name may not stand for a variable list or a library before another one."""
+        if self._is_known(prefix):
+            raise SourceError(at, f"found {prefix}.{name}, expected {name}, or the name of a library before it")
+        self.names.dialect.require("prefixes", at, f"{prefix}.{name}", name)
+
+    def unprefixed(self, node: tree.Expression) -> tree.Expression:
+        """Return an expression without a variable list or a library at its front: x for GVL.x. Raise SourceError."""
+        if isinstance(node, tree.MemberAccess) and isinstance(node.base, tree.Name):
+            base, name = node.base.name, node.name
+            if not self._is_known(base) and (self.names.dialect.prefixes or self.names.global_(name.lower())):
+                self.require_prefix(node.at, base, name)
+                return tree.Name(node.at, name, qualified=True)
+        return node
+
+    def _is_known(self, name: str) -> bool:
         key = name.lower()
-        if self.unit is not None and (member := self.unit.members.get(key)):
+        if self.own(key) is not None:
+            return True
+        names = self.names
+        return names.global_(key) is not None or key in names.values or key in names.functions or key in names.types
+
+    def find(self, node: tree.Name) -> Place | Thing:
+        """Return the variable or other meaning of a name. Raise SourceError for an unknown name."""
+        at, name = node.at, node.name
+        key = name.lower()
+        if self.unit is not None and not node.qualified and (member := self.own(key)):
             if member.section == "VAR_EXTERNAL":
-                place = self._global(at, key, name)
+                place = self._global(at, self.unit.statics.get(key, key), name)
                 return replace(place, fixed=place.fixed or f"{name}, a CONSTANT") if member.constant else place
             return place_of(at, "self", member, self.names.dialect)
         if self.names.global_(key) is not None:
             return self._global(at, key, name)
+        if (program := self._program(at, key)) is not None:
+            return program
         for known, what in self._others():
             if key in known:
                 return Thing(what)
@@ -72,16 +112,25 @@ class Scope:
         hint = f"; there is {self._written(close[0])}" if close else ""
         raise SourceError(at, f"found {name}, which is not declared, expected a variable{hint}")
 
-    def value(self, at: Position, name: str) -> Value:
+    def _program(self, at: Position, key: str) -> Place | None:
+        """Return the only instance of a program; None if the dialect has no access to it."""
+        kind = self.names.types.get(key)
+        if not isinstance(kind, BlockType) or not kind.is_program or not self.names.dialect.program_variables:
+            return None
+        self.names.programs.setdefault(key, at)
+        return Place(at, kind, kind.instance, fixed=f"{kind.name}, a program", root=f"({kind.instance}, '')")
+
+    def value(self, node: tree.Name) -> Value:
         """Return the value of a name. Raise SourceError."""
+        at, name = node.at, node.name
         key = name.lower()
-        own = self.unit is not None and key in self.unit.members
+        own = not node.qualified and self.own(key) is not None
         if not own and (kinds := self.names.values.get(key)) and self.names.global_(key) is None:
             if len(kinds) > 1:
                 listed = " or ".join(f"{kind.name}#{name}" for kind in kinds)
                 raise SourceError(at, f"found {name}, which several types have, expected {listed}")
             return constant(at, kinds[0], kinds[0].value(name))
-        named = self.find(at, name)
+        named = self.find(node)
         if isinstance(named, Thing):
             raise SourceError(at, f"found {name}, {named.what}, expected a value")
         return named
@@ -91,10 +140,13 @@ class Scope:
         key = name.lower()
         return (self.unit is not None and key in self.unit.members) or self.names.global_(key) is not None
 
-    def enumeration(self, name: str) -> Enumeration | None:
-        """Return the enumeration of a name, unless a variable hides it."""
+    def enumeration(self, name: str, qualified: bool = False) -> Enumeration | None:
+        """Return the enumeration of a name, unless a variable hides it.
+
+        qualified: True after the name of a library.
+        """
         kind = self.names.types.get(name.lower())
-        hidden = self.unit is not None and name.lower() in self.unit.members
+        hidden = not qualified and self.unit is not None and name.lower() in self.unit.members
         return kind if isinstance(kind, Enumeration) and not hidden else None
 
     def _global(self, at: Position, key: str, name: str) -> Place:

@@ -12,6 +12,8 @@ from conveyor_sim.control.st import tree
 from conveyor_sim.control.st.calls import CallCompiler
 from conveyor_sim.control.st.errors import Position, SourceError
 from conveyor_sim.control.st.expressions import Expressions
+from conveyor_sim.control.st.foreign import advice
+from conveyor_sim.control.st.implicit import adapted, as_number
 from conveyor_sim.control.st.types import BlockType, Subrange, Type, register
 from conveyor_sim.control.st.values import Place, Value, assignment, converted, converts, described, operand
 from conveyor_sim.control.st.work import statements
@@ -132,23 +134,30 @@ class Statements:
             raise SourceError(
                 node.at, f"found an assignment to a block, {place.type.name}, expected a call or a variable"
             )
-        value = self._expressions.value(node.value, place.type)
+        value = adapted(self._expressions.value(node.value, place.type), place.type, self._expressions.scope.names)
         self._lines.add(assignment(place, value), node.at)
         self._note(place, node.at)
 
     def _call(self, node: tree.CallStatement) -> None:
-        target = node.call.target
+        if code := self._calls.own_action(self._expressions, node.call):
+            self._lines.add(code, node.at)
+            return
+        target = self._expressions.scope.unprefixed(node.call.target)
         if isinstance(target, tree.Name) and not self._is_variable(target):
+            if node.bare:
+                foreign = advice(target.name)
+                found = target.name if foreign else f"{target.name} without ()"
+                raise SourceError(node.at, f"found {found}, expected {foreign or ':= or ()'}")
             value = self._calls(self._expressions, node.call, None)
             self._lines.add(value.code, node.at)
             return
-        _, lines = self._calls.block(self._expressions, node.call)
+        lines = self._calls.block(self._expressions, node.call, node.bare)
         for line in lines:
             self._lines.add(line, node.at)
 
     def _is_variable(self, node: tree.Name) -> bool:
         scope = self._expressions.scope
-        own = scope.unit.members if scope.unit is not None else {}
+        own = scope.unit.members if scope.unit is not None and not node.qualified else {}
         member = own.get(node.name.lower())
         if member is not None and member.section == "RESULT":
             return False
@@ -179,7 +188,7 @@ class Statements:
             self.block(node.otherwise, node.at, count)
 
     def _case(self, node: tree.Case) -> None:
-        selector = self._expressions.value(node.selector)
+        selector = as_number(self._expressions.value(node.selector), self._expressions.scope.names.dialect)
         kind = selector.type.base
         if kind.kind not in ("int", "enum", "bits"):
             raise SourceError(
@@ -211,7 +220,7 @@ class Statements:
         self._otherwise(node, "else:" if node.choices else "if True:", statements(work))
 
     def _label(self, node: tree.Expression, kind: Type) -> int:
-        value = self._expressions.value(node)
+        value = as_number(self._expressions.value(node), self._expressions.scope.names.dialect)
         if value.constant is None or not converts(value, kind) or isinstance(value.constant, float):
             raise SourceError(node.at, f"found {described(value)}, expected a constant {kind.name} as a label")
         converted(value, kind, "a label")
@@ -219,10 +228,12 @@ class Statements:
 
     def _for(self, node: tree.For) -> None:
         control = self._expressions.target(node.control)
-        kind = control.type
+        names = self._expressions.scope.names
+        kind = as_number(control, names.dialect).type
         if kind.base.kind != "int":
             raise SourceError(node.control.at, f"found {described(control)}, expected a variable of an integer type")
         first, last = (self._expressions.value(bound, kind.base) for bound in (node.first, node.last))
+        first, last = adapted(first, kind, names), as_number(last, names.dialect)
         step = "1" if node.step is None else self._step(node.step, kind)
         rounds = self._name("r")
         codes = f"{converted(first, kind)}, {self._wide(last, kind)}, {step}, {kind.low}, {kind.high}"
@@ -241,11 +252,13 @@ class Statements:
 
     def _wide(self, value: Value, kind: Type) -> str:
         """Return the code of the last value or the step of a FOR, as wide as it was computed."""
+        if self._expressions.scope.names.dialect.narrowing and value.type.base.kind == "int" and not value.literal:
+            return value.code
         code = converted(value, kind)
         return code if value.literal or value.span is None or isinstance(kind, Subrange) else operand(value, kind)
 
     def _step(self, node: tree.Expression, kind: Type) -> str:
-        step = self._expressions.value(node, kind.base)
+        step = as_number(self._expressions.value(node, kind.base), self._expressions.scope.names.dialect)
         if step.constant == 0:
             raise SourceError(node.at, "found BY 0, expected a step other than 0")
         if step.literal == "int":  # FOR i := 10 TO 0 BY -1 of a USINT

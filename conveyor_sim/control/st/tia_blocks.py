@@ -31,7 +31,6 @@ IEC_TIMER = replace(STANDARD["TON"], name="IEC_TIMER", python="_IEC_TIMER")
 
 BLOCKS: Mapping[str, BlockType] = {
     **{f"{name}_TIME": STANDARD[name] for name in ("TON", "TOF", "TP")},
-    **{f"{name}_INT": STANDARD[name] for name in ("CTU", "CTD", "CTUD")},
     "IEC_TIMER": IEC_TIMER,
 }
 """Block types by name."""

@@ -37,9 +37,13 @@ class Literal(Expression):
 
 @dataclass(frozen=True)
 class Name(Expression):
-    """Variable, constant or value of an enumeration."""
+    """Variable, constant or value of an enumeration.
+
+    qualified: True after the name of a variable list or library, where a local variable does not hide it.
+    """
 
     name: str
+    qualified: bool = False
 
 
 @dataclass(frozen=True)
@@ -68,10 +72,14 @@ class Item(Expression):
 
 @dataclass(frozen=True)
 class Bit(Expression):
-    """Bit of a bit string: w.3 or w.%X3."""
+    """Bit of a bit string (w.3 or w.%X3), or a larger part of it (w.%B1).
+
+    size: number of bits.
+    """
 
     base: Expression
     number: int
+    size: int = 1
 
 
 @dataclass(frozen=True)
@@ -141,9 +149,13 @@ class Assignment(Statement):
 
 @dataclass(frozen=True)
 class CallStatement(Statement):
-    """Call of a block or a function as a statement."""
+    """Call of a block or a function as a statement.
+
+    bare: True without parentheses.
+    """
 
     call: Call
+    bare: bool = False
 
 
 @dataclass(frozen=True)
@@ -209,11 +221,12 @@ class TypeSpec(Node):
 class NamedType(TypeSpec):
     """Elementary type, derived type or block.
 
-    length: of STRING[20].
+    length: of STRING[20]. prefix: library, as in Standard.TON.
     """
 
     name: str
     length: Expression | None = None
+    prefix: str = ""
 
 
 @dataclass(frozen=True)
@@ -236,10 +249,14 @@ class ArrayType(TypeSpec):
 
 @dataclass(frozen=True)
 class EnumType(TypeSpec):
-    """Enumeration: (Red, Green := 5), with the type of its values, "" if not stated."""
+    """Enumeration: (Red, Green := 5), with the type of its values, "" if not stated.
+
+    prefixed: True with the type before the values, as in INT (Red, Green := 5) and TON (PT := T#1s).
+    """
 
     values: tuple[tuple[Position, str, Expression | None], ...]
     base: str
+    prefixed: bool = False
 
 
 @dataclass(frozen=True)
@@ -282,6 +299,18 @@ class TypeDeclaration(Node):
 
 
 @dataclass(frozen=True)
+class Action(Node):
+    """Action: statements with a name, on the variables of their unit.
+
+    unit: unit that it belongs to, as written before its name; "": the unit around it, or before it.
+    """
+
+    name: str
+    unit: str
+    body: Block
+
+
+@dataclass(frozen=True)
 class ProgramUnit(Node):
     """Program organisation unit."""
 
@@ -290,6 +319,7 @@ class ProgramUnit(Node):
     result: TypeSpec | None
     sections: tuple[VariableSection, ...]
     body: Block
+    actions: tuple[Action, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -333,3 +363,5 @@ class SourceFile:
     globals: list[VariableSection] = field(default_factory=list)
     units: list[ProgramUnit] = field(default_factory=list)
     configurations: list[Configuration] = field(default_factory=list)
+    actions: list[Action] = field(default_factory=list)
+    """Actions without a unit before them."""

@@ -24,6 +24,12 @@ class AlarmState(IntEnum):
     SUPPRESSED = 7
     """Suppressed by design: an alarm that causes this one is standing."""
     OUT_OF_SERVICE = 8
+    UNCONFIRMED = 9
+    """Acknowledged, waits to be confirmed; this and the next two are states of OPC UA (OPC 10000-9, 4.3)."""
+    RETURNED_UNCONFIRMED = 10
+    """Returned to normal and acknowledged, waits to be confirmed."""
+    LATCHED_UNCONFIRMED = 11
+    """Latched and acknowledged, waits to be confirmed, then reset."""
 
 
 Shelving = Literal["", "timed", "one_shot"]
@@ -36,13 +42,23 @@ RAISED = {
     _S.RETURNED: _S.UNACKNOWLEDGED,
     _S.LATCHED_UNACKNOWLEDGED: _S.UNACKNOWLEDGED,
     _S.LATCHED_ACKNOWLEDGED: _S.UNACKNOWLEDGED,
+    _S.RETURNED_UNCONFIRMED: _S.UNACKNOWLEDGED,
+    _S.LATCHED_UNCONFIRMED: _S.UNACKNOWLEDGED,
 }
 """Next state when the condition begins."""
 
-CLEARED = {_S.UNACKNOWLEDGED: _S.RETURNED, _S.ACKNOWLEDGED: _S.NORMAL}
+CLEARED = {
+    _S.UNACKNOWLEDGED: _S.RETURNED,
+    _S.ACKNOWLEDGED: _S.NORMAL,
+    _S.UNCONFIRMED: _S.RETURNED_UNCONFIRMED,
+}
 """Next state when the condition ends, without latching."""
 
-LATCHED = {_S.UNACKNOWLEDGED: _S.LATCHED_UNACKNOWLEDGED, _S.ACKNOWLEDGED: _S.LATCHED_ACKNOWLEDGED}
+LATCHED = {
+    _S.UNACKNOWLEDGED: _S.LATCHED_UNACKNOWLEDGED,
+    _S.ACKNOWLEDGED: _S.LATCHED_ACKNOWLEDGED,
+    _S.UNCONFIRMED: _S.LATCHED_UNCONFIRMED,
+}
 """Next state when the condition ends, with latching."""
 
 ACKNOWLEDGED = {
@@ -52,11 +68,30 @@ ACKNOWLEDGED = {
 }
 """Next state on acknowledgement. Alarms in other states can't be acknowledged."""
 
+ACKNOWLEDGED_UNCONFIRMED = {
+    _S.UNACKNOWLEDGED: _S.UNCONFIRMED,
+    _S.RETURNED: _S.RETURNED_UNCONFIRMED,
+    _S.LATCHED_UNACKNOWLEDGED: _S.LATCHED_UNCONFIRMED,
+}
+"""Next state on acknowledgement of an alarm that must be confirmed."""
+
+CONFIRMED = {
+    _S.UNCONFIRMED: _S.ACKNOWLEDGED,
+    _S.RETURNED_UNCONFIRMED: _S.NORMAL,
+    _S.LATCHED_UNCONFIRMED: _S.LATCHED_ACKNOWLEDGED,
+}
+"""Next state on confirmation. Alarms in other states can't be confirmed."""
+
 RESET = {_S.LATCHED_ACKNOWLEDGED: _S.NORMAL}
 """Next state on reset. Alarms in other states can't be reset."""
 
-STANDING = frozenset({_S.UNACKNOWLEDGED, _S.ACKNOWLEDGED, _S.LATCHED_UNACKNOWLEDGED, _S.LATCHED_ACKNOWLEDGED})
+ACTIVE = frozenset({_S.UNACKNOWLEDGED, _S.ACKNOWLEDGED, _S.UNCONFIRMED})
+"""States while the condition holds."""
+STANDING = ACTIVE | {_S.LATCHED_UNACKNOWLEDGED, _S.LATCHED_ACKNOWLEDGED, _S.LATCHED_UNCONFIRMED}
 WAITING = frozenset(ACKNOWLEDGED)
+"""States that wait for an acknowledgement."""
+HIDDEN = frozenset({_S.SHELVED, _S.SUPPRESSED, _S.OUT_OF_SERVICE})
+"""States of alarms that are not displayed."""
 
 NEVER = -1
 """Tick of an event that is not scheduled."""

@@ -4,7 +4,7 @@
 from graphlib import CycleError
 from typing import Any, NamedTuple
 
-from conveyor_sim.line.alarms.alarm import NEVER, AlarmState, LineAlarm, Shelving, ticks
+from conveyor_sim.line.alarms.alarm import ACTIVE, HIDDEN, NEVER, AlarmState, LineAlarm, Shelving, ticks
 from conveyor_sim.line.alarms.alarms import UNDECLARED, Alarms
 from conveyor_sim.line.alarms.declaration import MOST_ALARMS, as_text, fields_of
 from conveyor_sim.physics.state.snapshot import entries, typed
@@ -83,7 +83,7 @@ def restore(alarms: Alarms, tick: int, memory: Any) -> None:
         raise ValueError(f"{name} have an alarm that suppresses itself") from None
     for alarm in made:
         shown = AlarmState.NORMAL if alarm.hidden else alarm.main
-        fits = alarm.active == (shown in (AlarmState.UNACKNOWLEDGED, AlarmState.ACKNOWLEDGED)) or alarm.hidden
+        fits = alarm.active == (shown in ACTIVE) or alarm.hidden
         _require(fits and shown is alarm.main, f"have one, {printable(alarm.id, 50)}, in an impossible state")
     for group in first:
         here = [alarm.main for alarm in made if alarm.fields.group == group]
@@ -106,7 +106,7 @@ def _made(one: _StoredAlarm, tick: int, alarms: Alarms) -> LineAlarm:
     alarm.condition, alarm.active, alarm.due = one.condition, one.active, one.due
     alarm.shelved, alarm.shelved_until, alarm.out_of_service = one.shelved, one.shelved_until, one.out_of_service
     alarm.since, alarm.changed_by = one.since, one.changed_by
-    _require(0 <= one.main <= AlarmState.LATCHED_ACKNOWLEDGED, f"{what} is in an impossible state")
+    _require(one.main in frozenset(AlarmState) - HIDDEN, f"{what} is in an impossible state")
     alarm.main = AlarmState(one.main)
     longest = ticks(LONGEST_DELAY, alarms.tick)
     _require((one.due == NEVER) == (one.condition == one.active), f"{what} has a delay without a reason")

@@ -1,11 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Operator actions on alarms: acknowledge, reset, shelve, unshelve, remove from service and return to it."""
+"""Operator actions on alarms: acknowledge, confirm, reset, shelve, unshelve, remove from service and return to it."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from conveyor_sim.columns.events import Kind
-from conveyor_sim.line.alarms.alarm import ACKNOWLEDGED, NEVER, RESET, LineAlarm, ticks
+from conveyor_sim.line.alarms.alarm import (
+    ACKNOWLEDGED,
+    ACKNOWLEDGED_UNCONFIRMED,
+    CONFIRMED,
+    NEVER,
+    RESET,
+    LineAlarm,
+    ticks,
+)
 from conveyor_sim.line.alarms.alarms import Alarms
 from conveyor_sim.scene.parts.alarm import LONGEST_DELAY, PREFIX
 from conveyor_sim.support.printable import printable
@@ -29,7 +37,11 @@ class AlarmOperation:
 
 
 def _acknowledge(alarm: LineAlarm) -> None:
-    alarm.main = ACKNOWLEDGED[alarm.main]
+    alarm.main = (ACKNOWLEDGED_UNCONFIRMED if alarm.fields.confirm else ACKNOWLEDGED)[alarm.main]
+
+
+def _confirm(alarm: LineAlarm) -> None:
+    alarm.main = CONFIRMED[alarm.main]
 
 
 def _reset(alarm: LineAlarm) -> None:
@@ -58,6 +70,13 @@ OPERATIONS = {
         lambda alarm: alarm.main in ACKNOWLEDGED,
         "one that waits to be acknowledged",
         _acknowledge,
+        all_of_them=True,
+    ),
+    "confirm": AlarmOperation(
+        "alarm_confirmed",
+        lambda alarm: alarm.main in CONFIRMED,
+        "one that is acknowledged and waits to be confirmed",
+        _confirm,
         all_of_them=True,
     ),
     "reset": AlarmOperation(

@@ -42,6 +42,7 @@ MAY: Mapping[str, Right] = {
     FORCE: Right((*PEOPLE, "test"), "Forces signals to values."),
     UNFORCE: Right((*PEOPLE, "test"), "Ends forcing of the named signals; of all if no names are given."),
     "acknowledge": Right((*PEOPLE, "test"), "Acknowledges the named alarms; all if no names are given."),
+    "confirm": Right((*PEOPLE, "test"), "Confirms the named acknowledged alarms; all that wait if no names are given."),
     "reset": Right((*PEOPLE, "test"), "Clears the named latched alarms; all if no names are given."),
     "shelve": Right((*PEOPLE, "test"), "Shelves alarms for a time in seconds (values), or once."),
     "unshelve": Right((*PEOPLE, "test"), "Ends shelving of the named alarms; of all if no names are given."),

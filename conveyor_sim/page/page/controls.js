@@ -42,8 +42,10 @@ export function controlsOf(tag, view) {
   return of("Set", "mode", tag.device, view.signal(tag.name), Object.entries(desk.rights.rights.texts));
 }
 
-const CAN = { acknowledge: [1, 3, 4], reset: [5], shelve: [1, 2, 3, 4, 5], unshelve: [6] };
-const WORDS = { acknowledge: "Acknowledge", reset: "Reset", shelve: "Shelve 1 min", unshelve: "Unshelve" };
+const CAN = {
+  acknowledge: [1, 3, 4], confirm: [9, 10, 11], reset: [5], shelve: [1, 2, 3, 4, 5, 9, 10, 11], unshelve: [6],
+};
+const WORDS = { acknowledge: "Acknowledge", confirm: "Confirm", reset: "Reset", shelve: "Shelve 1 min", unshelve: "Unshelve" };
 const SHELVED = 60; // shelving time, s
 
 // Returns the controls for an alarm in a state.

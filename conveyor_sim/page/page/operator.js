@@ -29,10 +29,11 @@ export class OperatorPanel {
     return element("div", { class: `part ${part.kind}`, dataset: { part: part.name } }, element("span", { class: "plate_label" }, part.label), ...make.call(this, part));
   }
 
-  _value(name) {
-    const { recording, story, clock } = this.view, signal = this.view.signal(name);
+  // Returns the value of a signal or command, by default at the displayed time.
+  _value(name, time = this.view.clock.time) {
+    const { recording, story } = this.view, signal = recording.signal(name, time);
     if (signal !== undefined) return signal;
-    return story.readBackAt(recording.head.commands.indexOf(name), clock.time)?.value ?? recording.tags.get(name)?.initial;
+    return story.readBackAt(recording.head.commands.indexOf(name), time)?.value ?? recording.tags.get(name)?.initial;
   }
 
   _give(tag, value) {
@@ -62,7 +63,7 @@ export class OperatorPanel {
     const tag = `panel/${name}/${action === "momentary" ? "press" : "pressed"}`, button = element("button", { class: "push", "aria-label": label, dataset: { colour } });
     const closed = () => this._value(`panel/${name}/contact`) === 1, isPressed = () => closed() === (contact === "NO");
     if (action === "momentary") this._hold(button, tag);
-    else button.addEventListener("click", () => this._give(tag, this._value(tag) ? 0 : 1));
+    else button.addEventListener("click", () => this._give(tag, this._value(tag, this.view.recording.end) ? 0 : 1));
     this.updates.push(() => button.setAttribute("aria-pressed", isPressed()));
     return [this._control(button, tag), this._state(() => (isPressed() ? "pressed" : "released"))];
   }
@@ -112,7 +113,7 @@ export class OperatorPanel {
 
   _stop({ name, label }) {
     const tag = `panel/${name}/press`, latched = () => this._value(`panel/${name}/contact`) === 0;
-    const button = this._control(element("button", { class: "mushroom", "aria-label": `Emergency stop ${label}`, onclick: () => this._give(tag, 1) }, element("b", {}, "STOP")), tag);
+    const button = this._control(element("button", { class: "mushroom", "aria-label": `STOP: ${label}`, onclick: () => this._give(tag, 1) }, element("b", {}, "STOP")), tag);
     const reset = this._control(element("button", { "aria-label": `Reset ${label}`, onclick: () => this._give(`panel/${name}/reset`, 1) }, "⟳ Reset"), `panel/${name}/reset`);
     this.updates.push(() => {
       button.setAttribute("aria-pressed", latched());

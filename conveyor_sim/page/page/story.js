@@ -11,11 +11,11 @@ const STATE_NAMES = [
 ];
 export const ALARM_STATES = [
   "normal", "unacknowledged", "acknowledged", "returned", "latched", "latched, acknowledged", "shelved", "suppressed",
-  "out of service",
+  "out of service", "unconfirmed", "returned, unconfirmed", "latched, unconfirmed",
 ];
-const STANDS = new Set([1, 2, 4, 5]);
+const STANDS = new Set([1, 2, 4, 5, 9, 11]);
 export const isStanding = (state) => STANDS.has(state);
-const SHOWN = new Set([1, 2, 3, 4, 5, 6, 7, 8]);
+const SHOWN = new Set([1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11]);
 
 const EXECUTE = 6;
 const WAITS = new Set(["starved", "blocked"]);

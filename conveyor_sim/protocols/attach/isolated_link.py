@@ -58,11 +58,11 @@ class IsolatedLink:
 
     async def write(self, values: Mapping[str, float]) -> None:
         """Write values in their order, by our names."""
-        await self._ask("write", dict(values))
+        await self._ask("write", dict(values), limit=LIMIT)
 
     async def read(self, names: Sequence[str]) -> dict[str, float]:
         """Return values, by our names."""
-        values: dict[str, float] = await self._ask("read", list(names))
+        values: dict[str, float] = await self._ask("read", list(names), limit=LIMIT)
         for name in self._singles.intersection(values):
             tag = self._mapped[name].tag
             values[name] = at_limit(values[name], tag.low, tag.high)
@@ -75,7 +75,7 @@ class IsolatedLink:
                 await self._ask(CLOSE, limit=FAREWELL)
         self._end()
 
-    async def _ask(self, what: str, *arguments: Any, limit: float = LIMIT) -> Any:
+    async def _ask(self, what: str, *arguments: Any, limit: float) -> Any:
         """Return the answer of the process. Without one the process is killed: no later call gets an old answer."""
         if self._pipe is None:
             raise PlcLinkError(f"{self._url}: is not connected")

@@ -47,6 +47,8 @@ class ModbusLink:
         """Set coils and holding registers, in the order of the values."""
         client = self._connected()
         for rows in _runs(self._rows[name] for name in values):
+            if rows[0].table not in _WRITABLE:
+                raise PlcLinkError(f"{self._url}: {rows[0].name} can't be written, expected {_WRITABLE_TEXT}")
             words = [word for row in rows for word in encode(row, values[row.name])]
             if rows[0].table == "coil":
                 await self._ask(rows, client.write_coils, rows[0].address, [bool(word) for word in words])

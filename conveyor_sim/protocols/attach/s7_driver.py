@@ -101,8 +101,8 @@ class S7Driver:
         try:
             data = bytes(self._client.read_area(Area[first.area], first.db, first.byte, count))
         except S7Error as error:
-            if not self._client.get_connected():
-                raise
+            if error.error_code is None and "failed" not in str(error):
+                raise  # no refusal of the PLC, but a lost connection or a malformed answer
             hint = "expected an existing address, PUT/GET permitted, and a data block without optimised access"
             raise PlaceError(first.name, f"{error}, {hint}") from error
         if len(data) != count:

@@ -15,7 +15,7 @@ from asyncua.common.utils import Buffer
 from asyncua.server.binary_server_asyncio import BinaryServer, OPCUAProtocol
 from asyncua.server.internal_server import InternalServer
 from asyncua.server.internal_subscription import InternalSubscription
-from asyncua.server.monitored_item_service import MonitoredItemService
+from asyncua.server.monitored_item_service import MonitoredItemService, WhereClauseEvaluator
 from asyncua.server.subscription_service import SubscriptionService
 from asyncua.server.uaprocessor import UaProcessor
 
@@ -144,6 +144,24 @@ class OpenItems(MonitoredItemService):
 
     def _delete_monitored_items(self, mid: int) -> ua.StatusCode:
         return self.delete(mid)
+
+
+class OpenWhereClause(WhereClauseEvaluator):
+    """Clause of an event filter with other operators. The library ignores subtypes, and reads nested fields wrongly."""
+
+    def operand(self, operand: Any, event: Any) -> Any:
+        """Return the value of an operand."""
+        return super()._eval_op(operand, event)
+
+    def element(self, index: int, event: Any) -> Any:
+        """Return the value of an element."""
+        return super()._eval_el(index, event)
+
+    def _eval_op(self, op: Any, event: Any) -> Any:
+        return self.operand(op, event)
+
+    def _eval_el(self, index: int, event: Any) -> Any:
+        return self.element(index, event)
 
 
 class OpenSubscription(InternalSubscription):

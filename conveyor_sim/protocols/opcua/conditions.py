@@ -20,7 +20,8 @@ from asyncua.server.internal_server import InternalServer
 
 from conveyor_sim.columns.alarms import AlarmColumns
 from conveyor_sim.columns.events import Event
-from conveyor_sim.line.alarms.alarm import NEVER, WAITING, AlarmState
+from conveyor_sim.line.alarms.alarm import CONFIRMED, HIDDEN, NEVER, WAITING, AlarmState
+from conveyor_sim.protocols.opcua.dates import Dates
 from conveyor_sim.protocols.opcua.methods import ALARM_METHODS, ALARM_STATES, add_alarm_methods
 from conveyor_sim.protocols.opcua.nodes import LINE, Nodes, node_id, nothing
 from conveyor_sim.protocols.opcua.values import status_of
@@ -139,8 +140,8 @@ MOST_OBJECTS = 4000
 
 STATE_TEXTS = [state.name.replace("_", " ").capitalize() for state in AlarmState]
 
-_HIDDEN = (AlarmState.SHELVED, AlarmState.SUPPRESSED)
-_LATCHED = (AlarmState.LATCHED_UNACKNOWLEDGED, AlarmState.LATCHED_ACKNOWLEDGED)
+_HIDDEN = HIDDEN - {AlarmState.OUT_OF_SERVICE}
+_LATCHED = (AlarmState.LATCHED_UNACKNOWLEDGED, AlarmState.LATCHED_ACKNOWLEDGED, AlarmState.LATCHED_UNCONFIRMED)
 
 
 class _Row(NamedTuple):
@@ -149,6 +150,7 @@ class _Row(NamedTuple):
     state: int
     active: bool
     acknowledged: bool
+    confirmed: bool
     first_out: bool
     priority: int
     alarm_class: str
@@ -169,16 +171,17 @@ _VARIABLES: Mapping[str, _Variable] = {
     "state": _Variable(ua.VariantType.UInt32, "State by ISA-18.2."),
     "active": _Variable(ua.VariantType.Boolean, "True while its condition holds."),
     "acknowledged": _Variable(ua.VariantType.Boolean, "True if it does not wait for an acknowledgement."),
+    "confirmed": _Variable(ua.VariantType.Boolean, "True if it does not wait for a confirmation."),
     "first_out": _Variable(ua.VariantType.Boolean, "True if it was the first of its group."),
     "priority": _Variable(ua.VariantType.UInt16, "1 to 1000."),
     "alarm_class": _Variable(ua.VariantType.String, "error, warning or message."),
     "text": _Variable(ua.VariantType.String, "Text of the alarm."),
     "tag": _Variable(ua.VariantType.String, "Signal of the alarm; empty: none."),
     "group": _Variable(ua.VariantType.String, "Group for first-out detection."),
-    "since": _Variable(ua.VariantType.DateTime, "Simulated time of the last change of its state."),
-    "shelved_until": _Variable(ua.VariantType.DateTime, "Simulated time at which shelving ends; year 1601: none."),
+    "since": _Variable(ua.VariantType.DateTime, "Time of the last change of its state."),
+    "shelved_until": _Variable(ua.VariantType.DateTime, "Time at which shelving ends; year 1601: none."),
     "changed_by": _Variable(
-        ua.VariantType.String, "Writer of the latest operation, such as acknowledge, shelve or reset."
+        ua.VariantType.String, "Writer of the latest operation, such as acknowledge, confirm, shelve or reset."
     ),
 }
 
@@ -186,8 +189,10 @@ _VARIABLES: Mapping[str, _Variable] = {
 class AlarmStates:
     """Alarms of one line."""
 
-    def __init__(self, nodes: Nodes, emitter: Emitter, clock: TickClock) -> None:
+    def __init__(self, nodes: Nodes, emitter: Emitter, clock: TickClock, tick: float) -> None:
+        """Add the object of all alarms. tick: its length, s."""
         self._nodes, self._emitter, self._clock = nodes, emitter, clock
+        self._dates = Dates(clock, tick)
         nodes.object(ALARM_STATES, ALARM_STATES, node_id(LINE), "All alarms, each with its state.")
         add_alarm_methods(nodes)
         self._template: Any = None
@@ -209,9 +214,10 @@ class AlarmStates:
             return
         first, self._columns, self._status = self._columns is None, snapshot.alarms, status
         rows = _rows(snapshot.alarms)
-        stamp = self._clock.stamp(snapshot.tick, heard)
+        if back:
+            self._dates.begin()
         for id in self._rows.keys() - rows.keys():
-            await self._write(id, self._rows.pop(id), stamp, ua.StatusCodes.BadNoData)
+            await self._write(id, self._rows.pop(id), snapshot, heard, ua.StatusCodes.BadNoData)
             self._emitter.forget(_object(id))
             self._event_ids.pop(id, None)
         for id, row in rows.items():
@@ -220,7 +226,7 @@ class AlarmStates:
             if before is None and not self._add(id):
                 pass
             elif before != row or every:
-                await self._write(id, row, stamp, status)
+                await self._write(id, row, snapshot, heard, status)
             changed = before is None or (before.state, before.active) != (row.state, row.active)
             if changed and not (row.state == AlarmState.NORMAL and (first or before is None)):
                 await self._emit(id, row, self._clock.stamp(row.since, heard))
@@ -257,14 +263,15 @@ class AlarmStates:
             self._nodes.refer(made, target, ua.ObjectIds.HasComponent, ua.NodeClass.Method)
         return True
 
-    async def _write(self, id: str, row: _Row, stamp: datetime, status: int) -> None:
-        name = f"{ALARM_STATES}/{id}"
+    async def _write(self, id: str, row: _Row, snapshot: LineSnapshot, heard: datetime, status: int) -> None:
+        name, stamp = f"{ALARM_STATES}/{id}", self._clock.stamp(snapshot.tick, heard)
         if name not in self._nodes:
             return
         for field, raw in row._asdict().items():
             value: Any = raw
             if _VARIABLES[field].kind is ua.VariantType.DateTime:
-                value = nothing(ua.VariantType.DateTime) if raw == NEVER else self._clock.simulated(raw)
+                never = raw == NEVER
+                value = nothing(ua.VariantType.DateTime) if never else self._dates.of((id, field), raw, snapshot, heard)
             await self._nodes.write(f"{name}/{field}", ua.Variant(value, _VARIABLES[field].kind), stamp, status)
 
     async def _emit(self, id: str, row: _Row, at: datetime) -> None:
@@ -290,6 +297,7 @@ class AlarmStates:
             ("EnabledState", True, "Enabled", "Disabled"),
             ("ActiveState", row.active, "Active", "Inactive"),
             ("AckedState", row.acknowledged, "Acknowledged", "Unacknowledged"),
+            ("ConfirmedState", row.confirmed, "Confirmed", "Unconfirmed"),
             ("SuppressedState", row.state == AlarmState.SUPPRESSED, "Suppressed", "Unsuppressed"),
             ("OutOfServiceState", row.state == AlarmState.OUT_OF_SERVICE, "Out of Service", "In Service"),
             ("LatchedState", row.state in _LATCHED, "Latched", "Unlatched"),
@@ -307,6 +315,7 @@ def _rows(columns: AlarmColumns) -> dict[str, _Row]:
             state,
             bool(columns.active[place]),
             state not in WAITING,
+            state not in CONFIRMED,
             bool(columns.first_out[place]),
             int(columns.priority[place]),
             columns.alarm_class[place],

@@ -15,6 +15,7 @@ from asyncua.common.utils import ServiceError
 from asyncua.ua.uaprotocol_auto import DataChangeFilter
 
 from conveyor_sim.protocols.opcua.limits import OpcUaLimits
+from conveyor_sim.protocols.opcua.where_clause import is_event_type
 
 Codes = ua.StatusCodes
 
@@ -81,35 +82,37 @@ _UNSUPPORTED = {
 """Operators that the library does not evaluate."""
 
 
-def filter_code(wanted: Any, *, of_events: bool) -> int:
+def filter_code(wanted: Any, event_types: Any | None) -> int:
     """Return the status code of the filter of a monitored item.
 
-    wanted: decoded filter; None or an empty extension object: without a filter. of_events: the item monitors events.
+    wanted: decoded filter; None or an empty extension object: without a filter. event_types: address space with the
+    types of events, if the item monitors events; None: it monitors a value.
     """
     if not wanted:
-        return int(Codes.BadEventFilterInvalid if of_events else Codes.Good)
-    if of_events:
+        return int(Codes.Good if event_types is None else Codes.BadEventFilterInvalid)
+    if event_types is not None:
         known = isinstance(wanted, ua.EventFilter)
-        return _event_code(wanted) if known else int(Codes.BadMonitoredItemFilterUnsupported)
+        return _event_code(wanted, event_types) if known else int(Codes.BadMonitoredItemFilterUnsupported)
     if not isinstance(wanted, DataChangeFilter):
         return int(Codes.BadMonitoredItemFilterUnsupported)
     valid = wanted.DeadbandType in set(ua.DeadbandType) and 0.0 <= wanted.DeadbandValue < math.inf
     return int(Codes.Good if valid else Codes.BadDeadbandFilterInvalid)
 
 
-def _event_code(wanted: ua.EventFilter) -> int:
+def _event_code(wanted: ua.EventFilter, event_types: Any) -> int:
     for clause in wanted.SelectClauses or []:
         if any(not name.Name for name in clause.BrowsePath or []):
             return int(Codes.BadBrowseNameInvalid)
         if clause.AttributeId not in set(ua.AttributeIds):
             return int(Codes.BadAttributeIdInvalid)
-    return _content_code(wanted.WhereClause.Elements or [])
+    return _content_code(wanted.WhereClause.Elements or [], event_types)
 
 
-def _content_code(elements: Sequence[ua.ContentFilterElement]) -> int:
+def _content_code(elements: Sequence[ua.ContentFilterElement], event_types: Any) -> int:
     """Return the status code of a where clause.
 
-    An element may refer to later elements only, so that the evaluation ends (OPC 10000-4, 7.7.1).
+    An element may refer to later elements only, so that the evaluation ends (OPC 10000-4, 7.7.1). A literal of OfType
+    must be the ID of a type of events.
     """
     for place, element in enumerate(elements):
         if element.FilterOperator in _UNSUPPORTED:
@@ -120,6 +123,10 @@ def _content_code(elements: Sequence[ua.ContentFilterElement]) -> int:
         for operand in operands:
             if (code := _operand_code(operand, place, len(elements))) != Codes.Good:
                 return code
+        if element.FilterOperator == Operators.OfType and isinstance(operands[0], ua.LiteralOperand):
+            literal = operands[0].Value
+            if literal is None or not is_event_type(event_types, literal.Value):
+                return int(Codes.BadFilterOperandInvalid)
     return int(Codes.Good)
 
 

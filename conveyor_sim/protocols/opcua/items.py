@@ -9,11 +9,11 @@ from contextlib import suppress
 from typing import Any
 
 from asyncua import ua
-from asyncua.server.monitored_item_service import WhereClauseEvaluator
 
 from conveyor_sim.protocols.opcua.asyncua_internals import OpenItems
 from conveyor_sim.protocols.opcua.filter_codes import filter_code, filter_units
 from conveyor_sim.protocols.opcua.limits import OpcUaLimits
+from conveyor_sim.protocols.opcua.where_clause import WhereClause
 
 CHANGE_UNITS, FIELD_UNITS = 4, 2
 """Work units of a change of a value, and of each field or operand of an event."""
@@ -106,6 +106,8 @@ class Items(OpenItems):
         """Register a new item and count it."""
         super().commit(result, item)
         if result.MonitoredItemId in self.by_id:
+            if item.where_clause_evaluator is not None:
+                item.where_clause_evaluator = WhereClause(self.logger, self.aspace, item.filter.WhereClause)
             self._count(item, 1)
 
     def modify(self, params: ua.MonitoredItemModifyRequest) -> ua.MonitoredItemModifyResult:
@@ -115,12 +117,12 @@ class Items(OpenItems):
             return ua.MonitoredItemModifyResult(ua.StatusCode(ua.StatusCodes.BadMonitoredItemIdInvalid))
         asked, of_events = params.RequestedParameters, item.callback_handle is None
         wanted: Any = asked.Filter or (item.filter if of_events else None)
-        if (code := filter_code(wanted, of_events=of_events)) != ua.StatusCodes.Good:
+        if (code := filter_code(wanted, self.aspace if of_events else None)) != ua.StatusCodes.Good:
             return ua.MonitoredItemModifyResult(ua.StatusCode(code))
         self._count(item, -1)
         item.filter, item.queue_size, item.client_handle = wanted, asked.QueueSize, asked.ClientHandle
         if of_events:
-            item.where_clause_evaluator = WhereClauseEvaluator(self.logger, self.aspace, wanted.WhereClause)
+            item.where_clause_evaluator = WhereClause(self.logger, self.aspace, wanted.WhereClause)
         self._count(item, 1)
         return ua.MonitoredItemModifyResult(ua.StatusCode(), asked.SamplingInterval, asked.QueueSize)
 

@@ -4,18 +4,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from asyncua import ua
 from asyncua.crypto.permission_rules import User
 
-from conveyor_sim.line.alarms.alarm import WAITING
+from conveyor_sim.line.alarms.alarm import CONFIRMED, WAITING
 from conveyor_sim.line.commands.inputs import DISOWN, FORCE, INJECT, MODE, OWN, SET, UNFORCE
 from conveyor_sim.line.run_state import RUN
 from conveyor_sim.line.tag import COMMANDS, SIGNALS
 from conveyor_sim.protocols.opcua.nodes import LINE, Nodes, name_of, node_id
+from conveyor_sim.protocols.opcua.reasons import as_status
 from conveyor_sim.protocols.opcua.requests import Codes, Requests
 from conveyor_sim.protocols.tags.tag_provider import Control, TagProvider
 
@@ -27,7 +28,26 @@ _LONGEST = 200
 _MOST = 1000
 """Largest number of elements in an argument."""
 
-_ACKNOWLEDGE = ua.NodeId(ua.ObjectIds.AcknowledgeableConditionType_Acknowledge)
+
+class ConditionMethod(NamedTuple):
+    """Method of conditions that refers to an event."""
+
+    operation: str
+    waiting: Collection[int]
+    """States of alarms to which it applies."""
+    otherwise: int
+    """Status code in another state."""
+
+
+_CONDITION_METHODS: Mapping[ua.NodeId, ConditionMethod] = {
+    ua.NodeId(ua.ObjectIds.AcknowledgeableConditionType_Acknowledge): ConditionMethod(
+        "acknowledge", WAITING, Codes.BadConditionBranchAlreadyAcked
+    ),
+    ua.NodeId(ua.ObjectIds.AcknowledgeableConditionType_Confirm): ConditionMethod(
+        "confirm", frozenset(CONFIRMED), Codes.BadConditionBranchAlreadyConfirmed
+    ),
+}
+"""Methods by their IDs in the standard (OPC 10000-9, 5.7.3 and 5.7.4)."""
 
 _TEXT, _NUMBER, _WHOLE = ua.VariantType.String, ua.VariantType.Double, ua.VariantType.UInt32
 
@@ -71,6 +91,7 @@ _SECONDS = MethodParameter("seconds", _NUMBER, "Duration in simulated time; 0: u
 
 LINE_METHODS: dict[str, OpcUaMethod] = {
     "acknowledge": OpcUaMethod("Acknowledges an alarm, or all.", (_ALARM_OR_ALL,), "acknowledge"),
+    "confirm": OpcUaMethod("Confirms an acknowledged alarm, or all that wait for it.", (_ALARM_OR_ALL,), "confirm"),
     "reset_alarm": OpcUaMethod("Clears a latched alarm, or all.", (_ALARM_OR_ALL,), "reset"),
     "shelve": OpcUaMethod("Shelves an alarm.", (_ALARM, _SECONDS), "shelve"),
     "unshelve": OpcUaMethod("Ends the shelving of an alarm, or of all.", (_ALARM_OR_ALL,), "unshelve"),
@@ -123,6 +144,7 @@ LINE_METHODS: dict[str, OpcUaMethod] = {
 
 ALARM_METHODS: dict[str, OpcUaMethod] = {
     "acknowledge": OpcUaMethod("Acknowledges this alarm; on the object of all alarms: all.", (), "acknowledge"),
+    "confirm": OpcUaMethod("Confirms this alarm, if it is acknowledged and waits for it.", (), "confirm"),
     "reset": OpcUaMethod("Clears this alarm if it has latched.", (), "reset"),
     "unshelve": OpcUaMethod("Ends the shelving of this alarm.", (), "unshelve"),
 }
@@ -196,8 +218,8 @@ class Methods:
 
     def call(self, client: User, request: ua.CallMethodRequest) -> ua.CallMethodResult | None:
         """Return the result of a call; None for a method that is not of this class."""
-        if request.MethodId == _ACKNOWLEDGE:
-            return self._acknowledge_event(client, request)
+        if (condition_method := _CONDITION_METHODS.get(request.MethodId)) is not None:
+            return self._answer_event(client, request, condition_method)
         owner, _, name = name_of(request.MethodId).rpartition("/")
         target = name_of(request.ObjectId)
         table = {LINE: LINE_METHODS, RUN: RUN_METHODS, ALARM_STATES: ALARM_METHODS}.get(owner, {})
@@ -208,8 +230,9 @@ class Methods:
         if target != owner and (owner != ALARM_STATES or alarm == target or not self.knows_alarm(alarm)):
             return _result(Codes.BadMethodInvalid)
         inputs = [] if request.InputArguments is None else list(request.InputArguments)
-        may = self._requests.may(client, method.operation) if method.operation else self._requests.may_control(client)
-        if not may:
+        if method.operation and not self._requests.may(client, method.operation):
+            return _result(self._requests.denied(client, method.operation))
+        if not method.operation and not self._requests.may_control(client):
             return _result(Codes.BadUserAccessDenied)
         if len(inputs) != len(method.parameters):
             few = len(inputs) < len(method.parameters)
@@ -226,20 +249,22 @@ class Methods:
             return _result(self._requests.operate(client, method.operation, () if target == owner else (alarm,)))
         return self._operate(client, method, arguments)
 
-    def _acknowledge_event(self, client: User, request: ua.CallMethodRequest) -> ua.CallMethodResult:
-        """Call Acknowledge of a condition: EventId, Comment (OPC 10000-9, 5.7.3). The comment is not stored."""
+    def _answer_event(
+        self, client: User, request: ua.CallMethodRequest, method: ConditionMethod
+    ) -> ua.CallMethodResult:
+        """Call Acknowledge or Confirm of a condition: EventId, Comment. The comment is not stored."""
         alarm = name_of(request.ObjectId).removeprefix(f"{ALARM_STATES}/")
         if not self.knows_alarm(alarm):
             return _result(Codes.BadNodeIdInvalid)
-        if not self._requests.may(client, "acknowledge"):
-            return _result(Codes.BadUserAccessDenied)
+        if not self._requests.may(client, method.operation):
+            return _result(self._requests.denied(client, method.operation))
         inputs = request.InputArguments or []
         if not inputs or not isinstance(inputs[0].Value, bytes) or not self._is_last_event(alarm, inputs[0].Value):
             return _result(Codes.BadEventIdUnknown)
         alarms = self._source.snapshot.alarms
-        if alarms is None or alarms.state[list(alarms.id).index(alarm)] not in WAITING:
-            return _result(Codes.BadConditionBranchAlreadyAcked)
-        return _result(self._requests.operate(client, "acknowledge", (alarm,)))
+        if alarms is None or alarms.state[list(alarms.id).index(alarm)] not in method.waiting:
+            return _result(method.otherwise)
+        return _result(self._requests.operate(client, method.operation, (alarm,)))
 
     def _operate(self, client: User, method: OpcUaMethod, arguments: Sequence[Any]) -> ua.CallMethodResult:
         if method.operation == SET:
@@ -284,4 +309,4 @@ def _of_arguments(code: int, places: Mapping[int, int], arguments: Sequence[Any]
 
 
 def _result(code: int, arguments: Sequence[int] = ()) -> ua.CallMethodResult:
-    return ua.CallMethodResult(ua.StatusCode(code), [ua.StatusCode(each) for each in arguments], [], [])
+    return ua.CallMethodResult(as_status(code), [ua.StatusCode(each) for each in arguments], [], [])

@@ -22,6 +22,8 @@ from conveyor_sim.line.tag import Tag
 from conveyor_sim.protocols.opcua.nodes import INDEX, Nodes, name_of, node_id
 from conveyor_sim.protocols.opcua.packml_admin import A_MINUTE, Admin
 from conveyor_sim.protocols.opcua.packml_admin import NAME as ADMIN
+from conveyor_sim.protocols.opcua.packml_times import NewsReader
+from conveyor_sim.protocols.opcua.reasons import ReasonedCode, as_status
 from conveyor_sim.protocols.opcua.requests import Codes, Requests
 from conveyor_sim.protocols.opcua.values import status_of
 from conveyor_sim.protocols.tags.tag_provider import LineSnapshot, TagProvider, TickClock
@@ -35,6 +37,9 @@ NAME = "PackML"
 
 _TYPE = 6
 """PackMLBaseObjectType."""
+
+_OBJECTS = 72
+"""PackMLObjects, the folder below Objects that contains all PackML objects (OPC 30050, 6.2)."""
 
 _MODES = 11
 """ProductionMaintenanceModeEnum, whose numbers the control modes use."""
@@ -113,7 +118,8 @@ class PackMl:
         self._source, self._requests, self._clock = source, requests, clock
         self._tags: Mapping[str, Tag] = {tag.name: tag for tag in source.info.tags}
         self._machines = [tag.device for tag in source.info.tags if tag.name == f"{tag.device}/cntrl_cmd"]
-        self._admins = {machine: Admin(machine, self._tags, clock) for machine in self._machines}
+        self._admins = {machine: Admin(machine, self._tags, source.info, clock) for machine in self._machines}
+        self._news = NewsReader(source)
         self._nodes: Nodes | None = None
         self._index = 0
         self._status = int(Codes.Good)
@@ -132,7 +138,11 @@ class PackMl:
         for machine in self._machines:
             root = f"{machine}/{NAME}"
             parent, name = server.get_node(node_id(machine)), ua.QualifiedName(NAME, INDEX)
-            await instantiate(parent, kind, node_id(root), bname=name, instantiate_optional=False)
+            await instantiate(
+                parent, kind, node_id(root), bname=name, dname=_shown_name(machine), instantiate_optional=False
+            )
+            folder = ua.NodeId(_OBJECTS, self._index)
+            nodes.refer(folder, node_id(root), ua.ObjectIds.Organizes, ua.NodeClass.Object)
             for state_machine, methods in _OF.items():
                 for method in methods:
                     target = ua.NodeId(method, self._index)
@@ -168,9 +178,11 @@ class PackMl:
         if status != self._status or back:
             self._status = status
             self._written.clear()
+        news = self._news.read(snapshot, back)
         for machine in self._machines:
-            admin = {f"{ADMIN}.{name}": value for name, value in self._admins[machine].values(snapshot).items()}
-            for name, value in {**self._values(machine, snapshot.values), **admin}.items():
+            admin = self._admins[machine].values(snapshot, heard, back, news)
+            of_admin = {f"{ADMIN}.{name}": value for name, value in admin.items()}
+            for name, value in {**self._values(machine, snapshot.values), **of_admin}.items():
                 if self._written.get((machine, name)) != value:
                     self._written[machine, name] = value
                     inactive = value.Value in _NONE and status == Codes.Good
@@ -189,8 +201,9 @@ class PackMl:
             return _result(self._command(client, machine, _METHODS[method]))
         if name not in ("SetUnitMode", "SetMachSpeed"):
             return None
-        if not self._requests.may(client, SET if name == "SetMachSpeed" else MODE):
-            return _result(Codes.BadUserAccessDenied)
+        operation = SET if name == "SetMachSpeed" else MODE
+        if not self._requests.may(client, operation):
+            return _result(self._requests.denied(client, operation))
         if len(arguments) != 1 or not isinstance(arguments[0], int | float) or isinstance(arguments[0], bool):
             return _result(Codes.BadInvalidArgument)
         value = float(arguments[0])
@@ -205,9 +218,9 @@ class PackMl:
     def _command(self, client: User, machine: str, command: Command) -> int:
         name, snapshot = f"{machine}/cntrl_cmd", self._source.snapshot.values
         if not self._requests.may(client, SET):
-            return int(Codes.BadUserAccessDenied)
-        if objection(command, int(snapshot[f"{machine}/state"])):
-            return int(Codes.BadInvalidState)
+            return self._requests.denied(client, SET)
+        if wrong := objection(command, int(snapshot[f"{machine}/state"])):
+            return ReasonedCode(Codes.BadInvalidState, f"{machine}: {wrong}")
         if snapshot.get(name) == command:  # a command acts when its value changes
             code = self._requests.write_together(client, [name], [0.0])
             if code != Codes.GoodCompletesAsynchronously:
@@ -248,6 +261,11 @@ class PackMl:
         return states
 
 
+def _shown_name(machine: str) -> ua.LocalizedText:
+    """Return the display name of a PackML object. In PackMLObjects, all have the browse name PackML."""
+    return ua.LocalizedText(f"{NAME} of {machine.rpartition('/')[2]}")
+
+
 def _a_second(speed: float, rate: Tag, is_single: bool) -> float:
     """Return a speed (packages per minute) as a rate (1/s).
 
@@ -262,4 +280,4 @@ def _a_second(speed: float, rate: Tag, is_single: bool) -> float:
 
 
 def _result(code: int) -> ua.CallMethodResult:
-    return ua.CallMethodResult(ua.StatusCode(code), [], [], [])
+    return ua.CallMethodResult(as_status(code), [], [], [])

@@ -16,6 +16,7 @@ from asyncua.ua.ua_binary import Primitives, extensionobject_from_binary, struct
 from conveyor_sim.protocols.opcua.asyncua_internals import OpenBuffer
 from conveyor_sim.protocols.opcua.dispatch import Dispatcher
 from conveyor_sim.protocols.opcua.limits import OpcUaLimits
+from conveyor_sim.protocols.opcua.reasons import ADDITIONAL_INFO, add_reasons
 
 Codes = ua.StatusCodes
 
@@ -236,6 +237,7 @@ class Processor(Dispatcher):
         self.channel = SecureConnection(SecurityPolicyNone(), self._limits)
         self.units = 0
         """Work units so far."""
+        self._explains = False  # True if the present request asks for reasons
 
     def send_response(
         self, requesthandle: int, seqhdr: Any, response: Any, msgtype: bytes = ua.MessageType.SecureMessage
@@ -245,6 +247,8 @@ class Processor(Dispatcher):
         End the connection of a client that does not read its answers.
         """
         response.ResponseHeader.RequestHandle = requesthandle
+        if self._explains:
+            add_reasons(response)
         content = struct_to_binary(response)
         self.units += len(content) // ANSWER_BYTES
         self.stream.write(self.channel.message_to_binary(content, message_type=msgtype, request_id=seqhdr.RequestId))
@@ -275,6 +279,7 @@ class Processor(Dispatcher):
 
     async def answer_request(self, typeid: Any, requesthdr: Any, seqhdr: Any, body: Any) -> Any:
         """Answer a request after a check of its session."""
+        self._explains = bool(requesthdr.ReturnDiagnostics & ADDITIONAL_INFO)
         try:
             self._require_session(typeid, requesthdr)
             if self._is_active:

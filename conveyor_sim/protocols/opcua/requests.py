@@ -13,11 +13,12 @@ from dataclasses import dataclass
 from asyncua import ua
 from asyncua.crypto.permission_rules import User, UserRole
 
-from conveyor_sim.line.commands.authority import MAY
+from conveyor_sim.line.commands.authority import MAY, unauthorized
 from conveyor_sim.line.commands.inputs import MODE, SET, Input, WriterKind
 from conveyor_sim.line.commands.receipt import Cause, Receipt
 from conveyor_sim.line.tag import COMMANDS, Tag
 from conveyor_sim.protocols.opcua.nodes import name_of
+from conveyor_sim.protocols.opcua.reasons import ReasonedCode, as_status
 from conveyor_sim.protocols.opcua.values import type_of
 from conveyor_sim.protocols.tags.control_mode import (
     CONTROL_RANGES,
@@ -95,7 +96,7 @@ class Requests:
         self._flush(client, together, places, codes)
         self.writes += (accepted := codes.count(Codes.GoodCompletesAsynchronously))
         self.refused += len(codes) - accepted
-        return [ua.StatusCode(code) for code in codes]
+        return [as_status(code) for code in codes]
 
     def write_together(self, client: User, names: Sequence[str], values: Sequence[float]) -> int:
         """Queue commands as one input, all or none.
@@ -128,7 +129,7 @@ class Requests:
         if not low <= value <= high:
             return int(Codes.BadOutOfRange)
         refused = self._source.control(what, value, f"{_kind(client)} {_writer(client)}")
-        return int(Codes.BadInvalidState if refused else Codes.GoodCompletesAsynchronously)
+        return ReasonedCode(Codes.BadInvalidState, refused) if refused else int(Codes.GoodCompletesAsynchronously)
 
     def may_control(self, client: User) -> bool:
         """Return True if this client may control the run."""
@@ -137,6 +138,14 @@ class Requests:
     def may(self, client: User, operation: str) -> bool:
         """Return True if the role of this client permits an operation."""
         return operation in MAY and _kind(client) in MAY[operation].writers
+
+    def denied(self, client: User, operation: str) -> ReasonedCode:
+        """Return the refusal of an operation that the role of this client does not permit."""
+        kind = _kind(client)
+        if kind is None:
+            return ReasonedCode(Codes.BadUserAccessDenied, "this user only reads, expected a user with a role")
+        reason = unauthorized(Input(OPCUA, _writer(client), kind, operation, (), ()), MAY)
+        return ReasonedCode(Codes.BadUserAccessDenied, reason)
 
     def count(self, result: ua.CallMethodResult) -> None:
         """Count a call by its result."""
@@ -157,7 +166,7 @@ class Requests:
     def _set_mode(self, client: User, value: ua.WriteValue) -> int:
         """Set the control mode of a device by a write, for clients that can't call methods."""
         if not self.may(client, MODE):
-            return int(Codes.BadUserAccessDenied)
+            return self.denied(client, MODE)
         tag = self._modes[name_of(value.NodeId)]
         if (code := _judge_form(value, type_of(tag))) != Codes.Good:
             return code
@@ -166,7 +175,7 @@ class Requests:
     def _judge(self, client: User, value: ua.WriteValue) -> tuple[int, float]:
         """Return the status code of a write, and its value as a number."""
         if not self.may(client, SET):
-            return Codes.BadUserAccessDenied, 0.0
+            return self.denied(client, SET), 0.0
         tag = self._commands.get(name_of(value.NodeId))
         if tag is None:
             return Codes.BadNotWritable, 0.0
@@ -181,9 +190,9 @@ class Requests:
             return Codes.BadUserAccessDenied
         request = Input(OPCUA, writer, kind, SET, (tag.name,), (number,))
         if refusal := refused_for_good(self._source, self._receipt, request):
-            return CODES[refusal.cause]
-        if objection(self._source, tag, number, kind, writer):
-            return Codes.BadInvalidState
+            return ReasonedCode(CODES[refusal.cause], refusal.reason)
+        if reason := objection(self._source, tag, number, kind, writer):
+            return ReasonedCode(Codes.BadUserAccessDenied, reason)
         return Codes.Good
 
     def _flush(self, client: User, together: dict[str, float], places: list[int], codes: list[int]) -> None:
@@ -199,15 +208,17 @@ class Requests:
     ) -> int:
         kind = _kind(client)
         if kind is None or not self.may(client, operation):
-            return Codes.BadUserAccessDenied
+            return self.denied(client, operation)
         request = Input(OPCUA, _writer(client), kind, operation, names, values, texts)
         if refusal := refused_for_good(self._source, self._receipt, request):
-            return CODES[refusal.cause]
+            return ReasonedCode(CODES[refusal.cause], refusal.reason)
         snapshot = self._source.snapshot
-        if snapshot.lost or snapshot.run.state in TAKES_NO_INPUT:
-            return Codes.BadInvalidState
-        if self._source.give(request):
-            return Codes.BadTooManyOperations
+        if snapshot.lost:
+            return ReasonedCode(Codes.BadNoCommunication, snapshot.lost)
+        if snapshot.run.state in TAKES_NO_INPUT:
+            return ReasonedCode(Codes.BadInvalidState, f"the run is {snapshot.run.text}, and takes no input")
+        if refused := self._source.give(request):
+            return ReasonedCode(Codes.BadTooManyOperations, refused)
         self.held.note(id(client), request)
         return Codes.GoodCompletesAsynchronously
 

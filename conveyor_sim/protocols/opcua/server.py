@@ -179,7 +179,7 @@ class OpcUaServer:
         nodes, emitter = Nodes(internal, history), Emitter(internal)
         add_line(nodes, source.info)
         add_methods(nodes, source)
-        alarms, events = AlarmStates(nodes, emitter, clock), LineEvents(source, nodes, emitter, clock)
+        alarms, events = AlarmStates(nodes, emitter, clock, source.info.tick), LineEvents(source, nodes, emitter, clock)
         packml = PackMl(source, requests, clock)
         await packml.add(server, nodes)
         weihenstephan = Weihenstephan(source, nodes, clock)

@@ -8,7 +8,7 @@ from asyncua import ua
 from conveyor_sim.line.run_state import RUN
 from conveyor_sim.line.tag import COMMANDS, SIGNALS, Tag
 from conveyor_sim.protocols.opcua.nodes import INDEX, LINE, READ, READ_AND_WRITE, Nodes, node_id, nothing
-from conveyor_sim.protocols.opcua.values import as_variant, range_of, unit_of
+from conveyor_sim.protocols.opcua.values import as_variant, counted_in_a_day, range_of, unit_of
 from conveyor_sim.protocols.tags.control_mode import is_mode
 from conveyor_sim.protocols.tags.handshake import TARGET
 from conveyor_sim.protocols.tags.tag_provider import LineInfo
@@ -36,9 +36,10 @@ def add_line(nodes: Nodes, info: LineInfo) -> None:
     for depth, part in enumerate(parts[:-1], start=1):
         parent = nodes.folder(f"where/{'/'.join(parts[:depth])}", part, parent)
     nodes.object(LINE, parts[-1] if parts else info.name, parent, f"The line {info.name}.")
+    counted = counted_in_a_day(info.tags)
     for tag in info.tags:
         if is_shown(tag):
-            _add_tag(nodes, tag)
+            _add_tag(nodes, tag, counted)
     run = node_id(RUN) if RUN in nodes else nodes.object(RUN, RUN, node_id(LINE), "The simulation itself.")
     for name, (kind, description) in RUN_VARIABLES.items():
         nodes.variable(f"{RUN}/{name}", name, run, ua.Variant(nothing(kind), kind), description)
@@ -57,7 +58,7 @@ def has_text(tag: Tag) -> bool:
     return tag.kind == "enumeration" and list(tag.texts) != list(range(len(tag.texts)))
 
 
-def _add_tag(nodes: Nodes, tag: Tag) -> None:
+def _add_tag(nodes: Nodes, tag: Tag, counted: float) -> None:
     path = tag.name.split("/")
     parent = node_id(LINE)
     for depth in range(1, len(path)):
@@ -76,7 +77,7 @@ def _add_tag(nodes: Nodes, tag: Tag) -> None:
     )
     extension, texts = ua.VariantType.ExtensionObject, ua.VariantType.LocalizedText
     if tag.kind in ("number", "count"):
-        nodes.property(f"{tag.name}/EURange", variable, range_of(tag), ua.ObjectIds.Range, extension)
+        nodes.property(f"{tag.name}/EURange", variable, range_of(tag, counted), ua.ObjectIds.Range, extension)
         nodes.property(f"{tag.name}/EngineeringUnits", variable, unit_of(tag), ua.ObjectIds.EUInformation, extension)
     elif tag.kind == "enumeration" and not has_text(tag):
         strings = [ua.LocalizedText(text) for text in tag.texts.values()]

@@ -11,6 +11,7 @@ from asyncua import ua
 from conveyor_sim.columns.read_back import ReadBackColumns
 from conveyor_sim.line.run_state import RUN
 from conveyor_sim.line.tag import COMMANDS, Tag
+from conveyor_sim.protocols.opcua.dates import Dates
 from conveyor_sim.protocols.opcua.nodes import Nodes
 from conveyor_sim.protocols.opcua.tree import VALUE_AS_TEXT, WRITTEN_AT, WRITTEN_BY, has_text, is_shown
 from conveyor_sim.protocols.opcua.values import as_variant, status_of
@@ -37,6 +38,7 @@ class Updates:
         self._last: LineSnapshot | None = None
         self._read_back: ReadBackColumns | None = None
         self._written: dict[str, tuple[int, str]] = {}
+        self._dates = Dates(clock, source.info.tick)
 
     async def bring_present(self) -> None:
         """Write the present snapshot."""
@@ -80,7 +82,9 @@ class Updates:
             self._read_back = snapshot.read_back
             if every:
                 self._written.clear()
-            await self._bring_read_back(snapshot.read_back, stamp, status)
+            if back:
+                self._dates.begin()
+            await self._bring_read_back(snapshot.read_back, snapshot, heard, status)
         for follow in self._others:
             await follow(snapshot, heard, back)
         # Last, so that clients that see the tick find all its values.
@@ -111,7 +115,10 @@ class Updates:
             await self._nodes.write(f"{RUN}/time", ua.Variant(seconds, ua.VariantType.Double), stamp, code)
             await self._nodes.write(f"{RUN}/date_time", ua.Variant(now, ua.VariantType.DateTime), stamp, code)
 
-    async def _bring_read_back(self, columns: ReadBackColumns, stamp: datetime, status: int) -> None:
+    async def _bring_read_back(
+        self, columns: ReadBackColumns, snapshot: LineSnapshot, heard: datetime, status: int
+    ) -> None:
+        stamp = self._clock.stamp(snapshot.tick, heard)
         rows = zip(self._commands, columns.since.tolist(), columns.writer.tolist(), strict=True)
         for name, since, writer in rows:
             kind, by = columns.writer_kinds[writer], columns.writers[writer]
@@ -119,7 +126,7 @@ class Updates:
             if self._written.get(name) != row:
                 self._written[name] = row
                 who = ua.Variant(row[1], ua.VariantType.String)
-                at = ua.Variant(self._clock.simulated(since), ua.VariantType.DateTime)
+                at = ua.Variant(self._dates.of(name, since, snapshot, heard), ua.VariantType.DateTime)
                 await self._nodes.write(f"{name}/{WRITTEN_BY}", who, stamp, status)
                 await self._nodes.write(f"{name}/{WRITTEN_AT}", at, stamp, status)
 

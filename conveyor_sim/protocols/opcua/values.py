@@ -4,12 +4,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from asyncua import ua
 
 from conveyor_sim.line.run_state import ENDED, PAUSED, STOPPED
-from conveyor_sim.line.tag import Tag
+from conveyor_sim.line.tag import LONGEST, MOST_COUNT, Tag
 from conveyor_sim.protocols.tags.tag_provider import LineSnapshot
+from conveyor_sim.support.nice_numbers import nice_above
 
 _WHOLE = {ua.VariantType.UInt32: (0, 2**32 - 1), ua.VariantType.Int32: (-(2**31), 2**31 - 1)}
 
@@ -37,10 +39,31 @@ def as_variant(tag: Tag, value: float) -> ua.Variant:
     return ua.Variant(whole, kind)
 
 
-def range_of(tag: Tag) -> ua.Range:
-    """Return the EURange (OPC 10000-8, 5.3.2)."""
+_DAY = 86_400.0
+"""Time that the range of a total spans, s."""
+
+_MOST_WITHOUT_RATE = 1e6
+"""End of the range of counters on a line without machines."""
+
+
+def counted_in_a_day(tags: Sequence[Tag]) -> float:
+    """Return the bottles that the fastest machine of a line handles in a day, rounded up to 1, 2 or 5 times 10^n."""
+    rates = [tag.nominal for tag in tags if tag.nominal and tag.unit == "1/s"]
+    return nice_above(max(rates) * _DAY) if rates else _MOST_WITHOUT_RATE
+
+
+def range_of(tag: Tag, counted: float) -> ua.Range:
+    """Return the EURange: the values in normal operation (OPC 10000-8, 5.3.2).
+
+    A counter or total time that grows without limit gets the range of a day. counted: bottles in a day.
+    """
     low, high = _WHOLE.get(type_of(tag), (-math.inf, math.inf))
-    return ua.Range(max(tag.low, low), min(tag.high, high))
+    low, high = max(tag.low, low), min(tag.high, high)
+    if tag.low >= 0.0 and tag.kind == "count" and tag.high >= MOST_COUNT:
+        high = counted
+    if tag.low >= 0.0 and tag.unit == "s" and tag.high >= LONGEST:
+        high = _DAY
+    return ua.Range(low, high)
 
 
 def unit_of(tag: Tag) -> ua.EUInformation:

@@ -96,7 +96,7 @@ class WellFormedSession(InternalSession):
         _require_timestamps(params.TimestampsToReturn)
         return await _each(
             params.ItemsToCreate,
-            _item_code,
+            self._item_code,
             lambda items: super(WellFormedSession, self).create_monitored_items(_with(params, ItemsToCreate=items)),
             lambda code: ua.MonitoredItemCreateResult(ua.StatusCode(code)),
         )
@@ -116,6 +116,10 @@ class WellFormedSession(InternalSession):
             if kind is None or kind.Value != ua.NodeClass.ReferenceType:
                 return int(Codes.BadReferenceTypeIdInvalid)
         return int(Codes.Good)
+
+    def _item_code(self, item: ua.MonitoredItemCreateRequest) -> int:
+        of_events = item.ItemToMonitor.AttributeId == ua.AttributeIds.EventNotifier
+        return filter_code(item.RequestedParameters.Filter, self.aspace if of_events else None)
 
 
 _CONTINUATION = Codes.BadContinuationPointInvalid
@@ -140,11 +144,6 @@ def _with(params: Any, **fields: Any) -> Any:
 def _require_timestamps(wanted: ua.TimestampsToReturn) -> None:
     if wanted == ua.TimestampsToReturn.Invalid:
         raise ServiceError(Codes.BadTimestampsToReturnInvalid)
-
-
-def _item_code(item: ua.MonitoredItemCreateRequest) -> int:
-    of_events = item.ItemToMonitor.AttributeId == ua.AttributeIds.EventNotifier
-    return filter_code(item.RequestedParameters.Filter, of_events=of_events)
 
 
 def _path_code(path: ua.BrowsePath) -> int:

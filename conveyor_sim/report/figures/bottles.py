@@ -17,6 +17,7 @@ from matplotlib.lines import Line2D
 
 from conveyor_sim.report.figures import style
 from conveyor_sim.report.figures.data import Floats, PlantFrame, StaticGeometry
+from conveyor_sim.support.nice_numbers import nice_below
 
 Z_BOTTLE: Final = 3.0
 Z_MARK: Final = 3.2
@@ -43,8 +44,8 @@ class ForceScale:
         if largest <= 0.0:
             return None
         largest = max(largest, 0.1 * peak)
-        top = style.nice_below(largest)
-        return cls(widest / largest, (style.nice_below(top / 9.0), style.nice_below(top / 2.0), top))
+        top = nice_below(largest)
+        return cls(widest / largest, (nice_below(top / 9.0), nice_below(top / 2.0), top))
 
     def legend(self, figure: Figure) -> Legend:
         """Add a legend of a few forces as lines of their width, above the axes at the right."""

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from conveyor_sim.report.figures import style
 from conveyor_sim.report.figures.data import Floats, Flow, PeakForceSeries
+from conveyor_sim.support.nice_numbers import nice_above
 
 _WINDOWS: Final = 10  # in a run: a rate is counted over this part of it
 
@@ -98,7 +99,7 @@ def force_figure(force: PeakForceSeries) -> Figure:
 def rate_window(time: Floats) -> float:
     """Return the time (s) over which entries are counted for a rate: a round part of the run."""
     span = float(time[-1] - time[0])
-    return style.nice_above(span / _WINDOWS) if span > 0.0 else 1.0
+    return nice_above(span / _WINDOWS) if span > 0.0 else 1.0
 
 
 def entries_per_minute(time: Floats, entered: NDArray[np.int64], window: float) -> Floats:

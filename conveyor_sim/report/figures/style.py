@@ -147,18 +147,6 @@ def pale(colour: NDArray[np.float64], strength: float) -> NDArray[np.float64]:
     return mixed
 
 
-def nice_below(value: float) -> float:
-    """Return the largest of 1, 2, 5 times a power of ten that does not exceed `value` > 0."""
-    power = 10.0 ** np.floor(np.log10(value))
-    return float(max(step * power for step in (1.0, 2.0, 5.0) if step * power <= value * (1.0 + 1e-12)))
-
-
-def nice_above(value: float) -> float:
-    """Return the smallest of 1, 2, 5 times a power of ten that is not below `value` > 0."""
-    power = 10.0 ** np.floor(np.log10(value))
-    return float(min(step * power for step in (1.0, 2.0, 5.0, 10.0) if step * power >= value * (1.0 - 1e-12)))
-
-
 def heading(figure: Figure, text: str) -> None:
     """Above all axes, at the left, in as many lines as it takes."""
     figure.suptitle(text, x=0.01, ha="left", fontsize=13.0, fontweight="bold", wrap=True)

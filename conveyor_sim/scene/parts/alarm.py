@@ -81,6 +81,10 @@ class AlarmFields(Part):
     on_delay: _Delay = quantity("The alarm comes when its condition has held for this time.", "s", default=0.0)
     off_delay: _Delay = quantity("The alarm goes when its condition has been gone for this time.", "s", default=0.0)
     latching: Flag = quantity("True: the alarm stands until it is acknowledged and reset.", default=False)
+    confirm: Flag = quantity(
+        "True: once acknowledged, the alarm waits until an operator confirms that its cause has been dealt with.",
+        default=False,
+    )
     suppressed_by: Annotated[
         tuple[AlarmId, ...], Len(0, MOST_CAUSES), Holds(f"a list of at most {MOST_CAUSES} ids of alarms")
     ] = quantity("IDs of alarms that cause this one. While one of them stands, this alarm is suppressed.", default=())

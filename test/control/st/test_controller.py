@@ -10,10 +10,12 @@ from pathlib import Path
 import pytest
 from facts import missing, stating
 
-from conveyor_sim.control.scan import Inputs, LineTags, together
+from conveyor_sim.control.scan import Controller, Inputs, LineTags, together
 from conveyor_sim.control.st.controller import StructuredText
 from conveyor_sim.control.st.errors import StructuredTextError
+from conveyor_sim.control.st.load import load
 from conveyor_sim.protocols.modbus.address_map import modbus_map
+from conveyor_sim.run.controller_parameters import controller_parameters
 from conveyor_sim.support.modbus_rows import to_csv
 from conveyor_sim.testing import Scenario
 from conveyor_sim.testing.evidence import draw_moment, traced
@@ -319,8 +321,8 @@ def test_conditions_read_variables_and_the_picture_shows_them(tmp_path: Path) ->
     assert draw_moment(plant, tmp_path / "line.png").stat().st_size > 0
 
 
-def fill(plant: Scenario, program: Path) -> None:
-    plant.attach(StructuredText(program))
+def fill(plant: Scenario, program: Controller) -> None:
+    plant.attach(program)
     plant.inject("machines/packer/stop")
     plant.eventually(lambda s: s["alarms/table full"], within=40)
 
@@ -331,7 +333,7 @@ def test_the_documented_line_and_its_fault(tmp_path: Path) -> None:
     faulty.write_text((PROGRAMS / "table.st").read_text().replace("table_speed := 0.4", "table_speed := feeder_speed"))
     for program, goes_on in ((PROGRAMS / "table.st", True), (faulty, False)):
         plant = Scenario(TABLE)
-        fill(plant, program)
+        fill(plant, StructuredText(program))
         plant.always(lambda s: s["belts/table/bottles"] <= 45, for_=5)
         plant.inject("machines/packer/stop", 0)
         if goes_on:
@@ -447,14 +449,21 @@ def test_what_is_no_file_is_said_to_be_none(tmp_path: Path) -> None:
             StructuredText(tmp_path / f"{name}.st")
 
 
-def test_a_program_brought_over_from_codesys_runs_the_line(tmp_path: Path) -> None:
-    """docs/structured_text.md, A program carried through: refusals and their solutions."""
-    with pytest.raises(StructuredTextError, match=stating("codesys.st:111:17", "GVL", "not declared")):
-        StructuredText(PROGRAMS / "brought_over" / "codesys.st")
-    plant = Scenario(TABLE)
-    fill(plant, PROGRAMS / "brought_over" / "table.st")
-    plant.always(lambda s: s["belts/table/bottles"] <= 45, for_=5)
-    plant.inject("machines/packer/stop", 0)
-    plant.eventually(lambda s: s["belts/feeder/speed"] > 0, within=15)
-    assert plant.signals["plc/plc_prg/fbfeeder/nstops"] == 1
-    assert plant.signals["plc/plc_prg/wstatus"] == 0x0102
+def test_a_program_brought_over_from_codesys_runs_the_line() -> None:
+    """docs/structured_text.md, A program carried through: unedited in its dialect, and with its changes in iec."""
+    folder = PROGRAMS / "brought_over"
+    with pytest.raises(StructuredTextError, match=stating("codesys.st:111:17", "GVL.xEyeHigh", "codesys")):
+        StructuredText(folder / "codesys.st")
+    unedited = load(str(folder / "codesys.st"), controller_parameters(str(folder / "codesys.yaml"), "--parameters"))
+    hashes = []
+    for program in (unedited, StructuredText(folder / "table.st")):
+        plant = Scenario(TABLE)
+        fill(plant, program)
+        plant.always(lambda s: s["belts/table/bottles"] <= 45, for_=5)
+        plant.inject("machines/packer/stop", 0)
+        plant.eventually(lambda s: s["belts/feeder/speed"] > 0, within=15)
+        assert plant.signals["plc/plc_prg/fbfeeder/nstops"] == 1
+        assert plant.signals["plc/plc_prg/wstatus"] == 0x0102
+        hashes.append(plant.simulation.state_hash())
+    assert hashes[0] == hashes[1]
+    assert any(not missing(sentence, "codesys.st:133:34", "DINT", "INT") for sentence in unedited.left_over)

@@ -13,6 +13,7 @@ from facts import missing, stating
 from conveyor_sim.cli import main
 from conveyor_sim.control.scan import ControlError
 from conveyor_sim.control.st import StructuredText
+from conveyor_sim.control.st.controller import MOST_WARNINGS
 from conveyor_sim.control.st.dialect import DIALECTS, Dialect
 from conveyor_sim.control.st.load import load
 
@@ -68,3 +69,22 @@ def test_every_flag_has_a_row_and_a_dialect() -> None:
     for one in flags:
         assert not getattr(DIALECTS["iec"], one.name)
         assert any(getattr(dialect, one.name) for dialect in DIALECTS.values())
+
+
+def test_conversions_that_may_change_a_value_are_reported(path: Path) -> None:
+    path.write_text(
+        "PROGRAM main VAR n : INT; d : DINT; w : WORD; u : UINT; END_VAR\n"
+        "n := d; w := u + 1; n := d / 100000;\nn := w;\nEND_PROGRAM"
+    )
+    plc = StructuredText(path, dialect="codesys")
+    first, second = plc.left_over
+    assert not missing(first, "p.st:2:6", "DINT", "INT")
+    assert not missing(second, "p.st:3:6", "WORD", "INT")
+
+
+def test_many_warnings_are_counted(path: Path) -> None:
+    lines = "n := d;\n" * 100
+    path.write_text(f"PROGRAM main VAR n : INT; d : DINT; END_VAR\n{lines}END_PROGRAM")
+    listed = StructuredText(path, dialect="codesys").left_over
+    assert len(listed) == MOST_WARNINGS + 1
+    assert not missing(listed[-1], str(100 - MOST_WARNINGS))

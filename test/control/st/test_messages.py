@@ -110,6 +110,12 @@ def test_a_foreign_word_may_be_a_name(word: str) -> None:
     assert compile_text(text + "END_PROGRAM").programs
 
 
+@pytest.mark.parametrize("word", ["INTERFACE", "CLASS", "POINTER", "NAMESPACE", "REFERENCE", "METHOD", "STEP"])
+def test_a_word_of_an_unsupported_feature_may_be_a_field(word: str) -> None:
+    text = f"TYPE t : STRUCT {word} : INT; END_STRUCT END_TYPE PROGRAM p VAR x : t; END_VAR x.{word} := 1; END_PROGRAM"
+    assert compile_text(text).programs
+
+
 def test_a_variable_with_a_foreign_name_is_not_blamed() -> None:
     _, column, found, _ = refusal("PROGRAM p VAR default, x : INT; END_VAR x := default x; END_PROGRAM")
     assert (column, found) == (54, "'x'")

@@ -85,7 +85,7 @@ def test_qualifiers_that_contradict_each_other_are_refused(pair: str) -> None:
         compile_text(text_of("PROGRAM", "VAR", pair))
 
 
-@pytest.mark.parametrize("section", ["VAR_STAT", "VAR_INST", "VAR_ACCESS", "VAR_CONFIG"])
+@pytest.mark.parametrize("section", ["VAR_INST", "VAR_ACCESS", "VAR_CONFIG"])
 def test_other_sections_are_refused(section: str) -> None:
     with pytest.raises(StructuredTextError, match=rf"program\.st:1:\d+: .*{section}.* without"):
         compile_text(f"PROGRAM main {section} x : INT; END_VAR END_PROGRAM")

@@ -13,6 +13,7 @@ from control.st.conformance import cases
 from fuzz.invariants import Violation
 
 from conveyor_sim.control.st.compile import compile_text
+from conveyor_sim.control.st.dialect import DIALECTS, Dialect
 from conveyor_sim.control.st.errors import StructuredTextError
 from conveyor_sim.control.st.program import Program
 
@@ -35,6 +36,8 @@ PIECES = (
     "{IF defined (A)}", "{ELSIF NOT defined (B)}", "{ELSE}", "{END_IF}", "{define A}", "{define B 'x'}", "{undefine A}",
     "AT %MW0", "AT %MX0.0", "AT %MD0", "AT %QX0.0", "LTIME", "LTIME#1s", "NON_RETAIN", "VAR_INPUT CONSTANT", "ABS(-1)",
     "(" * 300, "NOT " * 200, "a." * 100, "[1]" * 100, "FOR i := 1 TO 9 DO " * 25, "+ 1" * 500,
+    "ACTION A:", "END_ACTION", "GVL.", "Lib.", ".%B1", ".%W0", ".3", "VAR_STAT", "TON(PT := T#1s)", "SET1", "RESET",
+    "INT (A := 1, B)", ":= 1, 2(0)", "AND(", "XOR(", "ON", "WITH", "TASK", "VAR CONSTANT N : INT := M; END_VAR",
 )  # fmt: skip
 
 TYPES = (
@@ -87,18 +90,19 @@ def attack(seed: int, folder: Path) -> str:
     """One program, compiled and run for some scans."""
     draw = np.random.default_rng(seed)
     text = _random(draw) if draw.integers(2) else _changed(draw)
+    dialect = DIALECTS[str(draw.choice(list(DIALECTS)))]
     begun = time.process_time()
-    said = _play(text)
+    said = _play(text, dialect)
     if said == "ran" and draw.integers(4) == 0:
-        _trace(text)
+        _trace(text, dialect)
     if time.process_time() - begun > LONGEST:
         raise Violation("slow program", text[:2000])
     return said
 
 
-def _play(text: str) -> str:
+def _play(text: str, dialect: Dialect) -> str:
     try:
-        program = Program(compile_text(text), BUDGET)
+        program = Program(compile_text(text, dialect=dialect), BUDGET)
     except StructuredTextError as error:
         _check(str(error), text)
         return "refused"
@@ -112,9 +116,9 @@ def _play(text: str) -> str:
     return "ran"
 
 
-def _trace(text: str) -> None:
+def _trace(text: str, dialect: Dialect) -> None:
     """A trace changes nothing; a warm restart takes what it kept."""
-    plain, traced = (Program(compile_text(text, trace=trace), BUDGET) for trace in (False, True))
+    plain, traced = (Program(compile_text(text, trace=trace, dialect=dialect), BUDGET) for trace in (False, True))
     for scan in range(SCANS):
         for program in (plain, traced):
             program.run(scan * 10_000_000)
@@ -160,7 +164,9 @@ def _random(draw: np.random.Generator) -> str:
     for _ in range(int(draw.integers(1, 6))):
         target = int(draw.integers(len(names)))
         kind = kinds[target].partition("[")[0]
-        value = f"TO_{kind}({_expression(draw, names, int(draw.integers(4)))})"
+        value = _expression(draw, names, int(draw.integers(4)))
+        if draw.integers(3):
+            value = f"TO_{kind}({value})"
         statement = f"{names[target]} := {value};"
         match int(draw.integers(6)):
             case 0:
@@ -191,7 +197,9 @@ def _expression(draw: np.random.Generator, names: list[str], depth: int) -> str:
             return f"{draw.choice(FUNCTIONS)}({inner})"
         case 1:
             kind = str(draw.choice(TYPES)).partition("[")[0]
-            left, right = (f"TO_{kind}({_expression(draw, names, depth - 1)})" for _ in range(2))
+            left, right = (_expression(draw, names, depth - 1) for _ in range(2))
+            if draw.integers(2):
+                left, right = f"TO_{kind}({left})", f"TO_{kind}({right})"
             return f"({left} {draw.choice(OPERATORS)} {right})"
         case _:
             return f"{draw.choice(['-', 'NOT ', ''])}({_expression(draw, names, depth - 1)})"

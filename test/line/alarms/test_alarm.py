@@ -23,7 +23,17 @@ LATCHING = {
     "LATCHED_ACKNOWLEDGED": ["on", "off", "acknowledge"],
 }
 
-STEPS = ("on", "off", "acknowledge", "reset", "shelve", "unshelve", "remove_from_service", "return_to_service")
+STEPS = (
+    "on",
+    "off",
+    "acknowledge",
+    "confirm",
+    "reset",
+    "shelve",
+    "unshelve",
+    "remove_from_service",
+    "return_to_service",
+)
 HIDE = {"shelve": "SHELVED", "cause on": "SUPPRESSED", "remove_from_service": "OUT_OF_SERVICE"}
 
 DIAGRAM = {
@@ -62,8 +72,52 @@ DIAGRAM_LATCHING = {
 }
 
 
-def board_at(path: list[str], latching: bool) -> Board:
-    board = Board(cause={}, it={"latching": latching, "suppressed_by": ["cause"]})
+CONFIRM = {
+    "UNACKNOWLEDGED": ["on"],
+    "UNCONFIRMED": ["on", "acknowledge"],
+    "ACKNOWLEDGED": ["on", "acknowledge", "confirm"],
+    "RETURNED": ["on", "off"],
+    "RETURNED_UNCONFIRMED": ["on", "off", "acknowledge"],
+    "NORMAL": ["on", "off", "acknowledge", "confirm"],
+}
+"""Steps by which an alarm that must be confirmed gets to each state."""
+
+DIAGRAM_CONFIRM = {
+    ("NORMAL", "on"): "UNACKNOWLEDGED",
+    ("UNACKNOWLEDGED", "acknowledge"): "UNCONFIRMED",
+    ("UNACKNOWLEDGED", "off"): "RETURNED",
+    ("UNCONFIRMED", "confirm"): "ACKNOWLEDGED",
+    ("UNCONFIRMED", "off"): "RETURNED_UNCONFIRMED",
+    ("ACKNOWLEDGED", "off"): "NORMAL",
+    ("RETURNED", "acknowledge"): "RETURNED_UNCONFIRMED",
+    ("RETURNED", "on"): "UNACKNOWLEDGED",
+    ("RETURNED_UNCONFIRMED", "confirm"): "NORMAL",
+    ("RETURNED_UNCONFIRMED", "on"): "UNACKNOWLEDGED",
+    **{(state, hide): hidden for state in CONFIRM for hide, hidden in HIDE.items()},
+}
+
+LATCHING_CONFIRM = {
+    "LATCHED_UNACKNOWLEDGED": ["on", "off"],
+    "LATCHED_UNCONFIRMED": ["on", "off", "acknowledge"],
+    "LATCHED_ACKNOWLEDGED": ["on", "off", "acknowledge", "confirm"],
+    "UNCONFIRMED": ["on", "acknowledge"],
+}
+
+DIAGRAM_LATCHING_CONFIRM = {
+    ("LATCHED_UNACKNOWLEDGED", "acknowledge"): "LATCHED_UNCONFIRMED",
+    ("LATCHED_UNACKNOWLEDGED", "on"): "UNACKNOWLEDGED",
+    ("LATCHED_UNCONFIRMED", "confirm"): "LATCHED_ACKNOWLEDGED",
+    ("LATCHED_UNCONFIRMED", "on"): "UNACKNOWLEDGED",
+    ("LATCHED_ACKNOWLEDGED", "reset"): "NORMAL",
+    ("LATCHED_ACKNOWLEDGED", "on"): "UNACKNOWLEDGED",
+    ("UNCONFIRMED", "confirm"): "ACKNOWLEDGED",
+    ("UNCONFIRMED", "off"): "LATCHED_UNCONFIRMED",
+    **{(state, hide): hidden for state in LATCHING_CONFIRM for hide, hidden in HIDE.items()},
+}
+
+
+def board_at(path: list[str], latching: bool, confirm: bool = False) -> Board:
+    board = Board(cause={}, it={"latching": latching, "confirm": confirm, "suppressed_by": ["cause"]})
     for step in path:
         assert take(board, step) == ""
     return board
@@ -102,6 +156,24 @@ def test_every_transition_of_one_that_latches(state: str, step: str) -> None:
     assert board.states()["it"] == DIAGRAM_LATCHING.get((state, step), state)
     operation = step not in ("on", "off") and not step.startswith("cause")
     assert bool(problem) == (operation and (state, step) not in DIAGRAM_LATCHING)
+
+
+@pytest.mark.parametrize("step", [*STEPS, "cause on", "cause off"])
+@pytest.mark.parametrize(
+    ("latching", "path", "state"),
+    [
+        *((False, path, state) for state, path in CONFIRM.items()),
+        *((True, path, state) for state, path in LATCHING_CONFIRM.items()),
+    ],
+)
+def test_every_transition_of_one_that_must_be_confirmed(latching: bool, path: list[str], state: str, step: str) -> None:
+    diagram = DIAGRAM_LATCHING_CONFIRM if latching else DIAGRAM_CONFIRM
+    board = board_at(path, latching, confirm=True)
+    assert board.states()["it"] == state
+    problem = take(board, step)
+    assert board.states()["it"] == diagram.get((state, step), state)
+    operation = step not in ("on", "off") and not step.startswith("cause")
+    assert bool(problem) == (operation and (state, step) not in diagram)
 
 
 @pytest.mark.parametrize(

@@ -24,7 +24,8 @@ def busy(seed: int, ticks: int = 60) -> Board:
     """Return alarms after many events of all kinds."""
     board, draw = line(), random.Random(seed)
     board.declare(
-        full={"suppressed_by": ["jam", "trip"], "group": "g", "off_delay": 0.7}, hot={"group": "h", "latching": True}
+        full={"suppressed_by": ["jam", "trip"], "group": "g", "off_delay": 0.7},
+        hot={"group": "h", "latching": True, "confirm": seed % 2 == 1},
     )
     for _ in range(ticks):
         turn(board, draw)

@@ -64,7 +64,7 @@ def test_an_operator_takes_a_belt_by_writing_only(line: Line, tmp_path: Path) ->
     line.client()
     done = run(line, "operator", PASSWORD, tmp_path)
     told = json.loads(next(row for row in done.stdout.splitlines() if row.startswith("{")))
-    assert (told["mode"], told["good"]) == ("GoodCompletesAsynchronously", "BadInvalidState"), done.stderr
+    assert (told["mode"], told["good"]) == ("GoodCompletesAsynchronously", "BadUserAccessDenied"), done.stderr
     line.advance()
     assert line.read("belts/zone2/mode") == 3
 

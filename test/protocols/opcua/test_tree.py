@@ -57,6 +57,20 @@ def test_numbers_have_unit_and_range(line: Line) -> None:
     assert unit.NamespaceUri == "http://www.opcfoundation.org/UA/units/un/cefact"
 
 
+@pytest.mark.parametrize(
+    ("name", "low", "high"),
+    [
+        ("machines/filler/produced", 0.0, 500_000.0),  # the packer's 2.4 a second for a day: 207 360
+        ("photo_eyes/full1/edges", 0.0, 500_000.0),
+        ("machines/filler/blocked_time", 0.0, 86_400.0),
+        ("belts/zone1/bottles", 0.0, 74.0),
+    ],
+)
+def test_a_counter_spans_a_day_of_production(line: Line, name: str, low: float, high: float) -> None:
+    span = properties(line, name)["EURange"]
+    assert (span.Low, span.High) == (low, high)
+
+
 def test_units_have_the_numbers_of_the_opc_foundation(line: Line) -> None:
     """From UNECE_to_OPCUA.csv."""
     expected = {"m/s": 5067859, "1/h": 4731184, "1/min": 4405556, "N": 5129559, "J": 4869973, "%": 20529, "1": 4404786}

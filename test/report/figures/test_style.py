@@ -13,8 +13,8 @@ from facts import stating
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.report.figures import style
 from conveyor_sim.report.figures.draw import plot_scene
-from conveyor_sim.report.figures.style import nice_above, nice_below
 from conveyor_sim.scene import Scene
+from conveyor_sim.support.nice_numbers import nice_above, nice_below
 
 
 def test_a_scene_is_drawn_as_png_and_svg(scene: Scene, tmp_path: Path) -> None:
