@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import asyncio
 import csv
+import struct
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import replace
@@ -36,7 +37,7 @@ from conveyor_sim.protocols.attach.plc_certificate import PlcCertificate
 from conveyor_sim.protocols.attach.plc_link import PlcLinkError
 from conveyor_sim.protocols.attach.tag_map import TagMapError, read_tag_map
 from conveyor_sim.protocols.hosting.server_thread import ServerThread
-from conveyor_sim.protocols.server.certificates import CERTIFICATE, PLCS, CertificateError, identity
+from conveyor_sim.protocols.server.certificates import CERTIFICATE, PLCS, CertificateError, identity, trust_plc
 from conveyor_sim.testing import Scenario
 
 THEIRS = {BOTTLES: "bottles", SETPOINT: "speed", ALARM: "full", "run/tick": "tick", "run/target_tick": "target"}
@@ -452,3 +453,74 @@ def test_a_spoiled_answer_ends_the_test_with_one_error(
     assert "Traceback" not in capfd.readouterr().err
     with pytest.raises(PlcLinkError, match=stating(proxy.url)):
         connect(proxy.url, tags, trusting)
+
+
+HELLO = b"ACKF" + struct.pack("<I5I", 28, 0, 65535, 65535, 0, 0)
+"""Answer of a server to the first message."""
+
+
+@pytest.mark.parametrize(
+    "answers",
+    [
+        [b""],
+        [b"\x16\x03\x01" * 99],
+        [b"HTTP/1.1 400 Bad Request\r\n\r\n"],
+        [b"ERRF" + struct.pack("<III4s", 20, 0x80130000, 4, b"nope")],
+        [HELLO, b""],
+        [HELLO, b"OPNF" + struct.pack("<I", 0xFFFFFFFF) + b"x" * 99],
+        [HELLO, b"OPNF" + struct.pack("<I", 0) + b"x" * 99],
+        [HELLO, b"OPNF" + struct.pack("<I", 60) + b"\0" * 52],
+        [b"ACKF" + struct.pack("<I5I", 28, 0, 0, 0, 1, 1), b""],
+    ],
+)
+def test_a_port_that_is_no_opc_ua_server_is_one_error(
+    answers: list[bytes], monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """An empty answer is silence, which is not waited for without an end."""
+    monkeypatch.setattr(opcua_client, "PATIENCE", 0.2)
+
+    async def answer(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        for each in answers:
+            await reader.read(2**16)
+            writer.write(each)
+        await reader.read()
+        writer.close()
+
+    async def come() -> None:
+        async with await asyncio.start_server(answer, "127.0.0.1", 0) as server:
+            url = f"opc.tcp://127.0.0.1:{server.sockets[0].getsockname()[1]}"
+            with pytest.raises(PlcLinkError, match=stating(url)):
+                await plc_link(url, ()).connect()
+
+    asyncio.run(come())
+    assert capfd.readouterr().err == ""
+
+
+def test_a_damaged_file_of_a_trusted_certificate_is_named(
+    server: VendorServer, trusting: PlcAccess, tags: Path, tmp_path: Path
+) -> None:
+    identity(tmp_path / "own")
+    trust_plc(tmp_path / "own", server.url.removeprefix("opc.tcp://"), b"damaged")
+    with pytest.raises(CertificateError, match=stating(str(tmp_path), "certificate", "DER or PEM")):
+        connect(server.url, tags, trusting._replace(certificates=tmp_path / "own"))
+
+
+def test_security_is_for_opc_ua_only(tmp_path: Path) -> None:
+    answer = CliRunner().invoke(main, ["attach", LINE, "modbus://127.0.0.1:1", "--browse"])
+    assert answer.exit_code == 1 and missing(answer.output, "--browse", "modbus://", "opc.tcp://") == []
+    with pytest.raises(PlcLinkError, match=stating("modbus", "security", "opc.tcp")):
+        plc_link("modbus://127.0.0.1:1", (), PlcAccess(security="sign"))
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ([], ["SCENE", "--browse", "--trust"]),
+        (["--password-file", "x", "--browse"], ["--password-file", "--user"]),
+        (["--user", "a", "--user-certificate", "x", "--browse"], ["--user-certificate", "--user"]),
+        (["--user", "a", "--password-file", "/no/file", "--browse"], ["/no/file", "password", "PLC"]),
+    ],
+)
+def test_options_that_do_not_fit_are_refused(options: list[str], said: list[str]) -> None:
+    answer = CliRunner().invoke(main, ["attach", "opc.tcp://127.0.0.1:1", *options])
+    assert answer.exit_code == 1 and missing(answer.output, *said) == []

@@ -132,8 +132,10 @@ class Moment(Type):
 
     part: Literal["DATE", "TOD", "DT"] = "DT"
     """Name of the short type with the same values."""
-    unit: int = 1
+    unit: int = field(default=1, compare=False)
     """Nanoseconds per unit of a number that is converted."""
+    zero: int = field(default=0, compare=False)
+    """Value that is the number 0, in ns."""
 
     @property
     def width(self) -> int:

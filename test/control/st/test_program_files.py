@@ -232,6 +232,14 @@ def test_a_project_of_automation_studio_runs(tmp_path: Path) -> None:
     assert {"feed/local/sum", "limit_2"} <= set(program.variables)
 
 
+def test_a_library_of_automation_studio_without_source_is_missing(tmp_path: Path) -> None:
+    """A declaration in a .fun file without a body is no block that does nothing."""
+    folder = written(tmp_path, **BR)
+    (folder / "Lib" / "Adding.st").unlink()
+    with pytest.raises(StructuredTextError, match=r"Variables\.var:3:10: found Adding, expected a type"):
+        compile_files(folder)
+
+
 def test_what_a_project_of_automation_studio_can_not_have(tmp_path: Path) -> None:
     folder = written(tmp_path, **BR)
     written(folder, Feed___Second__st="PROGRAM _CYCLIC\n ;\nEND_PROGRAM")
@@ -253,6 +261,14 @@ def test_a_unit_as_codesys_shows_it_needs_no_end(tmp_path: Path) -> None:
     written(folder, f__st="FUNCTION_BLOCK Adding VAR_OUTPUT n : INT; END_VAR IF TRUE THEN n := n + 1;")
     with pytest.raises(StructuredTextError, match="END_IF"):
         compile_files(folder, dialect="codesys")
+
+
+def test_type_may_be_the_name_of_a_field_in_codesys(tmp_path: Path) -> None:
+    text = "TYPE t : STRUCT Type : INT; END_STRUCT END_TYPE; PROGRAM p VAR x : t; END_VAR x.Type := 1; END_PROGRAM"
+    folder = written(tmp_path, p__st=text)
+    assert values(scanned(folder, dialect="codesys"), "p/x/type") == [1.0]
+    with pytest.raises(StructuredTextError, match=r":1:17: found 'Type'"):
+        compile_files(folder)
 
 
 def test_a_program_calls_another_in_codesys(tmp_path: Path) -> None:
