@@ -93,7 +93,7 @@ def _difference(program: Program, check: Check, unit: Unit) -> str:
 def _name(program: Program, check: Check, unit: Unit) -> str:
     """Return the name of a variable, by a name that only one variable has, or by its number from the end.
 
-    Numbers of ironplc count global variables and those of the program, after a few of its own.
+    Numbers of ironplc count global variables and those of the program, after a few that it adds.
     """
     named = [name for name in program.variables if name == check.name or name.endswith(f"/{check.name}")]
     if check.name and len(named) == 1:
