@@ -7,7 +7,6 @@ import asyncio
 import csv
 import struct
 from collections.abc import Callable, Iterator
-from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -18,6 +17,7 @@ import pytest
 from click.testing import CliRunner
 from facts import missing, stating
 from testing.conftest import LINE
+from testing.faulty_proxy import FaultyProxy
 from testing.plc_servers import ALARM, OWN, write_map
 from testing.soft_plc import BOTTLES, SETPOINT
 from testing.test_plc_server import SECONDS, FreeRunning, Twin
@@ -34,7 +34,7 @@ from conveyor_sim.protocols.attach.access import PlcAccess, Security
 from conveyor_sim.protocols.attach.links import plc_link
 from conveyor_sim.protocols.attach.opcua_client import choose, trust_server
 from conveyor_sim.protocols.attach.plc_certificate import PlcCertificate
-from conveyor_sim.protocols.attach.plc_link import PlcLinkError
+from conveyor_sim.protocols.attach.plc_link import PlcLinkError, PlcRefusedError
 from conveyor_sim.protocols.attach.tag_map import TagMapError, read_tag_map
 from conveyor_sim.protocols.hosting.server_thread import ServerThread
 from conveyor_sim.protocols.server.certificates import CERTIFICATE, PLCS, CertificateError, identity, trust_plc
@@ -307,6 +307,27 @@ def test_a_fingerprint_that_can_t_be_is_refused(text: str) -> None:
     assert answer.exit_code == 1 and missing(answer.output, "--trust") == []
 
 
+def test_an_attacker_can_t_hide_the_encrypted_endpoint(
+    proxy: FaultyProxy, trusting: PlcAccess, folder: Path, tags: Path
+) -> None:
+    """Endpoints are read without security, where they can be changed; the secured session shows all of them."""
+    uri = b"http://opcfoundation.org/UA/SecurityPolicy#Basic256Sha256"
+    encrypted, signed = (bytes([mode, 0, 0, 0]) + struct.pack("<I", len(uri)) + uri for mode in (3, 2))
+    changed = []
+
+    def hide(data: bytes) -> bytes:
+        if encrypted in data and not changed:
+            changed.append(data)
+            return data.replace(encrypted, signed)
+        return data
+
+    asyncio.run(trust_server(url_of(proxy), trusting._replace(trust=sha256(folder)), lambda _: None))
+    proxy.fault = hide
+    with pytest.raises(PlcRefusedError, match=stating(url_of(proxy), "better endpoint", "attacker")):
+        connect(url_of(proxy), tags, trusting)
+    assert len(changed) == 1
+
+
 POLICY = "http://opcfoundation.org/UA/SecurityPolicy#"
 
 
@@ -372,50 +393,15 @@ def test_without_a_fitting_endpoint_it_is_told_what_there_is(
         choose("opc.tcp://plc", [endpoint(*each) for each in offered], access)
 
 
-class Proxy:
-    """A place between line and server that changes or swallows what the server answers."""
-
-    def __init__(self, url: str, thread: ServerThread) -> None:
-        self._to = int(url.rpartition(":")[2])
-        self.spoil: Callable[[bytes], bytes] = bytes
-        self._thread, self._writers = thread, list[asyncio.StreamWriter]()
-        self._server = thread.run(self._listen())
-        self.url = f"opc.tcp://127.0.0.1:{self._server.sockets[0].getsockname()[1]}"
-
-    async def _listen(self) -> asyncio.Server:
-        return await asyncio.start_server(self._join, "127.0.0.1", 0)
-
-    async def _join(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        other_reader, other_writer = await asyncio.open_connection("127.0.0.1", self._to)
-        self._writers += [writer, other_writer]
-        await asyncio.gather(
-            self._pass_on(reader, other_writer, bytes),
-            self._pass_on(other_reader, writer, lambda data: self.spoil(data)),
-        )
-
-    async def _pass_on(
-        self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, change: Callable[[bytes], bytes]
-    ) -> None:
-        with suppress(ConnectionError):
-            while data := await reader.read(2**16):
-                writer.write(change(data))
-        writer.close()
-
-    async def _stop(self) -> None:
-        self._server.close()
-        for writer in self._writers:
-            writer.close()
-
-    def close(self) -> None:
-        self._thread.run(self._stop())
-
-
 @pytest.fixture
-def proxy(server: VendorServer) -> Iterator[Proxy]:
-    with ServerThread() as thread:
-        proxy = Proxy(server.url, thread)
-        yield proxy
-        proxy.close()
+def proxy(server: VendorServer) -> Iterator[FaultyProxy]:
+    proxy = FaultyProxy(int(server.url.rpartition(":")[2]))
+    yield proxy
+    proxy.close()
+
+
+def url_of(proxy: FaultyProxy) -> str:
+    return f"opc.tcp://127.0.0.1:{proxy.port}"
 
 
 def flipped(data: bytes) -> bytes:
@@ -433,7 +419,7 @@ def of_another_protocol(data: bytes) -> bytes:
 
 @pytest.mark.parametrize("spoil", [flipped, without_end, of_another_protocol, lambda data: b""], ids=str)
 def test_a_spoiled_answer_ends_the_test_with_one_error(
-    proxy: Proxy,
+    proxy: FaultyProxy,
     trusting: PlcAccess,
     folder: Path,
     tags: Path,
@@ -443,16 +429,16 @@ def test_a_spoiled_answer_ends_the_test_with_one_error(
 ) -> None:
     """No traceback, and no command from an answer that is not the PLC's."""
     monkeypatch.setattr(opcua_client, "PATIENCE", 0.5)
-    asyncio.run(trust_server(proxy.url, trusting._replace(trust=sha256(folder)), lambda _: None))
+    asyncio.run(trust_server(url_of(proxy), trusting._replace(trust=sha256(folder)), lambda _: None))
     with Scenario(LINE) as plant:
-        plant.attach_plc(proxy.url, tags, access=trusting)
+        plant.attach_plc(url_of(proxy), tags, access=trusting)
         plant.run_for(0.1)
-        proxy.spoil = spoil
-        with pytest.raises(ControlError, match=stating("no PLC", proxy.url)):
+        proxy.fault = spoil
+        with pytest.raises(ControlError, match=stating("no PLC", url_of(proxy))):
             plant.run_for(0.1)
     assert "Traceback" not in capfd.readouterr().err
-    with pytest.raises(PlcLinkError, match=stating(proxy.url)):
-        connect(proxy.url, tags, trusting)
+    with pytest.raises(PlcLinkError, match=stating(url_of(proxy))):
+        connect(url_of(proxy), tags, trusting)
 
 
 HELLO = b"ACKF" + struct.pack("<I5I", 28, 0, 65535, 65535, 0, 0)

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from conveyor_sim.control.scan import ControlError
+from conveyor_sim.control.st import program_files
 from conveyor_sim.control.st.compile import compile_files
 from conveyor_sim.control.st.errors import StructuredTextError
 from conveyor_sim.control.st.load import load
@@ -78,6 +79,17 @@ def test_a_folder_and_further_files_are_a_controller(tmp_path: Path) -> None:
         load(str(folder / "main.st"), {"files": "twice.st"})
     with pytest.raises(ControlError, match="folder without a program"):
         load(str(written(tmp_path / "empty", readme__txt="")))
+
+
+def test_a_folder_with_too_many_files_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = written(tmp_path, **UNITS)
+    monkeypatch.setattr(program_files, "MOST_ENTRIES", 3)
+    with pytest.raises(StructuredTextError, match="found more than 3 files"):
+        compile_files(folder)
+    monkeypatch.undo()
+    monkeypatch.setattr(program_files, "MOST_FILES", 3)
+    with pytest.raises(StructuredTextError, match="found 4 files, expected at most 3"):
+        compile_files(folder)
 
 
 @pytest.mark.parametrize("name", ["p.TcPOU", "p.xml", "p.awl", "p.project"])
