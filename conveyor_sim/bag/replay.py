@@ -201,7 +201,13 @@ def _simulation(bag: Bag) -> Simulation:
         simulation = Simulation(recorded_scene(bag.line, f"{bag.path} (recorded scene)"))
     except SceneError as error:
         raise SceneError(f"{bag.path}: the recorded scene is refused by this version:\n{error}") from error
-    for shape in simulation.model.plant.moving:
+    model = simulation.model
+    if bag.format == 4 and model.friction_solver == "implicit" and model.settings.warm is not None:
+        raise BagError(
+            f"{bag.path}: format 4 with implicit friction and {model.integrator}, expected another format, solver or "
+            "integrator: this version evaluates the friction under bottles at another time of the step"
+        )
+    for shape in model.plant.moving:
         if f"{shape.name}/blocked" not in bag.line.signal_names:
             raise BagError(
                 f"{bag.path}: recorded when {shape.name} pushed with unlimited force, expected a recording with the "

@@ -67,7 +67,7 @@ def bottle_forces(world: World, worker: Worker, dt: float, spring_dt: float, fir
     for run in range(stepped_runs(world.riding, first)):
         begin, stop = stepped_run(world.riding, first, end, run)
         store_load(world.load, world.spin, world.ledger, begin, stop)
-        add_base_friction(world, world.spin, world.load, world.implicit, dt, begin, stop)
+        add_base_friction(world, world.spin, world.load, world.implicit, dt, spring_dt, begin, stop)
     add_straddling_friction(world, world.spin, world.load, _belt_power(world.ledger), lag, first, end)
     add_static_friction(world.bottles, world.load, world.footing, world.static_friction, lag, True, first, end)
     if world.ledger is not None:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -10,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from bag.editing import edited
+from bag.small_line import record
 from facts import stating
 from protocols.waiting import until
 
@@ -41,6 +43,8 @@ CYCLES = OLD / "before_cycles.mcap"
 """Format 2: a filler, a capper and two packers with failures, a reset, and rates above the nominal ones."""
 FRICTION = OLD / "before_warm_friction.mcap"
 """Format 3, recorded with commit cab9d27: a zigzag queue of four bottles with implicit friction in few steps."""
+VERLET = OLD / "before_warm_friction_verlet.mcap"
+"""Likewise, with velocity Verlet."""
 EYE = "photo_eyes/eye/blocked"
 
 
@@ -72,18 +76,19 @@ def test_machines_of_the_second_format_count_as_recorded() -> None:
     assert last.rate_limit.tolist() == last.rate.tolist() and np.isnan(last.set_effectiveness).all()
 
 
-def test_implicit_friction_of_the_third_format_is_solved_as_recorded() -> None:
+@pytest.mark.parametrize(("path", "ticks"), [(FRICTION, 30), (VERLET, 20)], ids=["leapfrog", "verlet"])
+def test_implicit_friction_of_the_third_format_is_solved_as_recorded(path: Path, ticks: int) -> None:
     """Replayed bit for bit, with friction that is solved anew in each step; the present solver gives another run."""
-    report = replay(FRICTION)
-    assert (report.difference, report.last_tick) == (None, 30)
-    with open_bag(FRICTION) as bag:
+    report = replay(path)
+    assert (report.difference, report.last_tick) == (None, ticks)
+    with open_bag(path) as bag:
         assert bag.format == 3
         line = bag.line
         recorded = list(bag.read("bottles"))[-1].data
         scene = recorded_scene(line, "bag")
     again, present = Simulation(scene), Simulation(parse_scene(line.scene_text))
     for sim in (again, present):
-        sim.advance(30)
+        sim.advance(ticks)
     assert scene.friction_anew and again.model.settings.warm is None and present.model.settings.warm is not None
     for name in ("x", "y", "vx", "vy", "omega"):
         assert np.array_equal(getattr(again.bottles(), name), getattr(recorded, name))
@@ -168,6 +173,42 @@ def test_a_recording_of_a_playback_keeps_the_format(tmp_path: Path) -> None:
     with open_bag(copy) as bag:
         assert bag.format == 2 and not bag.older_topics
     assert replay(copy).difference is None
+
+
+@pytest.mark.parametrize("integrator", ["leapfrog", "semi_implicit_euler", "velocity_verlet"])
+def test_implicit_friction_of_the_fourth_format_is_refused_and_reported(integrator: str, tmp_path: Path) -> None:
+    bag = _of_format_4(tmp_path, integrator, "implicit")
+    with pytest.raises(BagError, match=stating("format 4", "implicit friction", integrator)):
+        replay(bag)
+    assert summarize(bag).simulated == pytest.approx(0.02)
+
+
+@pytest.mark.parametrize(("integrator", "solver"), [("leapfrog", "explicit"), ("rk4", "implicit")])
+def test_other_friction_of_the_fourth_format_replays(integrator: str, solver: str, tmp_path: Path) -> None:
+    report = replay(_of_format_4(tmp_path, integrator, solver))
+    assert (report.difference, report.last_tick) == (None, 2)
+
+
+def _of_format_4(folder: Path, integrator: str, solver: str) -> Path:
+    """Record a bottle on a belt, with the number of the fourth format, whose messages are those of the present one."""
+    scene = {
+        "name": "friction",
+        "duration": 0.02,
+        "friction_solver": solver,
+        "accuracy": {"integrator": integrator, "per_tick": 20},
+        "base": [{"between": ["glass", "chain"], "friction": 0.3}],
+        "bottle_types": {"b": {"radius": 0.03, "mass": 0.3, "material": "glass"}},
+        "belts": {"chain": {"kind": "straight", "start": [0, 0], "angle": 0, "length": 2, "width": 0.2, "speed": 0.3,
+                            "material": "chain"}},
+        "bottles": [{"type": "b", "position": [0.5, 0.1], "velocity": [0.0, 0.0]}],
+    }  # fmt: skip
+
+    def fourth(topic: str, message: Any) -> None:
+        if topic == "line":
+            message.format = 4
+
+    record(parse_scene(json.dumps(scene)), folder / "bag", 2)
+    return edited(folder / "bag", folder / "fourth", fourth)
 
 
 def test_a_format_of_the_future_is_refused(tmp_path: Path) -> None:

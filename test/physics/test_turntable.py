@@ -102,10 +102,10 @@ def test_leapfrog_creeps_as_much_at_any_step(steps: int) -> None:
     assert gone[0] == pytest.approx(gone[1], rel=1e-4)
 
 
-@pytest.mark.parametrize("steps", [4, 8, 40])
+@pytest.mark.parametrize("steps", [2, 3, 4, 40])
 @pytest.mark.parametrize("integrator", ["leapfrog", "semi_implicit_euler", "velocity_verlet"])
 def test_creep_with_implicit_friction_is_predicted(integrator: str, steps: int) -> None:
-    """Within a factor of two, down to a step per v_lim / (mu g); none with leapfrog."""
+    """Within a factor of two: none, but for velocity Verlet with less than a step per v_lim / (mu g), 4 in a tick."""
     radius, share = 0.5, 0.5
     omega = math.sqrt(share * MU * G / radius)
     implicit = turntable(omega, radius, steps=steps, integrator=integrator).scene
@@ -120,8 +120,9 @@ def test_creep_with_implicit_friction_is_predicted(integrator: str, steps: int) 
         sim.advance(100)
         gone.append(distance(sim) - start)
     predicted = sum(term.value for term in sims[1].model.prediction.terms if term.quantity == "creep on curved belts")
+    assert (predicted > 0.0) == (integrator == "velocity_verlet" and steps < 4)
     error = abs(gone[1] / gone[0] - 1.0)
-    assert 0.5 * predicted - 1e-4 <= error <= predicted + 1e-4
+    assert 0.5 * predicted <= error <= 2.0 * predicted + 2e-4
 
 
 def test_it_slides_away_beyond_mu_g_over_omega_squared() -> None:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conveyor_sim.accuracy.candidates import standard_steps
-from conveyor_sim.accuracy.measure.reference import reference_setting, reference_simulation
+from conveyor_sim.accuracy.measure.reference import reference_setting, reference_simulation, with_explicit_friction
 from conveyor_sim.accuracy.measure.starts import Start
 from conveyor_sim.accuracy.results import Horizon
 from conveyor_sim.accuracy.setting import Setting
@@ -59,8 +59,10 @@ class HorizonFinder:
         """For a scene: nudges are watched in runs that are exact enough not to nudge bottles themselves.
 
         Equal steps are not, however short: where the force jumps at first touch by c v, a bottle that comes later by a
-        part of a step leaves faster by that part of c v dt / m, and a nudge d changes the speed by c d / m.
+        part of a step leaves faster by that part of c v dt / m, and a nudge d changes the speed by c d / m. Friction is
+        explicit in all runs, so that a horizon does not depend on the solver, whose errors it is to compare.
         """
+        scene = with_explicit_friction(scene)
         setting = reference_setting(scene)
         fine = replace(setting, error=None if setting.error is None else ERROR)
         coarse = Setting("leapfrog", standard_steps(scene))

@@ -13,19 +13,18 @@ from conveyor_sim.control.st.errors import Position, SourceError
 from conveyor_sim.control.st.foreign import ASSIGN, form_at
 
 REFUSED: Mapping[str, str] = {
-    **dict.fromkeys(("POINTER", "REF_TO"), "pointers and references"),
-    **dict.fromkeys(("CLASS", "INTERFACE", "EXTENDS", "IMPLEMENTS", "NAMESPACE"), "classes, methods and namespaces"),
-    **dict.fromkeys(("INITIAL_STEP", "END_STEP", "END_TRANSITION"), "SFC"),
+    **dict.fromkeys(("END_STEP", "END_TRANSITION"), "SFC"),
     **dict.fromkeys(("VAR_ACCESS", "VAR_CONFIG"), "access paths and VAR_CONFIG"),
     "VAR_INST": "VAR_INST, which belongs to methods; VAR of a block keeps its values",
 }
 """Words of the standard and of dialects that this interpreter does not support, with the feature they belong to."""
 
 SUSPECT: Mapping[str, str] = {
-    **dict.fromkeys(("REFERENCE", "REF", "ADR"), "pointers and references"),
+    **dict.fromkeys(("POINTER", "REFERENCE", "REF_TO", "REF", "ADR"), "pointers and references"),
+    **dict.fromkeys(("CLASS", "INTERFACE", "EXTENDS", "IMPLEMENTS", "NAMESPACE"), "classes, methods and namespaces"),
     **dict.fromkeys(("METHOD", "PROPERTY", "THIS", "SUPER", "USING"), "classes, methods and namespaces"),
     **dict.fromkeys(("PUBLIC", "PRIVATE", "PROTECTED", "INTERNAL"), "access specifiers"),
-    **dict.fromkeys(("STEP", "TRANSITION", "ACTION"), "SFC"),
+    **dict.fromkeys(("INITIAL_STEP", "STEP", "TRANSITION", "ACTION"), "SFC"),
     **dict.fromkeys(("JMP", "GOTO"), "jumps"),
     **dict.fromkeys(("UNION",), "unions"),
     **dict.fromkeys(("R_EDGE", "F_EDGE"), "R_EDGE and F_EDGE, which R_TRIG and F_TRIG do"),

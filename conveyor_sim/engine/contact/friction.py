@@ -14,7 +14,8 @@ next one, as in the sequential impulses of rigid-body solvers (Catto, Fast and s
 GDC 2006). Where velocities are steady, s = s_0 + dt T/m_t for the T of the last step, so T = -mu N p(s): the creep is
 that of explicit friction in steps of any length. A mode of the contacts with the share r of the split mobility
 is damped by sqrt(1 - r) per step, also beyond the limit of explicit friction. It may overshoot. Friction of the base is
-solved last, with all other forces of the step, so it needs no memory.
+solved last, with all other forces of the step, so it needs no memory. Its slip is that at the time of the positions,
+which is of second order, in steps up to gamma dt = 2 (`base._lead`).
 
 Without a warm start (rk4, and recordings before format 4), s_0 is the slip at which forces are evaluated, and
 B = max(0, ahead b - at_once) takes the place of b (`integrators.AHEAD`). At low slip the force then removes at most the

@@ -174,7 +174,7 @@ def _assemble(world: World, worker: Worker, dt: float, theta: float, first: int,
     _inertia(bottles, world.spin, own, first, end)
     linear_rails(world, worker.rail_contacts, (dt, theta), first, end)
     check_footing(bottles, world.belts, world.surface, world.footing, world.ring, first, end)
-    add_base_friction(world, world.spin, world.load, None, dt, first, end)
+    add_base_friction(world, world.spin, world.load, None, dt, dt, first, end)
     add_straddling_friction(world, world.spin, world.load, None, world.settings.lag * dt, first, end)
     resist_base(world, dt, theta, first, end)
     _copy_blocks(own, inverse, first, end)

@@ -281,7 +281,7 @@ def _find_base(world: World, tipping: Any, dt: float, first: int, end: int) -> N
     load = ForceSums(tipping.fx, tipping.fy, None, None)
     check_footing(world.bottles, world.belts, world.surface, world.footing, world.ring, first, end)
     spin, lag = _apart(world.spin, tipping.moment), world.settings.lag * dt
-    add_base_friction(world, spin, load, None, dt, first, end)
+    add_base_friction(world, spin, load, None, dt, dt, first, end)
     add_straddling_friction(world, spin, load, None, lag, first, end)
     add_static_friction(world.bottles, load, world.footing, world.static_friction, lag, False, first, end)
 

@@ -2,6 +2,7 @@
 """Effects of the support under bottles: friction, belts, and ring-shaped bases."""
 
 from collections.abc import Callable, Collection
+from functools import partial
 
 from conveyor_sim.physics.effects.declaration import Cause, Effect
 from conveyor_sim.physics.effects.terms import Meeting, Terms, drag_bound, tightest
@@ -36,8 +37,9 @@ def _friction_bounds(terms: Terms) -> list[Bound]:
         bounds.append(
             Bound("base friction", *drag_bound(terms, base_friction_bound(mu, g, limit), reason), stability=True)
         )
-    # On a turning belt, the creep of a bottle has a relative error of 1 / steps, with explicit and implicit friction.
-    turning = terms.method.slip_steps(terms.tolerance) if "curved_belts" in terms.on else 0.0
+    # On a turning belt, the creep of a bottle has a relative error of 1 / steps with explicit friction.
+    held = terms.method.held if implicit else terms.method.slip_steps(terms.tolerance)
+    turning = held if "curved_belts" in terms.on else 0.0
     if (steps := max(0.0 if implicit else _slip_steps(terms), turning)) > 0.0:
         reason = f"{steps:.3g} steps in v_lim / (mu g) at mu = {mu:g}"
         bounds.append(Bound("base slip", slip_time(mu, g, limit) / steps, reason))
@@ -70,9 +72,14 @@ def _lag(quantity: str, part: Callable[[float], float], terms: Terms, dt: float)
 
 
 def _creep(terms: Terms, dt: float) -> list[Term]:
-    method = terms.method
-    part = method.implicit_creep_off if _implicit_point(terms) else method.creep_off
-    return _lag("creep on curved belts", part, terms, dt)
+    return _lag("creep on curved belts", _creep_off(terms, dt), terms, dt)
+
+
+def _creep_off(terms: Terms, dt: float) -> Callable[[float], float]:
+    """Return a function that returns the relative error of creep from the steps per v_lim / (mu g)."""
+    if _implicit_point(terms):
+        return partial(terms.method.implicit_creep_off, per_tick=terms.scene.tick / dt)
+    return terms.method.creep_off
 
 
 def _resting(terms: Terms, dt: float) -> list[Term]:
@@ -84,8 +91,7 @@ def _resting(terms: Terms, dt: float) -> list[Term]:
     turns = terms.laws.base_friction is not None and "curved_belts" in terms.on
     behind = terms.method.turned * _turning(terms.plant) * dt if turns else 0.0
     late = [Term("load on turning belts", behind, "half a step's turn of the belt")] if behind > 0.0 else []
-    part = terms.method.implicit_creep_off if _implicit_point(terms) else terms.method.creep_off
-    return [*_lag("load on turning belts", part, terms, dt), *late]
+    return [*_lag("load on turning belts", _creep_off(terms, dt), terms, dt), *late]
 
 
 def _turning(plant: Plant) -> float:
@@ -161,17 +167,18 @@ BASE_FRICTION = Effect(
     needs="mu by surface and bottle type, velocity of each surface",
     bounds=_friction_bounds,
     bound="half of tau = v_lim / (mu g). Leapfrog and semi-implicit Euler: also 2 / sqrt(tolerance) steps per tau, 20 "
-    "at 1 %. Semi-implicit Euler with curved belts: also 1 / tolerance steps per tau, 100 at 1 %. The linearly "
+    "at 1 %. Semi-implicit Euler with curved belts: also 1 / tolerance steps per tau, 100 at 1 %. Implicit friction "
+    "has none of these bounds; velocity Verlet with curved belts takes at least one step per tau then. The linearly "
     "implicit method is stable in steps of any length; it takes at least 4 per tau",
     shares=_braked,
     share="with leapfrog and semi-implicit Euler mu g dt / (2 v). v is a fifth of the largest impact speed, because "
     "most impacts are slower",
     resting=_resting,
     rest="on curved belts 1 / n with semi-implicit Euler, where n is the number of steps per v_lim / (mu g); "
-    "Omega dt / 2 with leapfrog; 0.4 / n^2 with velocity Verlet and implicit friction",
+    "Omega dt / 2 with leapfrog; both as with leapfrog for implicit friction",
     side=_creep,
-    beside="in the creep on curved belts 1 / n with semi-implicit Euler, 0.4 / n^2 with velocity Verlet and implicit "
-    "friction; n as above",
+    beside="in the creep on curved belts 1 / n with semi-implicit Euler; none with implicit friction, but for velocity "
+    "Verlet (1 - n) dt / (n tick) below n = 1; n as above",
 )
 RING_BASE = Effect(
     name="ring_base",

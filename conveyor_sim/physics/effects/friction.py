@@ -96,7 +96,7 @@ def _excess(terms: Terms, dt: float) -> tuple[float, str]:
     integrator, load = terms.scene.accuracy.integrator, terms.load
     if load.force == 0.0 or all(_curve_friction(meeting) == 0.0 for meeting in meetings(terms)):
         return 0.0, ""
-    if integrator in WARM and not terms.scene.friction_anew:
+    if _is_warm(terms):
         most = terms.plant.most_bottles
         count = ENDLESS_QUEUE if most is None else most
         return (
@@ -106,11 +106,35 @@ def _excess(terms: Terms, dt: float) -> tuple[float, str]:
     cases = [(0.0, "")]
     for meeting in meetings(terms):
         mu = _curve_friction(meeting)
-        mobility = CLOSED * (_rim_mobility(meeting.first) + _rim_mobility(meeting.second))
-        b = dt * mu * load.force * mobility / terms.scene.slip_limit
+        b = dt * _rate(meeting, mu, terms)
         reason = f"{integrator} solves friction anew in each step, at mu = {mu:g} and N = {load.force:.3g} N"
         cases.append((2.0 * max(0.0, ahead * b - at_once), reason))
     return max(cases)
+
+
+def _is_warm(terms: Terms) -> bool:
+    """Return True if implicit friction starts from that of the last step."""
+    return terms.scene.accuracy.integrator in WARM and not terms.scene.friction_anew
+
+
+def _rate(meeting: Meeting, mu: float, terms: Terms) -> float:
+    """Return b / dt (1/s) at the largest load on a contact and CLOSED contacts (`friction.py` in the engine)."""
+    mobility = CLOSED * (_rim_mobility(meeting.first) + _rim_mobility(meeting.second))
+    return mu * terms.load.force * mobility / terms.scene.slip_limit
+
+
+def _implicit_bounds(terms: Terms) -> list[Bound]:
+    """Return the longest time step of friction that is solved anew with an error in resting load of the tolerance."""
+    if _is_warm(terms):
+        return []
+    ahead, at_once = AHEAD[terms.scene.accuracy.integrator]
+    most = (at_once + terms.tolerance / CHANGE) / ahead
+    candidates = []
+    for meeting in meetings(terms):
+        if (rate := _rate(meeting, mu := _curve_friction(meeting), terms)) > 0.0:
+            reason = f"{most:.2g} m_t v_lim / (mu N) at mu = {mu:g}, N = {terms.load.force:.3g} N, {CLOSED:g} contacts"
+            candidates.append((most / rate, reason))
+    return tightest("creep of pressed contacts", candidates)
 
 
 def _implicit_resting(terms: Terms, dt: float) -> list[Term]:
@@ -213,8 +237,9 @@ IMPLICIT_FRICTION = Effect(
     called_for=partial(_chosen, field="friction_solver", value="implicit"),
     absent="friction_solver is explicit, or nothing has friction",
     needs="closed contacts and 1/m + R^2/J of each bottle",
-    bound="none. It removes the bounds of contact_friction and, for bases that are points, of base_friction. With "
-    "semi-implicit Euler the bound of turning belts remains",
+    bounds=_implicit_bounds,
+    bound="with rk4 gamma dt is at most 1 + 20 times the tolerance, for resting load; none with the others. It removes "
+    "the bounds of contact_friction and, for bases that are points, of base_friction",
     resting=_implicit_resting,
     rest="5 % of the error of the creep, because forces change by less than 10 % in 1 s",
     side=_implicit_creep,

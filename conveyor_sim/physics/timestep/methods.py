@@ -60,8 +60,8 @@ class Method:
     """Smallest n for which the power law holds; for smaller n the error is about 1 / n."""
     turned: float = 0.0
     """Coefficient of Omega dt: lag of forces on a turning belt, which is an error in resting load."""
-    implicit_creep: float = 0.0
-    """Coefficient of 1 / n^2: error of creep on curved belts that implicit friction causes."""
+    held: float = 0.0
+    """Smallest n without error in the creep on curved belts under implicit friction."""
     explicit: bool = True
     """True if the method is unstable or chatters in long steps."""
     drag_limit: float = 1.0
@@ -90,9 +90,13 @@ class Method:
             return self.creep * math.pow(steps, -self.creep_order)
         return 1.0 / steps
 
-    def implicit_creep_off(self, steps: float) -> float:
-        """Return the relative error of creep under implicit friction with `steps` steps per v_lim / (mu g)."""
-        return max(self.creep_off(steps), self.implicit_creep / (steps * steps))
+    def implicit_creep_off(self, steps: float, per_tick: float) -> float:
+        """Return the relative error of creep on curved belts under implicit friction.
+
+        Below `held`, velocity Verlet repeats the friction of the last evaluation only in part at the start of a tick.
+        steps: per v_lim / (mu g).
+        """
+        return max(0.0, self.held - steps) / (steps * per_tick)
 
     def slip_steps(self, creep: float) -> float:
         """Return the steps per v_lim / (mu g) for a relative error of at most `creep`; 0 for methods without error."""
@@ -114,7 +118,7 @@ class Method:
 
 METHODS: Mapping[str, Method] = {
     # 1/sqrt(3) = 0.58 is the ratio of RMS to maximum of an error that is uniform over phases. Explicit forces use
-    # velocities half a step before the positions; implicit friction uses the slip half a step after them.
+    # velocities half a step before the positions.
     "leapfrog": Method(
         peak=0.6,
         jump=0.6,
@@ -127,7 +131,16 @@ METHODS: Mapping[str, Method] = {
         turned=0.5,
     ),
     "semi_implicit_euler": Method(
-        peak=0.6, jump=0.6, touch=0.0, tsuji=0.4, viscoelastic=0.38, onset=0.35, slip=1.3, second_order=False, creep=1.0
+        peak=0.6,
+        jump=0.6,
+        touch=0.0,
+        tsuji=0.4,
+        viscoelastic=0.38,
+        onset=0.35,
+        slip=1.3,
+        second_order=False,
+        creep=1.0,
+        turned=0.5,
     ),
     # Forces use the velocity v + a dt, with a of the previous step. For a drag with z = gamma dt, the growth factor l
     # per step solves l^2 - (1 - 3 z / 2) l - z / 2 = 0; it reaches -1, the stability limit, at z = 1.
@@ -141,7 +154,7 @@ METHODS: Mapping[str, Method] = {
         slip=2.7,
         second_order=True,
         drag_limit=0.5,
-        implicit_creep=0.4,
+        held=1.0,
     ),
     # For a drag with z = gamma dt the growth factor per step, 1 - z + z^2 / 2 - z^3 / 6 + z^4 / 24, reaches 1 at
     # z = 2.785. The error of a jump inside a step is 1/6, RMS over phases, and 1/3 at most. `jump` is near the maximum,

@@ -22,8 +22,9 @@ REFERENCES: Mapping[str, tuple[str, ...]] = {
 """Fields that hold names of parts, with the fields of the scene in which these parts are."""
 TAG, ALARM_IDS = "tag", "suppressed_by"
 """Fields of an alarm that hold a path to a signal, and ids of alarms."""
-OTHER_NAMES = ("between", "bottle", "material", "name", "plate", "type", "types")
-"""Fields that hold other names, without a prefix: bottle types, materials, sections of a conveyor."""
+OTHER_NAMES = ("between", "bottle", "initial", "material", "name", "plate", "positions", "type", "types")
+"""Fields that hold other names, without a prefix: bottle types, materials, sections of a conveyor, positions of a
+selector."""
 
 
 class Prefix:

@@ -49,6 +49,7 @@ FOREIGN = [  # statement, column, part found, form to use
     ('"x" := 1;', 1, '"x"', "tia"),
     ("REGION one\nx := 1;\nEND_REGION", 1, "REGION", "tia"),
     ("LD x\nADD 5\nST y", 1, "LD x", "instruction list"),
+    ("x := y := 5;", 8, ":=", "one := in a statement"),
     ("b S= y;", 3, "S=", "IF"),
     ("RETURN x;", 1, "RETURN x", "RETURN;"),
     ("x := 'abc", 6, "'abc", "text"),
@@ -77,6 +78,7 @@ DECLARATIONS = [
     ('ORGANIZATION_BLOCK "Main"\nBEGIN END_ORGANIZATION_BLOCK', (1, 1), "ORGANIZATION_BLOCK", "tia"),
     ("FUNCTION_BLOCK f EXTENDS g END_FUNCTION_BLOCK", (1, 18), "EXTENDS", "classes"),
     ("FUNCTION_BLOCK ABSTRACT f VAR END_VAR END_FUNCTION_BLOCK", (1, 1), "ABSTRACT", "classes"),
+    ("PROGRAM p VAR b : TON(TRUE, T#1s); END_VAR END_PROGRAM", (1, 19), "TON(TRUE,", "FB_init"),
     ("INTERFACE i END_INTERFACE", (1, 1), "INTERFACE", "classes"),
     ("FUNCTION_BLOCK f METHOD m END_METHOD END_FUNCTION_BLOCK", (1, 18), "METHOD", "classes"),
     ("PROGRAM p VAR x : POINTER TO INT; END_VAR END_PROGRAM", (1, 19), "POINTER", "pointers"),
@@ -108,6 +110,12 @@ def test_a_foreign_word_may_be_a_name(word: str) -> None:
     """A declared variable of that name is a variable, and an error after it is not blamed on its name."""
     text = f"PROGRAM p VAR {word} : INT; END_VAR {word} := {word} + 1; "
     assert compile_text(text + "END_PROGRAM").programs
+
+
+@pytest.mark.parametrize("word", ["INTERFACE", "CLASS", "POINTER", "NAMESPACE", "REFERENCE", "METHOD", "STEP"])
+def test_a_word_of_an_unsupported_feature_may_be_a_field(word: str) -> None:
+    text = f"TYPE t : STRUCT {word} : INT; END_STRUCT END_TYPE PROGRAM p VAR x : t; END_VAR x.{word} := 1; END_PROGRAM"
+    assert compile_text(text).programs
 
 
 def test_a_variable_with_a_foreign_name_is_not_blamed() -> None:
