@@ -96,7 +96,7 @@ def compile_texts(texts: Sequence[Text], trace: bool, dialect: Dialect) -> Compi
         except SourceError as error:
             raise files.error(error) from None
     except (RecursionError, MemoryError, SyntaxError):  # limits of Python's compiler
-        raise StructuredTextError(f"{file}: found a program nested too deeply, expected a flatter one") from None
+        raise StructuredTextError(f"{file}:1:1: found a program nested too deeply, expected a flatter one") from None
 
 
 def _compile(source: tree.SourceFile, files: ProgramFiles, fingerprint: str, trace: bool, dialect: Dialect) -> Compiled:
@@ -121,9 +121,14 @@ def _compile(source: tree.SourceFile, files: ProgramFiles, fingerprint: str, tra
         _class(lines, structure.python, "_Record", list(structure.members.values()))
     _class(lines, "_Globals", "", list(declared.names.globals.members.values()), layout)
     lines.add("_g = _Globals()")
-    python = "\n".join(lines.lines) + "\n"
     programs = {unit.name.lower(): kind for unit, kind in units if unit.kind == "PROGRAM"}
     scheduled = _schedule(source, programs, declared, calls)
+    for name, at in declared.names.programs.items():
+        kind = programs[name]
+        if (count := sum(one.type is kind for one in scheduled)) != 1:
+            raise SourceError(at, f"found {kind.name}, which has {count} instances, expected a program with one")
+        lines.add(f"{kind.instance} = {kind.python}()")
+    python = "\n".join(lines.lines) + "\n"
     for key in (program.name.lower() for program in scheduled):
         shared = declared.names.globals.members.get(key)
         if shared is not None and isinstance(shared.type, Structure):

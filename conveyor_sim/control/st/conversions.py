@@ -16,7 +16,7 @@ from dataclasses import replace
 from typing import Any
 
 from conveyor_sim.control.st.date_arithmetic import conversion_code
-from conveyor_sim.control.st.dates import PREFIXES, moment
+from conveyor_sim.control.st.dates import PREFIXES, in_dialect, moment
 from conveyor_sim.control.st.dialect import Dialect
 from conveyor_sim.control.st.errors import Fault, Position, SourceError
 from conveyor_sim.control.st.implicit import as_number
@@ -63,7 +63,9 @@ def convert(at: Position, name: str, value: Value, hint: Type | None, dialect: D
     types = conversion(name, hint)
     assert types is not None
     source, target, cut = types
+    target, value = in_dialect(target, dialect), replace(value, type=in_dialect(value.type, dialect))
     if source is not None:
+        source = in_dialect(source, dialect)
         into = replace(source, high=value.type.high) if isinstance(source, String) else source
         argument = converted(value, into, name)
         known = value.constant

@@ -35,12 +35,14 @@ def combined(at: Position, word: str, left: Value, right: Value) -> Value | None
 def conversion_code(source: Type, code: str, target: Type) -> str | None:
     """Return the code of a conversion from or to a date or a time of day; None if there is none.
 
-    A number counts s for DATE and DT, ms for TOD, and ns for the long types, as in CODESYS and TwinCAT.
+    A number counts s for DATE and DT, ms for TOD, and ns for the long types, as in CODESYS and TwinCAT. In TIA Portal a
+    DATE counts days.
     """
     if not isinstance(target, Moment):
         assert isinstance(source, Moment)
         if target.kind == "time":
             return code
+        code = f"({code} - {source.zero})" if source.zero else code
         if target.kind == "real":
             number = f"{code} / {source.unit}.0"
             return f"_single({number})" if target == REAL else f"({number})"
@@ -49,11 +51,14 @@ def conversion_code(source: Type, code: str, target: Type) -> str | None:
         if source.part != target.part and source.part != "DT" and not (source.part == "DATE" and target.part == "DT"):
             return None
     elif source.kind == "real":
-        code = f"_nearest({code}, {target.low // target.unit}, {target.high // target.unit}) * {target.unit}"
+        low, high = -(-(target.low - target.zero) // target.unit), (target.high - target.zero) // target.unit
+        code = f"_nearest({code}, {low}, {high}) * {target.unit}"
     elif source.kind in ("int", "bits", "bool"):
         code = f"{code} * {target.unit}"
     elif source.kind != "time":
         return None
+    if target.zero and source.kind in ("real", "int", "bits", "bool"):
+        code = f"{code} + {target.zero}"
     if target.part == "TOD":
         return f"({code} % {DAY})"
     if source.kind in ("int", "bits", "bool"):

@@ -7,10 +7,12 @@ A DATE and a DT are whole ns since 1970-01-01, a TOD is whole ns since midnight.
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from datetime import date
 
+from conveyor_sim.control.st.dialect import Dialect
 from conveyor_sim.control.st.errors import Fault, Position, SourceError
-from conveyor_sim.control.st.types import DATE, DT, LDATE, LDT, LTOD, TOD, Moment
+from conveyor_sim.control.st.types import DATE, DT, LDATE, LDT, LTOD, TOD, Moment, Type
 
 DAY = 86_400_000_000_000
 """Nanoseconds of a day."""
@@ -56,6 +58,14 @@ def moment(at: Position, text: str) -> int:
         pass
     years = "" if part == "TOD" else ", 1678 to 2261"
     raise SourceError(at, f"found {text[:_LONGEST]}, expected {expected_literal(part)}{years}")
+
+
+def in_dialect(kind: Type, dialect: Dialect) -> Type:
+    """Return a type with the begin and the unit of dates in a dialect (S7-1200 System Manual, 5.4.4)."""
+    if not dialect.dates_of_1990 or kind.base not in (DATE, DT):
+        return kind
+    begin = _days(1990, 1, 1)
+    return replace(DATE, start=str(begin), unit=DAY, zero=begin) if kind.base == DATE else replace(DT, start=str(begin))
 
 
 def expected_literal(part: str) -> str:

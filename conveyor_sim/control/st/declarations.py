@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from conveyor_sim.control.st import tree
 from conveyor_sim.control.st.actions import require_apart
 from conveyor_sim.control.st.blocks import CODESYS, STANDARD
+from conveyor_sim.control.st.dates import in_dialect
 from conveyor_sim.control.st.dialect import Dialect
 from conveyor_sim.control.st.errors import Position, SourceError
 from conveyor_sim.control.st.expressions import Expressions
@@ -122,7 +123,9 @@ class Declarations:
 
     def named(self, at: Position, name: str) -> Type:
         """Return the type of a name. Raise SourceError."""
-        if known := ELEMENTARY.get(name.upper()) or self.names.types.get(name.lower()):
+        if known := ELEMENTARY.get(name.upper()):
+            return in_dialect(known, self.names.dialect)
+        if known := self.names.types.get(name.lower()):
             return known
         declared = self._pending.get(name.lower())
         if declared is None:

@@ -53,9 +53,15 @@ class Dialect:
     instance_arguments: bool = _flag("`t : TON(PT := T#1s);`")
     bare_arrays: bool = _flag("`v : ARRAY [1..3] OF INT := 1, 2(0);`")
     byte_addresses: bool = _flag("`%MW2` begins at byte 2 (else `%MW2` is bytes 4 and 5)")
+    program_variables: bool = _flag("variables and actions of a PROGRAM in other units: `Main.x`, `Main.Reset();`")
     program_calls: bool = _flag("a unit calls a PROGRAM: `Outputs();`, which then does not run by itself")
-    open_units: bool = _flag("FUNCTIONBLOCK; a file may end without the END of its last unit")
+    open_units: bool = _flag(
+        "FUNCTIONBLOCK; a file may end without the END of its last unit; TYPE as the name of a field"
+    )
     written_inputs: bool = _flag("a unit writes its VAR_INPUT")
+    dates_of_1990: bool = _flag(
+        "DATE and DT begin at D#1990-01-01, and a DATE as a number counts days from there (else s since 1970-01-01)"
+    )
     bcd_marks: bool = _flag("BCD_TO_INT of no BCD is -1, INT_TO_BCD of more than 99 is 255 (else the program stops)")
 
     def require(self, flag: str, at: Position, found: str, expected: str) -> None:
@@ -76,7 +82,7 @@ _CODESYS = dict.fromkeys(
     (
         *("actions", "prefixes", "integer_bits", "bit_numbers", "integer_logic", "enumeration_numbers", "narrowing"),
         *("configuration_words", "standard_names", "static_variables", "instance_arguments", "bare_arrays"),
-        *("written_inputs", "open_units", "program_calls"),
+        *("written_inputs", "open_units", "program_calls", "program_variables"),
     ),
     True,
 )
@@ -90,7 +96,14 @@ DIALECTS: dict[str, Dialect] = {
         IEC,
         Dialect("codesys", bcd_marks=True, **_CODESYS),
         Dialect("twincat", byte_addresses=True, **_CODESYS),
-        Dialect("tia", tia_sources=True, integer_bits=True, configuration_words=True, byte_addresses=True),
+        Dialect(
+            "tia",
+            tia_sources=True,
+            integer_bits=True,
+            configuration_words=True,
+            byte_addresses=True,
+            dates_of_1990=True,
+        ),
     )
 }
 """Dialects by name."""

@@ -56,8 +56,11 @@ def adapted(value: Value, target: Type, names: Names) -> Value:
 
     A conversion that may change the value is recorded in `names.warnings`.
     """
-    if not names.dialect.narrowing or value.literal or converts(value, target):
+    if not names.dialect.narrowing or converts(value, target):
         return value
+    if value.literal:
+        named = value.literal == "int" and target.kind == "enum" and target.low <= value.constant <= target.high
+        return Value(value.at, target, value.code, value.constant) if named else value
     into = target.base
     number = as_number(value, names.dialect)
     source = number.type.base

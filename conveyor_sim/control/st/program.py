@@ -56,7 +56,9 @@ class Program:
         names = {**NAMESPACE, **large, "_rt": self._clock, "_late": self._late, "_noted": self._noted}
         exec(self.compiled.code, names)
         self.globals: Any = names["_g"]
-        self.instances: dict[str, Any] = {one.name.lower(): names[one.type.python]() for one in self.compiled.programs}
+        self.instances: dict[str, Any] = {
+            one.name.lower(): names.get(one.type.instance) or names[one.type.python]() for one in self.compiled.programs
+        }
         self._variables: dict[str, Variable] = {}
 
     def run(self, now: int) -> bool:

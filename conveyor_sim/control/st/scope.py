@@ -35,6 +35,8 @@ class Names:
     globals: BlockType = field(default_factory=lambda: BlockType("VAR_GLOBAL", "block", python="_Globals"))
     values: dict[str, list[Enumeration]] = field(default_factory=dict)
     """Enumerations that have a value of a name."""
+    programs: dict[str, Position] = field(default_factory=dict)
+    """First use of the only instance of a program in another unit, by name in small letters."""
     reading: set[str] = field(default_factory=set)
     """Global variables that are being declared."""
     read: Callable[[str], None] = lambda key: None
@@ -97,6 +99,8 @@ class Scope:
             return place_of(at, "self", member, self.names.dialect)
         if self.names.global_(key) is not None:
             return self._global(at, key, name)
+        if (program := self._program(at, key)) is not None:
+            return program
         for known, what in self._others():
             if key in known:
                 return Thing(what)
@@ -107,6 +111,14 @@ class Scope:
         close = get_close_matches(key, [one for known, _ in self._others(True) for one in known], 1)
         hint = f"; there is {self._written(close[0])}" if close else ""
         raise SourceError(at, f"found {name}, which is not declared, expected a variable{hint}")
+
+    def _program(self, at: Position, key: str) -> Place | None:
+        """Return the only instance of a program; None if the dialect has no access to it."""
+        kind = self.names.types.get(key)
+        if not isinstance(kind, BlockType) or not kind.is_program or not self.names.dialect.program_variables:
+            return None
+        self.names.programs.setdefault(key, at)
+        return Place(at, kind, kind.instance, fixed=f"{kind.name}, a program", root=f"({kind.instance}, '')")
 
     def value(self, node: tree.Name) -> Value:
         """Return the value of a name. Raise SourceError."""

@@ -188,7 +188,7 @@ class Statements:
             self.block(node.otherwise, node.at, count)
 
     def _case(self, node: tree.Case) -> None:
-        selector = self._expressions.value(node.selector)
+        selector = as_number(self._expressions.value(node.selector), self._expressions.scope.names.dialect)
         kind = selector.type.base
         if kind.kind not in ("int", "enum", "bits"):
             raise SourceError(
@@ -220,7 +220,7 @@ class Statements:
         self._otherwise(node, "else:" if node.choices else "if True:", statements(work))
 
     def _label(self, node: tree.Expression, kind: Type) -> int:
-        value = self._expressions.value(node)
+        value = as_number(self._expressions.value(node), self._expressions.scope.names.dialect)
         if value.constant is None or not converts(value, kind) or isinstance(value.constant, float):
             raise SourceError(node.at, f"found {described(value)}, expected a constant {kind.name} as a label")
         converted(value, kind, "a label")

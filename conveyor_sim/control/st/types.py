@@ -132,8 +132,10 @@ class Moment(Type):
 
     part: Literal["DATE", "TOD", "DT"] = "DT"
     """Name of the short type with the same values."""
-    unit: int = 1
+    unit: int = field(default=1, compare=False)
     """Nanoseconds per unit of a number that is converted."""
+    zero: int = field(default=0, compare=False)
+    """Value that is the number 0, in ns."""
 
     @property
     def width(self) -> int:
@@ -312,6 +314,16 @@ class BlockType(Structure):
     """Names of its actions, in small letters."""
     statics: dict[str, str] = field(default_factory=dict)
     """Names of the global variables that its VAR_STAT are, by name in small letters."""
+
+    @property
+    def is_program(self) -> bool:
+        """True for a PROGRAM."""
+        return self.python.startswith("_P_")
+
+    @property
+    def instance(self) -> str:
+        """Code of the only instance of a program that other units use."""
+        return f"_i{self.python}"
 
     def of(self, *sections: str) -> list[Member]:
         """Return the variables of some sections, in their order."""
