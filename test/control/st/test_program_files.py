@@ -10,6 +10,7 @@ import pytest
 from conveyor_sim.control.scan import ControlError
 from conveyor_sim.control.st import program_files
 from conveyor_sim.control.st.compile import compile_files
+from conveyor_sim.control.st.controller import StructuredText
 from conveyor_sim.control.st.errors import StructuredTextError
 from conveyor_sim.control.st.load import load
 from conveyor_sim.control.st.program import Program
@@ -75,6 +76,8 @@ def test_a_folder_and_further_files_are_a_controller(tmp_path: Path) -> None:
     rest = [str(folder / name) for name in ("twice.st", "counting.st", "globals.st")]
     for reference, parameters in ((folder, {}), (folder / "main.st", {"files": rest})):
         assert "plc/main/n" in load(str(reference), parameters).variables  # type: ignore[attr-defined]
+    library = written(tmp_path / "library", **{name: text for name, text in UNITS.items() if name != "main__st"})
+    assert StructuredText(folder / "main.st", files=library).variables["plc/main/n"] == 0
     with pytest.raises(ControlError, match="files"):
         load(str(folder / "main.st"), {"files": "twice.st"})
     with pytest.raises(ControlError, match="folder without a program"):
