@@ -72,7 +72,7 @@ def check(scene: str, out: Path, details: bool, watch: bool, port: int | None, o
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise ConveyorError(f"{out}: can't be made ({error.strerror}), expected a folder to draw into") from error
-    drawn = f"drawn to {plot_scene(checked, out / f'{path.stem}.png')}"
+    drawn = f"drawn to {plot_scene(checked, out / f'{path.stem}.png')} and {path.stem}.svg"
     click.echo(drawn if details else f"{drawn}; {lists}")
 
 

@@ -51,8 +51,8 @@ class StopReason(NamedTuple):
 
 
 def _why(category: str, reason: str) -> str:
-    """In words. One that is idle for what is no command stands on after it: a failure, or a stop by plan, is over."""
-    if category == "idle" and reason and not reason.startswith("command"):
+    """Return the reason in words. A failure, a planned stop or an Abort is over when its machine is idle after it."""
+    if category == "idle" and reason and (not reason.startswith("command") or reason.startswith("command Abort")):
         return f"after {reason}"
     return reason or category
 

@@ -398,8 +398,9 @@ class Scenario(AbstractContextManager["Scenario"]):
         and `run/target_tick` (docs/plc.md). user: "" for anonymous. access: all settings of an OPC UA connection,
         instead of user and password. patience: longest time for each scan, s of wall time.
 
-        Raises TagMapError for a map that does not fit; PlcLinkError if the PLC can't be reached; ControlError if it
-        does not answer, which every later tick may raise as well; ImportError without the library of the protocol.
+        Raises TagMapError for a map that does not fit; PlcLinkError if the PLC can't be reached or is not trusted;
+        CertificateError for a certificate of ours that can't be used; ControlError if it does not answer, which every
+        later tick may raise as well; ImportError without the library of the protocol.
         """
         image = self.simulation.process_image
         chosen = PlcAccess(user, password) if access is None else access

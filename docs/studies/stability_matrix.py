@@ -11,7 +11,7 @@ from __future__ import annotations
 import csv
 import hashlib
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from multiprocessing import active_children, get_context
@@ -157,17 +157,26 @@ def stamp(row: str) -> str:
 
 def read(path: Path) -> list[dict[str, Any]]:
     """Return the lines of the present sources and rows; none without a file."""
+    return [line for line in _stored(path) if line["sources"] == stamp(line["row"])]
+
+
+def _stored(path: Path) -> list[dict[str, Any]]:
+    """Return the lines of all sources; none without a file."""
     if not path.exists():
         return []
     with path.open(newline="", encoding="utf-8") as file:
-        return [line for line in csv.DictReader(file) if line["sources"] == stamp(line["row"])]
+        return list(csv.DictReader(file))
+
+
+def _key(line: Mapping[str, Any]) -> tuple[str, str, str, str]:
+    return line["row"], line["effects"], line["integrator"], line["preset"]
 
 
 def write(path: Path, lines: Sequence[dict[str, Any]]) -> None:
-    """Write the lines in the order of the table."""
+    """Write the lines in the order of the table. Stored lines of older sources stay until they are measured again."""
     place = {job.key: index for index, job in enumerate(jobs(list(_cases().values())))}
-    key = {id(line): (line["row"], line["effects"], line["integrator"], line["preset"]) for line in lines}
-    ordered = sorted((line for line in lines if key[id(line)] in place), key=lambda line: place[key[id(line)]])
+    newest = {_key(line): line for line in [*_stored(path), *lines]}
+    ordered = [newest[key] for key in sorted(newest.keys() & place.keys(), key=place.__getitem__)]
     with path.open("w", newline="", encoding="utf-8") as file:
         table = csv.DictWriter(file, COLUMNS, lineterminator="\n")
         table.writeheader()
@@ -181,7 +190,7 @@ def measure(path: Path, processes: int, some: Sequence[str] = (), beside: Callab
     """
     wanted = [job for job in jobs(list(_cases().values())) if not some or job.row in some]
     lines = read(path)
-    found = {(line["row"], line["effects"], line["integrator"], line["preset"]) for line in lines}
+    found = {_key(line) for line in lines}
     todo = [job for job in wanted if job.key not in found]
     try:
         _in_processes(todo, lines, path, processes, beside)

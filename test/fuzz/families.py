@@ -56,6 +56,7 @@ class Family:
     machines: bool = False
     sensors: bool = False
     ledger: bool = False
+    vibration: bool = False
     effects: tuple[tuple[str, str], ...] = ()
 
     def __str__(self) -> str:
@@ -65,7 +66,9 @@ class Family:
             for name in ("implicit_friction", "atan", "friction", "springs", "base_springs", "ring")
             if getattr(self, name)
         ]
-        parts += [name for name in ("drives", "movers", "machines", "sensors", "ledger") if getattr(self, name)]
+        parts += [
+            name for name in ("drives", "movers", "machines", "sensors", "ledger", "vibration") if getattr(self, name)
+        ]
         parts += [*(f"{kind} belts" for kind in self.belts), *(f"{kind}s" for kind in self.rails)]
         parts += [f"{self.types} types", *(f"{name} {value}" for name, value in self.effects)]
         return ", ".join(parts)
@@ -103,6 +106,7 @@ def random_family(seed: int) -> Family:
         machines=draw.random() < 0.5,
         sensors=draw.random() < 0.5,
         ledger=draw.random() < 0.3,
+        vibration=move and draw.random() < 0.3,
     )
 
 
@@ -125,6 +129,6 @@ _PLAIN = Family(
 CI_FAMILIES = (
     _PLAIN,
     replace(_PLAIN, drives=True, machines=True, sensors=True),
-    Family(types=2, drives=True, movers=True, machines=True, sensors=True, ledger=True),
+    Family(types=2, drives=True, movers=True, machines=True, sensors=True, ledger=True, vibration=True),
 )
 """Two mixtures of effects, so that CI compiles few kernels: devices call for none but rails that move."""

@@ -200,6 +200,8 @@ def _belts(draw: st.DrawFn, family: Family, frame: _Frame) -> list[Data]:
             belt["speed_limits"] = [-limit, limit]
             if draw(st.booleans()):
                 belt["watchdog"] = frame.tick * draw(st.sampled_from([1, 7, 20.5]))
+            if family.vibration and (not belts or draw(st.booleans())):
+                belt["vibration"] = draw(_vibrations(kind))
             if draw(st.integers(0, 3)):
                 belts.append({**belt, **draw(_area(kind, frame, "arc" in family.rails)), **draw(_turn(kind))})
             else:
@@ -207,6 +209,14 @@ def _belts(draw: st.DrawFn, family: Family, frame: _Frame) -> list[Data]:
                     {**belt, "kind": "path", "surfaces": draw(st.lists(_surface(kind, frame), min_size=1, max_size=3))}
                 )
     return draw(st.permutations(belts))
+
+
+def _vibrations(kind: str) -> st.SearchStrategy[Data]:
+    """Vibrations that are slower than belts, and shorter than bottles; along travel on surfaces that turn."""
+    directions = st.sampled_from([0.0, math.pi]) if kind == "curved" else angles
+    return st.fixed_dictionaries(
+        {"amplitude": scaled(1e-6, 1e-4), "frequency": scaled(1.0, 200.0), "direction": directions}
+    )
 
 
 @st.composite

@@ -34,7 +34,7 @@ START, MUSHROOM = "[data-part=start] .push", "[data-part=estop] .mushroom"
 @pytest.fixture(scope="module")
 def panel(users: Path) -> Iterator[Live]:
     """The line with a panel, in real time; its end is an hour away."""
-    scene = load_scene(SCENE, {"duration": 3600.0})
+    scene = load_scene(SCENE, {"duration": 3600.0, "panel": {"pump": {"kind": "button", "action": "maintained"}}})
     with SceneTagProvider(SceneTask(scene, None, 0, 1.0, 1), lambda text: None) as source:
         source.wait_for_line()
         made = Live(users, source)
@@ -76,6 +76,13 @@ def test_a_button_is_pressed_by_keys(page: Any, panel: Live, key: str) -> None:
     reads(panel, "start/contact", 1.0)
     page.keyboard.up(key)
     reads(panel, "start/contact", 0.0)
+
+
+def test_a_maintained_button_changes_with_each_click(page: Any, panel: Live) -> None:
+    for contact, state in ((1.0, "pressed"), (0.0, "released")):
+        page.click("[data-part=pump] .push")
+        reads(panel, "pump/contact", contact)
+        soon(page, lambda state=state: page.inner_text("[data-part=pump] .state") == state, "its look")
 
 
 def test_an_emergency_stop_latches_and_is_reset(page: Any, panel: Live) -> None:

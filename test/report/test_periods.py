@@ -16,6 +16,8 @@ from conveyor_sim.report.periods import Period, longest_stops, stop_reasons
         ("idle", "planned stop break", "after planned stop break"),
         ("down", "failure jam", "failure jam"),
         ("idle", "fault stop", "after fault stop"),
+        ("down", "command Abort", "command Abort"),
+        ("idle", "command Abort by hand", "after command Abort by hand"),
     ],
 )
 def test_why(category: str, reason: str, why: str) -> None:

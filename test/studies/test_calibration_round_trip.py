@@ -89,6 +89,82 @@ def test_friction_from_bottles_held_on_a_running_chain(tmp_path: Path) -> None:
     assert estimate.high - estimate.low < 0.05 * MU
 
 
+def test_contact_friction_from_bottles_pulled_along_a_rail(tmp_path: Path) -> None:
+    """Bottles that can't turn reach a constant speed on a chain at an angle to the rail: the pull equals the friction.
+
+    The pull follows from the slip on the chain, since friction of the base acts along it.
+    """
+    angle, speed, friction = math.radians(35.0), 0.3, 0.27
+    lanes = range(len(MASSES))
+    contact = {"stiffness": LINEAR, "friction": friction, "damping": {"law": "normal", "restitution": 0.5}}
+    sim = simulation(
+        gravity=GRAVITY,
+        contacts=[{"between": ["glass", other], **contact} for other in ("glass", "steel")],
+        base=[{"between": ["glass", "chain"], "friction": MU}],
+        bottle_types={f"type_{lane}": kind(mass=MASSES[lane]) for lane in lanes},
+        belts={"chain": belt(speed, (0.0, -10.0), 30.0, 30.0, angle=angle)},
+        rails={"rail": segment((8.0, RADIUS), (-4.0, RADIUS))},
+        bottles=[{**bottle(0.3 * lane, 0.0), "type": f"type_{lane}"} for lane in lanes],
+        effects={"rotation": "off"},
+    )
+    sim.advance(300)
+    bottles, touching = sim.bottles(), sim.contacts()
+    order = np.argsort(touching.a)
+    assert touching.a[order].tolist() == bottles.id.tolist()
+    normal = touching.normal_force[order]
+    pull = normal * (speed * math.cos(angle) - bottles.vx) / (speed * math.sin(angle))
+    rows = [
+        {"quantity": "contact_friction", **PAIR, "force": force, "normal_force": pressing}
+        for force, pressing in zip(read_with_error(pull, 11), normal, strict=True)
+    ]
+    estimate = only_contact(write(tmp_path / "data.csv", rows)).friction
+    assert estimate is not None
+    assert estimate.low <= friction <= estimate.high
+    assert estimate.high - estimate.low < 0.05 * friction
+
+
+def test_vibration_from_a_body_that_lies_on_the_chain(tmp_path: Path) -> None:
+    """The peak of the spectrum of its acceleration gives amplitude, frequency and axis of the chain's vibration."""
+    amplitude, frequency, direction = 20e-6, 25.0, math.radians(30.0)
+    vibration = {"amplitude": amplitude, "frequency": frequency, "direction": direction}
+    sim = simulation(
+        tick=0.001,
+        gravity=GRAVITY,
+        slip_limit=0.0005,
+        base=[{"between": ["glass", "chain"], "friction": 0.5}],
+        belts={"chain": belt(0.2, vibration=vibration)},
+        bottles=[bottle(0.0, 0.0, 0.2)],
+    )
+    sim.advance(1000)
+    velocities = []
+    for _ in range(1000):
+        sim.advance()
+        now = sim.bottles()
+        velocities.append((now.vx[0], now.vy[0]))
+    along = np.array(velocities) @ np.array([[math.cos(direction)], [math.sin(direction)]])
+    spectrum = np.abs(np.fft.rfft(along[:, 0])) / 500.0
+    peak = int(spectrum[1:].argmax()) + 1
+    readings = read_with_error(np.full(5, 2.0 * math.pi * peak * spectrum[peak]), 9)
+    x, y = np.array(velocities).std(axis=0)
+    axes = read_with_error(np.full(5, math.atan2(y, x)), 10)
+    rows = [
+        {
+            "quantity": "vibration",
+            "material": "",
+            "other": "chain",
+            "acceleration": reading,
+            "frequency": peak,
+            "direction": axis,
+        }
+        for reading, axis in zip(readings, axes, strict=True)
+    ]
+    found = calibrate(write(tmp_path / "data.csv", rows)).vibrations["chain"]
+    assert found.frequency.value == frequency
+    assert found.amplitude.low <= amplitude <= found.amplitude.high
+    assert found.amplitude.high - found.amplitude.low < 0.05 * amplitude
+    assert found.direction.low <= direction <= found.direction.high
+
+
 def test_slip_limit_from_bottles_held_on_slow_chains(tmp_path: Path) -> None:
     _, forces = pressed(SPEEDS, {"stiffness": LINEAR})
     triples = zip(MASSES, SPEEDS, read_with_error(forces, 2), strict=True)

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import asyncio
 import csv
+import struct
 from collections.abc import Callable, Iterator
-from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -17,6 +17,7 @@ import pytest
 from click.testing import CliRunner
 from facts import missing, stating
 from testing.conftest import LINE
+from testing.faulty_proxy import FaultyProxy
 from testing.plc_servers import ALARM, OWN, write_map
 from testing.soft_plc import BOTTLES, SETPOINT
 from testing.test_plc_server import SECONDS, FreeRunning, Twin
@@ -33,10 +34,10 @@ from conveyor_sim.protocols.attach.access import PlcAccess, Security
 from conveyor_sim.protocols.attach.links import plc_link
 from conveyor_sim.protocols.attach.opcua_client import choose, trust_server
 from conveyor_sim.protocols.attach.plc_certificate import PlcCertificate
-from conveyor_sim.protocols.attach.plc_link import PlcLinkError
+from conveyor_sim.protocols.attach.plc_link import PlcLinkError, PlcRefusedError
 from conveyor_sim.protocols.attach.tag_map import TagMapError, read_tag_map
 from conveyor_sim.protocols.hosting.server_thread import ServerThread
-from conveyor_sim.protocols.server.certificates import CERTIFICATE, PLCS, CertificateError, identity
+from conveyor_sim.protocols.server.certificates import CERTIFICATE, PLCS, CertificateError, identity, trust_plc
 from conveyor_sim.testing import Scenario
 
 THEIRS = {BOTTLES: "bottles", SETPOINT: "speed", ALARM: "full", "run/tick": "tick", "run/target_tick": "target"}
@@ -306,6 +307,27 @@ def test_a_fingerprint_that_can_t_be_is_refused(text: str) -> None:
     assert answer.exit_code == 1 and missing(answer.output, "--trust") == []
 
 
+def test_an_attacker_can_t_hide_the_encrypted_endpoint(
+    proxy: FaultyProxy, trusting: PlcAccess, folder: Path, tags: Path
+) -> None:
+    """Endpoints are read without security, where they can be changed; the secured session shows all of them."""
+    uri = b"http://opcfoundation.org/UA/SecurityPolicy#Basic256Sha256"
+    encrypted, signed = (bytes([mode, 0, 0, 0]) + struct.pack("<I", len(uri)) + uri for mode in (3, 2))
+    changed = []
+
+    def hide(data: bytes) -> bytes:
+        if encrypted in data and not changed:
+            changed.append(data)
+            return data.replace(encrypted, signed)
+        return data
+
+    asyncio.run(trust_server(url_of(proxy), trusting._replace(trust=sha256(folder)), lambda _: None))
+    proxy.fault = hide
+    with pytest.raises(PlcRefusedError, match=stating(url_of(proxy), "better endpoint", "attacker")):
+        connect(url_of(proxy), tags, trusting)
+    assert len(changed) == 1
+
+
 POLICY = "http://opcfoundation.org/UA/SecurityPolicy#"
 
 
@@ -371,50 +393,15 @@ def test_without_a_fitting_endpoint_it_is_told_what_there_is(
         choose("opc.tcp://plc", [endpoint(*each) for each in offered], access)
 
 
-class Proxy:
-    """A place between line and server that changes or swallows what the server answers."""
-
-    def __init__(self, url: str, thread: ServerThread) -> None:
-        self._to = int(url.rpartition(":")[2])
-        self.spoil: Callable[[bytes], bytes] = bytes
-        self._thread, self._writers = thread, list[asyncio.StreamWriter]()
-        self._server = thread.run(self._listen())
-        self.url = f"opc.tcp://127.0.0.1:{self._server.sockets[0].getsockname()[1]}"
-
-    async def _listen(self) -> asyncio.Server:
-        return await asyncio.start_server(self._join, "127.0.0.1", 0)
-
-    async def _join(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        other_reader, other_writer = await asyncio.open_connection("127.0.0.1", self._to)
-        self._writers += [writer, other_writer]
-        await asyncio.gather(
-            self._pass_on(reader, other_writer, bytes),
-            self._pass_on(other_reader, writer, lambda data: self.spoil(data)),
-        )
-
-    async def _pass_on(
-        self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, change: Callable[[bytes], bytes]
-    ) -> None:
-        with suppress(ConnectionError):
-            while data := await reader.read(2**16):
-                writer.write(change(data))
-        writer.close()
-
-    async def _stop(self) -> None:
-        self._server.close()
-        for writer in self._writers:
-            writer.close()
-
-    def close(self) -> None:
-        self._thread.run(self._stop())
-
-
 @pytest.fixture
-def proxy(server: VendorServer) -> Iterator[Proxy]:
-    with ServerThread() as thread:
-        proxy = Proxy(server.url, thread)
-        yield proxy
-        proxy.close()
+def proxy(server: VendorServer) -> Iterator[FaultyProxy]:
+    proxy = FaultyProxy(int(server.url.rpartition(":")[2]))
+    yield proxy
+    proxy.close()
+
+
+def url_of(proxy: FaultyProxy) -> str:
+    return f"opc.tcp://127.0.0.1:{proxy.port}"
 
 
 def flipped(data: bytes) -> bytes:
@@ -432,7 +419,7 @@ def of_another_protocol(data: bytes) -> bytes:
 
 @pytest.mark.parametrize("spoil", [flipped, without_end, of_another_protocol, lambda data: b""], ids=str)
 def test_a_spoiled_answer_ends_the_test_with_one_error(
-    proxy: Proxy,
+    proxy: FaultyProxy,
     trusting: PlcAccess,
     folder: Path,
     tags: Path,
@@ -442,13 +429,84 @@ def test_a_spoiled_answer_ends_the_test_with_one_error(
 ) -> None:
     """No traceback, and no command from an answer that is not the PLC's."""
     monkeypatch.setattr(opcua_client, "PATIENCE", 0.5)
-    asyncio.run(trust_server(proxy.url, trusting._replace(trust=sha256(folder)), lambda _: None))
+    asyncio.run(trust_server(url_of(proxy), trusting._replace(trust=sha256(folder)), lambda _: None))
     with Scenario(LINE) as plant:
-        plant.attach_plc(proxy.url, tags, access=trusting)
+        plant.attach_plc(url_of(proxy), tags, access=trusting)
         plant.run_for(0.1)
-        proxy.spoil = spoil
-        with pytest.raises(ControlError, match=stating("no PLC", proxy.url)):
+        proxy.fault = spoil
+        with pytest.raises(ControlError, match=stating("no PLC", url_of(proxy))):
             plant.run_for(0.1)
     assert "Traceback" not in capfd.readouterr().err
-    with pytest.raises(PlcLinkError, match=stating(proxy.url)):
-        connect(proxy.url, tags, trusting)
+    with pytest.raises(PlcLinkError, match=stating(url_of(proxy))):
+        connect(url_of(proxy), tags, trusting)
+
+
+HELLO = b"ACKF" + struct.pack("<I5I", 28, 0, 65535, 65535, 0, 0)
+"""Answer of a server to the first message."""
+
+
+@pytest.mark.parametrize(
+    "answers",
+    [
+        [b""],
+        [b"\x16\x03\x01" * 99],
+        [b"HTTP/1.1 400 Bad Request\r\n\r\n"],
+        [b"ERRF" + struct.pack("<III4s", 20, 0x80130000, 4, b"nope")],
+        [HELLO, b""],
+        [HELLO, b"OPNF" + struct.pack("<I", 0xFFFFFFFF) + b"x" * 99],
+        [HELLO, b"OPNF" + struct.pack("<I", 0) + b"x" * 99],
+        [HELLO, b"OPNF" + struct.pack("<I", 60) + b"\0" * 52],
+        [b"ACKF" + struct.pack("<I5I", 28, 0, 0, 0, 1, 1), b""],
+    ],
+)
+def test_a_port_that_is_no_opc_ua_server_is_one_error(
+    answers: list[bytes], monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """An empty answer is silence, which is not waited for without an end."""
+    monkeypatch.setattr(opcua_client, "PATIENCE", 0.2)
+
+    async def answer(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        for each in answers:
+            await reader.read(2**16)
+            writer.write(each)
+        await reader.read()
+        writer.close()
+
+    async def come() -> None:
+        async with await asyncio.start_server(answer, "127.0.0.1", 0) as server:
+            url = f"opc.tcp://127.0.0.1:{server.sockets[0].getsockname()[1]}"
+            with pytest.raises(PlcLinkError, match=stating(url)):
+                await plc_link(url, ()).connect()
+
+    asyncio.run(come())
+    assert capfd.readouterr().err == ""
+
+
+def test_a_damaged_file_of_a_trusted_certificate_is_named(
+    server: VendorServer, trusting: PlcAccess, tags: Path, tmp_path: Path
+) -> None:
+    identity(tmp_path / "own")
+    trust_plc(tmp_path / "own", server.url.removeprefix("opc.tcp://"), b"damaged")
+    with pytest.raises(CertificateError, match=stating(str(tmp_path), "certificate", "DER or PEM")):
+        connect(server.url, tags, trusting._replace(certificates=tmp_path / "own"))
+
+
+def test_security_is_for_opc_ua_only(tmp_path: Path) -> None:
+    answer = CliRunner().invoke(main, ["attach", LINE, "modbus://127.0.0.1:1", "--browse"])
+    assert answer.exit_code == 1 and missing(answer.output, "--browse", "modbus://", "opc.tcp://") == []
+    with pytest.raises(PlcLinkError, match=stating("modbus", "security", "opc.tcp")):
+        plc_link("modbus://127.0.0.1:1", (), PlcAccess(security="sign"))
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ([], ["SCENE", "--browse", "--trust"]),
+        (["--password-file", "x", "--browse"], ["--password-file", "--user"]),
+        (["--user", "a", "--user-certificate", "x", "--browse"], ["--user-certificate", "--user"]),
+        (["--user", "a", "--password-file", "/no/file", "--browse"], ["/no/file", "password", "PLC"]),
+    ],
+)
+def test_options_that_do_not_fit_are_refused(options: list[str], said: list[str]) -> None:
+    answer = CliRunner().invoke(main, ["attach", "opc.tcp://127.0.0.1:1", *options])
+    assert answer.exit_code == 1 and missing(answer.output, *said) == []

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import re
 import signal
 import time
@@ -24,12 +25,13 @@ from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.replay import replay
 from conveyor_sim.cli import main
 from conveyor_sim.control.scan import ControlError, Inputs
-from conveyor_sim.protocols.attach.access import ANONYMOUS, PlcAccess
+from conveyor_sim.protocols.attach.access import ANONYMOUS, PlcAccess, Security
 from conveyor_sim.protocols.attach.free_running import FreeRunningPlc
 from conveyor_sim.protocols.attach.links import plc_link
-from conveyor_sim.protocols.attach.plc_link import PlcLinkError
+from conveyor_sim.protocols.attach.plc_link import PlcLinkError, PlcRefusedError
 from conveyor_sim.protocols.attach.tag_map import TagMapError, read_tag_map
 from conveyor_sim.protocols.hosting.server_thread import ServerThread
+from conveyor_sim.protocols.server.certificates import identity, trust_plc
 from conveyor_sim.testing.scenario import Scenario
 
 SECONDS = 4.0
@@ -241,6 +243,26 @@ def test_a_variable_that_the_plc_lacks_is_named(plcs: Callable[[str], Plc], tmp_
     tags = write_map(tmp_path / "tags.csv", plc.places | {ALARM: "ns=2;s=GVL.lost"})
     with Scenario(LINE) as plant, pytest.raises(TagMapError, match=r"line 4: ns=2;s=GVL\.lost"):
         plant.attach_plc(plc.url, tags)
+
+
+def test_a_plc_that_has_lost_its_security_is_refused(plcs: Callable[[str], Plc], tmp_path: Path) -> None:
+    """Its certificate was trusted, so a server without one at its address may be another."""
+    plc = plcs("opcua")
+    access = PlcAccess(certificates=tmp_path / "own")
+    trust_plc(tmp_path / "own", plc.url.removeprefix("opc.tcp://"), identity(tmp_path / "own").certificate)
+    with Scenario(LINE) as plant:
+        mapped = read_tag_map(plc.tags, plant.simulation.process_image.tags).all
+
+    async def come(security: Security) -> None:
+        link = plc_link(plc.url, mapped, access._replace(security=security))
+        try:
+            await link.connect()
+        finally:
+            await link.close()
+
+    with pytest.raises(PlcRefusedError, match=stating(plc.url, "certificate is trusted", "--security none")):
+        asyncio.run(come("best"))
+    asyncio.run(come("none"))
 
 
 class FreeRunning:

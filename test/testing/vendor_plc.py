@@ -191,11 +191,11 @@ class VendorServer:
 
     def start(self) -> None:
         command = ["-m", "testing.vendor_plc", json.dumps(asdict(self.settings))]
-        with TemporaryFile("w+") as out:
-            self._process = Warm(command, out, out, cwd=Path(__file__).parents[1])
+        with TemporaryFile("w+") as out, TemporaryFile("w+") as errors:
+            self._process = Warm(command, out, errors, cwd=Path(__file__).parents[1])
             until(lambda: _text(out).endswith("\n") or self._process.poll() is not None, "the server")
             self.url = _text(out).strip()
-        assert self.url.startswith("opc.tcp://"), self.url
+            assert self.url.startswith("opc.tcp://"), _text(errors)
         self.settings = replace(self.settings, port=int(self.url.rpartition(":")[2]))
 
     def kill(self) -> None:

@@ -33,8 +33,8 @@ IGNORED: Mapping[str, tuple[str, ...]] = {
         "warning",
     ),
     _SYMBOLS: (
-        *("symbol", "monitoring", "linkalways", "tcnosymbol", "tchidesubitems", "tcrpcenable"),
-        *("tcdisplayscale", "tcdisplaymode", "tchmisymbol.show", "tchmisymbol.hide", "processvalue"),
+        *("symbol", "monitoring", "linkalways", "tcnosymbol", "tchidesubitems", "tcrpcenable", "tcgenerated"),
+        *("tcdisplayscale", "tcdisplaymode", "processvalue"),
         *("addproperty", "clr", "wpf", "container"),
     ),
     _LINKS: ("tclinkto", "tclinktooso", "tcncaxis", "generatedusingterminal"),
@@ -42,12 +42,12 @@ IGNORED: Mapping[str, tuple[str, ...]] = {
 }
 """Names of ignored attributes, in small letters, by what they concern."""
 
-_PREFIXES = {"opc.ua.": _SYMBOLS}
+_PREFIXES = {"opc.ua.": _SYMBOLS, "tchmisymbol.": _SYMBOLS}
 """Beginnings of names of ignored attributes."""
 
 _WORDS = re.compile(
     r"(region\b.*|endregion|info\s*'.*|text\s*'.*|warning\s*'.*|warning\s+(disable|restore)\s+\w+|flag\b.*"
-    r"|analysis\s+[-+]?\w+|redund_(un)?replicable)",
+    r"|analysis\s+[-+]?\w+|(no)?flow|redund_(un)?replicable)",
     re.IGNORECASE | re.DOTALL,
 )
 """Pragmas without a name in quotes."""

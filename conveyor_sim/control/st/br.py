@@ -16,8 +16,8 @@ from pathlib import PurePath
 from conveyor_sim.control.st import actions, tree
 from conveyor_sim.control.st.errors import SourceError
 
-VARIABLES = ".var"
-"""File type with sections of variables."""
+VARIABLES, DECLARED = ".var", ".fun"
+"""File types with sections of variables, and with units without bodies."""
 
 _INIT, _CYCLIC, _EXIT = _PARTS = ("_init", "_cyclic", "_exit")
 _FIRST = "_initialized"
@@ -53,7 +53,8 @@ def joined(parts: Sequence[tuple[PurePath, tree.SourceFile]]) -> tree.SourceFile
             whole.globals.extend(_global(section) for section in source.globals)
     for folder, inside in folders.items():
         whole.units.append(_program(folder, inside, local[folder], acting[folder]))
-    whole.units[:] = _with_bodies(whole.units)
+    declared = {id(unit) for path, source in parts if path.suffix.lower() == DECLARED for unit in source.units}
+    whole.units[:] = _with_bodies(whole.units, declared)
     actions.attach_rest(whole, elsewhere)
     return whole
 
@@ -99,21 +100,14 @@ def _returns(node: object) -> Iterator[tree.Jump]:
             yield from _returns(getattr(node, part.name))
 
 
-def _with_bodies(units: Iterable[tree.ProgramUnit]) -> Iterator[tree.ProgramUnit]:
-    """Join each unit of a .fun file, which has no body, with the unit of its name without variables."""
-    waiting: dict[tuple[str, str], tree.ProgramUnit] = {}
-    order: list[tuple[str, str] | tree.ProgramUnit] = []
+def _with_bodies(units: Iterable[tree.ProgramUnit], declared: set[int]) -> Iterator[tree.ProgramUnit]:
+    """Yield each unit of a .fun file with the body that the unit of its name has, or not at all without one.
+
+    declared: ids of the units of .fun files. A library without source must be missing, not do nothing.
+    """
+    units = list(units)
+    known = {(unit.kind, unit.name.lower()): unit for unit in units if id(unit) in declared}
     for unit in units:
-        key = unit.kind, unit.name.lower()
-        other = waiting.get(key)
-        if other is None:
-            waiting[key] = unit
-            order.append(key)
-        elif other.sections and not other.body and not unit.sections:
-            waiting[key] = replace(other, body=unit.body)
-        elif unit.sections and not unit.body and not other.sections:
-            waiting[key] = replace(unit, body=other.body)
-        else:
-            order.append(unit)
-    for one in order:
-        yield one if isinstance(one, tree.ProgramUnit) else waiting[one]
+        own = known.get((unit.kind, unit.name.lower()))
+        if id(unit) not in declared:
+            yield unit if own is None or unit.sections else replace(unit, sections=own.sections, result=own.result)

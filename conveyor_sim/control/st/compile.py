@@ -96,7 +96,7 @@ def compile_texts(texts: Sequence[Text], trace: bool, dialect: Dialect) -> Compi
         except SourceError as error:
             raise files.error(error) from None
     except (RecursionError, MemoryError, SyntaxError):  # limits of Python's compiler
-        raise StructuredTextError(f"{file}: found a program nested too deeply, expected a flatter one") from None
+        raise StructuredTextError(f"{file}:1:1: found a program nested too deeply, expected a flatter one") from None
 
 
 def _compile(source: tree.SourceFile, files: ProgramFiles, fingerprint: str, trace: bool, dialect: Dialect) -> Compiled:

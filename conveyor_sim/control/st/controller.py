@@ -37,7 +37,7 @@ class StructuredText:
         trace: bool = False,
         record: str | Iterable[str] = (),
         dialect: str = "",
-        files: Iterable[str | PathLike[str]] = (),
+        files: str | PathLike[str] | Iterable[str | PathLike[str]] = (),
     ) -> None:
         """Compile a program.
 
@@ -52,7 +52,8 @@ class StructuredText:
         """
         self._tags = dict(tags or {})
         self._addresses: Addresses = {} if modbus_map is None else read_addresses(Path(modbus_map))
-        self.program = Program(compile_files([path, *files], trace, dialect), budget)
+        more = [files] if isinstance(files, (str, PathLike)) else files
+        self.program = Program(compile_files([path, *more], trace, dialect), budget)
         self.record = patterns(record)
         """Patterns of the variables to record."""
         self.mapping: TagMapping | None = None

@@ -55,7 +55,9 @@ class Dialect:
     byte_addresses: bool = _flag("`%MW2` begins at byte 2 (else `%MW2` is bytes 4 and 5)")
     program_variables: bool = _flag("variables and actions of a PROGRAM in other units: `Main.x`, `Main.Reset();`")
     program_calls: bool = _flag("a unit calls a PROGRAM: `Outputs();`, which then does not run by itself")
-    open_units: bool = _flag("FUNCTIONBLOCK; a file may end without the END of its last unit")
+    open_units: bool = _flag(
+        "FUNCTIONBLOCK; a file may end without the END of its last unit; TYPE as the name of a field"
+    )
     written_inputs: bool = _flag("a unit writes its VAR_INPUT")
     dates_of_1990: bool = _flag(
         "DATE and DT begin at D#1990-01-01, and a DATE as a number counts days from there (else s since 1970-01-01)"

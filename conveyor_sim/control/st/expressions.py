@@ -13,7 +13,7 @@ from conveyor_sim.control.st.date_arithmetic import ALLOWED, combined
 from conveyor_sim.control.st.dates import PREFIXES, expected_literal
 from conveyor_sim.control.st.errors import SourceError
 from conveyor_sim.control.st.implicit import as_number, operands
-from conveyor_sim.control.st.integers import computed, negated
+from conveyor_sim.control.st.integers import computed, logical, negated
 from conveyor_sim.control.st.operations import divide, modulo
 from conveyor_sim.control.st.parts import part
 from conveyor_sim.control.st.scope import Scope
@@ -405,6 +405,7 @@ class Expressions:
                 raise error
             if not self.scope.names.dialect.integer_logic:
                 raise SourceError(error.at, f"{error}{self.scope.names.dialect.advice('integer_logic')}")
+            return folded(logical(node, kind, left, right, _LOGIC[word]), left, right)
         a, b = converted(left, kind), converted(right, kind)
         raw = f"{left.raw if left.kind == word else a} {_SHORT.get(word) or _LOGIC[word]} {b}"
         return folded(Value(node.at, kind, f"({raw})", raw=raw, kind=word), left, right)

@@ -41,7 +41,7 @@ WORDS: Mapping[str, str] = {
         ("__NEW", "__DELETE", "__ISVALIDREF", "__QUERYPOINTER", "ADR", "BITADR", "MEMSET", "MEMCPY", "MEMMOVE"),
         _NO_POINTERS,
     ),
-    **dict.fromkeys(("NULL", "NIL"), _NO_POINTERS),
+    **dict.fromkeys(("NULL", "NIL", "ACCESS"), _NO_POINTERS),
     **dict.fromkeys(("__QUERYINTERFACE", "ABSTRACT", "OVERRIDE"), _NO_OBJECTS),
     **dict.fromkeys(("REGION", "END_REGION", "BEGIN", "ORGANIZATION_BLOCK", "DATA_BLOCK", "VERSION"), _TIA),
     "NETWORK": _NO_LIST,
@@ -85,7 +85,7 @@ class Form(NamedTuple):
     before: str
     """Pattern that the text before the token ends with; its group is named in the message."""
     at: str
-    """Pattern at the token; it is named in the message after the group."""
+    """Pattern at the token, which the message shows with the text from the group on; "": the group alone."""
     expected: str
     """Form to use."""
     accepts: str = ""
@@ -104,7 +104,8 @@ FORMS: tuple[Form, ...] = (
     Form(r"(=)", r"<", "'<='"),
     Form(r"()", r"=>", "'>='"),
     Form(r"()", r"=(?!=)", "':=' to assign", ASSIGN),
-    Form(r"()", r":=", "'=' to compare", "EQUALS"),
+    Form(r"()", r":=", "'=' to compare, or one := in a statement", "EQUALS"),
+    Form(r":\s*(\w+[ \t]*\()[^()]*", r",", "no arguments of FB_init; b : FB(IN := x) sets inputs by name", "RPAR"),
     Form(r"()", r"\+=", "x := x + y"),
     Form(r"()", r"-=", "x := x - y"),
     Form(r"()", r"\*=", "x := x * y"),
@@ -126,8 +127,8 @@ FORMS: tuple[Form, ...] = (
     Form(r"()", r"[Ss][ \t]*=(?!=)", "IF y THEN x := TRUE; END_IF", ASSIGN),
     Form(r"()", r"[Rr][ \t]*=(?!=)", "IF y THEN x := FALSE; END_IF", ASSIGN),
     Form(r"(" + _CALLS + r")", r"\(", "the inputs in VAR_INPUT ... END_VAR"),
-    Form(r"(\bFUNCTION_BLOCK[ \t]+(?:ABSTRACT|FINAL|PUBLIC|INTERNAL)[ \t]+)\w+\s+", r"\w+", _NO_OBJECTS),
-    Form(r"(\bFUNCTION[ \t]+BLOCK)[ \t]+\w+\s+", r"\w+", "FUNCTION_BLOCK"),
+    Form(r"(\bFUNCTION_BLOCK[ \t]+(?:ABSTRACT|FINAL|PUBLIC|INTERNAL))[ \t]+\w+\s+", r"", _NO_OBJECTS),
+    Form(r"(\bFUNCTION[ \t]+BLOCK)[ \t]+\w+\s+", r"", "FUNCTION_BLOCK"),
     Form(rf"(\b(?:{_C_TYPES}))[ \t]+", r"[A-Za-z_]\w*", "the name first: x : INT;", "COLON"),
     Form(r"(\bARRAY)[ \t]*", r"\(", "ARRAY [1..9] OF and a type"),
     Form(r"(\bRETURN)[ \t]+", r"[^;\s]", "the name of the function := and its value, then RETURN;"),
@@ -164,7 +165,7 @@ def form_at(text: str, place: int, accepts: set[str]) -> tuple[int, str] | None:
         before = re.search(f"{form.before}\\Z", text[begin:place], re.IGNORECASE)
         if before is not None:
             start = begin + before.start(1)
-            shown = text[start : at.end()].partition("\n")[0].strip()
+            shown = text[start : at.end()] if form.at else before[1]
             return start, f"found {shown}, expected {form.expected}"
     line = text.rfind("\n", 0, place) + 1
     if (listed := _LIST.match(text, line)) is not None and text[listed.end() : listed.end() + 1] in ("", "\n", "\r"):

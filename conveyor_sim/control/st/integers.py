@@ -66,6 +66,18 @@ def computed(node: tree.Binary, kind: Type, left: Value, right: Value) -> Value:
     return replace(result, raw=raw, kind="sum")
 
 
+def logical(node: tree.Binary, kind: Type, left: Value, right: Value, sign: str) -> Value:
+    """Return AND, OR or XOR of two integers.
+
+    kind: their common type. sign: operator in Python.
+    """
+    (least, most), (low, high) = reach(left, kind), reach(right, kind)
+    inside = kind.low <= min(least, low) and max(most, high) <= kind.high
+    wide = register(kind)
+    code = f"({operand(left, kind)} {sign} {operand(right, kind)})"
+    return Value(node.at, kind, code, span=None if inside else (wide.low, wide.high))
+
+
 def _divided(node: tree.Binary, kind: Type, left: Value, right: Value) -> Value:
     a, b = operand(left, kind), operand(right, kind)
     (least, most), (low, high) = reach(left, kind), reach(right, kind)

@@ -27,6 +27,9 @@ _TABLES = {
 _STORED = ("VAR", "VAR_INPUT", "VAR_OUTPUT")
 """Sections of the variables that an instance stores, and that may have an address."""
 
+MOST_INCOMPLETE = 10_000
+"""Largest number of variables with an address without a number, elements of arrays included."""
+
 _LISTED = 20
 """Largest number of names in a sentence."""
 
@@ -90,7 +93,7 @@ def mapped(compiled: Compiled, tags: LineTags, chosen: Mapping[str, str], addres
     tag, an unsuitable type, a wrong direction, or a command with two variables.
     """
     file = compiled.file
-    candidates = list(_candidates(compiled))
+    candidates = _few(compiled)
     known = dict.fromkeys(one.name for one in candidates)
     groups = {one.name: one.group for one in candidates if one.group is not None}
     for name in chosen:
@@ -128,6 +131,21 @@ def mapped(compiled: Compiled, tags: LineTags, chosen: Mapping[str, str], addres
     tagged = {groups[one.variable] for one in bound if one.variable in groups}
     left = [name for name in left if groups.get(name) not in tagged]
     return TagMapping(tuple(bound), tuple(left), tuple(name for name in tags.commands if name not in sender))
+
+
+def _few(compiled: Compiled) -> list[Candidate]:
+    """Return the variables that may be tags. Raise StructuredTextError for too many with incomplete addresses."""
+    candidates: list[Candidate] = []
+    count = 0
+    for one in _candidates(compiled):
+        count += is_incomplete(one.member.address)
+        if count > MOST_INCOMPLETE:
+            where = f"{compiled.files.place(Position(*one.member.at))}: {one.member.name}"
+            raise StructuredTextError(
+                f"{where}: found more than {MOST_INCOMPLETE} variables AT {one.member.address}, expected fewer"
+            )
+        candidates.append(one)
+    return candidates
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path, PurePath
@@ -30,6 +30,9 @@ MOST_BYTES = 2 * MB
 
 MOST_FILES = 2000
 """Largest number of files of a program."""
+
+MOST_ENTRIES = 50_000
+"""Largest number of files and folders that are looked at in a folder."""
 
 _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 
@@ -67,7 +70,7 @@ def paths_of(paths: Paths) -> list[Path]:
         if not path.is_dir():
             files.add(path)
             continue
-        inside = {file for file in path.rglob("*") if file.suffix.lower() in SUFFIXES and file.is_file()}
+        inside = {file for file in _everything(path) if file.suffix.lower() in SUFFIXES and file.is_file()}
         if not inside:
             types = ", ".join(SUFFIXES)
             raise StructuredTextError(f"{path}: is a folder without a program in Structured Text, expected {types}")
@@ -77,6 +80,14 @@ def paths_of(paths: Paths) -> list[Path]:
     if len(files) > MOST_FILES:
         raise StructuredTextError(f"{named[0]}: found {len(files)} files, expected at most {MOST_FILES}")
     return sorted(files)
+
+
+def _everything(folder: Path) -> Iterator[Path]:
+    """Yield what a folder and its subfolders contain. Raise StructuredTextError for more than MOST_ENTRIES."""
+    for number, path in enumerate(folder.rglob("*")):
+        if number == MOST_ENTRIES:
+            raise StructuredTextError(f"{folder}: found more than {MOST_ENTRIES} files, expected a folder of a program")
+        yield path
 
 
 def read_texts(paths: Paths) -> list[Text]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Ends of units that tools leave out: CODESYS and TwinCAT show a unit without END_FUNCTION_BLOCK and its like."""
+"""Freedoms of CODESYS and TwinCAT: a unit without END_FUNCTION_BLOCK and its like, and TYPE as the name of a field."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def with_ends(tokens: Iterator[Token], dialect: Dialect) -> Iterator[Token]:
         yield from tokens
         return
     unit, configured, last = "", False, None
-    for token in tokens:
+    for token in _with_names(tokens):
         last = token
         if token.type == "NAME" and token.upper() == _ONE_WORD:
             token.type = "FUNCTION_BLOCK"
@@ -32,3 +32,18 @@ def with_ends(tokens: Iterator[Token], dialect: Dialect) -> Iterator[Token]:
         yield token
     if unit and last is not None:
         yield Token.new_borrow_pos(f"END_{unit}", f"END_{unit}", last)
+
+
+def _with_names(tokens: Iterator[Token]) -> Iterator[Token]:
+    """Yield the tokens, TYPE as a name after a period and before a colon, as fields of B&R and TwinCAT have it."""
+    before: Token | None = None
+    for token in tokens:
+        if before is not None and before.type == "TYPE" and token.type == "COLON":
+            before.type = "NAME"
+        elif token.type == "TYPE" and before is not None and before.type == "DOT":
+            token.type = "NAME"
+        if before is not None:
+            yield before
+        before = token
+    if before is not None:
+        yield before

@@ -103,7 +103,7 @@ export class Compare {
       if (far > most && far < Infinity) [most, worst] = [far, bottle.id];
     }
     const far = apart ? `; ${apart} more than 1 mm apart, bottle ${worst} most, ${(1000 * most).toFixed(1)} mm` : "";
-    const text = `${here.length} bottles in A, ${there.length} in B${far}`;
+    const text = `${here.length} ${here.length === 1 ? "bottle" : "bottles"} in A, ${there.length} in B${far}`;
     if (this.bottles.textContent !== text) this.bottles.textContent = text;
   }
 

@@ -88,7 +88,9 @@ def _resting(terms: Terms, dt: float) -> list[Term]:
     The force against the rim of a turntable is the part of m Omega^2 r that friction does not hold; it has the relative
     error of the creep. The lag is an outward slip of Omega^2 r dt / 2: a friction of m mu g Omega^2 r dt / v_lim.
     """
-    turns = terms.laws.base_friction is not None and "curved_belts" in terms.on
+    # With explicit friction, semi-implicit Euler's error of the creep contains the lag.
+    lags = _implicit_point(terms) or terms.method.creep == 0.0
+    turns = terms.laws.base_friction is not None and "curved_belts" in terms.on and lags
     behind = terms.method.turned * _turning(terms.plant) * dt if turns else 0.0
     late = [Term("load on turning belts", behind, "half a step's turn of the belt")] if behind > 0.0 else []
     return [*_lag("load on turning belts", _creep_off(terms, dt), terms, dt), *late]

@@ -22,6 +22,9 @@ from conveyor_sim.support.printable import printable
 MOST_NODES = 250_000
 """Largest number of nodes to look at. Servers may have endless trees."""
 
+PATIENCE = 60.0
+"""Longest time for each request, s of wall time. Servers are slow at folders with many nodes."""
+
 _PART = 1000
 """Number of nodes between two reports of the progress."""
 
@@ -46,14 +49,14 @@ class PlcVariable(NamedTuple):
 async def browse(
     url: str, access: PlcAccess, say: Callable[[str], object], progress: Callable[[int, int], object]
 ) -> list[PlcVariable]:
-    """Return the variables below the folder Objects of a server, without those of the object Server.
+    """Return the variables below the folder Objects of a server, without those that all servers have.
 
     access, say: as for `open_client`. progress: takes the numbers of nodes and of variables so far. If the server has
     more nodes than `MOST_NODES`, `say` reports it and the others are left out. Raise PlcLinkError, CertificateError.
     """
-    client = await open_client(url, access, say)
+    client = await open_client(url, access, say, PATIENCE)
     try:
-        requests = OpcUaRequests(url, client)
+        requests = OpcUaRequests(url, client, PATIENCE)
         await requests.read_limits()
         uris = await requests.namespaces()
         root = ua.NodeId(ua.ObjectIds.ObjectsFolder)
@@ -72,7 +75,7 @@ async def browse(
                     known.add(node)
                     here = (*path, str(child.BrowseName.Name or ""))
                     waiting.append((node, here))
-                    if child.NodeClass == ua.NodeClass.Variable:
+                    if child.NodeClass == ua.NodeClass.Variable and node.NamespaceIndex:
                         below.append((node, here))
             variables += await _described(requests, below, uris)
             progress(len(known), len(variables))

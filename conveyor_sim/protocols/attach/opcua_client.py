@@ -74,10 +74,12 @@ _OF_USERS = ("BadUserAccessDenied", "BadIdentityToken", "BadUserSignature")
 class PlcClient(Client):
     """Session with one PLC, which must be the server and have the endpoints that it announced without security."""
 
-    def __init__(self, url: str, endpoint: ua.EndpointDescription, expected: bytes | None, access: PlcAccess) -> None:
+    def __init__(
+        self, url: str, endpoint: ua.EndpointDescription, expected: bytes | None, access: PlcAccess, patience: float
+    ) -> None:
         """Prepare a session. expected: certificate of the PLC, DER; None: any."""
         # By default it disconnects from a server that has not answered for a second.
-        super().__init__(url, timeout=PATIENCE, watchdog_intervall=PATIENCE)
+        super().__init__(url, timeout=patience, watchdog_intervall=patience)
         self.name = self.description = "conveyor_sim"
         self._url, self._endpoint, self._expected, self._access = url, endpoint, expected, access
 
@@ -115,10 +117,13 @@ def user_policy(endpoint: ua.EndpointDescription, token: ua.UserTokenType) -> ua
     return max(known, key=lambda each: _STRENGTH[each.SecurityPolicyUri], default=default)
 
 
-async def open_client(url: str, access: PlcAccess, say: Callable[[str], object]) -> PlcClient:
+async def open_client(
+    url: str, access: PlcAccess, say: Callable[[str], object], patience: float | None = None
+) -> PlcClient:
     """Return a connected client of the server at a URL, by the most secure endpoint that `access` allows.
 
-    say: takes sentences for the user: the endpoint, and a certificate that is trusted from now on.
+    say: takes sentences for the user: the endpoint, and a certificate that is trusted from now on. patience: longest
+    time for each request, s of wall time; None: PATIENCE.
 
     Raise PlcLinkError, CertificateError.
     """
@@ -135,7 +140,7 @@ async def open_client(url: str, access: PlcAccess, say: Callable[[str], object])
     expected = None
     if secured or access.trust or (access.password and _encrypts_password(endpoint)):
         expected = _require_trusted(url, address, endpoint, access, say).der
-    client = PlcClient(reached, endpoint, expected, access)
+    client = PlcClient(reached, endpoint, expected, access, patience or PATIENCE)
     if secured:
         own = identity(folder)
         _require_valid(own.certificate, str(folder / CERTIFICATE))
@@ -176,8 +181,8 @@ async def trust_server(url: str, access: PlcAccess, say: Callable[[str], object]
 
 async def _discover(url: str, access: PlcAccess) -> tuple[str, str, int, list[ua.EndpointDescription]]:
     """Return the URL with its port, host, port, and the endpoints that the server offers. Raise PlcLinkError."""
-    for name, level in (("client", logging.CRITICAL + 1), ("crypto", logging.CRITICAL), ("common", logging.CRITICAL)):
-        logging.getLogger(f"asyncua.{name}").setLevel(level)  # PlcLinkError reports the same
+    for name in ("client", "crypto", "common", "uaprotocol"):
+        logging.getLogger(f"asyncua.{name}").setLevel(logging.CRITICAL + 1)  # PlcLinkError reports the same
     if access.trust:
         fingerprint(access.trust)  # a typing error is reported before anything else
     parts = urlsplit(url)
@@ -201,14 +206,17 @@ def _require_trusted(
     return certificate
 
 
-async def ask(url: str, request: Awaitable[T]) -> T:
-    """Return the answer to a request. Raise PlcLinkError if there is none in time, or if it is malformed."""
+async def ask(url: str, request: Awaitable[T], patience: float | None = None) -> T:
+    """Return the answer to a request. Raise PlcLinkError if there is none in time, or if it is malformed.
+
+    patience: as for `open_client`.
+    """
     try:
-        return await asyncio.wait_for(request, 2.0 * PATIENCE)
+        return await asyncio.wait_for(request, 2.0 * (patience or PATIENCE))
     except PlcLinkError:
         raise
     except (OSError, asyncio.TimeoutError, ua.UaError) as error:
-        text = type(error).__name__ if isinstance(error, asyncio.TimeoutError) else printable(error)
+        text = "does not answer in time" if isinstance(error, asyncio.TimeoutError) else printable(error)
         raise PlcLinkError(f"{url}: {text or type(error).__name__}") from error
     except Exception as error:  # malformed answers raise any kind while they are decoded
         raise PlcLinkError(f"{url}: answers in a form that can't be read ({type(error).__name__})") from error

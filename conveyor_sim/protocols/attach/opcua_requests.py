@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Awaitable, Sequence
 from typing import NamedTuple, TypeVar
 
 from asyncua import Client, ua
@@ -41,9 +41,9 @@ _LIMITS = RequestLimits(
 class OpcUaRequests:
     """Requests to one server. All methods raise PlcLinkError for an answer that is missing or malformed."""
 
-    def __init__(self, url: str, client: Client) -> None:
-        """Begin with the limits of `MOST_NODES`. url: for errors."""
-        self._url, self._client = url, client
+    def __init__(self, url: str, client: Client, patience: float | None = None) -> None:
+        """Begin with the limits of `MOST_NODES`. url: for errors. patience: as for `open_client`."""
+        self._url, self._client, self._patience = url, client, patience
         self.limits = RequestLimits()
 
     async def read_limits(self) -> None:
@@ -72,7 +72,7 @@ class OpcUaRequests:
                 TimestampsToReturn=ua.TimestampsToReturn.Neither,
                 NodesToRead=[ua.ReadValueId(node, attribute) for node, attribute in part],
             )
-            values += self._all(await ask(self._url, self._client.uaclient.read(parameters)), len(part))
+            values += self._all(await self._ask(self._client.uaclient.read(parameters)), len(part))
         return values
 
     async def write(self, nodes: Sequence[ua.NodeId], values: Sequence[ua.DataValue]) -> list[ua.StatusCode]:
@@ -84,7 +84,7 @@ class OpcUaRequests:
                 ua.WriteValue(node, ua.AttributeIds.Value, Value=value)
                 for node, value in zip(nodes[start:stop], values[start:stop], strict=True)
             ]
-            answer = await ask(self._url, self._client.uaclient.write(ua.WriteParameters(NodesToWrite=part)))
+            answer = await self._ask(self._client.uaclient.write(ua.WriteParameters(NodesToWrite=part)))
             codes += self._all(answer, len(part))
         return codes
 
@@ -103,15 +103,18 @@ class OpcUaRequests:
         parameters = ua.BrowseParameters(
             RequestedMaxReferencesPerNode=MOST_REFERENCES, NodesToBrowse=[_below(node) for node in nodes]
         )
-        return self._all(await ask(self._url, self._client.uaclient.browse(parameters)), len(nodes))
+        return self._all(await self._ask(self._client.uaclient.browse(parameters)), len(nodes))
 
     async def _complete(self, result: ua.BrowseResult) -> list[ua.ReferenceDescription]:
         references = list(result.References or ())
         while result.ContinuationPoint and result.References:
             following = ua.BrowseNextParameters(False, [result.ContinuationPoint])
-            (result,) = self._all(await ask(self._url, self._client.uaclient.browse_next(following)), 1)
+            (result,) = self._all(await self._ask(self._client.uaclient.browse_next(following)), 1)
             references += result.References or ()
         return references
+
+    async def _ask(self, request: Awaitable[T]) -> T:
+        return await ask(self._url, request, self._patience)
 
     def _all(self, answer: Sequence[T] | None, count: int) -> Sequence[T]:
         if answer is None or len(answer) != count:

@@ -240,3 +240,10 @@ def test_a_snapshot_holds_them(tmp_path: Path) -> None:
     scan(plc, 0, eye=1.0)
     other.restore(plc.snapshot())
     assert other.variables["plc/main/one/eye"] == plc.variables["plc/main/one/eye"] == 1.0
+
+
+def test_too_many_variables_without_a_number_are_refused(tmp_path: Path) -> None:
+    block = "FUNCTION_BLOCK B VAR a AT %I* : ARRAY [1..100] OF BOOL; END_VAR ; END_FUNCTION_BLOCK\n"
+    bound(tmp_path, block + program("VAR b : ARRAY [1..100] OF B; END_VAR"))
+    with pytest.raises(StructuredTextError, match=stating("program.st:1:22", "10000", "%I*")):
+        bound(tmp_path, block + program("VAR b : ARRAY [1..101] OF B; END_VAR"))

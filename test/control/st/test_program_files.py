@@ -8,7 +8,9 @@ from pathlib import Path
 import pytest
 
 from conveyor_sim.control.scan import ControlError
+from conveyor_sim.control.st import program_files
 from conveyor_sim.control.st.compile import compile_files
+from conveyor_sim.control.st.controller import StructuredText
 from conveyor_sim.control.st.errors import StructuredTextError
 from conveyor_sim.control.st.load import load
 from conveyor_sim.control.st.program import Program
@@ -74,10 +76,23 @@ def test_a_folder_and_further_files_are_a_controller(tmp_path: Path) -> None:
     rest = [str(folder / name) for name in ("twice.st", "counting.st", "globals.st")]
     for reference, parameters in ((folder, {}), (folder / "main.st", {"files": rest})):
         assert "plc/main/n" in load(str(reference), parameters).variables  # type: ignore[attr-defined]
+    library = written(tmp_path / "library", **{name: text for name, text in UNITS.items() if name != "main__st"})
+    assert StructuredText(folder / "main.st", files=library).variables["plc/main/n"] == 0
     with pytest.raises(ControlError, match="files"):
         load(str(folder / "main.st"), {"files": "twice.st"})
     with pytest.raises(ControlError, match="folder without a program"):
         load(str(written(tmp_path / "empty", readme__txt="")))
+
+
+def test_a_folder_with_too_many_files_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = written(tmp_path, **UNITS)
+    monkeypatch.setattr(program_files, "MOST_ENTRIES", 3)
+    with pytest.raises(StructuredTextError, match="found more than 3 files"):
+        compile_files(folder)
+    monkeypatch.undo()
+    monkeypatch.setattr(program_files, "MOST_FILES", 3)
+    with pytest.raises(StructuredTextError, match="found 4 files, expected at most 3"):
+        compile_files(folder)
 
 
 @pytest.mark.parametrize("name", ["p.TcPOU", "p.xml", "p.awl", "p.project"])
@@ -232,6 +247,14 @@ def test_a_project_of_automation_studio_runs(tmp_path: Path) -> None:
     assert {"feed/local/sum", "limit_2"} <= set(program.variables)
 
 
+def test_a_library_of_automation_studio_without_source_is_missing(tmp_path: Path) -> None:
+    """A declaration in a .fun file without a body is no block that does nothing."""
+    folder = written(tmp_path, **BR)
+    (folder / "Lib" / "Adding.st").unlink()
+    with pytest.raises(StructuredTextError, match=r"Variables\.var:3:10: found Adding, expected a type"):
+        compile_files(folder)
+
+
 def test_what_a_project_of_automation_studio_can_not_have(tmp_path: Path) -> None:
     folder = written(tmp_path, **BR)
     written(folder, Feed___Second__st="PROGRAM _CYCLIC\n ;\nEND_PROGRAM")
@@ -253,6 +276,14 @@ def test_a_unit_as_codesys_shows_it_needs_no_end(tmp_path: Path) -> None:
     written(folder, f__st="FUNCTION_BLOCK Adding VAR_OUTPUT n : INT; END_VAR IF TRUE THEN n := n + 1;")
     with pytest.raises(StructuredTextError, match="END_IF"):
         compile_files(folder, dialect="codesys")
+
+
+def test_type_may_be_the_name_of_a_field_in_codesys(tmp_path: Path) -> None:
+    text = "TYPE t : STRUCT Type : INT; END_STRUCT END_TYPE; PROGRAM p VAR x : t; END_VAR x.Type := 1; END_PROGRAM"
+    folder = written(tmp_path, p__st=text)
+    assert values(scanned(folder, dialect="codesys"), "p/x/type") == [1.0]
+    with pytest.raises(StructuredTextError, match=r":1:17: found 'Type'"):
+        compile_files(folder)
 
 
 def test_a_program_calls_another_in_codesys(tmp_path: Path) -> None:

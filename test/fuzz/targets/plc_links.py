@@ -23,7 +23,7 @@ from testing.vendor_servers import VENDORS
 
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.tag import count
-from conveyor_sim.protocols.attach import isolated_link, modbus_link, vendor_links
+from conveyor_sim.protocols.attach import isolated_link, modbus_link, opcua_client, vendor_links
 from conveyor_sim.protocols.attach.links import LIBRARIES, plc_link
 from conveyor_sim.protocols.attach.tag_map import MappedTag
 from conveyor_sim.protocols.hosting.server_thread import ServerThread
@@ -90,7 +90,7 @@ def attack(seed: int, folder: Path) -> str:
 
 
 def _wait_up_to(patience: float, limit: float) -> None:
-    vendor_links.PATIENCE = modbus_link.PATIENCE = patience
+    vendor_links.PATIENCE = modbus_link.PATIENCE = opcua_client.PATIENCE = patience
     isolated_link.LIMIT = limit
 
 
