@@ -291,6 +291,7 @@ BR = {
         " IF gCount.n >= LIMIT_2 THEN RETURN; END_IF;\n gCount.n := local.sum;\nEND_PROGRAM\n"
         "PROGRAM _EXIT\n starts := 0;\nEND_PROGRAM"
     ),
+    "Feed___Types__typ": "\nTYPE\n\nEND_TYPE\n",
     "Feed___Variables__var": "VAR\n starts : INT;\n local : Adding;\nEND_VAR",
     "Lib___Lib__fun": (
         "{REDUND_OK} FUNCTION_BLOCK Adding VAR_INPUT n : {REDUND_UNREPLICABLE} INT; END_VAR "
