@@ -80,6 +80,8 @@ NAVIGATION = {
         ],
         "Inside": ["docs/architecture", "docs/extending", "docs/api/index", "CONTRIBUTING", "CHANGELOG"],
     },
+    "docs/plc": {"PLCs": [f"plc/{page.stem}" for page in sorted(ROOT.glob("docs/plc/*.md"))]},
+    "docs/structured_text": {"Studies": ["studies/structured_text"]},
     "docs/ros": {"Pages": [f"ros/{page.stem}" for page in sorted(ROOT.glob("docs/ros/*.md"))]},
     "docs/scene": {"Parts": [f"parts/{page}" for page in PARTS]},
     "docs/performance": {"Tables": [*(f"performance/{page}" for page in MEASURED), "studies/performance_history"]},

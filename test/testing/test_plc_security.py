@@ -417,7 +417,11 @@ def of_another_protocol(data: bytes) -> bytes:
     return b"HTTP/1.1 400 Bad Request\r\n\r\n"
 
 
-@pytest.mark.parametrize("spoil", [flipped, without_end, of_another_protocol, lambda data: b""], ids=str)
+def empty(data: bytes) -> bytes:
+    return b""
+
+
+@pytest.mark.parametrize("spoil", [flipped, without_end, of_another_protocol, empty], ids=lambda spoil: spoil.__name__)
 def test_a_spoiled_answer_ends_the_test_with_one_error(
     proxy: FaultyProxy,
     trusting: PlcAccess,

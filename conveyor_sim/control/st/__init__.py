@@ -3,9 +3,10 @@
 
 A text passes through the files in this order. `pragmas.py` selects one branch of its conditional pragmas, and
 `parse.py` (with `grammar.lark`) builds the tree of `tree.py`. `declarations.py` resolves its types (`types.py`), names
-(`scope.py`), qualifiers (`sections.py`) and addresses (`located.py`). `expressions.py`, `integers.py`, `calls.py` and
-`statements.py` check the body and write it as Python, which `compile.py` puts together. `functions.py`,
-`conversions.py` and `blocks.py` are the standard library, `operations.py` the run-time functions of the code.
+(`scope.py`), qualifiers (`sections.py`), addresses (`located.py`) and initial values (`initial_values.py`).
+`expressions.py`, `integers.py`, `calls.py` and `statements.py` check the body and write it as Python, which
+`compile.py` puts together. `functions.py`, `conversions.py`, `blocks.py` and `tia_blocks.py` are the standard library,
+`operations.py` the run-time functions of the code.
 `dialect.py` decides the differences between CODESYS, TwinCAT, TIA Portal and the standard. `program_files.py` joins the
 files of a program; `scl.py` and `data_blocks.py` read those of TIA Portal, `br.py` those of B&R.
 `unit_ends.py` and `called_programs.py` supply what CODESYS leaves out, `foreign.py` names foreign forms.

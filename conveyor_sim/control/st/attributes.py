@@ -24,6 +24,7 @@ _SYMBOLS = "symbols, visualisation and OPC UA of the PLC"
 _EDITOR = "editor, documentation and compiler warnings"
 _LINKS = "links to terminals: tags take their place"
 _MEMORY = "memory layout, which no program sees here; SIZEOF counts natural alignment"
+_REDUNDANCY = "redundant controllers of B&R; there is one controller here"
 
 IGNORED: Mapping[str, tuple[str, ...]] = {
     _EDITOR: (
@@ -45,17 +46,40 @@ IGNORED: Mapping[str, tuple[str, ...]] = {
 _PREFIXES = {"opc.ua.": _SYMBOLS, "tchmisymbol.": _SYMBOLS}
 """Beginnings of names of ignored attributes."""
 
-_WORDS = re.compile(
-    r"(region\b.*|endregion|info\s*'.*|text\s*'.*|warning\s*'.*|warning\s+(disable|restore)\s+\w+|flag\b.*"
-    r"|analysis\s+[-+]?\w+|(no)?flow|redund_(un)?replicable)",
-    re.IGNORECASE | re.DOTALL,
-)
-"""Pragmas without a name in quotes."""
+PLAIN: Mapping[str, Mapping[str, str]] = {
+    _EDITOR: {
+        "region ...": r"region\b.*",
+        "endregion": "endregion",
+        "info '...'": r"info\s*'.*",
+        "text '...'": r"text\s*'.*",
+        "warning '...'": r"warning\s*'.*",
+        "warning disable ...": r"warning\s+disable\s+\w+",
+        "warning restore ...": r"warning\s+restore\s+\w+",
+        "analysis ...": r"analysis\s+[-+]?\w+",
+        "flow": "flow",
+        "noflow": "noflow",
+    },
+    _SYMBOLS: {"flag ...": r"flag\b.*"},
+    _REDUNDANCY: {
+        "REDUND_OK": "redund_ok",
+        "REDUND_ERROR": "redund_error",
+        "REDUND_REPLICABLE": "redund_replicable",
+        "REDUND_UNREPLICABLE": "redund_unreplicable",
+    },
+}
+"""Patterns of ignored pragmas without an attribute, by what they concern and by their text on the page."""
 
-_PROPERTY = re.compile(
-    r"\s*(s7_\w+|instructionname|libversion|external(accessible|visible|writable))\s*:=\s*'[^']*'\s*", re.IGNORECASE
-)
-"""Property of TIA Portal."""
+_WORDS = re.compile("|".join(one for forms in PLAIN.values() for one in forms.values()), re.IGNORECASE | re.DOTALL)
+
+_PROPERTIES: Mapping[str, str] = {
+    "S7_... := '...'": r"s7_\w+",
+    "InstructionName := '...'": "instructionname",
+    "LibVersion := '...'": "libversion",
+    **{f"External{one} := '...'": f"external{one.lower()}" for one in ("Accessible", "Visible", "Writable")},
+}
+"""Patterns of the names of ignored properties of TIA Portal, by their text on the page."""
+
+_PROPERTY = re.compile(rf"\s*({'|'.join(_PROPERTIES.values())})\s*:=\s*'[^']*'\s*", re.IGNORECASE)
 
 _ATTRIBUTE = re.compile(r"attribute\s+'?([\w.:-]+)", re.IGNORECASE)
 _KNOWN = {*HONOURED, *(name for names in IGNORED.values() for name in names)}
@@ -83,4 +107,10 @@ def tables() -> dict[str, dict[str, str]]:
     for text, names in IGNORED.items():
         more = tuple(f"{one}*" for one, concern in _PREFIXES.items() if concern == text)
         rows.append(f"| {', '.join(f'`{name}`' for name in (*names, *more))} | ignored: {text} |")
+    rows += ["", "| pragma | here |", "|---|---|"]
+    for text, forms in PLAIN.items():
+        rows.append(f"| {', '.join(f'`{{{form}}}`' for form in forms)} | ignored: {text} |")
+    rows.append(
+        f"| {', '.join(f'`{{{name}}}`' for name in _PROPERTIES)} | ignored: properties of a block in TIA Portal |"
+    )
     return {"structured_text": {"pragmas": "\n".join(rows)}}

@@ -15,7 +15,7 @@ from conveyor_sim.control.st.functions import apply, function_of, is_standard
 from conveyor_sim.control.st.implicit import adapted
 from conveyor_sim.control.st.open_arrays import BOUNDS, accepts, bound, passed
 from conveyor_sim.control.st.sizes import size_of
-from conveyor_sim.control.st.tia_blocks import IEC_TIMER, INSTRUCTIONS
+from conveyor_sim.control.st.tia_blocks import INSTRUCTIONS
 from conveyor_sim.control.st.types import BOOL, VOID, BlockType, Member, OpenArray, Type
 from conveyor_sim.control.st.values import Place, Value, assignment, converted, described
 from conveyor_sim.control.st.work import CALL
@@ -137,20 +137,34 @@ class CallCompiler:
     def _called(self, expressions: Expressions, target: tree.Expression) -> tuple[Place, str, str]:
         """Return the block that a statement calls, its action in small letters ("" for the body), and its method.
 
-        The method of an IEC_TIMER is that of the instruction.
+        An IEC_TIMER or IEC_COUNTER has the interface and the method of the instruction.
         """
-        names = expressions.scope.names
-        if isinstance(target, tree.MemberAccess) and (names.dialect.actions or target.name.lower() in INSTRUCTIONS):
+        dialect = expressions.scope.names.dialect
+        if isinstance(target, tree.MemberAccess) and (dialect.actions or dialect.tia_sources):
             name, plain = target.name.lower(), expressions.scope.unprefixed(target)
             owner = None if isinstance(plain, tree.Name) else expressions.place(target.base)
-            if owner is not None and owner.type is IEC_TIMER and name in INSTRUCTIONS:
-                return owner, "", f"run_{name}"
-            if owner is not None and isinstance(owner.type, BlockType) and name in owner.type.actions:
-                return owner, name, f"a_{name}"
+            if owner is not None and isinstance(owner.type, BlockType):
+                if owner.type in INSTRUCTIONS:
+                    return self._instruction(owner, target.at, name), "", f"run_{name}"
+                if name in owner.type.actions:
+                    return owner, name, f"a_{name}"
         place = expressions.place(target)
-        if place.type is IEC_TIMER:
-            raise SourceError(target.at, f"found a call of {place.type.name}, expected .TON, .TOF or .TP before (")
+        if isinstance(place.type, BlockType) and place.type in INSTRUCTIONS:
+            self._instruction(place, target.at, "")
         return place, "", "run"
+
+    def _instruction(self, place: Place, at: Position, name: str) -> Place:
+        """Return an IEC_TIMER or IEC_COUNTER with the interface of an instruction. Raise SourceError for another one.
+
+        name: in small letters; "" for a call without one.
+        """
+        assert isinstance(place.type, BlockType)
+        known = INSTRUCTIONS[place.type]
+        if name not in known:
+            *others, last = (f".{one.upper()}" for one in known)
+            found = f"found a call of {place.type.name}{'.' * bool(name)}{name.upper()}"
+            raise SourceError(at, f"{found}, expected {', '.join(others)} or {last} before (")
+        return replace(place, type=known[name])
 
     def noted(self, expressions: Expressions, root: str, at: Position) -> list[str]:
         """Return the line that records the last write of a variable, if that is traced.

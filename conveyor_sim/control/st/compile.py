@@ -33,6 +33,8 @@ class Scheduled:
 
     name: str
     type: BlockType
+    at: Position
+    """Position of the TASK; without one, that of the program in the CONFIGURATION or of its declaration."""
     task: str = ""
     """Task; "": the program runs in every scan."""
     interval: int = 0
@@ -242,10 +244,11 @@ def _schedule(
     if not source.configurations:
         if not programs:
             raise SourceError(Position(1, 1), "found no PROGRAM, expected one or more")
-        return [Scheduled(kind.name, kind) for kind in programs.values()]
+        places = {unit.name.lower(): unit.at for unit in source.units if unit.kind == "PROGRAM"}
+        return [Scheduled(kind.name, kind, places[key]) for key, kind in programs.items()]
     configuration = source.configurations[0]
     known = Expressions(declared.scope(None), calls)
-    tasks: dict[tuple[str, str], tuple[int, int]] = {}
+    tasks: dict[tuple[str, str], tuple[int, int, Position]] = {}
     for task in configuration.tasks:
         if (key := (task.resource, task.name.lower())) in tasks:
             raise SourceError(task.at, f"found {task.name} again, expected another name")
@@ -261,18 +264,18 @@ def _schedule(
             raise SourceError(one.at, f"found {one.task}, expected a TASK: {names or 'there is none'}")
         if one.name.lower() in scheduled:
             raise SourceError(one.at, f"found {one.name} again, expected each program once")
-        interval, priority = own or (0, LOWEST)
+        interval, priority, at = own or (0, LOWEST, one.at)
         kind = programs[one.type.lower()]
         elements, characters = elements + kind.size, characters + kind.characters
         require_small(elements, characters, one.at, " in programs")
-        scheduled[one.name.lower()] = Scheduled(one.name, kind, one.task, interval, priority)
+        scheduled[one.name.lower()] = Scheduled(one.name, kind, at, one.task, interval, priority)
     if not scheduled:
         raise SourceError(configuration.at, "found no program in the CONFIGURATION, expected PROGRAM name : type")
     return list(scheduled.values())
 
 
-def _task(task: tree.Task, known: Expressions) -> tuple[int, int]:
-    """Return interval (ns) and priority."""
+def _task(task: tree.Task, known: Expressions) -> tuple[int, int, Position]:
+    """Return interval (ns), priority and position."""
     interval, priority = 0, LOWEST - 1
     for at, name, node in task.fields:
         word = name.upper()
@@ -284,4 +287,4 @@ def _task(task: tree.Task, known: Expressions) -> tuple[int, int]:
             raise SourceError(at, f"found {name}, expected INTERVAL or PRIORITY")
     if interval <= 0 or not 0 <= priority < LOWEST:
         raise SourceError(task.at, f"found the TASK {task.name}, expected INTERVAL more than 0 and PRIORITY 0 or more")
-    return interval, priority
+    return interval, priority, task.at

@@ -131,10 +131,9 @@ class StructuredText:
         """
         for one in self.program.compiled.programs:
             if one.interval % length:
+                where = self.program.compiled.files.place(one.at)
                 task = f"the TASK {one.task} with INTERVAL {one.interval / 1e6:g} ms"
-                raise StructuredTextError(
-                    f"{self.program.compiled.file}: found {task}, expected a multiple of a scan, {length / 1e6:g} ms"
-                )
+                raise StructuredTextError(f"{where}: found {task}, expected a multiple of a scan, {length / 1e6:g} ms")
         self._checked = True
 
     @property

@@ -14,7 +14,7 @@ from conveyor_sim.control.st.dialect import Dialect
 from conveyor_sim.control.st.errors import Position, SourceError
 from conveyor_sim.control.st.expressions import Expressions
 from conveyor_sim.control.st.foreign import advice
-from conveyor_sim.control.st.implicit import adapted
+from conveyor_sim.control.st.initial_values import initial_value
 from conveyor_sim.control.st.located import Located, address_of, incomplete, is_incomplete, require_fit
 from conveyor_sim.control.st.scope import Names, Scope
 from conveyor_sim.control.st.sections import INCOMPLETE, LOCATED, OUTSIDE, meaning
@@ -31,9 +31,7 @@ from conveyor_sim.control.st.types import (
     Structure,
     Subrange,
     Type,
-    repeated,
 )
-from conveyor_sim.control.st.values import converted, described
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -255,7 +253,7 @@ class Declarations:
         _require_closed(kind, declared.type.at, "a TYPE")
         if declared.initial is None:
             return kind
-        return replace(kind, start=self._initial(declared.initial, kind, known))
+        return replace(kind, start=initial_value(declared.initial, kind, known))
 
     def _unit(self, unit: tree.ProgramUnit) -> BlockType:
         prefix = {"FUNCTION": "_F_", "FUNCTION_BLOCK": "_B_", "PROGRAM": "_P_"}[unit.kind]
@@ -370,7 +368,7 @@ class Declarations:
         if declared.initial is not None:
             if section in ("VAR_IN_OUT", "VAR_EXTERNAL"):
                 raise SourceError(declared.initial.at, f"found an initial value in {section}, expected none")
-            code = self._initial(declared.initial, type_, known)
+            code = initial_value(declared.initial, type_, known)
             if constant and type_.kind not in ("array", "structure", "block"):
                 value = eval(code)
         elif constant and section != "VAR_EXTERNAL":
@@ -425,56 +423,6 @@ class Declarations:
             type=tree.NamedType(spec.at, spec.base),
             initial=tree.InitialStructure(spec.at, tuple(fields)),
         )
-
-    def _initial(self, node: tree.Expression, kind: Type, known: Expressions) -> str:
-        """Code of an initial value, made of constants."""
-        if isinstance(node, tree.InitialArray):
-            return self._initial_array(node, kind, known)
-        if isinstance(node, tree.InitialStructure):
-            return self._initial_structure(node, kind, known)
-        value = adapted(known.value(node, kind), kind, self.names)
-        if value.constant is None:
-            raise SourceError(node.at, f"found {described(value)}, expected a constant as an initial value")
-        code = converted(value, kind)
-        return repr(eval(code)) if isinstance(kind, String) else code
-
-    def _initial_array(self, node: tree.InitialArray, kind: Type, known: Expressions) -> str:
-        if not isinstance(kind, Array):
-            raise SourceError(node.at, f"found a list, expected {kind.name}")
-        (low, high), *rest = kind.ranges
-        # The values of further dimensions follow each other, as in memory.
-        size, inner, nested = high - low + 1, kind.element, isinstance(kind.element, Array)
-        for one, other in rest:
-            size *= other - one + 1
-        codes: list[str] = []
-        values = 0
-        for count, element in node.elements:
-            values += count
-            if values > size:
-                raise SourceError(node.at, f"found more than {size} values, expected at most {size}")
-            deeper = nested or not isinstance(element, tree.InitialArray)
-            if element is not None and not deeper:
-                raise SourceError(element.at, f"found a list, expected {inner.name}")
-            value = inner.initial if element is None else self._initial(element, inner, known)
-            codes.append(repeated(inner, value, count))
-        codes.append(repeated(inner, inner.initial, size - values))
-        code = f"[{', '.join(filter(None, codes))}]"
-        for one, other in reversed(rest):
-            code = f"_rows({code}, {other - one + 1})"
-        return code
-
-    def _initial_structure(self, node: tree.InitialStructure, kind: Type, known: Expressions) -> str:
-        if not isinstance(kind, Structure):
-            raise SourceError(node.at, f"found a list of fields, expected {kind.name}")
-        fields = []
-        for at, name, value in node.fields:
-            member = kind.members.get(name.lower())
-            if member is None:
-                raise SourceError(
-                    at, f"found {name}, expected one of {', '.join(m.name for m in kind.members.values())}"
-                )
-            fields.append(f"{member.slot}={self._initial(value, member.type, known)}")
-        return f"_with({kind.python}(), {', '.join(fields)})"
 
 
 def _require_closed(kind: Type, at: Position, where: str) -> None:

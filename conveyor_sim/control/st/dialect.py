@@ -44,7 +44,9 @@ class Dialect:
         "a number is converted to a smaller type, DINT to REAL and LREAL to REAL, with a warning if its value may "
         "change; REAL with an integer is computed in REAL"
     )
-    tia_sources: bool = _flag("DATA_BLOCK, `TON_TIME`, `IEC_TIMER` and its `t.TON(...)`")
+    tia_sources: bool = _flag(
+        "DATA_BLOCK, `TON_TIME`, `CTU_UINT`, `IEC_TIMER` and its `t.TON(...)`, `IEC_COUNTER` and its `c.CTU(...)`"
+    )
     configuration_words: bool = _flag("CONFIGURATION, RESOURCE, TASK, ON and WITH are names outside of a CONFIGURATION")
     standard_names: bool = _flag(
         "`SR(SET1, RESET)`, `RS(SET, RESET1)`, `CTU(RESET)`, `CTD(LOAD)`, `CTUD(RESET, LOAD)`; PV and CV are WORD"

@@ -4,8 +4,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
 from itertools import product
 from pathlib import Path
 
@@ -92,21 +93,26 @@ def mapped(compiled: Compiled, tags: LineTags, chosen: Mapping[str, str], addres
     chosen: tags by variable; they override those in the program. Raise StructuredTextError for an unknown variable or
     tag, an unsuitable type, a wrong direction, or a command with two variables.
     """
-    file = compiled.file
     candidates = _few(compiled)
-    known = dict.fromkeys(one.name for one in candidates)
+    declared = {one.name: Position(*one.member.at) for one in candidates}
     groups = {one.name: one.group for one in candidates if one.group is not None}
+
+    def place(name: str) -> str:
+        """Return file, line and column of a variable; those of the first program for an unknown one."""
+        return compiled.files.place(declared.get(name, compiled.programs[0].at))
+
     for name in chosen:
-        if name.lower() not in known:
-            raise StructuredTextError(
-                f"{file}: found {name} among the tags, expected one of {_listed(tuple(known)) or 'none'}"
-            )
+        if name.lower() not in declared:
+            close = next(iter(get_close_matches(name.lower(), declared, 1)), "")
+            hint = f"; there is {close}" if close else ""
+            listed = _listed(tuple(declared)) or "none"
+            raise StructuredTextError(f"{place(close)}: found {name} among the tags, expected one of {listed}{hint}")
     wanted = {name.lower(): tag for name, tag in chosen.items()}
     by_identifier = _by_identifier(tags)
     bound: list[TagBinding] = []
     left: list[str] = []
     for name, member, shared in ((one.name, one.member, one.is_global) for one in candidates):
-        where = f"{compiled.files.place(Position(*member.at))}: {member.name}"
+        where = f"{place(name)}: {member.name}"
         tag, how = wanted.get(name) or member.tag, "tag"
         if not tag and member.address:
             tag, how = _located(where, member, addresses), "address"
@@ -122,12 +128,12 @@ def mapped(compiled: Compiled, tags: LineTags, chosen: Mapping[str, str], addres
         other = sender.get(one.tag, one.variable)
         if not one.is_input and groups.get(other, other) != groups.get(one.variable, one.variable):
             both = f"{other} and {one.variable}"
-            raise StructuredTextError(f"{file}: {one.tag}: found {both} for it, expected one variable")
+            raise StructuredTextError(f"{place(one.variable)}: {one.tag}: found {both} for it, expected one variable")
         if not one.is_input:
             sender[one.tag] = one.variable
-    _require_one_tag(file, bound, groups)
+    _require_one_tag(place, bound, groups)
     if not addresses:
-        _require_apart(file, candidates, bound)
+        _require_apart(place, candidates, bound)
     tagged = {groups[one.variable] for one in bound if one.variable in groups}
     left = [name for name in left if groups.get(name) not in tagged]
     return TagMapping(tuple(bound), tuple(left), tuple(name for name in tags.commands if name not in sender))
@@ -230,25 +236,30 @@ def _located(where: str, member: Member, addresses: Addresses) -> str:
     return tag
 
 
-def _require_one_tag(file: str, bound: list[TagBinding], groups: Mapping[str, int]) -> None:
-    """Raise StructuredTextError for two tags of variables that share memory."""
+def _require_one_tag(place: Callable[[str], str], bound: list[TagBinding], groups: Mapping[str, int]) -> None:
+    """Raise StructuredTextError for two tags of variables that share memory. place: of a variable, by its name."""
     tags: dict[int, TagBinding] = {}
     for one in bound:
         if one.variable in groups and (other := tags.setdefault(groups[one.variable], one)).tag != one.tag:
             both = f"{one.tag} for {one.variable}, and {other.tag} for {other.variable}"
-            raise StructuredTextError(f"{file}: found {both}, expected one tag, because they share memory")
+            raise StructuredTextError(
+                f"{place(one.variable)}: found {both}, expected one tag, because they share memory"
+            )
 
 
-def _require_apart(file: str, candidates: Iterable[Candidate], bound: list[TagBinding]) -> None:
-    """Raise StructuredTextError for variables of %I or %Q that a PLC would overlap. Used without a Modbus map."""
+def _require_apart(place: Callable[[str], str], candidates: Iterable[Candidate], bound: list[TagBinding]) -> None:
+    """Raise StructuredTextError for variables of %I or %Q that a PLC would overlap. Used without a Modbus map.
+
+    place: of a variable, by its name.
+    """
     tagged = {one.variable for one in bound}
     spans = []
     for one in candidates:
         address = one.member.address
         if address and not address.startswith("%M") and not is_incomplete(address):
-            place = address_of(Position(*one.member.at), address)
-            start = place.number * place.bits
-            spans.append((place.area, start, start + place.bits, one))
+            located = address_of(Position(*one.member.at), address)
+            start = located.number * located.bits
+            spans.append((located.area, start, start + located.bits, one))
     for group in overlapping(spans):
         own = {one.group if one.group is not None else one.name for one in group}
         free = [one for one in group if one.name not in tagged]
@@ -256,7 +267,7 @@ def _require_apart(file: str, candidates: Iterable[Candidate], bound: list[TagBi
             other = next(one for one in group if one is not free[0])
             both = f"{free[0].name} at {free[0].member.address}, {other.name} at {other.member.address}"
             expected = "a tag for each or other addresses: bits and registers are two memories"
-            raise StructuredTextError(f"{file}: found {both}, expected {expected}")
+            raise StructuredTextError(f"{place(free[0].name)}: found {both}, expected {expected}")
 
 
 def _checked(where: str, name: str, member: Member, tag: str, how: str, tags: LineTags) -> TagBinding:

@@ -191,6 +191,8 @@ class Requests:
         request = Input(OPCUA, writer, kind, SET, (tag.name,), (number,))
         if refusal := refused_for_good(self._source, self._receipt, request):
             return ReasonedCode(CODES[refusal.cause], refusal.reason)
+        if (code := self._run_code()) != Codes.Good:
+            return code  # before the control mode, whose change would not help
         if reason := objection(self._source, tag, number, kind, writer):
             return ReasonedCode(Codes.BadUserAccessDenied, reason)
         return Codes.Good
@@ -212,15 +214,21 @@ class Requests:
         request = Input(OPCUA, _writer(client), kind, operation, names, values, texts)
         if refusal := refused_for_good(self._source, self._receipt, request):
             return ReasonedCode(CODES[refusal.cause], refusal.reason)
+        if (code := self._run_code()) != Codes.Good:
+            return code
+        if refused := self._source.give(request):
+            return ReasonedCode(Codes.BadTooManyOperations, refused)
+        self.held.note(id(client), request)
+        return Codes.GoodCompletesAsynchronously
+
+    def _run_code(self) -> int:
+        """Return Good if the line takes inputs at present."""
         snapshot = self._source.snapshot
         if snapshot.lost:
             return ReasonedCode(Codes.BadNoCommunication, snapshot.lost)
         if snapshot.run.state in TAKES_NO_INPUT:
             return ReasonedCode(Codes.BadInvalidState, f"the run is {snapshot.run.text}, and takes no input")
-        if refused := self._source.give(request):
-            return ReasonedCode(Codes.BadTooManyOperations, refused)
-        self.held.note(id(client), request)
-        return Codes.GoodCompletesAsynchronously
+        return int(Codes.Good)
 
     def leave(self, client: User) -> None:
         """Release the buttons that a client holds, because its session has ended or has another user."""

@@ -67,7 +67,7 @@ def write(path: Path, rows: Sequence[Row]) -> None:
     lines += ["", _NOT_MEASURED, "", "## Units without pointers", "", _POINTERS]
     lines += ["| source | group | units | right | share |", "|---|---|---|---|---|"]
     for source in SOURCES:
-        if source.key != "oscat":
+        if source.key not in ("oscat", "strucpp library"):
             continue
         for group, title in _GROUPS.items():
             part = [row for row in rows if row.source == source.key and row.group == group]
@@ -129,8 +129,8 @@ shows how much existing code the [interpreter](../structured_text.md) accepts, a
     python docs/studies/structured_text/run.py corpus    # renews this page and structured_text.csv
 
 The folder contains checkouts of all repositories at the commits of the table, each with the name of its repository.
-The project contains none of their code. [structured_text.csv](structured_text.csv) lists every unit with its result
-and message.
+That of STruCpp at `1015203` is `STruCpp-1015203`. The project contains none of their code.
+[structured_text.csv](structured_text.csv) lists every unit with its result and message.
 
 - A unit is a file, an object of TwinCAT, a program of B&R with its files, or a test. It is compiled together with
   everything of its repository that it needs, in the dialect of its vendor.
@@ -142,13 +142,14 @@ and message.
 
 _NOT_MEASURED = """Not measured: RuSTy (`PLC-lang/rusty`), whose repository was too large to fetch for this study;
 tests of its standard library began as PLC-lang/StandardFunctions. `sployal/soda_bottling_TIAportal` contains no text in
-SCL. The 119 exports of OSCAT 2.6 are not part of STruCpp at the commit above. Tests of StandardFunctions that run more
-than once, or whose expected value is no constant number, are left out; so are programs of ironplc without a constant
-number."""
+SCL. No commit of STruCpp up to `fb7980f` contains the 119 exports of OSCAT 2.6. Tests of StandardFunctions that run
+more than once, or whose expected value is no constant number, are left out; so are programs of ironplc without a
+constant number."""
 
 _POINTERS = """OSCAT is a library for CODESYS 2.3. Some of its functions of texts and arrays use pointers, which the
 interpreter does not have. Those, and the units that need them, are counted apart. The exports lack the lists of global
-variables; their text is read from the binary library in the same repository.
+variables; their text is read from the binary library in the same repository. The texts of STruC++ lack the constant
+STRING_LENGTH, which is an option of its compiler.
 """
 
 _REFUSALS = (

@@ -25,11 +25,13 @@ class Source:
     """Contents, in words."""
     dialect: str
     units: Callable[[Path], Iterator[Unit]]
+    checkout: str = ""
+    """Name of the checkout of a second commit of a repository."""
 
     @property
     def folder(self) -> str:
         """Name of the checkout."""
-        return self.repository.partition("/")[2]
+        return self.checkout or self.repository.partition("/")[2]
 
 
 _CDATA = re.compile(r"<(Declaration|ST)>\s*<!\[CDATA\[(.*?)\]\]>", re.DOTALL)
@@ -63,6 +65,11 @@ def _oscat(folder: Path) -> Iterator[Unit]:
     """Yield the exports of OSCAT, each with those that it needs, and with the lists of global variables."""
     lists = oscat.global_lists(folder)
     yield from (unit for unit in with_needs([*files(folder, (".exp",)), lists]) if unit.name != lists.name)
+
+
+def _oscat_texts(folder: Path) -> Iterator[Unit]:
+    """Yield the units of OSCAT that STruC++ extracted from a binary library, with its lists of global variables."""
+    return with_needs(files(folder / "tests" / "st-validation" / "oscat" / "lib", (".st",)))
 
 
 def _twincat(folder: Path) -> Iterator[Unit]:
@@ -143,6 +150,15 @@ SOURCES: tuple[Source, ...] = (
         "OSCAT tests with values",
         "codesys",
         lambda folder: strucpp.units(folder, "oscat"),
+    ),
+    Source(
+        "strucpp library",
+        "Autonomy-Logic/STruCpp",
+        "1015203",
+        "OSCAT Basic 335, extracted from a library of CODESYS",
+        "codesys",
+        _oscat_texts,
+        "STruCpp-1015203",
     ),
     Source("iec-checker", "jubnzv/iec-checker", "d3e5dae", "test files", "codesys", _each(".st")),
     Source(

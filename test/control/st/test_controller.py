@@ -129,6 +129,33 @@ def test_a_mapping_that_can_not_be_is_refused_before_the_first_scan(tmp_path: Pa
     assert text in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("name", "at", "facts"),
+    [
+        ("Main/Speeed", "3:1", ("Main/Speeed", "main/speed", "main/eye")),
+        ("lid", "1:9", ("lid", "main/speed", "main/eye")),
+    ],
+)
+def test_a_tag_of_an_unknown_variable_is_refused_at_the_closest_one(
+    tmp_path: Path, name: str, at: str, facts: tuple[str, ...]
+) -> None:
+    with pytest.raises(StructuredTextError, match=rf"program\.st:{at}: ") as caught:
+        bound(tmp_path, "VAR\neye : BOOL;\nspeed : LREAL; END_VAR", tags={name: "belts/a/speed"})
+    assert missing(str(caught.value), facts) == []
+
+
+@pytest.mark.parametrize(
+    ("declare", "at"),
+    [
+        ("VAR {tag: machines/m/run} x : BOOL;\n{tag: machines/m/run} y : BOOL; END_VAR", "2:23"),
+        ("VAR x AT %IX0.0 : BOOL;\ny AT %IW0 : INT; END_VAR", "1:18"),
+    ],
+)
+def test_a_conflict_of_two_variables_is_refused_at_its_place(tmp_path: Path, declare: str, at: str) -> None:
+    with pytest.raises(StructuredTextError, match=rf"program\.st:{at}: "):
+        bound(tmp_path, declare)
+
+
 def test_a_signal_that_a_variable_can_not_hold_stops_the_program(tmp_path: Path) -> None:
     plc = bound(tmp_path, "VAR {tag: zones/z/bottles} n : SINT; END_VAR")
     with pytest.raises(StructuredTextError, match=stating("zones/z/bottles", "200", "SINT", "-128 to 127")):
@@ -160,7 +187,7 @@ def test_a_task_does_not_make_up_for_scans_that_there_were_not(tmp_path: Path) -
 
 def test_an_interval_is_a_multiple_of_the_scan(tmp_path: Path) -> None:
     plc = bound(tmp_path, TASKS.replace("30ms", "25ms"))
-    with pytest.raises(StructuredTextError, match=stating("INTERVAL", "25 ms", "multiple", "scan", "10 ms")):
+    with pytest.raises(StructuredTextError, match=stating("program.st:2:8:", "25 ms", "multiple", "scan", "10 ms")):
         scan(plc, 0)
 
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from facts import missing, stating
 
 from conveyor_sim.control.scan import ControlError
 from conveyor_sim.control.st import program_files
@@ -203,8 +204,66 @@ def test_an_iec_timer_is_called_by_the_name_of_an_instruction(tmp_path: Path) ->
     q = ("t/q", "main/late/q", "main/held/q")
     assert [values(scanned(folder, n), *q) for n in (2, 3)] == [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
     written(tmp_path, main__scl=text.replace('"t".TP(', '"t"('))
-    with pytest.raises(StructuredTextError, match=r"found a call of IEC_TIMER, expected \.TON, \.TOF or \.TP"):
+    with pytest.raises(StructuredTextError, match=stating("IEC_TIMER", ".TON", ".TOF", ".TP", ".TONR")):
         compile_files(folder)
+
+
+def test_an_iec_counter_is_called_by_the_name_of_an_instruction(tmp_path: Path) -> None:
+    """Single instance, multi-instances of several types, limits of the type, and Q of each instruction."""
+    text = (
+        "DATA_BLOCK \"c\"\n{InstructionName := 'IEC_COUNTER'}\nVERSION : 1.0\nIEC_COUNTER\nBEGIN\nEND_DATA_BLOCK\n"
+        'FUNCTION_BLOCK "Counting" VAR tick : Bool; up, down : Bool; n : UInt; small : IEC_SCOUNTER; '
+        "both : IEC_UDCOUNTER; local : CTU_USINT; END_VAR BEGIN #tick := NOT #tick;\n"
+        '"c".CTU(CU := #tick, R := FALSE, PV := 2, Q => #up);\n'
+        "#small.CTD(CD := #tick, LD := FALSE, PV := 3, Q => #down);\n"
+        "#both.CTUD(CU := #tick, CD := FALSE, R := FALSE, LD := FALSE, PV := 100000);\n"
+        "#local(CU := #tick, R := FALSE, PV := 255, CV => #n); END_FUNCTION_BLOCK\n"
+        'DATA_BLOCK "f" "Counting" BEGIN END_DATA_BLOCK ORGANIZATION_BLOCK "Main" BEGIN "f"(); END_ORGANIZATION_BLOCK'
+    )
+    folder = written(tmp_path, main__scl=text)
+    names = ("c/cv", "c/qu", "f/up", "f/small/cv", "f/small/qd", "f/down", "f/both/cv", "f/both/qu", "f/n")
+    assert values(scanned(folder, 2), *names) == [1, 0, 0, -1, 1, 1, 1, 0, 1]
+    assert values(scanned(folder, 3), *names) == [2, 1, 1, -2, 1, 1, 2, 0, 2]
+    assert values(scanned(folder, 600), *names) == [300, 1, 1, -128, 1, 1, 300, 0, 255]
+
+
+def test_tonr_adds_up_the_time_until_its_reset(tmp_path: Path) -> None:
+    text = (
+        'FUNCTION_BLOCK "Adding" VAR n : Int; t : IEC_TIMER; own : TONR_TIME; END_VAR BEGIN #n := #n + 1;\n'
+        "#t.TONR(IN := #n MOD 3 <> 0, R := #n = 9, PT := T#25ms);\n"
+        "#own(IN := #n MOD 3 <> 0, R := FALSE, PT := T#15ms); END_FUNCTION_BLOCK\n"
+        'DATA_BLOCK "a" "Adding" BEGIN END_DATA_BLOCK ORGANIZATION_BLOCK "Main" BEGIN "a"(); END_ORGANIZATION_BLOCK'
+    )
+    folder = written(tmp_path, main__scl=text)
+    elapsed = {scans: values(scanned(folder, scans), "a/t/et", "a/t/q", "a/own/q") for scans in (2, 3, 5, 7, 8, 9, 10)}
+    assert elapsed == {
+        2: [pytest.approx(0.01), 0, 0],
+        3: [pytest.approx(0.01), 0, 0],
+        5: [pytest.approx(0.02), 0, 1],
+        7: [pytest.approx(0.02), 0, 1],
+        8: [pytest.approx(0.025), 1, 1],
+        9: [0, 0, 1],
+        10: [0, 0, 1],
+    }
+
+
+@pytest.mark.parametrize(
+    ("call", "facts"),
+    [
+        ('"c"(CU := TRUE)', ("IEC_COUNTER", ".CTU", ".CTD", ".CTUD")),
+        ('"c".CTU(LD := TRUE)', ("LD", "CTU_INT", "CU", "R", "PV", "Q", "CV")),
+        ('"c".CTD(CV := 1)', ("CV", "CTD_INT", "=>")),
+        ('"c".TON(IN := TRUE)', ("IEC_COUNTER.TON", ".CTU", ".CTD", ".CTUD")),
+        ('"c".CTU(CU := TRUE, PV := 40000)', ("40000", "INT", "32767")),
+    ],
+)
+def test_a_wrong_call_of_an_iec_counter_is_refused_at_its_place(
+    tmp_path: Path, call: str, facts: tuple[str, ...]
+) -> None:
+    text = f'DATA_BLOCK "c"\nIEC_COUNTER\nBEGIN\nEND_DATA_BLOCK\nORGANIZATION_BLOCK "Main"\nBEGIN\n{call};\n'
+    with pytest.raises(StructuredTextError, match=r"main\.scl:7:\d+: ") as caught:
+        compile_files(written(tmp_path, main__scl=f"{text}END_ORGANIZATION_BLOCK"))
+    assert missing(str(caught.value), facts) == []
 
 
 def test_positions_in_a_source_of_tia_portal_are_those_of_the_text(tmp_path: Path) -> None:
@@ -232,9 +291,11 @@ BR = {
         " IF gCount.n >= LIMIT_2 THEN RETURN; END_IF;\n gCount.n := local.sum;\nEND_PROGRAM\n"
         "PROGRAM _EXIT\n starts := 0;\nEND_PROGRAM"
     ),
+    "Feed___Types__typ": "\nTYPE\n\nEND_TYPE\n",
     "Feed___Variables__var": "VAR\n starts : INT;\n local : Adding;\nEND_VAR",
     "Lib___Lib__fun": (
-        "FUNCTION_BLOCK Adding VAR_INPUT n : INT; END_VAR VAR_OUTPUT sum : INT; END_VAR END_FUNCTION_BLOCK"
+        "{REDUND_OK} FUNCTION_BLOCK Adding VAR_INPUT n : {REDUND_UNREPLICABLE} INT; END_VAR "
+        "VAR_OUTPUT sum : INT; END_VAR END_FUNCTION_BLOCK"
     ),
     "Lib___Adding__st": "FUNCTION_BLOCK Adding\n sum := n + gCount.step;\nEND_FUNCTION_BLOCK",
 }

@@ -37,8 +37,8 @@ def test_not_permitted_and_wrong_state_differ(line: Line, tmp_path: Path) -> Non
         assert (role, missing(role_reason, "disown", "operator", "controller")) == ("BadUserAccessDenied", [])
         assert good == [LATER, ""]
         line.source.show(run=RunState(ENDED))
-        ((ended, ended_reason),) = session.ask("refusals", writes=[], calls=[stop])
-        assert (ended, missing(ended_reason, "ended")) == ("BadInvalidState", [])
+        for ended, ended_reason in session.ask("refusals", writes=[SETPOINT], calls=[stop]):
+            assert (ended, missing(ended_reason, "ended")) == ("BadInvalidState", [])
 
 
 def test_a_viewer_gets_the_reason(line: Line, tmp_path: Path) -> None:
