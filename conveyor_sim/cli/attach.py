@@ -118,7 +118,10 @@ def _password(user: str, file: Path | None, user_certificate: Path | None) -> st
         raise ConveyorError("--password-file: given without --user, expected both")
     if not user:
         return ""
-    return read_password(file, PASSWORD, "the PLC") or str(click.prompt("password", hide_input=True, err=True))
+    password = read_password(file, PASSWORD, "the PLC")
+    if file is not None and not password:
+        raise ConveyorError(f"{file}: line 1 is empty, expected the password of the PLC")
+    return password or str(click.prompt("password", hide_input=True, err=True))
 
 
 def _require_opcua(url: str, option: str) -> None:
