@@ -13,6 +13,7 @@ from facts import missing
 from conveyor_sim.control.scan import ControlError
 from conveyor_sim.control.st import StructuredText
 from conveyor_sim.errors import CommandError
+from conveyor_sim.protocols.attach.tag_map import TagMapError, read_tag_map
 from conveyor_sim.testing import Scenario
 
 PRESSES = """
@@ -84,3 +85,11 @@ def test_a_program_with_an_output_to_an_input_of_the_panel_is_refused(plant: Sce
     with pytest.raises(ControlError) as refused:
         plant.attach(StructuredText(program))
     assert missing(str(refused.value), "panel/start/press") == []
+
+
+def test_a_map_of_a_plc_with_an_input_of_the_panel_is_refused(plant: Scenario, tmp_path: Path) -> None:
+    tags = tmp_path / "tags.csv"
+    tags.write_text("tag,theirs\npanel/start/press,coil 0 bool\n")
+    with pytest.raises(TagMapError) as refused:
+        read_tag_map(tags, plant.simulation.process_image.tags)
+    assert missing(str(refused.value), f"{tags}: line 2", "panel/start/press", "input of the panel", "operators") == []

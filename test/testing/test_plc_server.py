@@ -180,6 +180,9 @@ def test_attach_says_that_there_is_no_plc(tmp_path: Path, caplog: pytest.LogCapt
         ("tag,theirs\nalarms/,x\n", "line 2: alarms/ given, expected a signal or command"),
         ("tag,theirs\nalarms/a,x\nalarms/a,y\n", "line 3: alarms/a given twice"),
         ("tag,theirs\nalarms/a\n", "line 2: alarms/a given, expected a tag and its place in the PLC"),
+        ('tag,theirs\nplc/a,"x\n', "line 2: unexpected end of data, expected a CSV file"),
+        ('tag,theirs\nplc/a,"x\ny"\nzone,z\n', "line 4: zone given, expected a signal or command"),
+        ("tag,theirs\nrun/tick,x\nrun/target_tick, x\n", "line 3:  x given, expected a place that run/tick does not"),
         ("tag,theirs\nalarms/a,coil 0 bool\n", "run/tick or run/target_tick is missing"),
     ],
 )
@@ -189,6 +192,14 @@ def test_a_map_that_can_t_be_is_refused(tmp_path: Path, lines: str, said: str) -
     with Scenario(LINE) as plant, pytest.raises(TagMapError) as refused:
         plant.attach_plc("modbus://127.0.0.1:1", path)
     assert str(refused.value).startswith(f"{path}: {said}")
+
+
+def test_a_map_has_lines_of_any_end_spaces_and_as_many_rows_as_fit(tmp_path: Path) -> None:
+    path, many = tmp_path / "tags.csv", 50_000
+    rows = "".join(f"plc/{n},x{n}\r\n" for n in range(many))
+    path.write_text(f"\ufefftag,theirs\r\nalarms/a ,x\r\nalarms/b,x\r\n{rows}", newline="")
+    tags = read_tag_map(path, ())
+    assert [each.tag.name for each in tags.read] == ["alarms/a", "alarms/b"] and len(tags.own) == many
 
 
 @pytest.mark.parametrize(
@@ -232,10 +243,36 @@ def test_a_place_that_the_plc_lacks_is_said_at_once(plcs: Callable[[str], Plc], 
         plant.attach_plc(plc.url, tags)
 
 
-@pytest.mark.parametrize("url", ["http://127.0.0.1:1", "127.0.0.1", "opc.tcp://", "modbus://[", "modbus://a:b"])
+@pytest.mark.parametrize(
+    "url",
+    [
+        "http://127.0.0.1:1",
+        "127.0.0.1",
+        "opc.tcp://",
+        "modbus://[",
+        "modbus://a:b",
+        "opc.tcp://a:0",
+        "modbus://a..b",
+        "modbus://a\0b",
+        "opc.tcp://\ud800:1",
+        f"modbus://{'a' * 64}",
+    ],
+)
 def test_a_url_that_can_t_be_is_refused(url: str) -> None:
     with pytest.raises(PlcLinkError, match=stating("opc.tcp://host:port", "modbus://host:port")):
         plc_link(url, ())
+
+
+@pytest.mark.parametrize("url", ["modbus://127.0.0.1/3", "modbus://127.0.0.1?unit=3"])
+def test_a_part_of_a_url_without_effect_is_refused(url: str) -> None:
+    with pytest.raises(PlcLinkError, match=stating(url, "expected modbus://host:port")):
+        plc_link(url, ())
+
+
+def test_a_url_with_a_password_is_refused_and_not_printed() -> None:
+    with pytest.raises(PlcLinkError, match=stating("127.0.0.1", "user in the URL", "--user")) as refused:
+        plc_link("opc.tcp://jo:secret@127.0.0.1:1", ())
+    assert "secret" not in str(refused.value)
 
 
 def test_a_variable_that_the_plc_lacks_is_named(plcs: Callable[[str], Plc], tmp_path: Path) -> None:

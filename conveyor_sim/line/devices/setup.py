@@ -28,6 +28,9 @@ BRANCHES = {(JITTER, "infeeds"): (), (BAD, "infeeds"): (1,), (BAD, "machines"): 
 """Prefixes of the spawn keys in recordings from before streams were named, by purpose and field of the scene. The index
 in the field follows."""
 
+MOST_TICKS = 2**52
+"""Largest number of ticks of a device: checkpoints store integers up to 2**53."""
+
 D = TypeVar("D", bound=Device)
 
 
@@ -69,8 +72,8 @@ class DeviceSetup:
         return self.index(field, name) + (len(self.scene.belts) if field == "drives" else 0)
 
     def ticks(self, seconds: float) -> int:
-        """Return the first tick at which `seconds` have passed."""
-        return math.ceil(seconds / self.scene.tick - 1e-9)
+        """Return the first tick at which `seconds` have passed, at most MOST_TICKS."""
+        return min(math.ceil(seconds / self.scene.tick - 1e-9), MOST_TICKS)
 
     def entry(self, bottle: str, direction: float, speed: float) -> BottleEntry:
         """Return the entry of bottles of a type in a direction (rad) at a speed (m/s)."""

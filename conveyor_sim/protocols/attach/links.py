@@ -41,11 +41,15 @@ def plc_link(
     try:
         parts = urlsplit(url)
         host, port = parts.hostname, parts.port
+        if host is not None and not (host.isprintable() and host.encode("idna")):
+            host = None
     except ValueError:
         host = port = None
-    if not host or parts.scheme not in LIBRARIES:
+    if not host or port == 0 or parts.scheme not in LIBRARIES:
         expected = ", ".join(("opc.tcp://host:port", "modbus://host:port", *FORMS.values()))
         raise PlcLinkError(f"{printable(url)} given, expected one of {expected}")
+    if "@" in parts.netloc:  # recordings have the URL, and must have no password
+        raise PlcLinkError(f"{printable(host)}: given with a user in the URL, expected none (OPC UA: --user)")
     if access != ANONYMOUS and parts.scheme != "opc.tcp":
         raise PlcLinkError(f"{parts.scheme}://: given with a user or security, expected neither, or opc.tcp://")
     if parts.scheme in FORMS:
@@ -54,6 +58,8 @@ def plc_link(
             raise ImportError(f"{PLC}: {library} is not installed: pip install 'conveyor_sim[{extra}]'")
         return vendor_link(url, parts, mapped)
     if parts.scheme == "modbus":
+        if parts.path.strip("/") or parts.query or parts.fragment:
+            raise PlcLinkError(f"{printable(url)} given, expected modbus://host:port and nothing after it")
         from conveyor_sim.protocols.attach.modbus_link import ModbusLink
 
         return ModbusLink(host, port or 502, mapped)

@@ -18,13 +18,13 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.commands.refusal import ALARMS
-from conveyor_sim.line.tag import CONTROLLED, SIGNALS, Tag, count, switch
+from conveyor_sim.line.tag import CONTROLLED, PANEL, SIGNALS, Tag, count, switch
 from conveyor_sim.protocols.tags.handshake import TARGET, TICK
 from conveyor_sim.support.files import MB, FileError, read_file
 from conveyor_sim.support.printable import printable
@@ -80,45 +80,64 @@ def read_tag_map(path: Path, tags: Sequence[Tag]) -> TagMap:
     """Return the map in a file, for a line with these tags. Raise TagMapError."""
     try:
         text = read_file(path, MB).decode("utf-8-sig")
-        rows = list(csv.reader(io.StringIO(text), strict=True))
-    except (FileError, csv.Error) as error:
+    except FileError as error:
         raise TagMapError(f"{path}: {error}, expected a CSV file of tags") from error
     except UnicodeDecodeError as error:
         raise TagMapError(f"{path}: is not UTF-8, expected a CSV file of tags") from error
-    columns = tuple(rows[0]) if rows else ()
+    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
+    try:
+        rows = [(reader.line_num, cells) for cells in reader]
+    except csv.Error as error:
+        raise TagMapError(f"{path}: line {reader.line_num}: {error}, expected a CSV file of tags") from error
+    columns = tuple(rows[0][1]) if rows else ()
     if columns not in (COLUMNS, (*COLUMNS, NOTE)):
-        header = printable(",".join(rows[0])) if rows else "nothing"
+        header = printable(",".join(rows[0][1])) if rows else "nothing"
         raise TagMapError(f"{path}: line 1: {header} given, expected {','.join(COLUMNS)}")
     known = mappable(tags)
     mapped: dict[str, MappedTag] = {}
-    for number, cells in enumerate(rows[1:], start=2):
+    for number, cells in rows[1:]:
         if not cells:
             continue
         where = f"{path}: line {number}"
         if len(cells) != len(columns) or not cells[1]:
             raise TagMapError(f"{where}: {printable(','.join(cells))} given, expected a tag and its place in the PLC")
-        name, theirs = cells[:2]
+        name, theirs = cells[0].strip(), cells[1]
         if not name and len(cells) > len(COLUMNS):
             continue
         tag = known.get(name) or _of_the_plc(name)
         if tag is None:
             expected = "expected a signal or command of the line, alarms/<name> or plc/<name>"
+            if any(name == each.name and each.role == PANEL for each in tags):
+                expected = f"an input of the panel that operators set, {expected}"
             raise TagMapError(f"{where}: {printable(name)} given, {expected} (conveyor-sim tags lists them)")
         if name in mapped:
             raise TagMapError(f"{where}: {printable(name)} given twice")
         mapped[name] = MappedTag(tag, theirs, where)
     if not mapped:
         raise TagMapError(f"{path}: has no tag, expected one or more")
+    _require_apart(mapped.values())
     tick, target = mapped.pop(TICK, None), mapped.pop(TARGET, None)
     own = tuple(each for name, each in mapped.items() if name.startswith(OWN))
-    written = tuple(each for each in mapped.values() if each.tag.role in SIGNALS and each not in own)
-    read = tuple(each for each in mapped.values() if each not in (*written, *own))
+    written = tuple(each for each in mapped.values() if each.is_written)
+    read = tuple(each for name, each in mapped.items() if not (each.is_written or name.startswith(OWN)))
     return TagMap(written, read, own, tick, target)
 
 
 def mappable(tags: Sequence[Tag]) -> dict[str, Tag]:
     """Return the tags of a line that a map may name, and those of the handshake, by name."""
     return {tag.name: tag for tag in tags if tag.role in (*SIGNALS, *CONTROLLED)} | _HANDSHAKE
+
+
+def _require_apart(mapped: Iterable[MappedTag]) -> None:
+    """Raise TagMapError for a signal in the place of another signal or of a command, which it would overwrite."""
+    taken: dict[str, MappedTag] = {}
+    for each in mapped:
+        if each.tag.name.startswith(OWN):
+            continue
+        other = taken.setdefault(each.theirs.strip(), each)
+        if other is not each and (each.is_written or other.is_written):
+            expected = f"expected a place that {printable(other.tag.name)} does not have"
+            raise TagMapError(f"{each.where}: {printable(each.theirs)} given, {expected}")
 
 
 def _of_the_plc(name: str) -> Tag | None:

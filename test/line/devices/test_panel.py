@@ -102,6 +102,16 @@ def test_bounce_is_drawn_from_the_seed_and_loses_no_press() -> None:
     assert any(course(lined(seed=seed)) != first for seed in (2, 3))
 
 
+def test_a_checkpoint_holds_a_bounce_of_any_length(tmp_path: Path) -> None:
+    sim = lined({"worn": {"kind": "button", "bounce": 1e20}})
+    act(sim, worn__press=1.0)
+    sim.save(tmp_path / "checkpoint")
+    again = Simulation.load(tmp_path / "checkpoint")
+    for each in (sim, again):
+        each.advance(5)
+    assert again.state_hash() == sim.state_hash()
+
+
 def test_selector_and_number() -> None:
     sim = lined()
     assert (read(sim, "panel/mode/position"), read(sim, "panel/speed/value")) == (1.0, 0.3)
