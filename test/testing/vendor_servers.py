@@ -14,7 +14,7 @@ import sys
 import tempfile
 import time
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -171,19 +171,24 @@ class EipPlc(VendorPlc):
             await asyncio.sleep(0.01)
         port = int(line[1])
         self._client = PLC("127.0.0.1", 0, 60.0, port=port)
+        self._one_request = asyncio.Lock()  # a test writes while the program scans, over the same connection
         return f"eip://127.0.0.1:{port}"
 
     async def get(self, name: str) -> float:
-        return float((await asyncio.to_thread(self._client.Read, self.place(name))).Value)
+        return float((await self._ask(self._client.Read, self.place(name))).Value)
 
     async def get_all(self, names: Sequence[str]) -> list[float]:
-        answers = await asyncio.to_thread(self._client.Read, [self.place(name) for name in names])
+        answers = await self._ask(self._client.Read, [self.place(name) for name in names])
         return [float(answer.Value) for answer in answers]
 
     async def put(self, values: Mapping[str, float]) -> None:
         types = {"tick": int, "target": int, "bottles": int, "full": bool}
         pairs = [(self.place(name), types.get(name, float)(value)) for name, value in values.items()]
-        await asyncio.to_thread(self._client.Write, pairs)
+        await self._ask(self._client.Write, pairs)
+
+    async def _ask(self, request: Callable[[Any], Any], of: Any) -> Any:
+        async with self._one_request:
+            return await asyncio.to_thread(request, of)
 
     def place(self, name: str) -> str:
         return re.sub(r"^fill(\d+)$", r"fill[\1]", name)
