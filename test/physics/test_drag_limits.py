@@ -147,6 +147,9 @@ def test_implicit_friction_stops_a_slip(integrator: str) -> None:
         if integrator == "velocity_verlet":
             # The kick of a step is the mean of two forces, so the slip may overshoot.
             assert all(np.all(np.abs(after) < speeds) for after in slips[1:])
+        elif integrator == "semi_implicit_euler":
+            # Friction is that of a slip up to v_lim/(2 mu g) before the end of the step: a slip may reverse by v_lim/2.
+            assert all(np.all((after >= -0.5 * LIMIT) & (np.abs(after) < speeds)) for after in slips[1:])
         else:
             assert all(np.all((after >= 0.0) & (after < before)) for before, after in pairwise(slips))
         assert np.all(np.abs(slips[-1]) < (0.1 if steps < 1.0 else 1e-5) * speeds)
@@ -174,7 +177,7 @@ def test_implicit_friction_is_stable_in_a_packing(integrator: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("integrator", "expected"), [("semi_implicit_euler", 1.0), ("velocity_verlet", 2.0), ("rk4", 4.0)]
+    ("integrator", "expected"), [("semi_implicit_euler", 2.0), ("velocity_verlet", 2.0), ("rk4", 4.0)]
 )
 def test_implicit_friction_has_the_order_of_the_method(integrator: str, expected: float) -> None:
     """Below v_lim: u = v/v_lim falls by du/dt = -(mu g/v_lim)(2 u - u^2)."""
