@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import asyncio
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -134,19 +133,22 @@ def _trust(url: str, access: PlcAccess, console: Console) -> None:
         raise ConveyorError("attach: URL alone given, expected SCENE and URL, or --browse or --trust")
     _require_opcua(url, "--trust")
     from conveyor_sim.protocols.attach.opcua_client import trust_server
+    from conveyor_sim.protocols.hosting.server_thread import ServerThread
 
-    asyncio.run(trust_server(url, access, console.print))
+    with ServerThread() as thread:
+        thread.run(trust_server(url, access, console.print))
 
 
 def _browsed(url: str, access: PlcAccess, console: Console, scene: str | None, options: SceneOptions) -> str:
     """Return the map of a PLC's variables, with the names of the tags of a scene where they match."""
     _require_opcua(url, "--browse")
     from conveyor_sim.protocols.attach.opcua_browse import browse, tag_rows
+    from conveyor_sim.protocols.hosting.server_thread import ServerThread
     from conveyor_sim.report.tags import line_tags
 
     tags = () if scene is None else line_tags(options.load(scene))
-    with console.status(f"{url}: browsing") as status:
-        variables = asyncio.run(
+    with console.status(f"{url}: browsing") as status, ServerThread() as thread:
+        variables = thread.run(
             browse(url, access, console.print, lambda nodes, numbers: status.update(f"{nodes} nodes, {numbers} tags"))
         )
     console.print(f"{url}: {len(variables)} variables that hold a number or a bool")

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from facts import missing, stating
+from protocols.waiting import alone
 from testing.conftest import LINE
 from testing.faulty_proxy import FaultyProxy
 from testing.plc_servers import ALARM, OWN, write_map
@@ -94,7 +95,7 @@ def sha256(folder: Path, name: str = "server") -> str:
 def trusting(folder: Path, server: VendorServer) -> PlcAccess:
     """Access by name to the server, which is trusted."""
     access = PlcAccess(USER, PASSWORD, certificates=folder / "own")
-    asyncio.run(trust_server(server.url, access._replace(trust=sha256(folder)), lambda _: None))
+    alone(trust_server(server.url, access._replace(trust=sha256(folder)), lambda _: None))
     return access
 
 
@@ -111,7 +112,7 @@ def connect(url: str, tags: Path, access: PlcAccess) -> list[str]:
         finally:
             await link.close()
 
-    asyncio.run(come())
+    alone(come())
     return said
 
 
@@ -200,7 +201,8 @@ def test_a_server_without_the_kind_of_user_is_refused(server: VendorServer, fold
 
 
 def test_a_variable_that_can_t_be_written_is_named(server: VendorServer, trusting: PlcAccess, tmp_path: Path) -> None:
-    tags = write_map(tmp_path / "tags.csv", {**PLACES, BOTTLES: PLACES[SETPOINT]})
+    others = {ours: theirs for ours, theirs in PLACES.items() if ours not in (BOTTLES, SETPOINT)}
+    tags = write_map(tmp_path / "tags.csv", {BOTTLES: PLACES[SETPOINT], **others})
     with pytest.raises(TagMapError, match=stating("line 2", "GVL.speed", "read-only", BOTTLES)):
         connect(server.url, tags, trusting)
 
@@ -321,7 +323,7 @@ def test_an_attacker_can_t_hide_the_encrypted_endpoint(
             return data.replace(encrypted, signed)
         return data
 
-    asyncio.run(trust_server(url_of(proxy), trusting._replace(trust=sha256(folder)), lambda _: None))
+    alone(trust_server(url_of(proxy), trusting._replace(trust=sha256(folder)), lambda _: None))
     proxy.fault = hide
     with pytest.raises(PlcRefusedError, match=stating(url_of(proxy), "better endpoint", "attacker")):
         connect(url_of(proxy), tags, trusting)
@@ -433,7 +435,7 @@ def test_a_spoiled_answer_ends_the_test_with_one_error(
 ) -> None:
     """No traceback, and no command from an answer that is not the PLC's."""
     monkeypatch.setattr(opcua_client, "PATIENCE", 0.5)
-    asyncio.run(trust_server(url_of(proxy), trusting._replace(trust=sha256(folder)), lambda _: None))
+    alone(trust_server(url_of(proxy), trusting._replace(trust=sha256(folder)), lambda _: None))
     with Scenario(LINE) as plant:
         plant.attach_plc(url_of(proxy), tags, access=trusting)
         plant.run_for(0.1)
@@ -482,7 +484,7 @@ def test_a_port_that_is_no_opc_ua_server_is_one_error(
             with pytest.raises(PlcLinkError, match=stating(url)):
                 await plc_link(url, ()).connect()
 
-    asyncio.run(come())
+    alone(come())
     assert capfd.readouterr().err == ""
 
 

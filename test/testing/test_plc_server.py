@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import re
 import signal
 import time
@@ -16,6 +15,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from facts import missing, stating
+from protocols.waiting import alone
 from testing.conftest import LINE
 from testing.plc_servers import ALARM, KINDS, OWN, program, write_map
 from testing.soft_plc import BOTTLES, SETPOINT
@@ -298,8 +298,8 @@ def test_a_plc_that_has_lost_its_security_is_refused(plcs: Callable[[str], Plc],
             await link.close()
 
     with pytest.raises(PlcRefusedError, match=stating(plc.url, "certificate is trusted", "--security none")):
-        asyncio.run(come("best"))
-    asyncio.run(come("none"))
+        alone(come("best"))
+    alone(come("none"))
 
 
 class FreeRunning:
