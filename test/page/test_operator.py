@@ -47,6 +47,7 @@ def panel(users: Path) -> Iterator[Live]:
 def page(open_page: Callable[[str], Any], panel: Live) -> Any:
     opened = open_page(panel.url)
     signed_in(opened, "jo")
+    opened.wait_for_selector(f"{START}:enabled")  # a disabled button takes no focus
     return opened
 
 
