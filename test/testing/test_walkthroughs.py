@@ -15,6 +15,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
+from protocols.waiting import until
 from shell_blocks import Block, Command, snippets
 
 from conveyor_sim.support.child_process import Process
@@ -42,7 +43,8 @@ def stack() -> Iterator[ExitStack]:
 def test_a_walkthrough_ends_in_a_test_that_passes(page: str, pytester: pytest.Pytester, stack: ExitStack) -> None:
     library, port = PAGES[page]
     pytest.importorskip(library)
-    text = re.sub(rf"\b{port}\b", free_port(), (ROOT / "docs" / "plc" / f"{page}.md").read_text())
+    free = free_port()
+    text = re.sub(rf"\b{port}\b", free, (ROOT / "docs" / "plc" / f"{page}.md").read_text())
     folder = pytester.path
     shutil.copy(ROOT / "examples" / "my_line.yaml", folder)
     attached = []
@@ -56,6 +58,7 @@ def test_a_walkthrough_ends_in_a_test_that_passes(page: str, pytester: pytest.Py
             words = [sys.executable, *each.words[1:-1]]
             name = shlex.join(each.words[1:3]).replace("/", "_")
             stack.callback(_started(name, words, folder).stop)
+            until(lambda: _listens(int(free)), f"{name} listens")  # a test starts at once here, without imports
         elif isinstance(each, Command) and each.words[0] == "pytest":
             pytester.runpytest_inprocess(*PLUGIN, *each.words[1:]).assert_outcomes(passed=1)
         elif isinstance(each, Command) and each.words[0] == "conveyor-sim":
@@ -76,7 +79,12 @@ def test_a_walkthrough_ends_in_a_test_that_passes(page: str, pytester: pytest.Py
     assert attach.exit_code == 0 and "0 refused" in attach.log.read_text(), attach.last_words()
 
 
+def _listens(port: int) -> bool:
+    with socket.socket() as client:
+        return client.connect_ex(("127.0.0.1", port)) == 0
+
+
 def _started(name: str, words: list[str], folder: Path) -> Process:
-    """Start a command in a folder; it listens within the time that the next one takes to import."""
+    """Start a command in a folder."""
     lead = [sys.executable, "-c", f"import os, sys; os.chdir({str(folder)!r}); os.execv(sys.argv[1], sys.argv[1:])"]
     return Process(name, [*lead, *words], {**ENVIRONMENT, "PYTHONUNBUFFERED": "1"}, folder)
