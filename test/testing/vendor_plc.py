@@ -78,7 +78,7 @@ def make_certificate(
 
 
 class VendorPlc(OpcUaPlc):
-    """The same program, behind another server."""
+    """Server of another vendor with the same program."""
 
     def __init__(self, settings: Settings) -> None:
         super().__init__()
