@@ -3,15 +3,18 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from conveyor_sim.scene.geometry import Array, RailShape, SegmentPiece
-from conveyor_sim.scene.parts.movers import Diverter, Mover, Pusher, SwingingGate
+from conveyor_sim.scene.parts.movers import Diverter, Mover, Positioned, Pusher, SwingingDivider, SwingingGate
 from conveyor_sim.scene.problems import Path
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.scene.types import XY
+
+MOVER_FIELDS = ("gates", "pushers", "diverters", "dividers", "adjustable")
+"""Fields of a scene with movers, in the order of their rails' numbers."""
 
 
 @dataclass(frozen=True)
@@ -74,14 +77,16 @@ class MovingShape:
 
 
 def movers_of(scene: Scene) -> Iterator[tuple[Path, Mover]]:
-    """Yield every gate, pusher and diverter with its path, in the order of their rails' numbers."""
-    for field, movers in (("gates", scene.gates), ("pushers", scene.pushers), ("diverters", scene.diverters)):
-        for name, mover in movers.items():
+    """Yield every mover with its path, in the order of their rails' numbers."""
+    for field in MOVER_FIELDS:
+        for name, mover in getattr(scene, field).items():
             yield (field, name), mover
 
 
 def moving_shape(path: Path, mover: Mover) -> MovingShape:
     """Return the shape of a mover."""
+    if isinstance(mover, Positioned):
+        return _positioned_shape(path, mover)
     if isinstance(mover, (SwingingGate, Diverter)):
         along, turning, stroke = (0.0, 0.0), math.copysign(1.0, mover.angle), abs(mover.angle)
     else:
@@ -101,6 +106,27 @@ def moving_shape(path: Path, mover: Mover) -> MovingShape:
         limit=mover.drive_limit,
         mass=mover.drive_mass,
     )
+
+
+def _positioned_shape(path: Path, mover: Positioned) -> MovingShape:
+    """Return the shape of a mover with several positions. It is at home at the least of them."""
+    swings, (least, greatest) = isinstance(mover, SwingingDivider), (min(mover.positions), max(mover.positions))
+    zero = MovingShape(
+        name="/".join(str(part) for part in path),
+        material=mover.material,
+        start=mover.from_,
+        end=mover.to,
+        along=(0.0, 0.0) if swings else (math.cos(mover.direction), math.sin(mover.direction)),
+        turning=1.0 if swings else 0.0,
+        stroke=greatest - least,
+        max_speed=mover.max_speed,
+        acceleration=mover.acceleration,
+        first=mover.positions[min(mover.index, len(mover.positions) - 1)] - least,
+        limit=mover.drive_limit,
+        mass=mover.drive_mass,
+    )
+    home = zero.at(least)
+    return replace(zero, start=home.p1, end=home.p2)
 
 
 def moving_shapes(scene: Scene) -> list[MovingShape]:
