@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from conveyor_sim.scene.bodies import AxisShape, BodyShape
 from conveyor_sim.scene.geometry import Array, RailShape, SegmentPiece
 from conveyor_sim.scene.parts.movers import Diverter, Mover, Positioned, Pusher, SwingingDivider, SwingingGate
 from conveyor_sim.scene.problems import Path
@@ -132,3 +133,39 @@ def _positioned_shape(path: Path, mover: Positioned) -> MovingShape:
 def moving_shapes(scene: Scene) -> list[MovingShape]:
     """Return the moving rails. Their numbers follow those of the rails at rest."""
     return [moving_shape(path, mover) for path, mover in movers_of(scene)]
+
+
+def mover_shape(path: Path, mover: Mover) -> tuple[BodyShape, AxisShape]:
+    """Return the straight rail of a mover, and the axis that moves only this rail."""
+    if isinstance(mover, (SwingingGate, Diverter)):
+        along, turning, stroke = (0.0, 0.0), math.copysign(1.0, mover.angle), abs(mover.angle)
+    else:
+        along, turning, stroke = (math.cos(mover.direction), math.sin(mover.direction)), 0.0, mover.stroke
+    starts_open = not isinstance(mover, (Pusher, Diverter)) and mover.open
+    name = "/".join(str(part) for part in path)
+    piece = SegmentPiece(mover.from_, mover.to)
+    body = BodyShape(name, mover.material, (piece,), axis=name, pivot=mover.from_, along=along, turning=turning)
+    axis = AxisShape(
+        name=name,
+        kind="position",
+        stroke=stroke,
+        max_speed=mover.max_speed,
+        acceleration=mover.acceleration,
+        first=stroke if starts_open else 0.0,
+        limit=mover.drive_limit,
+        inertia=mover.drive_mass,
+    )
+    return body, axis
+
+
+def bodies_of(scene: Scene) -> list[BodyShape]:
+    """Return all bodies. Bodies of one machine follow each other; machines have the rail numbers after rails at rest.
+
+    Those of gates, pushers and diverters come first.
+    """
+    return [mover_shape(path, mover)[0] for path, mover in movers_of(scene)]
+
+
+def axes_of(scene: Scene) -> list[AxisShape]:
+    """Return all axes in the order of their numbers: those of gates, pushers and diverters, then named ones."""
+    return [mover_shape(path, mover)[1] for path, mover in movers_of(scene)]
