@@ -17,7 +17,7 @@ from conveyor_sim.scene.words import shown
 
 
 def changeover(scene: Scene, format: str) -> dict[str, float]:
-    """Return commands by name that give a running line of a scene the speeds, rates, bottle types and guides of a format.
+    """Return commands by name that set speeds, rates, bottle types and guides of a running line to a format.
 
     They set everything in which the formats differ, so they do not depend on the format that the line has now.
     Raise SceneError, in one sentence, for an unknown format, and for one that differs in other fields.
@@ -32,8 +32,8 @@ def changeover(scene: Scene, format: str) -> dict[str, float]:
     if other is not None:
         field, now, then = other
         raise SceneError(
-            f"{scene.source_name}: formats.{format}: changes {field} from {now} to {then}, expected only speeds, rates, "
-            "bottle types and settings of guides in a run: choose it at the start"
+            f"{scene.source_name}: formats.{format}: changes {field} from {now} to {then}, expected only speeds, "
+            "rates, bottle types and settings of guides in a run: choose it at the start"
         )
     wanted = dict(_changeable(target))
     changed = [path for path, value in wanted.items() if any(version.get(path) != value for version in versions)]

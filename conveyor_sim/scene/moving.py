@@ -111,14 +111,18 @@ def moving_shape(path: Path, mover: Mover) -> MovingShape:
 
 def _positioned_shape(path: Path, mover: Positioned) -> MovingShape:
     """Return the shape of a mover with several positions. It is at home at the least of them."""
-    swings, (least, greatest) = isinstance(mover, SwingingDivider), (min(mover.positions), max(mover.positions))
+    least, greatest = min(mover.positions), max(mover.positions)
+    if isinstance(mover, SwingingDivider):
+        along, turning = (0.0, 0.0), 1.0
+    else:
+        along, turning = (math.cos(mover.direction), math.sin(mover.direction)), 0.0
     zero = MovingShape(
         name="/".join(str(part) for part in path),
         material=mover.material,
         start=mover.from_,
         end=mover.to,
-        along=(0.0, 0.0) if swings else (math.cos(mover.direction), math.sin(mover.direction)),
-        turning=1.0 if swings else 0.0,
+        along=along,
+        turning=turning,
         stroke=greatest - least,
         max_speed=mover.max_speed,
         acceleration=mover.acceleration,
@@ -137,6 +141,8 @@ def moving_shapes(scene: Scene) -> list[MovingShape]:
 
 def mover_shape(path: Path, mover: Mover) -> tuple[BodyShape, AxisShape]:
     """Return the straight rail of a mover, and the axis that moves only this rail."""
+    if isinstance(mover, Positioned):
+        return _positioned_body(path, mover)
     if isinstance(mover, (SwingingGate, Diverter)):
         along, turning, stroke = (0.0, 0.0), math.copysign(1.0, mover.angle), abs(mover.angle)
     else:
@@ -154,6 +160,32 @@ def mover_shape(path: Path, mover: Mover) -> tuple[BodyShape, AxisShape]:
         first=stroke if starts_open else 0.0,
         limit=mover.drive_limit,
         inertia=mover.drive_mass,
+    )
+    return body, axis
+
+
+def _positioned_body(path: Path, mover: Positioned) -> tuple[BodyShape, AxisShape]:
+    """Return the rail of a mover with several positions, and its axis. It is at home at the least position."""
+    shape = _positioned_shape(path, mover)
+    piece = SegmentPiece(shape.start, shape.end)
+    body = BodyShape(
+        shape.name,
+        shape.material,
+        (piece,),
+        axis=shape.name,
+        pivot=shape.start,
+        along=shape.along,
+        turning=shape.turning,
+    )
+    axis = AxisShape(
+        name=shape.name,
+        kind="position",
+        stroke=shape.stroke,
+        max_speed=shape.max_speed,
+        acceleration=shape.acceleration,
+        first=shape.first,
+        limit=shape.limit,
+        inertia=shape.mass,
     )
     return body, axis
 
