@@ -7,6 +7,7 @@ from typing import Any
 from conveyor_sim.line.device import Device
 from conveyor_sim.line.devices.belt import belt_device
 from conveyor_sim.line.devices.crossing import CounterDevice, InspectionDevice
+from conveyor_sim.line.devices.divider import PositionedDevice
 from conveyor_sim.line.devices.drive import NamedDriveDevice
 from conveyor_sim.line.devices.indicator import IndicatorDevice
 from conveyor_sim.line.devices.infeed import InfeedDevice
@@ -42,6 +43,8 @@ DEVICES: Mapping[str, Callable[[str, Any, DeviceSetup], Device]] = {
     "gate": Mover,
     "pusher": Mover,
     "diverter": Mover,
+    "divider": PositionedDevice,
+    "adjustable": PositionedDevice,
     "infeed": InfeedDevice,
     "outfeed": OutfeedDevice,
     "source": SourceDevice,

@@ -40,6 +40,14 @@ pushers:
   p: {from: [2, 0], to: [3, 0], direction: 90 deg, stroke: 0.5, max_speed: 1, acceleration: 5, material: rail}
 diverters:
   d: {from: [4, 0], to: [4.5, 0], angle: 45 deg, max_speed: 1, acceleration: 5, material: rail}
+dividers:
+  v:
+    {kind: swing, from: [4, 0.5], to: [4.5, 0.5], positions: [-20 deg, 0 deg, 20 deg], max_speed: 1,
+     acceleration: 5, material: rail}
+adjustable:
+  a:
+    {from: [7, 0.1], to: [7.5, 0.1], direction: 90 deg, positions: [0, 10 mm], max_speed: 1, acceleration: 5,
+     material: rail}
 infeeds:
   i: {bottle: bottle, types: [bottle], position: [0.1, 0.5], direction: 0, speed: 0.5, rate: 1, rate_limit: 2}
 outfeeds: {o: {region: [[9.5, 0], [10, 0], [10, 1]]}}
@@ -67,6 +75,7 @@ PAGES: dict[str, dict[str, tuple[str, ...]]] = {
     "parts/infeeds": {"feeds": ("infeeds", "outfeeds"), "spills": ("spills",)},
     "parts/machines": {"machines": ("machines",)},
     "parts/movers": {"movers": ("gates", "pushers", "diverters")},
+    "parts/dividers": {"dividers": ("dividers", "adjustable")},
     "parts/photo_eyes": {"photo_eyes": ("photo_eyes",)},
     "parts/zones": {"zones": ("zones",), "counters": ("counters",)},
     "parts/indicators": {"indicators": ("indicators",)},

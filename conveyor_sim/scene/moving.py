@@ -3,15 +3,19 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from conveyor_sim.scene.bodies import AxisShape, BodyShape
 from conveyor_sim.scene.geometry import Array, RailShape, SegmentPiece
-from conveyor_sim.scene.parts.movers import Diverter, Mover, Pusher, SwingingGate
+from conveyor_sim.scene.parts.movers import Diverter, Mover, Positioned, Pusher, SwingingDivider, SwingingGate
 from conveyor_sim.scene.problems import Path
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.scene.types import XY
+
+MOVER_FIELDS = ("gates", "pushers", "diverters", "dividers", "adjustable")
+"""Fields of a scene with movers, in the order of their rails' numbers."""
 
 
 @dataclass(frozen=True)
@@ -74,14 +78,16 @@ class MovingShape:
 
 
 def movers_of(scene: Scene) -> Iterator[tuple[Path, Mover]]:
-    """Yield every gate, pusher and diverter with its path, in the order of their rails' numbers."""
-    for field, movers in (("gates", scene.gates), ("pushers", scene.pushers), ("diverters", scene.diverters)):
-        for name, mover in movers.items():
+    """Yield every mover with its path, in the order of their rails' numbers."""
+    for field in MOVER_FIELDS:
+        for name, mover in getattr(scene, field).items():
             yield (field, name), mover
 
 
 def moving_shape(path: Path, mover: Mover) -> MovingShape:
     """Return the shape of a mover."""
+    if isinstance(mover, Positioned):
+        return _positioned_shape(path, mover)
     if isinstance(mover, (SwingingGate, Diverter)):
         along, turning, stroke = (0.0, 0.0), math.copysign(1.0, mover.angle), abs(mover.angle)
     else:
@@ -103,6 +109,95 @@ def moving_shape(path: Path, mover: Mover) -> MovingShape:
     )
 
 
+def _positioned_shape(path: Path, mover: Positioned) -> MovingShape:
+    """Return the shape of a mover with several positions. It is at home at the least of them."""
+    least, greatest = min(mover.positions), max(mover.positions)
+    if isinstance(mover, SwingingDivider):
+        along, turning = (0.0, 0.0), 1.0
+    else:
+        along, turning = (math.cos(mover.direction), math.sin(mover.direction)), 0.0
+    zero = MovingShape(
+        name="/".join(str(part) for part in path),
+        material=mover.material,
+        start=mover.from_,
+        end=mover.to,
+        along=along,
+        turning=turning,
+        stroke=greatest - least,
+        max_speed=mover.max_speed,
+        acceleration=mover.acceleration,
+        first=mover.positions[min(mover.index, len(mover.positions) - 1)] - least,
+        limit=mover.drive_limit,
+        mass=mover.drive_mass,
+    )
+    home = zero.at(least)
+    return replace(zero, start=home.p1, end=home.p2)
+
+
 def moving_shapes(scene: Scene) -> list[MovingShape]:
     """Return the moving rails. Their numbers follow those of the rails at rest."""
     return [moving_shape(path, mover) for path, mover in movers_of(scene)]
+
+
+def mover_shape(path: Path, mover: Mover) -> tuple[BodyShape, AxisShape]:
+    """Return the straight rail of a mover, and the axis that moves only this rail."""
+    if isinstance(mover, Positioned):
+        return _positioned_body(path, mover)
+    if isinstance(mover, (SwingingGate, Diverter)):
+        along, turning, stroke = (0.0, 0.0), math.copysign(1.0, mover.angle), abs(mover.angle)
+    else:
+        along, turning, stroke = (math.cos(mover.direction), math.sin(mover.direction)), 0.0, mover.stroke
+    starts_open = not isinstance(mover, (Pusher, Diverter)) and mover.open
+    name = "/".join(str(part) for part in path)
+    piece = SegmentPiece(mover.from_, mover.to)
+    body = BodyShape(name, mover.material, (piece,), axis=name, pivot=mover.from_, along=along, turning=turning)
+    axis = AxisShape(
+        name=name,
+        kind="position",
+        stroke=stroke,
+        max_speed=mover.max_speed,
+        acceleration=mover.acceleration,
+        first=stroke if starts_open else 0.0,
+        limit=mover.drive_limit,
+        inertia=mover.drive_mass,
+    )
+    return body, axis
+
+
+def _positioned_body(path: Path, mover: Positioned) -> tuple[BodyShape, AxisShape]:
+    """Return the rail of a mover with several positions, and its axis. It is at home at the least position."""
+    shape = _positioned_shape(path, mover)
+    piece = SegmentPiece(shape.start, shape.end)
+    body = BodyShape(
+        shape.name,
+        shape.material,
+        (piece,),
+        axis=shape.name,
+        pivot=shape.start,
+        along=shape.along,
+        turning=shape.turning,
+    )
+    axis = AxisShape(
+        name=shape.name,
+        kind="position",
+        stroke=shape.stroke,
+        max_speed=shape.max_speed,
+        acceleration=shape.acceleration,
+        first=shape.first,
+        limit=shape.limit,
+        inertia=shape.mass,
+    )
+    return body, axis
+
+
+def bodies_of(scene: Scene) -> list[BodyShape]:
+    """Return all bodies. Bodies of one machine follow each other; machines have the rail numbers after rails at rest.
+
+    Those of gates, pushers and diverters come first.
+    """
+    return [mover_shape(path, mover)[0] for path, mover in movers_of(scene)]
+
+
+def axes_of(scene: Scene) -> list[AxisShape]:
+    """Return all axes in the order of their numbers: those of gates, pushers and diverters, then named ones."""
+    return [mover_shape(path, mover)[1] for path, mover in movers_of(scene)]

@@ -31,6 +31,7 @@ PAGES: dict[str, tuple[str, ...]] = {
     "infeeds": ("`infeeds`", "`outfeeds`", "`spills`"),
     "machines": ("`machines`", "`acting_times`"),
     "materials": ("`contacts`", "of a contact", "`base`", "`floor`", "`bottle_types`"),
+    "dividers": ("`dividers`", "`adjustable`"),
     "movers": ("`gates`", "`pushers`", "`diverters`"),
     "panel": ("`panel`",),
     "photo_eyes": ("`photo_eyes`",),

@@ -25,7 +25,7 @@ from conveyor_sim.scene.parts.device_part import DevicePart, Entry, Exit, Giver
 from conveyor_sim.scene.parts.indicator import Indicator
 from conveyor_sim.scene.parts.infeed import Infeed
 from conveyor_sim.scene.parts.inspection import Inspection
-from conveyor_sim.scene.parts.movers import Diverter, Gate, Pusher
+from conveyor_sim.scene.parts.movers import AdjustableGuide, Diverter, Divider, Gate, Pusher
 from conveyor_sim.scene.parts.outfeed import Outfeed
 from conveyor_sim.scene.parts.panel import Button, EmergencyStop, Horn, Lamp, NumberField, Selector, StackLight
 from conveyor_sim.scene.parts.photo_eye import PhotoEye
@@ -288,6 +288,12 @@ class Scene(Part):
     )
     diverters: Annotated[dict[Name, Diverter], _named("diverters")] = quantity(
         "Rails that swing into the path of bottles on command and return.", default={}
+    )
+    dividers: Annotated[dict[Name, Divider], _named("dividers")] = quantity(
+        "Lane dividers and lane switches: rails that move between the positions of several lanes.", default={}
+    )
+    adjustable: Annotated[dict[Name, AdjustableGuide], _named("adjustable guides")] = quantity(
+        "Guides that a drive sets to one of several positions, such as those of formats.", default={}
     )
     floor: Annotated[
         Annotated[Floor, Tag("(floor)")] | Annotated[Literal["none"], Tag("(none)")],

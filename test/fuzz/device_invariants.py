@@ -98,7 +98,7 @@ class DeviceWatch:
             if signal.kind == "bool":
                 good = value in (0.0, 1.0)
             elif signal.kind == "count":
-                good = float(value).is_integer() and (value >= 0.0 or signal.name.endswith("/pulses"))
+                good = float(value).is_integer() and (value >= signal.low or signal.name.endswith("/pulses"))
             if not good:
                 raise Violation("signal of another type", f"{signal.name} is {value} ({signal.kind})")
 

@@ -15,6 +15,7 @@ from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.accuracy.trajectory import variant
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.errors import SimulationError
+from conveyor_sim.line.devices.divider import NAMES
 from conveyor_sim.line.devices.mover import WORDS
 from conveyor_sim.physics.effects.terms import meetings
 from conveyor_sim.scene import Scene
@@ -28,6 +29,13 @@ LEAST_HALVES = 6
 """Commands of each mover in the scene's duration, at least."""
 
 
+_COMMANDS = {
+    **{field: order for field, (order, *_) in WORDS.items()},
+    **{field: setpoint for field, (_, setpoint, _) in NAMES.items()},
+}
+"""Commands of movers, by field. Those with several positions take 0 and 1, the first two of them."""
+
+
 class Exercise:
     """Sends every moving rail of a scene to and fro, one after the other. A run with it depends on the scene alone.
 
@@ -38,7 +46,8 @@ class Exercise:
         self._half = max(1, round(min(HALF, scene.duration / LEAST_HALVES) / scene.tick))
         """Ticks between two commands of one mover."""
         self._movers = [
-            (f"{shape.name}/{WORDS[shape.name.split('/')[0]][0]}", shape.first != 0.0) for shape in moving_shapes(scene)
+            (f"{shape.name}/{_COMMANDS[shape.name.split('/')[0]]}", shape.first != 0.0)
+            for shape in moving_shapes(scene)
         ]
         """The command of each, and whether it is at the far end of its stroke at the start."""
 

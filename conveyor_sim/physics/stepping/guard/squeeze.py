@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Gate, pusher or diverter that presses on a bottle, and the object that holds the bottle against it."""
+"""Mover that presses on a bottle, and the object that holds the bottle against it."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,13 @@ from conveyor_sim.engine.observers.contact_list import BOTTLE_BOTTLE, BOTTLE_RAI
 from conveyor_sim.physics.model import Model
 from conveyor_sim.scene.moving import MovingShape
 
-ACTIONS = {"gates": "gate {} closes on", "pushers": "pusher {} pushes", "diverters": "diverter {} swings against"}
+ACTIONS = {
+    "gates": "gate {} closes on",
+    "pushers": "pusher {} pushes",
+    "diverters": "diverter {} swings against",
+    "dividers": "divider {} moves against",
+    "adjustable": "adjustable guide {} moves against",
+}
 """Verb phrases of movers, by kind."""
 
 
