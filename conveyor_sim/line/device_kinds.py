@@ -25,8 +25,9 @@ from conveyor_sim.line.devices.reject import RejectDevice
 from conveyor_sim.line.devices.row_pusher import pusher_device
 from conveyor_sim.line.devices.setup import DeviceSetup
 from conveyor_sim.line.devices.spill import SpillDevice
+from conveyor_sim.line.machines.carrier import station_device
 from conveyor_sim.line.machines.source import SourceDevice
-from conveyor_sim.line.machines.station import SinkDevice, StationDevice
+from conveyor_sim.line.machines.station import SinkDevice
 from conveyor_sim.physics.model import Model
 from conveyor_sim.scene.schema import Scene
 
@@ -49,7 +50,7 @@ DEVICES: Mapping[str, Callable[[str, Any, DeviceSetup], Device]] = {
     "outfeed": OutfeedDevice,
     "source": SourceDevice,
     "sink": SinkDevice,
-    "station": StationDevice,
+    "station": station_device,
     "inspection": InspectionDevice,
     "reject": RejectDevice,
     "spill": SpillDevice,

@@ -57,6 +57,9 @@ machines:
   station:
     {kind: station, region: [[3, 0.6], [3.2, 0.6], [3.2, 1]], position: [3.5, 0.8], direction: 0, speed: 0.5, rate: 1,
      sets: {test: {to: 1}}, tests: {test: {low: 1}}}
+  carrier:
+    {kind: station, region: [[3.6, 0.6], [3.8, 0.6], [3.8, 1]], position: [3.9, 0.8], direction: 0, speed: 0.5, rate: 1,
+     capacity: 3, hold: 2}
   inspection: {kind: inspection, from: [5, 0], to: [5, 1]}
   reject: {kind: reject, region: [[6, 0], [6.1, 0], [6.1, 1]]}
 spills: {s: {bottle: bottle, position: [7, 0.5], count: 3}}

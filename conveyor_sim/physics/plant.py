@@ -91,7 +91,7 @@ class Plant:
     def supply(self) -> dict[str, float]:
         """Largest number of bottles of each type in a run, by type name; infinite for an infeed without end.
 
-        Types without bottles are left out.
+        Types without bottles are left out. A station may give all bottles of a type another one.
         """
         supply: dict[str, float] = {}
         for name, *_ in self.bottles:
@@ -99,7 +99,17 @@ class Plant:
         for _, entry in self.scene.entries():
             for kind in entry.kinds:
                 supply[kind] = supply.get(kind, 0.0) + (math.inf if entry.most is None else entry.most)
-        return supply
+        return self._after_changes(supply)
+
+    def _after_changes(self, supply: dict[str, float]) -> dict[str, float]:
+        """Return the supply of each type, with that of all types that stations turn into it."""
+        sources = {kind: {kind} for kind in supply}
+        changes = [change for part in self.scene.machines.values() for change in getattr(part, "changes", {}).items()]
+        for _ in self.scene.bottle_types:  # a type is reached by that many changes at most
+            for before, after in changes:
+                if before in sources:
+                    sources[after] = sources.get(after, set()) | sources[before]
+        return {kind: sum(supply[source] for source in sorted(some)) for kind, some in sources.items()}
 
     @property
     def most_bottles(self) -> int | None:

@@ -126,7 +126,10 @@ class DeviceWatch:
                 if now[f"{place}/rejected_bad"] + now[f"{place}/rejected_good"] != now[f"{place}/rejected"]:
                     raise Violation("bad and good", f"{place}: not all rejected are one or the other")
             elif isinstance(machine, Station):
-                held += now[f"{place}/holds"]
+                inside = now[f"{place}/held"] if machine.carries else now[f"{place}/holds"]
+                if inside > machine.capacity or (inside > 0.0) != now[f"{place}/holds"]:
+                    raise Violation("too full", f"{place} holds {inside}, {machine.capacity} at most")
+                held += inside
                 if now[f"{place}/good"] + now[f"{place}/defective"] != now[f"{place}/processed"]:
                     raise Violation("bad and good", f"{place}: not all processed are good or defective")
             else:

@@ -163,12 +163,23 @@ def machines(draw: st.DrawFn, frame: Frame, clear: Clear) -> Data:
         if what in ("source", "sink", "station"):
             entry["rate"] = draw(scaled(0.02, 2.0)) / frame.tick
             entry |= draw(st.sampled_from([{}, {"rate_limit": 3.0 * entry["rate"]}]))
+            if what == "station":
+                entry |= draw(_insides(entry["rate"], sorted(frame.types)))
             entry |= draw(_habits(frame.tick))
         elif what == "reject":
             entry |= {"delay": frame.tick * draw(st.sampled_from([0.0, 2.5])),
                       "window": frame.tick * draw(st.sampled_from([0.5, 4.0]))}  # fmt: skip
         found["machines"][f"machine_{n}"] = entry
     return found
+
+
+@st.composite
+def _insides(draw: st.DrawFn, rate: float, types: list[str]) -> Data:
+    """How many bottles a station holds and for how long, and what becomes of their types."""
+    capacity = draw(st.integers(1, 5))
+    found = draw(st.sampled_from([{}, {"capacity": capacity}, {"capacity": capacity, "hold": 0.6 * capacity / rate}]))
+    changes = {before: after for before in types if (after := draw(st.sampled_from(types))) != before}
+    return {**found, "changes": changes} if draw(st.booleans()) else found
 
 
 @st.composite

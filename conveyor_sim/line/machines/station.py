@@ -152,19 +152,14 @@ class SinkDevice(TakingDevice):
         return [self.works, self.cause == STARVED, *self.condition]
 
 
-EMPTY = -1
-
-
-class StationDevice(TakingDevice, Scattering):
-    """Station of a running line.
-
-    Starved: it is empty, and no bottle waits. Blocked: it is done, and there is no room for the bottle.
-    """
+class ProcessingDevice(TakingDevice, Scattering):
+    """Station of a running line: attributes, tests and types of bottles that it gives back, and its counts."""
 
     defects: dict[str, int]
     """Number of defective bottles, by test."""
 
-    def __init__(self, name: str, station: Station, setup: DeviceSetup) -> None:
+    def __init__(self, name: str, station: Station, setup: DeviceSetup, own: Sequence[Tag]) -> None:
+        """Build the tags. own: signals that show the bottles inside."""
         signals = [
             count(f"{name}/processed", "counter", "Bottles given back."),
             count(f"{name}/good", "counter", "Bottles that passed all tests."),
@@ -175,7 +170,7 @@ class StationDevice(TakingDevice, Scattering):
                 count(f"{name}/defect_{test}", "counter", f"Bottles that failed the test `{test}`.")
                 for test in station.tests
             ),
-            switch(f"{name}/holds", "status", "A bottle is in the station."),
+            *own,
             switch(f"{name}/starved", "status", "A bottle is due, and none is there.", adds_to="state"),
             switch(f"{name}/blocked", "status", "A bottle is done, and there is no room.", adds_to="state"),
             seconds(f"{name}/starved_time", "counter", "Total time starved."),
@@ -185,6 +180,8 @@ class StationDevice(TakingDevice, Scattering):
         self._heading = station.heading
         self.scatter(station, lambda: setup.random(name, JITTER))
         self._radii = setup.model.type_radius.tolist()
+        types = setup.model.bottle_types
+        self._changes = {types.index(before): types.index(after) for before, after in station.changes.items()}
         self._sets = [
             AttributeSetting(what, setting, setup.random(name, f"sets/{what}"))
             for what, setting in station.sets.items()
@@ -195,16 +192,96 @@ class StationDevice(TakingDevice, Scattering):
         named = {f"sets_{setting.attribute}": setting.random for setting in self._sets}
         self.streams = SimpleNamespace(**named, **{f"tests_{test.attribute}": test.random for test in self._tests})
         """Random streams of settings and tests."""
-        self.holding = EMPTY
-        """Id of the bottle in the station."""
-        self.begun = 0
-        """First tick of the work on it."""
-        self.cycle = 0.0
         self.processed = self.good = 0
         self.false_accepts = self.false_rejects = 0
         self.defects = dict.fromkeys(station.tests, 0)
         self.starved_ticks = 0
         self.blocked_ticks = 0
+
+    def give_back(self, bottle: int, now: ScanContext) -> int:
+        """Return a finished bottle to the line, unless the machine can't go on. Return BLOCKED without room, else NONE.
+
+        Its new type decides whether there is room.
+        """
+        place, before = self.place(), now.state.held[bottle][0]
+        after = self._changes.get(before, before)
+        if not has_room(now.state, *place, self._radii[after]):
+            self.blocked_ticks += 1
+            return BLOCKED
+        if self.goes_on():
+            self._finish(bottle, now)
+            if after != before:
+                now.state.convert(bottle, after)
+            direction, speed = self._heading
+            now.state.give(bottle, *place, *velocity(speed, direction + self.deflection))
+            self.draw_scatter()
+        return NONE
+
+    def _finish(self, bottle: int, now: ScanContext) -> None:
+        """Set the attributes of a bottle, and test it."""
+        self.processed += 1
+        for setting in self._sets:
+            if (value := setting.value(self.processed)) is not None:
+                now.set_attribute(bottle, setting.attribute, value)
+        defective = False
+        for test in self._tests:
+            within = test.within(now.attribute(bottle, test.attribute))
+            passed = test.passes(within)
+            self.false_accepts += passed and not within
+            self.false_rejects += within and not passed
+            self.defects[test.attribute] += not passed
+            defective = defective or not passed
+        if defective:
+            now.set_attribute(bottle, BAD, 1.0)
+        self.good += not defective
+
+    def counts(self) -> tuple[int, int, int]:
+        """Return processed bottles, and defective ones among them."""
+        return self.processed, self.processed - self.good, 0
+
+    def inside(self) -> Sequence[float]:
+        """Return the values of the signals that show the bottles inside."""
+        raise NotImplementedError
+
+    def values(self, now: ScanContext) -> Sequence[float]:
+        """Return the values in the order of the signals."""
+        return (
+            self.works,
+            self.processed,
+            self.good,
+            self.processed - self.good,
+            self.false_accepts,
+            self.false_rejects,
+            *self.defects.values(),
+            *self.inside(),
+            self.cause == STARVED,
+            self.cause == BLOCKED,
+            self.waited_time("starved", self.starved_ticks, now),
+            self.waited_time("blocked", self.blocked_ticks, now),
+            *self.status(),
+        )
+
+    def states(self, now: ScanContext) -> list[float]:
+        """Return running, starved, blocked, state, category and stop reason."""
+        return [self.works, self.cause == STARVED, self.cause == BLOCKED, *self.condition]
+
+
+EMPTY = -1
+
+
+class StationDevice(ProcessingDevice):
+    """Station with one bottle at a time.
+
+    Starved: it is empty, and no bottle waits. Blocked: it is done, and there is no room for the bottle.
+    """
+
+    def __init__(self, name: str, station: Station, setup: DeviceSetup) -> None:
+        super().__init__(name, station, setup, [switch(f"{name}/holds", "status", "A bottle is in the station.")])
+        self.holding = EMPTY
+        """Id of the bottle in the station."""
+        self.begun = 0
+        """First tick of the work on it."""
+        self.cycle = 0.0
 
     @property
     def held(self) -> Sequence[int]:
@@ -232,68 +309,22 @@ class StationDevice(TakingDevice, Scattering):
                 cause = STARVED
                 self.starved_ticks += 1
         elif now.tick > self.begun and self.turn(now):
-            place = self.place()
-            if not has_room(now.state, *place, self._radii[now.state.held[self.holding][0]]):
-                cause = BLOCKED
-                self.blocked_ticks += 1
+            cause = self.give_back(self.holding, now)
+            if cause == BLOCKED:
                 self.wait()
-            elif self.goes_on():
-                self._finish(self.holding, now)
-                direction, speed = self._heading
-                now.state.give(self.holding, *place, *velocity(speed, direction + self.deflection))
-                self.draw_scatter()
+            elif self.holding not in now.state.held:
                 self.holding = EMPTY
                 self.cycle = 0.0 if self.cause == BLOCKED else min(self.cycle - 1.0, 1.0)
         self.conclude(cause, now)
-
-    def _finish(self, bottle: int, now: ScanContext) -> None:
-        """Set the attributes of a bottle, and test it."""
-        self.processed += 1
-        for setting in self._sets:
-            if (value := setting.value(self.processed)) is not None:
-                now.set_attribute(bottle, setting.attribute, value)
-        defective = False
-        for test in self._tests:
-            within = test.within(now.attribute(bottle, test.attribute))
-            passed = test.passes(within)
-            self.false_accepts += passed and not within
-            self.false_rejects += within and not passed
-            self.defects[test.attribute] += not passed
-            defective = defective or not passed
-        if defective:
-            now.set_attribute(bottle, BAD, 1.0)
-        self.good += not defective
 
     @property
     def begun_part(self) -> float:
         """Part of the present cycle that is done; 0 without a bottle."""
         return 0.0 if self.holding == EMPTY and self.cause == STARVED else self.cycle
 
-    def counts(self) -> tuple[int, int, int]:
-        """Return processed bottles, and defective ones among them."""
-        return self.processed, self.processed - self.good, 0
-
-    def values(self, now: ScanContext) -> Sequence[float]:
-        """Return the values in the order of the signals."""
-        return (
-            self.works,
-            self.processed,
-            self.good,
-            self.processed - self.good,
-            self.false_accepts,
-            self.false_rejects,
-            *self.defects.values(),
-            self.holding != EMPTY,
-            self.cause == STARVED,
-            self.cause == BLOCKED,
-            self.waited_time("starved", self.starved_ticks, now),
-            self.waited_time("blocked", self.blocked_ticks, now),
-            *self.status(),
-        )
-
-    def states(self, now: ScanContext) -> list[float]:
-        """Return running, starved, blocked, state, category and stop reason."""
-        return [self.works, self.cause == STARVED, self.cause == BLOCKED, *self.condition]
+    def inside(self) -> Sequence[float]:
+        """Return True if a bottle is in the station."""
+        return (self.holding != EMPTY,)
 
 
 class AttributeSetting:

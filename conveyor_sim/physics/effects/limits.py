@@ -38,9 +38,9 @@ LIMITS: dict[str, tuple[Limit, ...]] = {
         ),
         Limit(
             "liquid in bottles",
-            "A bottle is a rigid body of constant mass. A station that fills it does not change its mass.",
+            "A bottle is a rigid body. Its mass changes only when a station gives it another type (`changes`).",
             "Sloshing, foam and spilling are missing. Filled bottles brake and tip differently.",
-            "Give the line behind the filler a scene with the full mass. Test accelerations with real bottles.",
+            "Test accelerations with real bottles.",
         ),
         Limit(
             "shapes other than circles",

@@ -55,6 +55,11 @@ class State:
         self._free_slot(slot)
         return bottle
 
+    def convert(self, bottle: int, kind: int) -> None:
+        """Change the type of a held bottle. Its angle and loads stay. Raise KeyError if it is not held."""
+        _, theta, loads = self.held[bottle]
+        self.held[bottle] = kind, theta, loads
+
     def give(self, bottle: int, x: float, y: float, vx: float, vy: float) -> None:
         """Return a held bottle to the line at (x, y) m, moving at m/s, with its id and loads.
 

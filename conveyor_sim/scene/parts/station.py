@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stations of a scene file: machines that take a bottle, work on it, and return it."""
+"""Stations of a scene file: machines that take bottles, work on them, and return them."""
 
 from collections.abc import Iterator, Sequence
 from typing import Annotated, ClassVar, Literal
@@ -7,17 +7,23 @@ from typing import Annotated, ClassVar, Literal
 from annotated_types import Len
 
 from conveyor_sim.scene.part import Part
-from conveyor_sim.scene.parts.device_part import Mark, Others
+from conveyor_sim.scene.parts.device_part import Mark, Others, name_problems
 from conveyor_sim.scene.parts.machine import TakingPart
 from conveyor_sim.scene.parts.scatter import Scattered
 from conveyor_sim.scene.problems import Path, Problem
-from conveyor_sim.scene.types import Angle, Count, Holds, Name, NotNegative, Number, Point, Share, quantity
+from conveyor_sim.scene.types import Angle, Count, Holds, Name, NotNegative, Number, Point, Positive, Share, quantity
 from conveyor_sim.scene.words import shown, some_of
 
 BAD = "bad"
 """Attribute that inspections, rejects and sinks use: 0 or 1."""
 
 MOST_ATTRIBUTES = 20
+
+MOST_CHANGES = 100
+"""Largest number of bottle types that a station changes."""
+
+ROUNDING = 1e-9
+"""Tolerance of capacity / hold against rounding."""
 
 
 class AttributeRule(Part):
@@ -64,10 +70,11 @@ class Acceptance(Part):
 
 
 class Station(TakingPart, Scattered):
-    """A machine such as a capper, a labeller or a checkweigher. It takes a bottle out of a region, holds it for a cycle
-    of 1 / rate, works on it, and returns it elsewhere on the line, with its accumulated loads.
+    """A machine such as a capper, a labeller, a rinser or a pasteuriser. It takes bottles out of a region in the order
+    of their arrival, works on them, and returns them elsewhere on the line in this order, with their accumulated loads.
 
-    Waiting bottles press on the rail at the end of the region.
+    A station holds one bottle for a cycle of 1 / rate, or up to `capacity` bottles, each for `hold`. Waiting bottles
+    press on the rail at the end of the region.
     """
 
     KIND: ClassVar[str] = "station"
@@ -77,6 +84,23 @@ class Station(TakingPart, Scattered):
     direction: Angle = quantity("Direction of the bottle's velocity then.", "rad")
     speed: NotNegative = quantity(
         "Its speed then, along `direction`. Left out along a conveyor: that of the belt.", "m/s"
+    )
+    capacity: Count = quantity(
+        "Most bottles that it holds. With more than one it works like a conveyor that carries bottles through the "
+        "machine: it takes one each 1 / rate, and stops while a bottle that is done has no room.",
+        "1",
+        default=1,
+    )
+    hold: Positive | None = quantity(
+        "Time for which it holds each bottle while it runs at `rate`; at another rate it changes in inverse "
+        "proportion. Left out: capacity / rate.",
+        "s",
+        default=None,
+    )
+    changes: Annotated[
+        dict[Name, Name], Len(0, MOST_CHANGES), Holds(f"a mapping of at most {MOST_CHANGES} types to types")
+    ] = quantity(
+        "Types that bottles have afterwards, by their types before: `empty: full`. Other types stay.", default={}
     )
     sets: Annotated[
         dict[Name, AttributeRule],
@@ -89,6 +113,16 @@ class Station(TakingPart, Scattered):
         Holds(f"a mapping of at most {MOST_ATTRIBUTES} names of attributes to tests"),
     ] = quantity("What it looks at, after that; bottles that it finds defective become bad.", default={})
 
+    @property
+    def carries(self) -> bool:
+        """True if it carries several bottles, or holds one for a time other than a cycle."""
+        return self.capacity > 1 or self.hold is not None
+
+    @property
+    def holding_time(self) -> float:
+        """Time between intake and return of a bottle at `rate`, s."""
+        return self.capacity / self.rate if self.hold is None else self.hold
+
     def marks(self, name: str) -> Sequence[Mark]:
         """Return the marks of the places where it takes and returns bottles."""
         return self._mark("exit", name, self.region), self._mark("entry", name, (self.position,), self.direction)
@@ -96,6 +130,12 @@ class Station(TakingPart, Scattered):
     def problems(self, path: Path, others: Others) -> Iterator[Problem]:
         """Yield further problems, those of its settings and tests, and tests of attributes that no station sets."""
         yield from super().problems(path, others)
+        yield from self._hold_problems(path)
+        for before, after in self.changes.items():
+            for name in (before, after):
+                yield from name_problems((*path, "changes", before), name, "bottle_types", others)
+            if before == after:
+                yield Problem((*path, "changes", before), f"{shown(after)} given, expected another type")
         for name, setting in self.sets.items():
             yield from setting.problems((*path, "sets", name), name)
         stations = [machine for machine in others["machines"].values() if isinstance(machine, Station)]
@@ -105,3 +145,10 @@ class Station(TakingPart, Scattered):
             if name not in known:
                 text = f"no station sets {shown(name)}, expected {some_of(known)}"
                 yield Problem((*path, "tests", name), text)
+
+    def _hold_problems(self, path: Path) -> Iterator[Problem]:
+        """Yield a problem of a rate at which it would hold more bottles than its capacity."""
+        if self.hold is not None and self.rate * self.hold > self.capacity * (1.0 + ROUNDING):
+            many = "a bottle that is" if self.capacity == 1 else f"{self.capacity} bottles that are each"
+            text = f"{shown(self.rate)} given, expected at most {self.capacity / self.hold:g} (1/s), capacity / hold"
+            yield Problem((*path, "rate"), f"{text}: it has room for {many} held for {self.hold:g} s")
