@@ -23,6 +23,7 @@ from conveyor_sim.line.devices.panel import (
 from conveyor_sim.line.devices.photo_eye import PhotoEyeDevice
 from conveyor_sim.line.devices.region import OutfeedDevice, ZoneDevice
 from conveyor_sim.line.devices.reject import RejectDevice
+from conveyor_sim.line.devices.row_pusher import pusher_device
 from conveyor_sim.line.devices.setup import DeviceSetup
 from conveyor_sim.line.devices.spill import SpillDevice
 from conveyor_sim.line.machines.carrier import station_device
@@ -43,7 +44,7 @@ DEVICES: Mapping[str, Callable[[str, Any, DeviceSetup], Device]] = {
     "axis": AxisDevice,
     "belt": belt_device,
     "gate": Mover,
-    "pusher": Mover,
+    "pusher": pusher_device,
     "diverter": Mover,
     "divider": PositionedDevice,
     "adjustable": PositionedDevice,

@@ -38,7 +38,7 @@ gates:
   g:
     {kind: slide, from: [1, 0], to: [1, 1], direction: 90 deg, stroke: 1, max_speed: 1, acceleration: 5, material: rail}
 pushers:
-  p: {from: [2, 0], to: [3, 0], direction: 90 deg, stroke: 0.5, max_speed: 1, acceleration: 5, material: rail}
+  p: {from: [2, 0], to: [3, 0], direction: 90 deg, stroke: 0.5, max_speed: 1, acceleration: 5, material: rail, zone: z}
 diverters:
   d: {from: [4, 0], to: [4.5, 0], angle: 45 deg, max_speed: 1, acceleration: 5, material: rail}
 dividers:

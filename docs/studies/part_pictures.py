@@ -34,6 +34,7 @@ MOMENTS = {
     "axes": 14.0,
     "bottles": 0.5,
     "failures": 120.0,
+    "rows": 17.1,
     "stations": 20.0,
     "zones": 14.0,
 }
