@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from fuzz.axis_invariants import AxisWatch
 from fuzz.crossing import crossed
 from fuzz.violation import Violation
 from numpy.typing import NDArray
@@ -50,6 +51,7 @@ class DeviceWatch:
         """The last accepted value of each injected fault."""
         self._shapes = moving_shapes(simulation.scene) if simulation.model.has("moving_rails") else []
         self._now = self._before = self._values()
+        self._axes = AxisWatch(simulation)
         self._still = dict.fromkeys((shape.name for shape in self._shapes), 0)
         """Ticks for which each moving rail has stood."""
         ledger = simulation.ledger()
@@ -70,6 +72,7 @@ class DeviceWatch:
         self._zones(now)
         self._eyes(before, now)
         self._movers()
+        self._axes.check(self._before, self._now, outcomes)
         self._ledger()
 
     def in_frames(self, before: F8, after: F8) -> list[tuple[str, SegmentPiece, F8, F8]]:

@@ -120,7 +120,7 @@ class AxisDevice(Device):
         geared = float(self._part.in_gear)
         yield switch(f"{name}/in_gear", "status", "In gear, in phase, without following error.", geared, "state")
         yield number(f"{name}/phase_error", "actual", "Deviation from the phase in gear.", "rad", -CYCLE, CYCLE)
-        yield switch(f"{name}/gear_in", "command", "Its rising edge gears in: takes up speed, then phase.")
+        yield switch(f"{name}/gear_in", "command", "Its rising edge gears an enabled axis in: speed first, then phase.")
         yield switch(f"{name}/gear_out", "command", "Its rising edge gears out: goes on at its own rate.")
         yield number(f"{name}/phase_shift", "setpoint", "Shift of the phase from the scene's.", "rad", -CYCLE, CYCLE)
 
@@ -172,12 +172,9 @@ class AxisDevice(Device):
             self._phase_error = motion.position
 
     def objection(self, name: str, value: float, now: ScanContext) -> str:
-        """Return why a command can't be taken now: jogging in gear, and gearing in without being enabled."""
-        what = name.rpartition("/")[2]
-        if value and what.startswith("jog_") and self.mode != FREE:
+        """Return why a command can't be taken now: an axis in gear does not jog."""
+        if value and self.mode != FREE and name.rpartition("/")[2].startswith("jog_"):
             return f"{name}: {value:g} given in gear, expected {self.name}/gear_out before"
-        if value and what == "gear_in" and not (self.enable.on and not self.tripped):
-            return f"{name}: {value:g} given, expected {self.name} to be enabled and without fault before"
         return ""
 
     def command(self, name: str, value: float, now: ScanContext) -> None:
@@ -193,7 +190,7 @@ class AxisDevice(Device):
             if not on and self.mode != FREE:
                 self._leave_gear()
         elif what == "gear_in":
-            if self.gear_in.rises(value) and self.mode == FREE:
+            if self.gear_in.rises(value) and self.mode == FREE and self.enable.on and not self.tripped:
                 self._start()
                 self.mode, self.jog_forward, self.jog_backward = SYNCHRONISING, False, False
         elif what == "gear_out":
