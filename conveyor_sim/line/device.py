@@ -262,6 +262,11 @@ class Device:
         """Function that reads all signal values, in the order of the signals in `tags`."""
         return self._read
 
+    @property
+    def cycle_rate(self) -> float:
+        """Present rate of cycles, 1/s; 0 for a device without cycles."""
+        return 0.0
+
     def counts(self) -> tuple[int, int, int] | None:
         """Return processed, defective and rejected bottles; None if the device has no such counts."""
         return None

@@ -19,6 +19,7 @@ from conveyor_sim.scene.words import expectation, field_names, in_yaml
 
 PAGES: dict[str, tuple[str, ...]] = {
     "along": ("Along a conveyor:",),
+    "axes": ("`axes`",),
     "failures": ("`failures`", "Times of a failure", "`planned_stops`"),
     "stations": ("`kind: station`", "of a station"),
     "belts": ("`drives`", "`belts`", "curved belt", "path belt", "of a belt", "`plates`"),

@@ -73,7 +73,12 @@ class TakingDevice(MachineDevice):
 
 
 class SinkDevice(TakingDevice):
-    """Downstream machine that takes bottles at a rate. Starved: a bottle is due, and none is in its region."""
+    """Downstream machine that takes bottles at a rate. Starved: they are due, and not all of them are in its region."""
+
+    holds: bool | int
+    """Bottles that it works on; with one at a time, True or False."""
+    holds_bad: bool | int
+    """Bad ones among them."""
 
     def __init__(self, name: str, sink: Sink, setup: DeviceSetup) -> None:
         signals = [
@@ -88,45 +93,46 @@ class SinkDevice(TakingDevice):
                 count(f"{name}/defective", "counter", "Bad bottles among them."),
             ]
         super().__init__(name, sink, setup, signals)
+        self._batch = sink.at_once
         self.removed = 0
         self.removed_bad = 0
         self.processed = self.defective = 0
         self.holds = self.holds_bad = False
-        """True while it works on a bottle, and on a bad one."""
         self.starved_ticks = 0
 
     def take(self, now: ScanContext) -> None:
-        """Take the bottle that has waited longest, if one is due."""
+        """Take the bottles that have waited longest, if they are due and all there."""
         if self._busy:
             self.advance(now)
         slot_of = self.queue(now)
         cause = NONE
         if self.turn(now):
             self._complete()
-            if not self.waiting:
+            if len(self.waiting) < self._batch:
                 cause = STARVED
                 self.starved_ticks += 1
                 self.wait()
             elif self.goes_on():
-                first, *others = self.waiting
-                self.holds, self.holds_bad = True, first in now.bad
-                now.state.remove(slot_of[first])
-                self.waiting = tuple(others)
-                self.removed += 1
-                self.removed_bad += first in now.bad
+                taken, self.waiting = self.waiting[: self._batch], self.waiting[self._batch :]
+                bad = sum(bottle in now.bad for bottle in taken)
+                self.holds, self.holds_bad = (len(taken), bad) if self._batch > 1 else (True, bool(bad))
+                for bottle in taken:
+                    now.state.remove(slot_of[bottle])
+                self.removed += len(taken)
+                self.removed_bad += bad
                 self.cycle -= 1.0
         self.conclude(cause, now)
 
     def _complete(self) -> None:
-        """Count the bottle whose cycle is complete."""
+        """Count the bottles whose cycle is complete."""
         self.processed += self.holds
         self.defective += self.holds_bad
         self.holds = self.holds_bad = False
 
     @property
     def begun_part(self) -> float:
-        """Part of the present cycle that is done; 0 without a bottle."""
-        return self.cycle if self.holds else self.cycle - 1.0
+        """Bottles of the present cycle that are done, a part of them; 0 without a bottle."""
+        return (self.cycle if self.holds else self.cycle - 1.0) * self._batch
 
     def counts(self) -> tuple[int, int, int]:
         """Return processed bottles, and bad ones among them."""
