@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from conveyor_sim.line.device import Device
+from conveyor_sim.line.devices.axis import AxisDevice
 from conveyor_sim.line.devices.belt import belt_device
 from conveyor_sim.line.devices.crossing import CounterDevice, InspectionDevice
 from conveyor_sim.line.devices.divider import PositionedDevice
@@ -22,6 +23,7 @@ from conveyor_sim.line.devices.panel import (
 from conveyor_sim.line.devices.photo_eye import PhotoEyeDevice
 from conveyor_sim.line.devices.region import OutfeedDevice, ZoneDevice
 from conveyor_sim.line.devices.reject import RejectDevice
+from conveyor_sim.line.devices.row_pusher import pusher_device
 from conveyor_sim.line.devices.setup import DeviceSetup
 from conveyor_sim.line.devices.spill import SpillDevice
 from conveyor_sim.line.machines.carrier import station_device
@@ -39,9 +41,10 @@ DEVICES: Mapping[str, Callable[[str, Any, DeviceSetup], Device]] = {
     "stack_light": LightsDevice,
     "numeric": NumberFieldDevice,
     "drive": NamedDriveDevice,
+    "axis": AxisDevice,
     "belt": belt_device,
     "gate": Mover,
-    "pusher": Mover,
+    "pusher": pusher_device,
     "diverter": Mover,
     "divider": PositionedDevice,
     "adjustable": PositionedDevice,

@@ -5,6 +5,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 from conveyor_sim.scene.bodies import AxisShape, BodyShape, moved_piece
+from conveyor_sim.scene.gearing import first_position, top_speed
 from conveyor_sim.scene.geometry import RailShape, SegmentPiece
 from conveyor_sim.scene.parts.movers import Diverter, Mover, Positioned, Pusher, SwingingDivider, SwingingGate
 from conveyor_sim.scene.problems import Path
@@ -80,7 +81,24 @@ def bodies_of(scene: Scene) -> list[BodyShape]:
 
 def axes_of(scene: Scene) -> list[AxisShape]:
     """Return all axes in the order of their numbers: those of gates, pushers and diverters, then named ones."""
-    return [mover_shape(path, mover)[1] for path, mover in movers_of(scene)]
+    own = [mover_shape(path, mover)[1] for path, mover in movers_of(scene)]
+    return [*own, *(axis_shape(scene, name) for name in scene.axes)]
+
+
+def axis_shape(scene: Scene, name: str) -> AxisShape:
+    """Return a named axis, which has no end stops."""
+    axis = scene.axes[name]
+    return AxisShape(
+        name=f"axes/{name}",
+        kind="velocity",
+        stroke=math.inf,
+        max_speed=top_speed(scene, name) + axis.jog_speed,
+        acceleration=axis.acceleration,
+        first=first_position(scene, name),
+        limit=None if axis.torque_limit == "none" else axis.torque_limit,
+        inertia=axis.inertia,
+    )
+
 
 
 def positions_of(axes: Sequence[AxisShape], value: Callable[[str], float]) -> dict[str, float]:

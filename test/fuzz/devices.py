@@ -112,6 +112,16 @@ def movers(draw: st.DrawFn, frame: Frame, material: str) -> Data:
 
 
 @st.composite
+def row_pushers(draw: st.DrawFn, frame: Frame, pushers: Data, zones: Data) -> None:
+    """Let some pushers push by themselves."""
+    for pusher in pushers.values():
+        if draw(st.booleans()):
+            pusher["zone"] = draw(st.sampled_from(sorted(zones)))
+            pusher["settle"] = frame.tick * draw(st.sampled_from([0.0, 3.5]))
+            zones[pusher["zone"]].setdefault("full_at", 2)
+
+
+@st.composite
 def _drives(draw: st.DrawFn, frame: Frame, swings: bool, length: float, acceleration: float) -> Data:
     """Limit and mass of a rail that can follow its profile without bottles: with little to spare, much, or no limit."""
     mass = max(kind["mass"] for kind in frame.types.values()) * draw(scaled(0.3, 30.0))
@@ -148,6 +158,8 @@ def machines(draw: st.DrawFn, frame: Frame, clear: Clear) -> Data:
             entry |= draw(st.sampled_from([{}, WORK]))
         else:
             entry = {"kind": what, "region": draw(_regions(frame))}
+            if what == "sink":
+                entry |= draw(st.sampled_from([{}, {"at_once": 3}]))
         if what in ("source", "sink", "station"):
             entry["rate"] = draw(scaled(0.02, 2.0)) / frame.tick
             entry |= draw(st.sampled_from([{}, {"rate_limit": 3.0 * entry["rate"]}]))

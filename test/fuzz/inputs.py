@@ -56,6 +56,7 @@ def commands_of(scene: Scene) -> Table:
     for field, order in POSITIONED:
         for name, part in getattr(scene, field).items():
             table[f"{field}/{name}/{order}"] = Input("count", 0.0, len(part.positions) - 1.0)
+    table |= {f"pushers/{name}/auto": Input() for name, part in scene.pushers.items() if part.zone is not None}
     for name, machine in scene.machines.items():
         if isinstance(machine, PackmlPart):
             most = machine.rate if machine.rate_limit is None else machine.rate_limit

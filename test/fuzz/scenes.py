@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from fuzz.checked import checked
-from fuzz.devices import drives, machines, movers, sensors
+from fuzz.devices import drives, machines, movers, row_pushers, sensors
 from fuzz.draws import Data, between, fractions, scaled, signed
 from fuzz.families import Family
 from hypothesis import strategies as st
@@ -78,6 +78,8 @@ def scenes(draw: st.DrawFn, family: Family, beyond: bool = True) -> Data:
         data |= draw(machines(frame, clear))
     if family.sensors:
         data |= draw(sensors(frame, list(data["belts"])))
+        if family.movers:
+            draw(row_pushers(frame, data["pushers"], data["zones"]))
     if family.ledger:
         data["outputs"]["ledger"] = round(1.0 / frame.tick)
     if family.infeeds:

@@ -89,6 +89,11 @@ class Mover(Device):
             speed = self.speed
             self.course = profile_to(self.position, speed, self.target, shape.max_speed, shape.acceleration)
 
+    @property
+    def is_home(self) -> bool:
+        """True if it is at home, and stays there."""
+        return self.target == 0.0 and self.position <= SWITCHED * self._shape.stroke
+
     def begin(self, now: ScanContext) -> None:
         """Set the motion profile of this tick in the engine."""
         rails, number = self._rails(now), self._number

@@ -14,9 +14,22 @@ from annotated_types import Len
 from pydantic import Tag
 
 from conveyor_sim.scene.part import one_of
-from conveyor_sim.scene.parts.device_part import DevicePart, Others, line_problems
+from conveyor_sim.scene.parts.device_part import DevicePart, Others, line_problems, name_problems
 from conveyor_sim.scene.problems import Path, Problem
-from conveyor_sim.scene.types import XY, Angle, Flag, Holds, Index, Limit, Name, Number, Point, Positive, quantity
+from conveyor_sim.scene.types import (
+    XY,
+    Angle,
+    Flag,
+    Holds,
+    Index,
+    Limit,
+    Name,
+    NotNegative,
+    Number,
+    Point,
+    Positive,
+    quantity,
+)
 from conveyor_sim.scene.words import shown
 
 PRESSURE = 6e5
@@ -181,6 +194,21 @@ class Pusher(_SlidingStroke):
         "N",
         default=PUSHER_FORCE,
     )
+    zone: Name | None = quantity(
+        "Zone with `full_at` that holds a complete row or layer. The pusher pushes by itself when the zone is full, "
+        "and returns from the end of its stroke. Left out: it pushes on command only.",
+        default=None,
+    )
+    settle: NotNegative = quantity("Time for which the zone must be full before it pushes.", "s", default=0.0)
+
+    def problems(self, path: Path, others: Others) -> Iterator[Problem]:
+        """Yield problems of its shape and drive, and of a zone that is unknown or never full."""
+        yield from super().problems(path, others)
+        yield from name_problems((*path, "zone"), self.zone, "zones", others)
+        if self.zone is None and self.settle:
+            yield Problem((*path, "settle"), f"{shown(self.settle)} given, expected zone beside it")
+        if self.zone is not None and self.zone in others["zones"] and others["zones"][self.zone].full_at is None:
+            yield Problem((*path, "zone"), f"{shown(self.zone)} given, expected a zone with full_at")
 
 
 class Diverter(_SwingingStroke):
