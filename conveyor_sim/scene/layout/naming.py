@@ -16,6 +16,7 @@ REFERENCES: Mapping[str, tuple[str, ...]] = {
     "counter": ("counters",),
     "downstream": ("belts", "conveyors"),
     "drive": ("drives",),
+    "pusher": ("pushers",),
     "start_zone": ("zones",),
     "zone": ("zones",),
 }
