@@ -50,7 +50,7 @@ def _changeable(scene: Scene) -> Iterator[tuple[Path, Any]]:
     for name, drive in scene.drives.items():
         yield ("drives", name, "speed"), drive.speed
     for name, belt in scene.belts.items():
-        if belt.drive_name is None:
+        if not belt.has_foreign_drive:
             yield ("belts", name, "speed"), belt.speed
     for name, guide in scene.adjustable.items():
         yield ("adjustable", name, "setting"), guide.setting

@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from conveyor_sim.line.device import Device
+from conveyor_sim.line.devices.axis import AxisDevice
 from conveyor_sim.line.devices.belt import belt_device
 from conveyor_sim.line.devices.crossing import CounterDevice, InspectionDevice
 from conveyor_sim.line.devices.divider import PositionedDevice
@@ -40,6 +41,7 @@ DEVICES: Mapping[str, Callable[[str, Any, DeviceSetup], Device]] = {
     "stack_light": LightsDevice,
     "numeric": NumberFieldDevice,
     "drive": NamedDriveDevice,
+    "axis": AxisDevice,
     "belt": belt_device,
     "gate": Mover,
     "pusher": pusher_device,

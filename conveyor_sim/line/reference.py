@@ -29,6 +29,7 @@ panel:
   stack: {kind: stack_light}
   number: {kind: numeric, unit: m/s, limits: [0, 1], written_by: both}
 drives: {m: {acceleration: 1.0, pulses_per_metre: 1000}}
+axes: {a: {rate: 1, rate_limit: 2}, f: {drive: m, travel: 1}, s: {master: a, torque_limit: 20}}
 belts:
   b:
     {kind: straight, start: [0, 0], angle: 0, length: 10, width: 1, material: chain,
@@ -71,6 +72,7 @@ indicators: {i: {counter: c, zone: z, belt: b, backup: z, jam_time: 5}}
 """Scene with one device of each kind, and all its optional features."""
 
 PAGES: dict[str, dict[str, tuple[str, ...]]] = {
+    "parts/axes": {"axes": ("axes",)},
     "parts/belts": {"belts": ("belts", "drives")},
     "parts/infeeds": {"feeds": ("infeeds", "outfeeds"), "spills": ("spills",)},
     "parts/machines": {"machines": ("machines",)},

@@ -12,6 +12,7 @@ from conveyor_sim.page.block import FORCE_FRAMES, LEAST_FORCE, LEVELS, MM, SIGNA
 from conveyor_sim.page.drawings.underlay import ShownUnderlay, shown_underlay
 from conveyor_sim.page.story import fields
 from conveyor_sim.scene import Scene
+from conveyor_sim.scene.driven import speed_owner
 from conveyor_sim.scene.geometry import BeltShape, named_surfaces, rail_shapes, surface_shapes
 from conveyor_sim.scene.marks import marks_of
 from conveyor_sim.scene.moving import moving_shapes
@@ -36,7 +37,9 @@ def head(line: Any, scene: Scene) -> dict[str, Any]:
             for name, radius in zip(line.bottle_types, line.type_radius, strict=True)
         ],
         "drives": {
-            f"belts/{name}": f"drives/{belt.drive_name}" for name, belt in scene.belts.items() if belt.drive_name
+            f"belts/{name}": "/".join(map(str, speed_owner(scene, name)))
+            for name, belt in scene.belts.items()
+            if belt.has_foreign_drive
         },
         "signals": signals,
         "commands": list(line.command_names),

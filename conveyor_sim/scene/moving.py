@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from conveyor_sim.scene.bodies import AxisShape, BodyShape
+from conveyor_sim.scene.gearing import first_position, top_speed
 from conveyor_sim.scene.geometry import Array, RailShape, SegmentPiece
 from conveyor_sim.scene.parts.movers import Diverter, Mover, Positioned, Pusher, SwingingDivider, SwingingGate
 from conveyor_sim.scene.problems import Path
@@ -200,4 +201,20 @@ def bodies_of(scene: Scene) -> list[BodyShape]:
 
 def axes_of(scene: Scene) -> list[AxisShape]:
     """Return all axes in the order of their numbers: those of gates, pushers and diverters, then named ones."""
-    return [mover_shape(path, mover)[1] for path, mover in movers_of(scene)]
+    own = [mover_shape(path, mover)[1] for path, mover in movers_of(scene)]
+    return [*own, *(axis_shape(scene, name) for name in scene.axes)]
+
+
+def axis_shape(scene: Scene, name: str) -> AxisShape:
+    """Return a named axis, which has no end stops."""
+    axis = scene.axes[name]
+    return AxisShape(
+        name=f"axes/{name}",
+        kind="velocity",
+        stroke=math.inf,
+        max_speed=top_speed(scene, name) + axis.jog_speed,
+        acceleration=axis.acceleration,
+        first=first_position(scene, name),
+        limit=None if axis.torque_limit == "none" else axis.torque_limit,
+        inertia=axis.inertia,
+    )

@@ -20,6 +20,7 @@ from conveyor_sim.scene.layout.plan import LayoutPlan
 from conveyor_sim.scene.limits import Limits as DamageLimits
 from conveyor_sim.scene.part import Part, one_of
 from conveyor_sim.scene.parts.alarm import MeasuredAlarm
+from conveyor_sim.scene.parts.axis import Axis
 from conveyor_sim.scene.parts.counter import Counter
 from conveyor_sim.scene.parts.device_part import DevicePart, Entry, Exit, Giver
 from conveyor_sim.scene.parts.indicator import Indicator
@@ -270,6 +271,9 @@ class Scene(Part):
     )
     drives: Annotated[dict[Name, NamedDrive], _named("drives")] = quantity(
         "Drives that move several belts.", default={}
+    )
+    axes: Annotated[dict[Name, Axis], _named("axes")] = quantity(
+        "Axes that move machines in step: star wheels, screws, turn-tables.", default={}
     )
     belts: Annotated[dict[Name, Belt], _named("belts")] = quantity(
         "Belts. Where belts overlap, the last one in the list carries.", default={}

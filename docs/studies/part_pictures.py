@@ -31,6 +31,7 @@ MOMENT = 8.0
 MOMENTS = {
     "accuracy": 14.0,
     "alarms": 14.0,
+    "axes": 14.0,
     "bottles": 0.5,
     "failures": 120.0,
     "rows": 17.1,

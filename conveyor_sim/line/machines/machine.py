@@ -377,10 +377,14 @@ class MachineDevice(Device):
         """State, category and stop reason."""
         return self._shown[:3]
 
+    @property
+    def cycle_rate(self) -> float:
+        """Present rate, 1/s; 0 while it does not work."""
+        return (self.speed if self._ramp else self.rate) if self._works and not self._waits else 0.0
+
     def status(self) -> Sequence[float]:
         """Return state, category, stop_reason, fault, failures and cur_rate (1/s)."""
-        rate = (self.speed if self._ramp else self.rate) if self._works and not self._waits else 0.0
-        return *self._shown, self.failures, rate
+        return *self._shown, self.failures, self.cycle_rate
 
     def waited_time(self, category: Category, ticks: int, now: ScanContext) -> float:
         """Return the total time starved or blocked, s. ticks: number of ticks at whose end it waited."""

@@ -152,7 +152,7 @@ LIMITS: dict[str, tuple[Limit, ...]] = {
     "Drives, sensors and machines": (
         Limit(
             "dynamics of drives below the ramp",
-            "A drive follows its ramp exactly under any load. Only gates, pushers and diverters have a force limit.",
+            "A drive follows its ramp exactly under any load. Only rails that move and axes have a limit.",
             "Slip of motors, controllers that overshoot and overload trips of a jammed chain are missing.",
             "Inject the fault `trip`. Compare the work of belts in the energy ledger with the rating of the drive.",
         ),

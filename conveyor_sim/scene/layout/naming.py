@@ -10,6 +10,7 @@ from conveyor_sim.scene.provenance import Sources
 REFERENCES: Mapping[str, tuple[str, ...]] = {
     "after": ("conveyors",),
     "along": ("conveyors",),
+    "axis": ("axes",),
     "backup": ("zones",),
     "belt": ("belts", "conveyors"),
     "beside": ("conveyors",),
@@ -17,6 +18,8 @@ REFERENCES: Mapping[str, tuple[str, ...]] = {
     "downstream": ("belts", "conveyors"),
     "drive": ("drives",),
     "pusher": ("pushers",),
+    "machine": ("machines",),
+    "master": ("axes",),
     "start_zone": ("zones",),
     "zone": ("zones",),
 }
