@@ -100,7 +100,6 @@ def axis_shape(scene: Scene, name: str) -> AxisShape:
     )
 
 
-
 def positions_of(axes: Sequence[AxisShape], value: Callable[[str], float]) -> dict[str, float]:
     """Return the position (m or rad) of each axis, by name. value: returns the value of a signal."""
     return {axis.name: axis.position(value(f"{axis.name}/position")) for axis in axes}
