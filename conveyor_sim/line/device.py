@@ -17,7 +17,7 @@ from conveyor_sim.engine.support.footing import find_carriers
 from conveyor_sim.line.alarms.declaration import Declared
 from conveyor_sim.line.tag import COMMANDS, SIGNALS, Tag, of_roles
 from conveyor_sim.physics.state import State
-from conveyor_sim.scene.parts.station import BAD
+from conveyor_sim.scene.parts.work import BAD
 
 
 @dataclass

@@ -14,7 +14,7 @@ from fuzz.families import Family
 from hypothesis import strategies as st
 
 from conveyor_sim.scene.geometry import rail_shapes
-from conveyor_sim.scene.moving import moving_shapes
+from conveyor_sim.scene.moving import axes_of, bodies_at, bodies_of
 
 STEEL, CHAIN = "steel", "chain"
 MATERIALS = ("glass", "pet", "glass")
@@ -329,7 +329,10 @@ class _Clear:
         self._taken: list[tuple[float, float, float]] = []
         scene, rails = checked(data), []
         if scene is not None:
-            rails = [*rail_shapes(scene), *(shape.shape(shape.first) for shape in moving_shapes(scene))]
+            rails = [
+                *rail_shapes(scene),
+                *bodies_at(bodies_of(scene), {axis.name: axis.first for axis in axes_of(scene)}),
+            ]
         self._pieces = [piece for rail in rails for piece in rail.pieces]
 
     def of_rails(self, points: Any, radius: float) -> bool:

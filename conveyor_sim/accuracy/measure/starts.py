@@ -19,7 +19,7 @@ from conveyor_sim.line.devices.divider import NAMES
 from conveyor_sim.line.devices.mover import WORDS
 from conveyor_sim.physics.effects.terms import meetings
 from conveyor_sim.scene import Scene
-from conveyor_sim.scene.moving import moving_shapes
+from conveyor_sim.scene.moving import axes_of
 from conveyor_sim.simulation import Simulation
 
 HALF = 2.0
@@ -46,8 +46,9 @@ class Exercise:
         self._half = max(1, round(min(HALF, scene.duration / LEAST_HALVES) / scene.tick))
         """Ticks between two commands of one mover."""
         self._movers = [
-            (f"{shape.name}/{_COMMANDS[shape.name.split('/')[0]]}", shape.first != 0.0)
-            for shape in moving_shapes(scene)
+            (f"{axis.name}/{_COMMANDS[axis.name.split('/')[0]]}", axis.first != 0.0)
+            for axis in axes_of(scene)
+            if axis.kind == "position"
         ]
         """The command of each, and whether it is at the far end of its stroke at the start."""
 

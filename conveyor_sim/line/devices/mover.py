@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from conveyor_sim.engine.arrays.moving import HELD, OFF_PROFILE, ON_PROFILE, PHASES, MovingRails
+from conveyor_sim.engine.arrays.moving import HELD, OFF_PROFILE, ON_PROFILE, PHASES, MovingBodies
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.engine.rails.motion_profile import plan_profile
 from conveyor_sim.line.device import Device, ScanContext
@@ -37,9 +37,9 @@ class Mover(Device):
     """
 
     def __init__(self, name: str, part: MoverPart, setup: DeviceSetup) -> None:
-        shapes = setup.model.plant.moving
-        index = [shape.name for shape in shapes].index(name)
-        shape = shapes[index]
+        axes = setup.model.plant.axes
+        index = [axis.name for axis in axes].index(name)
+        shape = axes[index]
         self._number, self._shape, self._part = index, shape, part
         super().__init__(name, self.own_tags(name, shape.first / shape.stroke))
         self.target = self.position = shape.first
@@ -127,7 +127,7 @@ class Mover(Device):
         """Return blocked."""
         return [self.blocked]
 
-    def _rails(self, now: ScanContext) -> MovingRails:
+    def _rails(self, now: ScanContext) -> MovingBodies:
         moving = now.state.world.moving
         assert moving is not None
         return moving

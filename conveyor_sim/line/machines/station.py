@@ -5,21 +5,19 @@ Stations work on a bottle for one cycle, and give it back at another place.
 """
 
 from collections.abc import Mapping, Sequence
-from types import SimpleNamespace
-
-import numpy as np
 
 from conveyor_sim.line.device import ScanContext
 from conveyor_sim.line.devices.entry import Scattering, has_room, velocity
 from conveyor_sim.line.devices.region import Region, ZoneDevice
 from conveyor_sim.line.devices.setup import JITTER, DeviceSetup
+from conveyor_sim.line.machines.bottle_work import BottleWork, work_tags
 from conveyor_sim.line.machines.machine import MachineDevice
 from conveyor_sim.line.machines.packml import PackMLState
 from conveyor_sim.line.machines.stop_reason import BLOCKED, NONE, STARVED
 from conveyor_sim.line.tag import Tag, count, seconds, switch
 from conveyor_sim.scene.parts.machine import TakingPart
 from conveyor_sim.scene.parts.sink import Sink
-from conveyor_sim.scene.parts.station import BAD, Acceptance, AttributeRule, Station
+from conveyor_sim.scene.parts.station import Station
 
 FILLS = frozenset({PackMLState.STARTING, PackMLState.UNSUSPENDING})
 
@@ -152,24 +150,14 @@ class SinkDevice(TakingDevice):
         return [self.works, self.cause == STARVED, *self.condition]
 
 
-class ProcessingDevice(TakingDevice, Scattering):
-    """Station of a running line: attributes, tests and types of bottles that it gives back, and its counts."""
-
-    defects: dict[str, int]
-    """Number of defective bottles, by test."""
+class ProcessingDevice(BottleWork, TakingDevice, Scattering):
+    """Station of a running line: work on bottles, and their return."""
 
     def __init__(self, name: str, station: Station, setup: DeviceSetup, own: Sequence[Tag]) -> None:
         """Build the tags. own: signals that show the bottles inside."""
         signals = [
             count(f"{name}/processed", "counter", "Bottles given back."),
-            count(f"{name}/good", "counter", "Bottles that passed all tests."),
-            count(f"{name}/defective", "counter", "Bottles that failed a test."),
-            count(f"{name}/false_accepts", "counter", "Tests passed by values outside their limits."),
-            count(f"{name}/false_rejects", "counter", "Tests failed by values within their limits."),
-            *(
-                count(f"{name}/defect_{test}", "counter", f"Bottles that failed the test `{test}`.")
-                for test in station.tests
-            ),
+            *work_tags(name, station),
             *own,
             switch(f"{name}/starved", "status", "A bottle is due, and none is there.", adds_to="state"),
             switch(f"{name}/blocked", "status", "A bottle is done, and there is no room.", adds_to="state"),
@@ -180,21 +168,7 @@ class ProcessingDevice(TakingDevice, Scattering):
         self._heading = station.heading
         self.scatter(station, lambda: setup.random(name, JITTER))
         self._radii = setup.model.type_radius.tolist()
-        types = setup.model.bottle_types
-        self._changes = {types.index(before): types.index(after) for before, after in station.changes.items()}
-        self._sets = [
-            AttributeSetting(what, setting, setup.random(name, f"sets/{what}"))
-            for what, setting in station.sets.items()
-        ]
-        self._tests = [
-            AttributeTest(what, test, setup.random(name, f"tests/{what}")) for what, test in station.tests.items()
-        ]
-        named = {f"sets_{setting.attribute}": setting.random for setting in self._sets}
-        self.streams = SimpleNamespace(**named, **{f"tests_{test.attribute}": test.random for test in self._tests})
-        """Random streams of settings and tests."""
-        self.processed = self.good = 0
-        self.false_accepts = self.false_rejects = 0
-        self.defects = dict.fromkeys(station.tests, 0)
+        self.work_as(name, station, setup)
         self.starved_ticks = 0
         self.blocked_ticks = 0
 
@@ -204,40 +178,18 @@ class ProcessingDevice(TakingDevice, Scattering):
         Its new type decides whether there is room.
         """
         place, before = self.place(), now.state.held[bottle][0]
-        after = self._changes.get(before, before)
+        after = self.type_after(before)
         if not has_room(now.state, *place, self._radii[after]):
             self.blocked_ticks += 1
             return BLOCKED
         if self.goes_on():
-            self._finish(bottle, now)
+            self.finish(bottle, now)
             if after != before:
                 now.state.convert(bottle, after)
             direction, speed = self._heading
             now.state.give(bottle, *place, *velocity(speed, direction + self.deflection))
             self.draw_scatter()
         return NONE
-
-    def _finish(self, bottle: int, now: ScanContext) -> None:
-        """Set the attributes of a bottle, and test it."""
-        self.processed += 1
-        for setting in self._sets:
-            if (value := setting.value(self.processed)) is not None:
-                now.set_attribute(bottle, setting.attribute, value)
-        defective = False
-        for test in self._tests:
-            within = test.within(now.attribute(bottle, test.attribute))
-            passed = test.passes(within)
-            self.false_accepts += passed and not within
-            self.false_rejects += within and not passed
-            self.defects[test.attribute] += not passed
-            defective = defective or not passed
-        if defective:
-            now.set_attribute(bottle, BAD, 1.0)
-        self.good += not defective
-
-    def counts(self) -> tuple[int, int, int]:
-        """Return processed bottles, and defective ones among them."""
-        return self.processed, self.processed - self.good, 0
 
     def inside(self) -> Sequence[float]:
         """Return the values of the signals that show the bottles inside."""
@@ -248,11 +200,7 @@ class ProcessingDevice(TakingDevice, Scattering):
         return (
             self.works,
             self.processed,
-            self.good,
-            self.processed - self.good,
-            self.false_accepts,
-            self.false_rejects,
-            *self.defects.values(),
+            *self.work_values(),
             *self.inside(),
             self.cause == STARVED,
             self.cause == BLOCKED,
@@ -325,43 +273,3 @@ class StationDevice(ProcessingDevice):
     def inside(self) -> Sequence[float]:
         """Return True if a bottle is in the station."""
         return (self.holding != EMPTY,)
-
-
-class AttributeSetting:
-    """Setting of one attribute by a station."""
-
-    def __init__(self, attribute: str, setting: AttributeRule, random: np.random.Generator) -> None:
-        self.attribute, self.random = attribute, random
-        self._setting, self._at = setting, frozenset(setting.at)
-
-    def value(self, number: int) -> float | None:
-        """Return the new value for the bottle of a number (from 1), None if it keeps its value."""
-        setting = self._setting
-        # Random numbers are drawn only if they decide.
-        chosen = setting.every is None or number % setting.every == 0
-        chosen = chosen and (not self._at or number in self._at)
-        if chosen and setting.share < 1.0:
-            chosen = float(self.random.uniform()) < setting.share
-        spread = setting.deviation * float(self.random.standard_normal()) if setting.deviation else 0.0
-        return setting.to + spread if chosen else None
-
-
-class AttributeTest:
-    """Test of one attribute by a station."""
-
-    def __init__(self, attribute: str, test: Acceptance, random: np.random.Generator) -> None:
-        self.attribute, self.random = attribute, random
-        self._test = test
-
-    def within(self, value: float) -> bool:
-        """Return True if a value is within the limits."""
-        test = self._test
-        return (test.low is None or value >= test.low) and (test.high is None or value <= test.high)
-
-    def passes(self, within: bool) -> bool:
-        """Return True if the test passes.
-
-        within: True for a value within the limits. A false accept or reject inverts the result.
-        """
-        wrong = self._test.false_reject if within else self._test.false_accept
-        return within != (wrong > 0.0 and float(self.random.uniform()) < wrong)

@@ -17,6 +17,7 @@ REFERENCES: Mapping[str, tuple[str, ...]] = {
     "counter": ("counters",),
     "downstream": ("belts", "conveyors"),
     "drive": ("drives",),
+    "pusher": ("pushers",),
     "machine": ("machines",),
     "master": ("axes",),
     "start_zone": ("zones",),

@@ -14,7 +14,7 @@ from scenes import scene
 
 from conveyor_sim.scene.layout.devices import PLACEABLE
 from conveyor_sim.scene.layout.expand import expand
-from conveyor_sim.scene.moving import moving_shape
+from conveyor_sim.scene.moving import mover_shape
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.scene.types import XY
 from conveyor_sim.scene.words import field_names
@@ -176,8 +176,8 @@ def test_moving_rails_move_as_their_place_says(turn: str, side: str) -> None:
 
     def seen(field: str, name: str, s: float) -> np.ndarray:
         """Ends at the end of the stroke as (along, left) of the path at a station, (2, 2)."""
-        shape = moving_shape((field, name), getattr(result, field)[name])
-        return np.array([route.frame(s).seen_from(end) for end in shape.at(shape.stroke).ends])
+        body, axis = mover_shape((field, name), getattr(result, field)[name])
+        return np.array([route.frame(s).seen_from(end) for end in body.at(axis.stroke)[0].ends])
 
     slid = seen("gates", "slide", 2.9)
     assert np.allclose(np.sort(sign * slid[:, 1]), [HALF, HALF + CLEARANCE])
