@@ -71,29 +71,54 @@ def _drive(draw: st.DrawFn, frame: Frame) -> Data:
     return drive
 
 
+POSITIONED = {"dividers": "lane", "adjustable": "setting"}
+"""Fields of movers with several positions, and their field for the initial one."""
+
+
 @st.composite
 def movers(draw: st.DrawFn, frame: Frame, material: str) -> Data:
-    """Gates, pushers and diverters; at least one."""
-    found: dict[str, dict[str, Data]] = {"gates": {}, "pushers": {}, "diverters": {}}
+    """Gates, pushers, diverters, dividers and adjustable guides; at least one."""
+    found: dict[str, dict[str, Data]] = {field: {} for field in ("gates", "pushers", "diverters", *POSITIONED)}
     for n in range(draw(st.integers(1, 3))):
         field = draw(st.sampled_from(sorted(found)))
         start, angle = draw(frame.points), draw(between(-math.pi, math.pi))
         length = frame.unit * draw(st.integers(1, 6))
         end = [start[0] + length * math.cos(angle), start[1] + length * math.sin(angle)]
         speed = frame.speed * draw(between(0.1, 0.7))
-        swings = field == "diverters" or (field == "gates" and draw(st.booleans()))
+        swings = field == "diverters" or (field in ("gates", "dividers") and draw(st.booleans()))
         rail: Data = {"from": start, "to": end, "material": material}
         if field == "gates":
             rail |= {"kind": "swing" if swings else "slide", "open": draw(st.booleans())}
-        if swings:
-            rail |= {"angle": draw(between(0.2, 2.0)) * draw(st.sampled_from([1.0, -1.0])), "max_speed": speed / length}
+        if field == "dividers":
+            rail |= {"kind": "swing" if swings else "slide"}
+        if field in POSITIONED:
+            count, unit = draw(st.integers(2, 4)), 0.3 if swings else frame.unit
+            steps = [draw(st.integers(-4, 4)) for _ in range(count - 1)]
+            rail |= {
+                "positions": [unit * place for place in (*steps, 5)],
+                POSITIONED[field]: draw(st.integers(0, count - 1)),
+            }
+        elif swings:
+            rail |= {"angle": draw(between(0.2, 2.0)) * draw(st.sampled_from([1.0, -1.0]))}
         else:
-            rail |= {"direction": draw(between(-math.pi, math.pi)), "stroke": frame.unit * draw(between(0.3, 5.0))}
-            rail["max_speed"] = speed
+            rail |= {"stroke": frame.unit * draw(between(0.3, 5.0))}
+        rail["max_speed"] = speed / length if swings else speed
+        if not swings:
+            rail["direction"] = draw(between(-math.pi, math.pi))
         rail["acceleration"] = rail["max_speed"] / (frame.tick * draw(st.sampled_from([0.5, 4.0, 30.0])))
         rail |= draw(_drives(frame, swings, length, rail["acceleration"]))
         found[field][f"mover_{n}"] = rail
     return found
+
+
+@st.composite
+def row_pushers(draw: st.DrawFn, frame: Frame, pushers: Data, zones: Data) -> None:
+    """Let some pushers push by themselves."""
+    for pusher in pushers.values():
+        if draw(st.booleans()):
+            pusher["zone"] = draw(st.sampled_from(sorted(zones)))
+            pusher["settle"] = frame.tick * draw(st.sampled_from([0.0, 3.5]))
+            zones[pusher["zone"]].setdefault("full_at", 2)
 
 
 @st.composite
@@ -133,15 +158,28 @@ def machines(draw: st.DrawFn, frame: Frame, clear: Clear) -> Data:
             entry |= draw(st.sampled_from([{}, WORK]))
         else:
             entry = {"kind": what, "region": draw(_regions(frame))}
+            if what == "sink":
+                entry |= draw(st.sampled_from([{}, {"at_once": 3}]))
         if what in ("source", "sink", "station"):
             entry["rate"] = draw(scaled(0.02, 2.0)) / frame.tick
             entry |= draw(st.sampled_from([{}, {"rate_limit": 3.0 * entry["rate"]}]))
+            if what == "station":
+                entry |= draw(_insides(entry["rate"], sorted(frame.types)))
             entry |= draw(_habits(frame.tick))
         elif what == "reject":
             entry |= {"delay": frame.tick * draw(st.sampled_from([0.0, 2.5])),
                       "window": frame.tick * draw(st.sampled_from([0.5, 4.0]))}  # fmt: skip
         found["machines"][f"machine_{n}"] = entry
     return found
+
+
+@st.composite
+def _insides(draw: st.DrawFn, rate: float, types: list[str]) -> Data:
+    """How many bottles a station holds and for how long, and what becomes of their types."""
+    capacity = draw(st.integers(1, 5))
+    found = draw(st.sampled_from([{}, {"capacity": capacity}, {"capacity": capacity, "hold": 0.6 * capacity / rate}]))
+    changes = {before: after for before in types if (after := draw(st.sampled_from(types))) != before}
+    return {**found, "changes": changes} if draw(st.booleans()) else found
 
 
 @st.composite

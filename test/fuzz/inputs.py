@@ -30,6 +30,7 @@ class Input:
 Table = Mapping[str, Input]
 
 MOVERS = (("gates", "open"), ("pushers", "push"), ("diverters", "divert"))
+POSITIONED = (("dividers", "cmd_lane"), ("adjustable", "cmd_setting"))
 
 
 def speed_parts(scene: Scene) -> list[tuple[str, SpeedSetpoint]]:
@@ -52,6 +53,10 @@ def commands_of(scene: Scene) -> Table:
             table |= {f"{place}/{what}": Input() for what in ("run", "reverse", "reset")}
     for field, order in MOVERS:
         table |= {f"{field}/{name}/{order}": Input() for name in getattr(scene, field)}
+    for field, order in POSITIONED:
+        for name, part in getattr(scene, field).items():
+            table[f"{field}/{name}/{order}"] = Input("count", 0.0, len(part.positions) - 1.0)
+    table |= {f"pushers/{name}/auto": Input() for name, part in scene.pushers.items() if part.zone is not None}
     for name, machine in scene.machines.items():
         if isinstance(machine, PackmlPart):
             most = machine.rate if machine.rate_limit is None else machine.rate_limit
@@ -64,7 +69,7 @@ def commands_of(scene: Scene) -> Table:
 def faults_of(scene: Scene) -> Table:
     """The faults."""
     table = {f"{place}/trip": Input() for place, part in speed_parts(scene) if has_drive(part)}
-    for field, _ in MOVERS:
+    for field, _ in (*MOVERS, *POSITIONED):
         table |= {f"{field}/{name}/jammed": Input() for name in getattr(scene, field)}
     table |= {f"machines/{name}/stop": Input() for name in scene.machines}
     table |= {f"spills/{name}/drop": Input() for name in scene.spills}

@@ -307,3 +307,40 @@ def test_the_model_knows_all_types_that_can_enter(line: Scene) -> None:
             parse_scene(LINE.replace("types: [full, half], ", "").replace("types: [half, full], ", ""), "line.yaml")
         ).model.steps_per_tick
     )
+
+
+GUIDED = """\
+name: guided
+duration: 10
+parameters: {speed: 0.3 m/s, size: 0}
+contacts:
+  - {between: [glass, glass], stiffness: 20 kN/m, damping: {law: normal, restitution: 0.5}}
+  - {between: [glass, steel], stiffness: 20 kN/m, damping: {law: normal, restitution: 0.5}}
+base: [{between: [glass, chain], friction: 0.3}]
+bottle_types: {full: {radius: 35 mm, mass: 400 g, material: glass}, half: {radius: 25 mm, mass: 200 g, material: glass}}
+conveyors: {lane: {start: [0, 0], path: [{straight: 3}], width: 0.1, material: chain, speed: speed}}
+adjustable:
+  left: &guide {along: lane, from: 1, to: 2, side: left, positions: [40 mm, 30 mm], setting: size, max_speed: 0.05,
+    acceleration: 0.5, material: steel}
+  right: {<<: *guide, side: right, positions: [40 mm, 40 mm, 35 mm], setting: 0}
+infeeds: {inlet: {along: lane, at: 0.2, bottle: full, types: [full, half], rate: 1 /s}}
+formats:
+  full: {bottle: full}
+  half: {bottle: half, set: {size: 1}}
+format: full
+"""
+
+
+def test_a_changeover_moves_guides_to_their_setting_of_the_format() -> None:
+    """Only guides whose setting depends on the format move; bottles then pass between them."""
+    scene = parse_scene(GUIDED, "guided.yaml")
+    commands = changeover(scene, "half")
+    assert commands == {"infeeds/inlet/cmd_bottle": 1.0, "adjustable/left/cmd_setting": 1.0}
+    assert changeover(scene, "full") == {"infeeds/inlet/cmd_bottle": 0.0, "adjustable/left/cmd_setting": 0.0}
+    simulation = Simulation(scene)
+    simulation.command(list(commands), list(commands.values()))
+    simulation.advance(100)
+    left, right = (shape.pieces[0] for shape in simulation.moving_rails())
+    assert (left.p1[1], left.p2[1]) == pytest.approx((0.03, 0.03), abs=1e-9)
+    assert (right.p1[1], right.p2[1]) == pytest.approx((-0.04, -0.04), abs=1e-9)
+    assert parse_scene(GUIDED, "guided.yaml", {"format": "half"}).adjustable["left"].setting == 1

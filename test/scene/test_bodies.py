@@ -81,3 +81,19 @@ def test_movers_are_bodies_with_an_axis_each() -> None:
     np.testing.assert_allclose(gate.at(0.4)[0].points(), [[1.0, 2.4], [1.0, 3.4]])
     np.testing.assert_allclose(diverter.at(TURN / 12)[0].points(), [[1.0, 2.0], [1.5, 2.0 + math.sqrt(0.75)]])
     assert (axes_of(built)[0].first, gate.fastest_point, diverter.fastest_point) == (0.4, 1.0, 1.0)
+
+
+def test_movers_with_several_positions_are_at_home_at_the_least_of_them() -> None:
+    moves = {"material": "steel", "max_speed": 1.0, "acceleration": 5.0, "from": [1.0, 2.0], "to": [2.0, 2.0]}
+    built = scene(
+        contacts=[contact(1e3, "steel")],
+        dividers={"d": {**moves, "kind": "swing", "positions": ["30 deg", "-30 deg"]}},
+        adjustable={"a": {**moves, "direction": "90 deg", "positions": [-0.1, 0.2, 0.3], "setting": 1}},
+    )
+    (divider, guide), (arm, slide) = bodies_of(built), axes_of(built)
+    assert (arm.stroke, arm.first) == (pytest.approx(TURN / 6), pytest.approx(TURN / 6))
+    assert (slide.stroke, slide.first) == (pytest.approx(0.4), pytest.approx(0.3))
+    half = math.sqrt(0.75)
+    np.testing.assert_allclose(divider.at(0.0)[0].points(), [[1.0, 2.0], [1.0 + half, 1.5]])
+    np.testing.assert_allclose(divider.at(arm.first)[0].points(), [[1.0, 2.0], [1.0 + half, 2.5]])
+    np.testing.assert_allclose(guide.at(slide.first)[0].points(), [[1.0, 2.2], [2.0, 2.2]])
