@@ -43,7 +43,7 @@ def publish(kind: str, device: str, metrics: list[tuple[str, int, float]]) -> No
 def connected(client: Client, *_: Any) -> None:
     client.subscribe([(f"spBv1.0/{group}/{kind}/{node}/#", 1) for kind in ("NBIRTH", "NDATA", "NDEATH")])
     client.subscribe([(f"spBv1.0/{group}/{kind}/{node}/line", 1) for kind in ("DBIRTH", "DDATA", "DDEATH")])
-    publish("NCMD", "", [("Node Control/Rebirth", BOOLEAN, 1.0)])  # whoever comes late asks for all births
+    publish("NCMD", "", [("Node Control/Rebirth", BOOLEAN, 1.0)])  # a host that starts late requests all births
 
 
 def heard(client: Client, _: Any, message: Any) -> None:
