@@ -3,8 +3,10 @@
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 
 from conveyor_sim.scene.bodies import AxisShape, BodyShape, moved_piece
+from conveyor_sim.scene.cam_table import cam_through
 from conveyor_sim.scene.gearing import first_position, top_speed
 from conveyor_sim.scene.geometry import RailShape, SegmentPiece
 from conveyor_sim.scene.parts.movers import Diverter, Mover, Positioned, Pusher, SwingingDivider, SwingingGate
@@ -78,7 +80,16 @@ def bodies_of(scene: Scene) -> list[BodyShape]:
     Those of gates, pushers and diverters come first, then those of star wheels, screws and side belts.
     """
     movers = [mover_shape(path, mover)[0] for path, mover in movers_of(scene)]
-    return [*movers, *wheel_bodies(scene)]
+    return [_on_cam(scene, body) for body in (*movers, *wheel_bodies(scene))]
+
+
+def _on_cam(scene: Scene, body: BodyShape) -> BodyShape:
+    """Return a body with the cam of its axis, if that has one."""
+    axis = scene.axes.get(body.axis.removeprefix("axes/")) if body.axis.startswith("axes/") else None
+    if axis is None or axis.cam is None:
+        return body
+    cam = cam_through(axis.cam)
+    return replace(body, cam=cam, period=cam.end)
 
 
 def axes_of(scene: Scene) -> list[AxisShape]:

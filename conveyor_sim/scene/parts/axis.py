@@ -128,6 +128,11 @@ class Axis(DevicePart):
             yield from self._gear_problems(path, others["axes"])
         if self.cam is not None:
             yield from _cam_problems((*path, "cam"), self.cam)
+            for field in ("belts", "screws"):
+                for name, part in others.get(field, {}).items():
+                    if getattr(part, "axis", None) == path[-1]:
+                        text = f"given, expected none: {field}.{name} needs an axis without a cam"
+                        yield Problem((*path, "cam"), text)
         if self.torque_limit != "none" and self.acceleration * self.inertia > self.torque_limit:
             most = self.torque_limit / self.inertia
             yield Problem(
