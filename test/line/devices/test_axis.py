@@ -337,7 +337,7 @@ def test_fields_of_a_belt_that_contradict_its_axis_are_refused(changes: dict[str
 def test_a_belt_needs_an_axis_without_a_cam() -> None:
     star = {"master": "block", "cam": [[0.0, 0.0], [1.0, 1.0], [2.0, 0.0]]}
     with pytest.raises(
-        SceneError, match="axes.star.cam: given, expected none: belts.table needs an axis without a cam"
+        SceneError, match=r"axes\.star\.cam: given, expected none: belts\.table needs an axis without a cam"
     ):
         simulation(base=base(0.9), belts=table(), axes={"block": {"rate": 1.0}, "star": star}, bottles=[bottle(0.4, 0)])
 
