@@ -12,6 +12,7 @@ from conveyor_sim.scene.geometry import RailShape, SegmentPiece
 from conveyor_sim.scene.parts.movers import Diverter, Mover, Positioned, Pusher, SwingingDivider, SwingingGate
 from conveyor_sim.scene.problems import Path
 from conveyor_sim.scene.schema import Scene
+from conveyor_sim.scene.wheel_bodies import wheel_bodies
 
 MOVER_FIELDS = ("gates", "pushers", "diverters", "dividers", "adjustable")
 """Fields of a scene with movers, in the order of their rails' numbers."""
@@ -76,10 +77,10 @@ def _positioned_body(path: Path, mover: Positioned) -> tuple[BodyShape, AxisShap
 def bodies_of(scene: Scene) -> list[BodyShape]:
     """Return all bodies. Bodies of one machine follow each other; machines have the rail numbers after rails at rest.
 
-    Those of gates, pushers and diverters come first.
+    Those of gates, pushers and diverters come first, then those of star wheels, screws and side belts.
     """
-    bodies = [mover_shape(path, mover)[0] for path, mover in movers_of(scene)]
-    return [_on_cam(scene, body) for body in bodies]
+    movers = [mover_shape(path, mover)[0] for path, mover in movers_of(scene)]
+    return [_on_cam(scene, body) for body in (*movers, *wheel_bodies(scene))]
 
 
 def _on_cam(scene: Scene, body: BodyShape) -> BodyShape:
