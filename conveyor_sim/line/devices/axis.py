@@ -273,7 +273,7 @@ class AxisDevice(Device):
             target = part.ratio * master.speed
         else:
             target = self.wanted(now)
-        if target == self.speed == 0.0:
+        if target == self.speed == 0.0 and self.mode == FREE:
             return Motion(self.position, 0.0)
         # A drive has a ramp itself. Once an axis has its speed, it keeps up.
         limit = math.inf if self.follows and self.runs else part.acceleration
@@ -350,7 +350,7 @@ class AxisDevice(Device):
         if self.following_error == 0.0:
             return motion
         if self.catch_up.distance == 0.0:
-            if self.limited or self.tripped:
+            if self.limited or not self.runs:
                 return motion.plus(Motion(-self.following_error, 0.0))
             self.catch_up.start(now.tick, self.following_error, part.jog_speed, part.acceleration, tick)
         gain = self.catch_up.during(now.tick, tick)

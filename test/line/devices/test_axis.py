@@ -142,6 +142,15 @@ def test_gearing_out_goes_on_at_the_own_rate() -> None:
     assert deviation(sim) == pytest.approx(0.0, abs=1e-12)
 
 
+def test_an_axis_gears_in_with_a_master_at_rest() -> None:
+    sim = axes(block={"rate": 0.0, "rate_limit": RATE}, star={"in_gear": False})
+    commanded(sim, gear_in=1)
+    in_gear(sim)
+    commanded(sim, block_rate=RATE)
+    sim.advance(300)
+    assert signal(sim, "star/speed") == OMEGA / 12 and deviation(sim) == pytest.approx(0.0, abs=1e-12)
+
+
 def test_a_phase_shift_moves_to_the_new_phase_and_back() -> None:
     sim = axes()
     sim.advance(10)
