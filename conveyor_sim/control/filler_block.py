@@ -91,4 +91,4 @@ class FillerBlock:
 
 def filler_block() -> FillerBlock:
     """Return the controller of `config/filler_block.yaml`."""
-    return FillerBlock(("star", "filler", "capper"))
+    return FillerBlock(("inlet", "filler", "outlet", "capper"))
