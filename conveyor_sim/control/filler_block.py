@@ -40,7 +40,6 @@ class FillerBlock:
     _step: Step = Step.STOPPED
     _ready: bool = True
     _start: bool = field(default=True)
-    _reset: bool = field(default=True)
     _pulse: bool = False
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
@@ -49,9 +48,10 @@ class FillerBlock:
         powered = inputs["panel/estop/contact"] != 0.0
         failed = any(inputs[f"axes/{axis}/fault"] for axis in axes)
         start, reset = inputs["panel/start/contact"] != 0.0, inputs["panel/reset/contact"] != 0.0
-        starts, resets = start and not self._start, reset and not self._reset
-        self._start, self._reset = start, reset
-        self._ready = powered and not failed and (self._ready or resets)
+        starts = start and not self._start
+        self._start = start
+        # An axis reports the end of its failure one scan after the reset.
+        self._ready = powered and not failed and (self._ready or reset)
         geared = all(inputs[f"axes/{axis}/in_gear"] for axis in self.slaves)
         self._pulse = self._step == Step.GEARING and not self._pulse
         self._step = self._next(failed, starts, geared, inputs["panel/stop/contact"] != 0.0)
