@@ -72,7 +72,7 @@ def scenes(draw: st.DrawFn, family: Family, beyond: bool = True) -> Data:
     if family.drives:
         data |= draw(drives(frame, data["belts"]))
     if family.movers:
-        data |= draw(movers(frame, STEEL))
+        data |= draw(movers(frame, STEEL, family.lifts))
     clear = _Clear(data, frame)
     if family.machines:
         data |= draw(machines(frame, clear))

@@ -12,7 +12,7 @@ from conveyor_sim.scene.marks import marks_of
 from conveyor_sim.scene.parts.device_part import DevicePart, Entry, Exit
 from conveyor_sim.support.resources import scene_path
 
-BY_SHAPE = {"belt", "gate", "pusher", "diverter", "divider", "adjustable"}
+BY_SHAPE = {"belt", "gate", "pusher", "diverter", "divider", "adjustable", "clamp"}
 """Kinds that are drawn as belts and rails."""
 ON_PANEL = {"button", "selector", "emergency_stop", "lamp", "horn", "stack_light", "numeric"}
 PLACELESS = {"axis", "drive", "indicator", *ON_PANEL}
