@@ -10,6 +10,7 @@ from conveyor_sim.line.devices.belt import belt_device
 from conveyor_sim.line.devices.crossing import CounterDevice, InspectionDevice
 from conveyor_sim.line.devices.divider import PositionedDevice
 from conveyor_sim.line.devices.drive import NamedDriveDevice
+from conveyor_sim.line.devices.geared_machine import ScrewDevice, StarDevice
 from conveyor_sim.line.devices.indicator import IndicatorDevice
 from conveyor_sim.line.devices.infeed import InfeedDevice
 from conveyor_sim.line.devices.lifting_gate import gate_device
@@ -26,6 +27,7 @@ from conveyor_sim.line.devices.region import OutfeedDevice, ZoneDevice
 from conveyor_sim.line.devices.reject import RejectDevice
 from conveyor_sim.line.devices.row_pusher import pusher_device
 from conveyor_sim.line.devices.setup import DeviceSetup
+from conveyor_sim.line.devices.side_belt import SideBeltDevice
 from conveyor_sim.line.devices.spill import SpillDevice
 from conveyor_sim.line.machines.carrier import station_device
 from conveyor_sim.line.machines.source import SourceDevice
@@ -50,6 +52,9 @@ DEVICES: Mapping[str, Callable[[str, Any, DeviceSetup], Device]] = {
     "divider": PositionedDevice,
     "adjustable": PositionedDevice,
     "clamp": Mover,
+    "star": StarDevice,
+    "screw": ScrewDevice,
+    "side_belt": SideBeltDevice,
     "infeed": InfeedDevice,
     "outfeed": OutfeedDevice,
     "source": SourceDevice,

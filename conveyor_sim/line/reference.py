@@ -53,6 +53,14 @@ clamps:
   k:
     {from: [6.2, 0.2], to: [6.4, 0.2], direction: 90 deg, opening: 0.1, stroke: 0.03, max_speed: 1, acceleration: 5,
      material: rail}
+stars:
+  st:
+    {centre: [1, 5], turn: left, entry: -90 deg, pockets: 12, pitch_radius: 0.3, pocket_radius: 34 mm, axis: a,
+     material: rail}
+screws:
+  sc: {from: [2, 5], to: [2.6, 5], side: left, pitch: [[0, 70 mm]], pocket_radius: 34 mm, axis: a, material: rail}
+side_belts:
+  sb: {from: [3, 5], to: [4, 5], material: rail}
 infeeds:
   i: {bottle: bottle, types: [bottle], position: [0.1, 0.5], direction: 0, speed: 0.5, rate: 1, rate_limit: 2}
 outfeeds: {o: {region: [[9.5, 0], [10, 0], [10, 1]]}}
@@ -82,6 +90,9 @@ PAGES: dict[str, dict[str, tuple[str, ...]]] = {
     "parts/machines": {"machines": ("machines",)},
     "parts/movers": {"movers": ("gates", "pushers", "diverters", "clamps")},
     "parts/dividers": {"dividers": ("dividers", "adjustable")},
+    "parts/stars": {"stars": ("stars",)},
+    "parts/screws": {"screws": ("screws",)},
+    "parts/side_belts": {"side_belts": ("side_belts",)},
     "parts/photo_eyes": {"photo_eyes": ("photo_eyes",)},
     "parts/zones": {"zones": ("zones",), "counters": ("counters",)},
     "parts/indicators": {"indicators": ("indicators",)},

@@ -9,6 +9,7 @@ from conveyor_sim.scene.accuracy import CHOICES
 from conveyor_sim.scene.belts import CurvedBelt, CurvedSurface, PathBelt
 from conveyor_sim.scene.check_contacts import contact_problems
 from conveyor_sim.scene.check_shapes import shape_problems
+from conveyor_sim.scene.check_wheels import wheel_problems
 from conveyor_sim.scene.moving import movers_of
 from conveyor_sim.scene.problem_count import MOST_SAID
 from conveyor_sim.scene.problems import Path, Problem
@@ -71,6 +72,7 @@ def problems_of(scene: Scene) -> list[Problem]:
         _devices,
         _alarms,
         _moving_rails,
+        wheel_problems,
         _vibrations,
         limit_problems,
         shape_problems,
@@ -140,6 +142,12 @@ def _touching(scene: Scene) -> Iterator[tuple[frozenset[str], str]]:
             first.setdefault(belt.rails.material, f"rails of belt {name}")
     for path, mover in movers_of(scene):
         first.setdefault(mover.material, f"{path[0]}.{path[1]}")
+    for field in ("stars", "screws", "side_belts"):
+        for name, part in getattr(scene, field).items():
+            first.setdefault(part.material, f"{field}.{name}")
+    for name, star in scene.stars.items():
+        if star.guide is not None:
+            first.setdefault(star.guide.material, f"guide of stars.{name}")
     for material, what in first.items():
         for one in bottles:
             yield frozenset((one, material)), f"bottle of {one} and {what} of {material}"
@@ -246,3 +254,8 @@ def _rail_names(scene: Scene) -> Iterator[Problem]:
                         f"{shown(derived)} given as a name, expected another one: "
                         f"the {side} rail of belt {name} is called so",
                     )
+    for name, star in scene.stars.items():
+        derived = f"{name}_guide"
+        if star.guide is not None and derived in scene.rails:
+            text = f"{shown(derived)} given as a name, expected another one: the guide of stars.{name} is called so"
+            yield Problem(("rails", derived), text)

@@ -6,8 +6,9 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from conveyor_sim.scene.bodies import AxisShape, BodyShape, Cam, moved_piece
+from conveyor_sim.scene.cam_table import cam_through
 from conveyor_sim.scene.gearing import first_position, top_speed
-from conveyor_sim.scene.geometry import RailShape, SegmentPiece
+from conveyor_sim.scene.geometry import Piece, RailShape, SegmentPiece
 from conveyor_sim.scene.parts.movers import (
     Clamp,
     Diverter,
@@ -22,6 +23,7 @@ from conveyor_sim.scene.parts.movers import (
 from conveyor_sim.scene.problems import Path
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.scene.types import XY
+from conveyor_sim.scene.wheel_bodies import wheel_bodies
 
 MOVER_FIELDS = ("gates", "pushers", "diverters", "dividers", "adjustable", "clamps")
 """Fields of a scene with movers, in the order of their rails' numbers."""
@@ -42,7 +44,7 @@ def mover_shape(path: Path, mover: Mover) -> tuple[tuple[BodyShape, ...], AxisSh
     name = "/".join(str(part) for part in path)
     along, turning, least, stroke, first = _motion(mover)
     shift = along[0] * least, along[1] * least
-    pieces = _pieces(mover)
+    pieces: tuple[Piece, ...] = _pieces(mover)
     if least:  # without rounding where there is nothing to move
         pieces = tuple(moved_piece(piece, mover.from_, shift, turning * least) for piece in pieces)
     pivot = mover.from_[0] + shift[0], mover.from_[1] + shift[1]
@@ -102,9 +104,19 @@ def _pieces(mover: Mover) -> tuple[SegmentPiece, ...]:
 def bodies_of(scene: Scene) -> list[BodyShape]:
     """Return all bodies. Bodies of one machine follow each other; machines have the rail numbers after rails at rest.
 
-    Those of gates, pushers and diverters come first.
+    Those of gates, pushers and diverters come first, then those of star wheels, screws and side belts.
     """
-    return [body for path, mover in movers_of(scene) for body in mover_shape(path, mover)[0]]
+    movers = [body for path, mover in movers_of(scene) for body in mover_shape(path, mover)[0]]
+    return [_on_cam(scene, body) for body in (*movers, *wheel_bodies(scene))]
+
+
+def _on_cam(scene: Scene, body: BodyShape) -> BodyShape:
+    """Return a body with the cam of its axis, if that has one."""
+    axis = scene.axes.get(body.axis.removeprefix("axes/")) if body.axis.startswith("axes/") else None
+    if axis is None or axis.cam is None:
+        return body
+    cam = cam_through(axis.cam)
+    return replace(body, cam=cam, period=cam.end)
 
 
 def axes_of(scene: Scene) -> list[AxisShape]:

@@ -31,9 +31,12 @@ from conveyor_sim.scene.parts.outfeed import Outfeed
 from conveyor_sim.scene.parts.panel import Button, EmergencyStop, Horn, Lamp, NumberField, Selector, StackLight
 from conveyor_sim.scene.parts.photo_eye import PhotoEye
 from conveyor_sim.scene.parts.reject import Reject
+from conveyor_sim.scene.parts.screw import Screw
+from conveyor_sim.scene.parts.side_belt import SideBelt
 from conveyor_sim.scene.parts.sink import Sink
 from conveyor_sim.scene.parts.source import Source
 from conveyor_sim.scene.parts.spill import Spill
+from conveyor_sim.scene.parts.star import Star
 from conveyor_sim.scene.parts.station import Station
 from conveyor_sim.scene.parts.zone import Zone
 from conveyor_sim.scene.plates import Plate
@@ -301,6 +304,15 @@ class Scene(Part):
     )
     clamps: Annotated[dict[Name, Clamp], _named("clamps")] = quantity(
         "Pairs of jaws that close on bottles on command.", default={}
+    )
+    stars: Annotated[dict[Name, Star], _named("star wheels")] = quantity(
+        "Wheels that carry bottles in pockets.", default={}
+    )
+    screws: Annotated[dict[Name, Screw], _named("infeed screws")] = quantity(
+        "Screws that space bottles to a pitch.", default={}
+    )
+    side_belts: Annotated[dict[Name, SideBelt], _named("side belts")] = quantity(
+        "Belts on edge beside the path of bottles: timing belts, side grippers.", default={}
     )
     floor: Annotated[
         Annotated[Floor, Tag("(floor)")] | Annotated[Literal["none"], Tag("(none)")],

@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from fuzz.axis_invariants import AxisWatch
 from fuzz.crossing import crossed
 from fuzz.violation import Violation
 from numpy.typing import NDArray
@@ -51,6 +52,7 @@ class DeviceWatch:
         """The last accepted value of each injected fault."""
         self._movers = [mover_shape(*mover) for mover in movers_of(simulation.scene)]
         self._now = self._before = self._values()
+        self._axes = AxisWatch(simulation)
         self._still = dict.fromkeys((axis.name for _, axis in self._movers), 0)
         """Ticks for which each moving rail has stood."""
         ledger = simulation.ledger()
@@ -70,7 +72,8 @@ class DeviceWatch:
         self._lines(before, now)
         self._zones(now)
         self._eyes(before, now)
-        self._movers()
+        self._check_movers()
+        self._axes.check(self._before, self._now, outcomes)
         self._ledger()
 
     def in_frames(self, before: F8, after: F8) -> list[tuple[str, SegmentPiece, F8, F8]]:
@@ -228,7 +231,7 @@ class DeviceWatch:
             if max(rose, fell) > self._sim.time + 1e-9:
                 raise Violation("eye", f"{name}: an edge at {rose} or {fell} s, at {self._sim.time} s")
 
-    def _movers(self) -> None:
+    def _check_movers(self) -> None:
         """No rail is off its course, or faster than it can, unless its drive is held up; none leaves its end stops."""
         for n, (_, axis) in enumerate(self._movers):
             before, now = self._place(axis, self._before), self._place(axis, self._now)

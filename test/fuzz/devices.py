@@ -60,6 +60,31 @@ def drives(draw: st.DrawFn, frame: Frame, belts: Data) -> Data:
 
 
 @st.composite
+def axes(draw: st.DrawFn, frame: Frame, belts: Data, drives: Data) -> Data:
+    """Axes with gears, and belts that they move; the fields `axes` and `belts`."""
+    top = frame.speed / frame.unit
+    found: Data = {"axis_0": {"rate": top / 6.3 * draw(between(-1.0, 1.0)), "rate_limit": top / 6.3}}
+    for n in range(1, draw(st.integers(2, 4))):
+        if drives and draw(st.integers(0, 3)) == 3:
+            axis = {"drive": draw(st.sampled_from(sorted(drives))), "travel": 6.3 * frame.unit}
+        else:
+            ratio = draw(st.sampled_from([1.0, -0.5, "1/12", "-2/3", 0.3819660112501051]))
+            axis = {"master": draw(st.sampled_from(sorted(found))), "ratio": ratio, "in_gear": draw(st.booleans())}
+            axis["phase"] = draw(between(-math.pi, math.pi))
+        found[f"axis_{n}"] = axis
+    for axis in found.values():
+        axis["acceleration"] = top / (frame.tick * draw(st.sampled_from([0.5, 4.0, 30.0])))
+        axis["jog_speed"] = top * draw(between(0.1, 0.5))
+        axis["following_limit"] = draw(st.sampled_from(["none", 0.1, 3.0]))
+    moved = dict(belts)
+    for name, belt in belts.items():
+        if "drive" not in belt and draw(st.booleans()):
+            rest = {field: value for field, value in belt.items() if field not in OF_DRIVE}
+            moved[name] = {**rest, "axis": draw(st.sampled_from(sorted(found))), "travel": 6.3 * frame.unit}
+    return {"axes": found, "belts": moved}
+
+
+@st.composite
 def _drive(draw: st.DrawFn, frame: Frame) -> Data:
     """Ramps and encoder of a drive."""
     ticks = draw(st.sampled_from([0.5, 3.0, 17.0]))

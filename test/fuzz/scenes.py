@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from fuzz.checked import checked
-from fuzz.devices import drives, machines, movers, row_pushers, sensors
+from fuzz.devices import axes, drives, machines, movers, row_pushers, sensors
 from fuzz.draws import Data, between, fractions, scaled, signed
 from fuzz.families import Family
 from hypothesis import strategies as st
@@ -71,6 +71,8 @@ def scenes(draw: st.DrawFn, family: Family, beyond: bool = True) -> Data:
         data["base"] = [{**base, "tangential": spring} for base in data["base"]]
     if family.drives:
         data |= draw(drives(frame, data["belts"]))
+    if family.axes:
+        data |= draw(axes(frame, data["belts"], data.get("drives", {})))
     if family.movers:
         data |= draw(movers(frame, STEEL, family.lifts))
     clear = _Clear(data, frame)

@@ -8,6 +8,7 @@ grows, which the drive takes up again at jog speed when it can.
 
 import math
 from collections.abc import Iterator, Sequence
+from typing import Protocol
 
 import numpy as np
 
@@ -21,7 +22,6 @@ from conveyor_sim.line.devices.setup import DeviceSetup
 from conveyor_sim.line.tag import Tag, number, switch
 from conveyor_sim.scene.driven import moved_by_axis
 from conveyor_sim.scene.gearing import first_position, first_speed, top_speed, travel_per_radian
-from conveyor_sim.scene.moving import axes_of
 from conveyor_sim.scene.parts.axis import CYCLE, Axis
 
 FREE, SYNCHRONISING, GEARED = range(3)
@@ -32,6 +32,13 @@ ROUNDING = 1e-12
 
 LARGEST_TORQUE = 1e6
 """Range of the torque signal of drives without limit, N m."""
+
+
+class CarriedMachine(Protocol):
+    """Machine on the shaft of an axis."""
+
+    jammed: bool
+    """True while it blocks the axis."""
 
 
 class AxisDevice(Device):
@@ -51,14 +58,14 @@ class AxisDevice(Device):
         self._has_own_rate = part.drive is None and part.machine is None
         self._modulus = CYCLE if part.cam is None else part.cam[-1][0]
         super().__init__(name, [*self._drive_tags(name, first, start), *(self._gear_tags(name) if part.master else ())])
-        shapes = axes_of(scene)
-        self._number = [shape.name for shape in shapes].index(name)
+        self._number = [axis.name for axis in setup.model.plant.axes].index(name)
         belts = moved_by_axis(scene, short_name)
         self._belts = np.array([setup.speed_index(f"belts/{belt}") for belt in belts], dtype=np.int64)
         self._travels = np.array([travel_per_radian(scene.belts[belt]) for belt in belts])
         self._torque_alarm, self._fault_alarm = f"{name}/torque", f"{name}/fault"
         self._power = setup.power("drives", self)
         self._master: AxisDevice | None = None
+        self._machines: list[CarriedMachine] = []
         self._motion = Motion(first, start)
         self._planned = -1
         self.mode = GEARED if part.master is not None and part.in_gear else FREE
@@ -66,7 +73,7 @@ class AxisDevice(Device):
         """Commanded position (rad) and speed (rad/s) at the end of the last tick."""
         self.actual_position, self.actual_speed = first, start
         self.torque = 0.0
-        """Torque that the drive exerts on bottles at the end of the last tick, N m."""
+        """Mean torque that the drive exerts on bottles in the last tick, N m."""
         self.following_error = 0.0
         """Commanded minus actual position, rad."""
         self.offset = first - part.ratio * (first_position(scene, part.master) if part.master else 0.0)
@@ -89,7 +96,8 @@ class AxisDevice(Device):
     def _drive_tags(self, name: str, first: float, start: float) -> Iterator[Tag]:
         part, top = self._part, self._top
         most = LARGEST_TORQUE if part.torque_limit == "none" else part.torque_limit
-        yield number(f"{name}/position", "actual", "Position.", "rad", 0.0, self._modulus, first % self._modulus)
+        place = "Position." if part.cam is None else "Position, the input of its cam."
+        yield number(f"{name}/position", "actual", place, "rad", 0.0, self._modulus, first % self._modulus)
         yield number(f"{name}/speed", "actual", "Speed.", "rad/s", -top, top, start)
         yield number(
             f"{name}/torque", "actual", "Torque that it exerts on bottles, forward positive.", "N m", -most, most
@@ -120,7 +128,7 @@ class AxisDevice(Device):
         geared = float(self._part.in_gear)
         yield switch(f"{name}/in_gear", "status", "In gear, in phase, without following error.", geared, "state")
         yield number(f"{name}/phase_error", "actual", "Deviation from the phase in gear.", "rad", -CYCLE, CYCLE)
-        yield switch(f"{name}/gear_in", "command", "Its rising edge gears in: takes up speed, then phase.")
+        yield switch(f"{name}/gear_in", "command", "Its rising edge gears an enabled axis in: speed first, then phase.")
         yield switch(f"{name}/gear_out", "command", "Its rising edge gears out: goes on at its own rate.")
         yield number(f"{name}/phase_shift", "setpoint", "Shift of the phase from the scene's.", "rad", -CYCLE, CYCLE)
 
@@ -153,6 +161,14 @@ class AxisDevice(Device):
         """Commanded position minus position in phase, rad; 0 out of gear."""
         return self._phase_error
 
+    def add_machine(self, machine: "CarriedMachine") -> None:
+        """Add a machine that it turns, whose jam blocks it."""
+        self._machines.append(machine)
+
+    @property
+    def _is_jammed(self) -> bool:
+        return self.jammed or any(machine.jammed for machine in self._machines)
+
     @property
     def _is_locked(self) -> bool:
         return self._power is not None and self._power.holds(self.name)
@@ -172,12 +188,9 @@ class AxisDevice(Device):
             self._phase_error = motion.position
 
     def objection(self, name: str, value: float, now: ScanContext) -> str:
-        """Return why a command can't be taken now: jogging in gear, and gearing in without being enabled."""
-        what = name.rpartition("/")[2]
-        if value and what.startswith("jog_") and self.mode != FREE:
+        """Return why a command can't be taken now: an axis in gear does not jog."""
+        if value and self.mode != FREE and name.rpartition("/")[2].startswith("jog_"):
             return f"{name}: {value:g} given in gear, expected {self.name}/gear_out before"
-        if value and what == "gear_in" and not (self.enable.on and not self.tripped):
-            return f"{name}: {value:g} given, expected {self.name} to be enabled and without fault before"
         return ""
 
     def command(self, name: str, value: float, now: ScanContext) -> None:
@@ -193,13 +206,13 @@ class AxisDevice(Device):
             if not on and self.mode != FREE:
                 self._leave_gear()
         elif what == "gear_in":
-            if self.gear_in.rises(value) and self.mode == FREE:
+            if self.gear_in.rises(value) and self.mode == FREE and self.enable.on and not self.tripped:
                 self._start()
                 self.mode, self.jog_forward, self.jog_backward = SYNCHRONISING, False, False
         elif what == "gear_out":
             if self.gear_out.rises(value) and self.mode != FREE:
                 self._leave_gear()
-        elif self.reset.rises(value) and self.tripped and not self.jammed:
+        elif self.reset.rises(value) and self.tripped and not self._is_jammed:
             self.tripped = False
             now.alarm(self._fault_alarm, False)
 
@@ -314,11 +327,11 @@ class AxisDevice(Device):
         """Set the motion profile of this tick in the engine, and the speeds of its belts."""
         motion = self._of_shaft(self.plan(now), now)
         moving, number = now.state.world.moving, self._number
-        if moving is not None and number < len(moving.course):
+        if moving is not None:
             motion.write(moving.course[number], self._tick)
             if (actuators := moving.actuators) is not None:
                 actuators.left[number] = 0
-                if self.jammed:
+                if self._is_jammed:
                     actuators.mode[number] = HELD
                 elif actuators.mode[number] == HELD:
                     actuators.mode[number] = ON_PROFILE
@@ -330,7 +343,7 @@ class AxisDevice(Device):
     def _of_shaft(self, motion: Motion, now: ScanContext) -> Motion:
         """Return the motion of the shaft: at rest if jammed, else with the following error, which it catches up."""
         part, tick = self._part, self._tick
-        if self.jammed:
+        if self._is_jammed:
             self.catch_up.stop()
             self.following_error = self.position - self.actual_position
             return Motion(self.actual_position, 0.0)
@@ -348,9 +361,9 @@ class AxisDevice(Device):
     def end(self, now: ScanContext) -> None:
         """Take over position and torque of a limited drive, and fail if the following error is too large."""
         moving, number = now.state.world.moving, self._number
-        if moving is not None and number < len(moving.course) and (actuators := moving.actuators) is not None:
-            self.torque = -float(actuators.push[:, number, 0].sum())
-            limited = bool(actuators.left[number]) and not self.jammed
+        if now.tick and moving is not None and (actuators := moving.actuators) is not None:
+            self.torque = -float(actuators.load[number] / moving.clock[0])
+            limited = bool(actuators.left[number]) and not self._is_jammed
             if limited:
                 self.catch_up.stop()
                 self.actual_position, self.actual_speed = float(moving.position[number]), float(moving.speed[number])
@@ -359,7 +372,7 @@ class AxisDevice(Device):
                 self.limited = limited
                 now.alarm(self._torque_alarm, limited)
         limit = self._part.following_limit
-        grows = self.jammed or self.limited
+        grows = self._is_jammed or self.limited
         if grows and limit != "none" and abs(self.following_error) > limit and not self.tripped:
             self.tripped = True
             now.alarm(self._fault_alarm, True)
