@@ -7,6 +7,7 @@ from typing import Any
 from conveyor_sim.line.device import Device
 from conveyor_sim.line.devices.axis import AxisDevice
 from conveyor_sim.line.devices.belt import belt_device
+from conveyor_sim.line.devices.carousel import CarouselDevice
 from conveyor_sim.line.devices.crossing import CounterDevice, InspectionDevice
 from conveyor_sim.line.devices.divider import PositionedDevice
 from conveyor_sim.line.devices.drive import NamedDriveDevice
@@ -53,6 +54,7 @@ DEVICES: Mapping[str, Callable[[str, Any, DeviceSetup], Device]] = {
     "adjustable": PositionedDevice,
     "clamp": Mover,
     "star": StarDevice,
+    "carousel": CarouselDevice,
     "screw": ScrewDevice,
     "side_belt": SideBeltDevice,
     "infeed": InfeedDevice,

@@ -57,6 +57,8 @@ stars:
   st:
     {centre: [1, 5], turn: left, entry: -90 deg, pockets: 12, pitch_radius: 0.3, pocket_radius: 34 mm, axis: a,
      material: rail}
+carousels:
+  ca: {star: st, from: 30 deg, to: 120 deg, sets: {test: {to: 1}}, tests: {test: {low: 1}}}
 screws:
   sc: {from: [2, 5], to: [2.6, 5], side: left, pitch: [[0, 70 mm]], pocket_radius: 34 mm, axis: a, material: rail}
 side_belts:
@@ -90,6 +92,7 @@ PAGES: dict[str, dict[str, tuple[str, ...]]] = {
     "parts/machines": {"machines": ("machines",)},
     "parts/movers": {"movers": ("gates", "pushers", "diverters", "clamps")},
     "parts/dividers": {"dividers": ("dividers", "adjustable")},
+    "parts/carousels": {"carousels": ("carousels",)},
     "parts/stars": {"stars": ("stars",)},
     "parts/screws": {"screws": ("screws",)},
     "parts/side_belts": {"side_belts": ("side_belts",)},

@@ -37,6 +37,7 @@ PAGES: dict[str, tuple[str, ...]] = {
     "panel": ("`panel`",),
     "photo_eyes": ("`photo_eyes`",),
     "rails": ("`rails`",),
+    "carousels": ("`carousels`",),
     "screws": ("`screws`",),
     "side_belts": ("`side_belts`",),
     "stars": ("`stars`", "`guide` of a star wheel"),

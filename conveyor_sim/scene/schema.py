@@ -21,6 +21,7 @@ from conveyor_sim.scene.limits import Limits as DamageLimits
 from conveyor_sim.scene.part import Part, one_of
 from conveyor_sim.scene.parts.alarm import MeasuredAlarm
 from conveyor_sim.scene.parts.axis import Axis
+from conveyor_sim.scene.parts.carousel import Carousel
 from conveyor_sim.scene.parts.counter import Counter
 from conveyor_sim.scene.parts.device_part import DevicePart, Entry, Exit, Giver
 from conveyor_sim.scene.parts.indicator import Indicator
@@ -307,6 +308,9 @@ class Scene(Part):
     )
     stars: Annotated[dict[Name, Star], _named("star wheels")] = quantity(
         "Wheels that carry bottles in pockets.", default={}
+    )
+    carousels: Annotated[dict[Name, Carousel], _named("carousels")] = quantity(
+        "Tools of star wheels that work on bottles: fillers, cappers, labellers.", default={}
     )
     screws: Annotated[dict[Name, Screw], _named("infeed screws")] = quantity(
         "Screws that space bottles to a pitch.", default={}

@@ -33,6 +33,7 @@ MOMENTS = {
     "alarms": 14.0,
     "axes": 14.0,
     "bottles": 0.5,
+    "carousels": 18.0,
     "failures": 120.0,
     "rows": 17.1,
     "stations": 20.0,
