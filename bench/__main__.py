@@ -16,6 +16,7 @@ with while_importing():
 
     from bench import (
         accuracy,
+        bodies,
         compiling,
         control,
         dense,
@@ -70,6 +71,7 @@ PARTS: dict[str, Part] = {
     "node": node,
     "control": control,
     "riding": riding,
+    "bodies": bodies,
     "lockstep": lockstep,
     "scada": scada,
     "isolation": isolation,

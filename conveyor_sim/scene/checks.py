@@ -17,6 +17,9 @@ from conveyor_sim.scene.schema import Grid, Scene
 from conveyor_sim.scene.types import TOUCH, is_whole_nanoseconds, nanoseconds
 from conveyor_sim.scene.words import listed, shown, some_of
 
+WHEEL_FIELDS = ("stars", "screws", "side_belts")
+"""Fields of a scene with bodies of other parts than movers."""
+
 
 def accuracy_problems(scene: Scene) -> Iterator[Problem]:
     """Yield problems of the choice of the time step."""
@@ -142,7 +145,7 @@ def _touching(scene: Scene) -> Iterator[tuple[frozenset[str], str]]:
             first.setdefault(belt.rails.material, f"rails of belt {name}")
     for path, mover in movers_of(scene):
         first.setdefault(mover.material, f"{path[0]}.{path[1]}")
-    for field in ("stars", "screws", "side_belts"):
+    for field in WHEEL_FIELDS:
         for name, part in getattr(scene, field).items():
             first.setdefault(part.material, f"{field}.{name}")
     for name, star in scene.stars.items():
@@ -210,7 +213,8 @@ def _alarms(scene: Scene) -> Iterator[Problem]:
 
 def _moving_rails(scene: Scene) -> Iterator[Problem]:
     chosen = scene.accuracy.integrator
-    for path, _ in movers_of(scene):
+    wheels = ((field, name) for field in WHEEL_FIELDS for name in getattr(scene, field))
+    for path in (*(path for path, _ in movers_of(scene)), *wheels):
         if chosen not in MOVE_RAILS:
             yield Problem(
                 ("accuracy", "integrator"),
