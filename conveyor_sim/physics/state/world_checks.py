@@ -87,6 +87,7 @@ def ranges(world: World, model: Model, next_id: int) -> dict[str, tuple[int, int
         "riding.runs": (0, slots),
         "riding.progress": (STEPPED, PLANNED),
         "impulses.anew": (0, 1),
+        "impulses.mask": (0, 2**63 - 1),
     }
     if world.belts is not None:
         limits["belts.start"] = (0, world.belts.candidate.size)
@@ -105,6 +106,7 @@ def ranges(world: World, model: Model, next_id: int) -> dict[str, tuple[int, int
             "pairs.impulse.kind": (0, len(model.bottle_types) ** 2 - 1),
             "pairs.impulse.place": (0, pairs - 1),
             "pairs.impulse.start": (0, int(world.pairs.used[0])),
+            "pairs.impulse.next": (0, pairs),
             "pairs.impulse.kept_i": (0, slots - 1),
             "pairs.impulse.kept_j": (0, slots - 1),
             "pairs.impulse.kept_count": (-1, pairs),
