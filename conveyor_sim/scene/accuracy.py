@@ -11,6 +11,7 @@ from conveyor_sim.scene.part import Part
 from conveyor_sim.scene.types import Positive, Says, Tolerance, quantity
 
 Preset = Literal["draft", "standard", "fine"]
+PresetName = Literal["draft", "standard", "fine", "fast"]
 IntegratorName = Literal[
     "leapfrog", "semi_implicit_euler", "velocity_verlet", "rk4", "dormand_prince", "linearly_implicit", "impulses"
 ]
@@ -47,7 +48,9 @@ class Accuracy(Part):
     `{integrator: impulses, per_tick: 8, sweeps: 2}`.
     """
 
-    preset: Preset | None = quantity("A row of the table of presets in docs/accuracy.md.", default=None)
+    preset: PresetName | None = quantity(
+        "A row of the table of presets in docs/accuracy.md; or fast, for flow and counts.", default=None
+    )
     tolerance: Tolerance | None = quantity(
         "Largest relative error in contact force; the time step is derived from it.", "1", default=None
     )

@@ -3,11 +3,12 @@
 
 from collections.abc import Iterator
 
+from conveyor_sim.scene.effect_names import EffectName
 from conveyor_sim.scene.problems import Path, Problem
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.scene.words import shown
 
-OBSERVERS = ("energy_ledger", "scuffing", "crushing", "impacts", "tipping")
+OBSERVERS: tuple[EffectName, ...] = ("energy_ledger", "scuffing", "crushing", "impacts", "tipping")
 """Effects that evaluate forces in every step; an impact has none."""
 
 LOADS = ("scuffing_work", "crushing_force", "opposed_force", "impact_speed", "impact_force", "tipping")
@@ -19,6 +20,11 @@ _WITH = "with integrator impulses, or another integrator"
 def impulse_problems(scene: Scene) -> Iterator[Problem]:
     """Yield problems of the fields that belong to integrator impulses, and of those that it does not support."""
     accuracy = scene.accuracy
+    if accuracy.preset == "fast":
+        yield Problem(
+            ("accuracy", "preset"), '"fast" given beside other fields, expected it alone, or integrator impulses'
+        )
+        return
     if accuracy.integrator != "impulses":
         if accuracy.sweeps is not None:
             yield Problem(

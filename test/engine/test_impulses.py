@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from conveyor_sim.bag.replay import replay
 from conveyor_sim.engine.arrays.impulses import COLOURS
 from conveyor_sim.engine.integrators import INTEGRATORS
 from conveyor_sim.engine.threads.workers import UNIT
+from conveyor_sim.physics.state.empty_world import empty_pairs
 from conveyor_sim.scene import parse_scene
 from conveyor_sim.scene.recorded import expanded_text
 from conveyor_sim.simulation import Simulation
@@ -77,8 +79,9 @@ def test_one_kind_of_pairs_has_the_bits_of_several() -> None:
         np.testing.assert_array_equal(getattr(alike.bottles(), name), getattr(several.bottles(), name))
 
 
-def test_a_recording_replays_bit_for_bit(tmp_path: Path) -> None:
-    given = crowd(6, 5, outputs={"bottles": 50, "contacts": 50})
+@pytest.mark.parametrize("accuracy", ["fast", swept(8, 3)])
+def test_a_recording_replays_bit_for_bit(accuracy: Any, tmp_path: Path) -> None:
+    given = crowd(6, 5, accuracy=accuracy, outputs={"bottles": 50, "contacts": 50})
     recorded = scene(**given, duration=1.0)
     record(recorded, tmp_path / "bag", 100)
     report = replay(tmp_path / "bag")
@@ -143,6 +146,23 @@ def test_more_neighbours_than_colours() -> None:
         momentum = sim.model.type_mass[state.type] @ np.column_stack([state.vx, state.vy])
         assert np.abs(momentum).max() < 1e-12
     assert hashes[0] == hashes[1]
+
+
+def test_lists_that_are_too_short_leave_no_trace() -> None:
+    """A call returns where a rebuilt list does not fit; the rest of the tick follows with a longer one."""
+    one, other = pressed_crowd(), pressed_crowd()
+    state = other._state
+    assert state.world.pairs is not None
+    shortest = int(state.world.pairs.used[0])
+    state.world = state.world._replace(pairs=empty_pairs(state.model, shortest))
+    state.world.neighbourhood.stale[0] = 1
+    state.make_lists()
+    for sim in (one, other):
+        sim.advance(100)
+    assert state.world.pairs is not None
+    assert state.world.pairs.i.size > shortest
+    assert other.state_hash() == one.state_hash()
+    np.testing.assert_array_equal(other.bottles().impulse, one.bottles().impulse)
 
 
 def resting_file() -> Simulation:

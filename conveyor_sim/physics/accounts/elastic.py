@@ -52,7 +52,7 @@ def impulse_energy(model: Model, world: World) -> float:
         stored += _stored(world.pairs.impulse.row, step, model.pair_law, world.pairs.impulse.kind[:used])
     for near, pieces in ((world.near_segments, model.segments), (world.near_arcs, model.arcs)):
         if near is not None and near.impulse is not None and pieces is not None and model.rail_law is not None:
-            bottle = np.repeat(np.arange(near.start.size - 1), np.diff(near.start.astype(np.int64)))
+            bottle = np.repeat(np.arange(near.start.size - 1), near.start[1:].astype(np.int64) - near.start[:-1])
             piece = near.piece[: bottle.size]
             kind = world.bottles.type[bottle].astype(np.int64) * materials + pieces.material[piece]
             stored += _stored(near.impulse.row, step, model.rail_law, kind)
