@@ -73,17 +73,18 @@ def _one_size(count: int, effort: Effort) -> list[Row]:
     compares = count <= COMPARED
     say(f"impulses, {count} bottles: the explicit reference")
     explicit.advance(round((REST if compares and not effort.quick else TICK) / TICK))
-    reference = _forces(explicit) if compares else {}
+    reference, pushed = _forces(explicit) if compares else ({}, math.nan)
     simulations = {name_of(*setting): Simulation(swept(count, *setting), threads=1) for setting in SETTINGS}
-    rows = []
+    drag = count * FRICTION * MASS * GRAVITY
+    rows = [Row(CASE, count, EXPLICIT, WALL, 0, pushed / drag)] if compares else []
     for name, simulation in simulations.items():
         say(f"impulses, {count} bottles: {name} settles")
         simulation.restore_from(explicit)
         simulation.advance(round(SETTLE / TICK))
-        forces = _forces(simulation)
+        forces, pushed = _forces(simulation)
         if compares:
             rows.append(Row(CASE, count, name, FORCES, 0, _error(forces, reference)))
-        rows.append(Row(CASE, count, name, WALL, 0, _on_wall(simulation) / (count * FRICTION * MASS * GRAVITY)))
+        rows.append(Row(CASE, count, name, WALL, 0, pushed / drag))
         rows.append(Row(CASE, count, name, OVERLAP, 0, 1e3 * float(simulation.contacts().overlap.max(initial=0.0))))
     for turn in range(effort.rounds):
         say(f"impulses, {count} bottles: round {turn + 1}")
@@ -96,9 +97,11 @@ def _one_size(count: int, effort: Effort) -> list[Row]:
     return rows
 
 
-def _forces(simulation: Simulation) -> dict[tuple[int, int, int], float]:
-    """Return the mean normal force (N) of each contact over SHOWN ticks, by kind and ends."""
+def _forces(simulation: Simulation) -> tuple[dict[tuple[int, int, int], float], float]:
+    """Return means over SHOWN ticks: normal force (N) of each contact, by kind and ends; force of all rails along the
+    belt, N, friction at the side walls included."""
     sums: dict[tuple[int, int, int], float] = {}
+    along = 0.0
     for _ in range(SHOWN):
         simulation.advance(1)
         contacts = simulation.contacts()
@@ -108,7 +111,9 @@ def _forces(simulation: Simulation) -> dict[tuple[int, int, int], float]:
             strict=True,
         ):
             sums[key] = sums.get(key, 0.0) + force / SHOWN
-    return sums
+        pushes = contacts.normal_force * contacts.nx + contacts.tangential_force * contacts.ny
+        along += float(np.sum(pushes[contacts.kind == 1])) / SHOWN
+    return sums, along
 
 
 def _error(forces: dict[tuple[int, int, int], float], reference: dict[tuple[int, int, int], float]) -> float:
@@ -116,14 +121,6 @@ def _error(forces: dict[tuple[int, int, int], float], reference: dict[tuple[int,
     keys = forces.keys() | reference.keys()
     squares = sum((forces.get(key, 0.0) - reference.get(key, 0.0)) ** 2 for key in keys)
     return math.sqrt(squares / sum(force**2 for force in reference.values()))
-
-
-def _on_wall(simulation: Simulation) -> float:
-    """Return the force of all rails along the belt, N: friction at the side walls is in it."""
-    contacts = simulation.contacts()
-    rails = contacts.kind == 1
-    along = contacts.normal_force * contacts.nx + contacts.tangential_force * contacts.ny
-    return float(np.sum(along[rails]))
 
 
 def tables(rows: Rows) -> str:

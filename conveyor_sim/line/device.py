@@ -17,7 +17,7 @@ from conveyor_sim.engine.support.footing import find_carriers
 from conveyor_sim.line.alarms.declaration import Declared
 from conveyor_sim.line.tag import COMMANDS, SIGNALS, Tag, of_roles
 from conveyor_sim.physics.state import State
-from conveyor_sim.scene.parts.station import BAD
+from conveyor_sim.scene.parts.work import BAD
 
 
 @dataclass
@@ -261,6 +261,11 @@ class Device:
     def read(self) -> Callable[[ScanContext], Sequence[float]]:
         """Function that reads all signal values, in the order of the signals in `tags`."""
         return self._read
+
+    @property
+    def cycle_rate(self) -> float:
+        """Present rate of cycles, 1/s; 0 for a device without cycles."""
+        return 0.0
 
     def counts(self) -> tuple[int, int, int] | None:
         """Return processed, defective and rejected bottles; None if the device has no such counts."""

@@ -12,9 +12,10 @@ from conveyor_sim.page.block import FORCE_FRAMES, LEAST_FORCE, LEVELS, MM, SIGNA
 from conveyor_sim.page.drawings.underlay import ShownUnderlay, shown_underlay
 from conveyor_sim.page.story import fields
 from conveyor_sim.scene import Scene
+from conveyor_sim.scene.driven import speed_owner
 from conveyor_sim.scene.geometry import BeltShape, named_surfaces, rail_shapes, surface_shapes
 from conveyor_sim.scene.marks import marks_of
-from conveyor_sim.scene.moving import moving_shapes
+from conveyor_sim.scene.moving import mover_shape, movers_of
 from conveyor_sim.scene.parts.panel import PanelPart
 
 _ARC_POINTS = 96
@@ -36,7 +37,9 @@ def head(line: Any, scene: Scene) -> dict[str, Any]:
             for name, radius in zip(line.bottle_types, line.type_radius, strict=True)
         ],
         "drives": {
-            f"belts/{name}": f"drives/{belt.drive_name}" for name, belt in scene.belts.items() if belt.drive_name
+            f"belts/{name}": "/".join(map(str, speed_owner(scene, name)))
+            for name, belt in scene.belts.items()
+            if belt.has_foreign_drive
         },
         "signals": signals,
         "commands": list(line.command_names),
@@ -71,15 +74,15 @@ def plan_head(scene: Scene) -> dict[str, Any]:
         "rails": [_points(shape.outline(_ARC_POINTS)) for shape in rail_shapes(scene)],
         "movers": [
             {
-                "name": shape.name,
-                "from": shape.start,
-                "to": shape.end,
-                "along": shape.along,
-                "turning": shape.turning,
-                "stroke": shape.stroke,
-                "first": shape.first,
+                "name": body.name,
+                "from": body.pieces[0].ends[0],
+                "to": body.pieces[0].ends[1],
+                "along": body.along,
+                "turning": body.turning,
+                "stroke": axis.stroke,
+                "first": axis.first,
             }
-            for shape in moving_shapes(scene)
+            for body, axis in (mover_shape(path, mover) for path, mover in movers_of(scene))
         ],
         "marks": [
             {

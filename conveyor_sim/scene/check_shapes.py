@@ -20,7 +20,7 @@ from conveyor_sim.scene.geometry import (
     rail_pieces,
     rails_of_curved,
 )
-from conveyor_sim.scene.moving import movers_of, moving_shape
+from conveyor_sim.scene.moving import mover_shape, movers_of
 from conveyor_sim.scene.overlaps import near_pieces, overlapping
 from conveyor_sim.scene.parts.device_part import Entry, Giver
 from conveyor_sim.scene.problems import Path, Problem
@@ -135,8 +135,8 @@ def _valid_rails(scene: Scene, wrong: set[Path]) -> list[RailShape]:
 
 def _valid_moving(scene: Scene) -> list[RailShape]:
     """Return the moving rails with a valid geometry, at their initial positions."""
-    moving = [moving_shape(path, mover) for path, mover in movers_of(scene) if not any(mover.shape_problems(path))]
-    return [shape.shape(shape.first) for shape in moving]
+    moving = [mover_shape(path, mover) for path, mover in movers_of(scene) if not any(mover.shape_problems(path))]
+    return [body.shape(axis.first) for body, axis in moving]
 
 
 @dataclass(frozen=True)

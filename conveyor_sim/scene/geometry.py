@@ -132,6 +132,11 @@ class SegmentPiece:
         """Both end points."""
         return self.p1, self.p2
 
+    @property
+    def length(self) -> float:
+        """Length, m."""
+        return math.dist(self.p1, self.p2)
+
     def points(self, n: int = 64) -> Array:
         """Return the end points, (2, 2)."""
         return np.array([self.p1, self.p2])
@@ -158,6 +163,11 @@ class ArcPiece:
     radius: float
     start_angle: float
     span: float
+
+    @property
+    def length(self) -> float:
+        """Length along the arc, m."""
+        return self.radius * self.span
 
     @property
     def ends(self) -> tuple[XY, XY]:

@@ -20,12 +20,13 @@ from conveyor_sim.scene.layout.plan import LayoutPlan
 from conveyor_sim.scene.limits import Limits as DamageLimits
 from conveyor_sim.scene.part import Part, one_of
 from conveyor_sim.scene.parts.alarm import MeasuredAlarm
+from conveyor_sim.scene.parts.axis import Axis
 from conveyor_sim.scene.parts.counter import Counter
 from conveyor_sim.scene.parts.device_part import DevicePart, Entry, Exit, Giver
 from conveyor_sim.scene.parts.indicator import Indicator
 from conveyor_sim.scene.parts.infeed import Infeed
 from conveyor_sim.scene.parts.inspection import Inspection
-from conveyor_sim.scene.parts.movers import Diverter, Gate, Pusher
+from conveyor_sim.scene.parts.movers import AdjustableGuide, Diverter, Divider, Gate, Pusher
 from conveyor_sim.scene.parts.outfeed import Outfeed
 from conveyor_sim.scene.parts.panel import Button, EmergencyStop, Horn, Lamp, NumberField, Selector, StackLight
 from conveyor_sim.scene.parts.photo_eye import PhotoEye
@@ -271,6 +272,9 @@ class Scene(Part):
     drives: Annotated[dict[Name, NamedDrive], _named("drives")] = quantity(
         "Drives that move several belts.", default={}
     )
+    axes: Annotated[dict[Name, Axis], _named("axes")] = quantity(
+        "Axes that move machines in step: star wheels, screws, turn-tables.", default={}
+    )
     belts: Annotated[dict[Name, Belt], _named("belts")] = quantity(
         "Belts. Where belts overlap, the last one in the list carries.", default={}
     )
@@ -288,6 +292,12 @@ class Scene(Part):
     )
     diverters: Annotated[dict[Name, Diverter], _named("diverters")] = quantity(
         "Rails that swing into the path of bottles on command and return.", default={}
+    )
+    dividers: Annotated[dict[Name, Divider], _named("dividers")] = quantity(
+        "Lane dividers and lane switches: rails that move between the positions of several lanes.", default={}
+    )
+    adjustable: Annotated[dict[Name, AdjustableGuide], _named("adjustable guides")] = quantity(
+        "Guides that a drive sets to one of several positions, such as those of formats.", default={}
     )
     floor: Annotated[
         Annotated[Floor, Tag("(floor)")] | Annotated[Literal["none"], Tag("(none)")],

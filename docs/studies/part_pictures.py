@@ -28,7 +28,16 @@ PARTS = ROOT / "docs" / "parts"
 IMAGES = ROOT / "docs" / "images" / "parts"
 MOMENT = 8.0
 """Simulated time of the pictures, s."""
-MOMENTS = {"accuracy": 14.0, "alarms": 14.0, "bottles": 0.5, "failures": 120.0, "stations": 20.0, "zones": 14.0}
+MOMENTS = {
+    "accuracy": 14.0,
+    "alarms": 14.0,
+    "axes": 14.0,
+    "bottles": 0.5,
+    "failures": 120.0,
+    "rows": 17.1,
+    "stations": 20.0,
+    "zones": 14.0,
+}
 """Simulated times of pages whose scenes show more at another time, s."""
 WIDTH = 960
 """Width of a picture, px."""

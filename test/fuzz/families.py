@@ -57,6 +57,7 @@ class Family:
     sensors: bool = False
     ledger: bool = False
     vibration: bool = False
+    axes: bool = False
     effects: tuple[tuple[str, str], ...] = ()
 
     def __str__(self) -> str:
@@ -67,7 +68,9 @@ class Family:
             if getattr(self, name)
         ]
         parts += [
-            name for name in ("drives", "movers", "machines", "sensors", "ledger", "vibration") if getattr(self, name)
+            name
+            for name in ("drives", "movers", "machines", "sensors", "ledger", "vibration", "axes")
+            if getattr(self, name)
         ]
         parts += [*(f"{kind} belts" for kind in self.belts), *(f"{kind}s" for kind in self.rails)]
         parts += [f"{self.types} types", *(f"{name} {value}" for name, value in self.effects)]
@@ -107,6 +110,7 @@ def random_family(seed: int) -> Family:
         sensors=draw.random() < 0.5,
         ledger=draw.random() < 0.3,
         vibration=move and draw.random() < 0.3,
+        axes=draw.random() < 0.3,
     )
 
 
@@ -128,7 +132,7 @@ _PLAIN = Family(
 
 CI_FAMILIES = (
     _PLAIN,
-    replace(_PLAIN, drives=True, machines=True, sensors=True),
+    replace(_PLAIN, drives=True, machines=True, sensors=True, axes=True),
     Family(types=2, drives=True, movers=True, machines=True, sensors=True, ledger=True, vibration=True),
 )
 """Two mixtures of effects, so that CI compiles few kernels: devices call for none but rails that move."""

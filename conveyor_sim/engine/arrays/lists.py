@@ -31,7 +31,7 @@ class NearSprings(NamedTuple):
 
 @group
 class Near(NamedTuple):
-    """Rail pieces near each bottle: slot s has piece[start[s]:start[s + 1]], in order."""
+    """Rail pieces, or bodies, near each bottle: slot s has piece[start[s]:start[s + 1]], in order."""
 
     start: U4
     piece: U4
@@ -58,7 +58,7 @@ class Neighbourhood(NamedTuple):
 
 @group
 class StaticGrid(NamedTuple):
-    """Cells over the plant; each lists the pieces and belts within reach of a bottle whose axis is in it."""
+    """Cells over the plant; each lists the parts within reach of a bottle whose axis is in it."""
 
     x: float
     y: float
@@ -71,3 +71,5 @@ class StaticGrid(NamedTuple):
     arc: U4
     belt_start: U4
     belt: U4
+    body_start: U4
+    body: U4

@@ -9,7 +9,7 @@ from conveyor_sim.engine.arrays.damage import ContactLoads, DamageArrays
 from conveyor_sim.engine.arrays.impulses import Impulses
 from conveyor_sim.engine.arrays.integrators import Linear, Slopes, Stage, Triple
 from conveyor_sim.engine.arrays.lists import BottleList, Near, Neighbourhood, StaticGrid
-from conveyor_sim.engine.arrays.moving import MovingRails
+from conveyor_sim.engine.arrays.moving import MovingBodies
 from conveyor_sim.engine.arrays.observers import GuardProbe, LedgerArrays
 from conveyor_sim.engine.arrays.rails import Arcs, RailContacts, Segments
 from conveyor_sim.engine.arrays.riding import Riding
@@ -75,9 +75,10 @@ class World(NamedTuple):
     near_segments: Near | None
     arcs: Arcs | None
     near_arcs: Near | None
-    moving: MovingRails | None
+    moving: MovingBodies | None
+    near_bodies: Near | None
     railed: BottleList | None
-    """Bottles near a rail, or near the sweep of a moving one."""
+    """Bottles near a rail, or near the sweep of a body."""
     rail_law: ContactLaw | None
     belts: Belts | None
     surface: Surface | None

@@ -15,7 +15,7 @@ from conveyor_sim.scene.geometry import ArcPiece, BeltShape, RailShape, rail_sha
 from conveyor_sim.scene.layout.plan import ConveyorPlan
 from conveyor_sim.scene.layout.routes import Bend
 from conveyor_sim.scene.marks import marks_of
-from conveyor_sim.scene.moving import moving_shapes
+from conveyor_sim.scene.moving import bodies_of
 from conveyor_sim.scene.parts.device_part import Mark
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.scene.types import XY
@@ -134,10 +134,10 @@ def _curve(shape: RailShape) -> tuple[DrawnPiece, ...]:
 
 
 def _movers(scene: Scene) -> Iterator[DrawnShape]:
-    """Yield gates, pushers and diverters where the scene gives their ends."""
-    for shape in moving_shapes(scene):
-        field, name = shape.name.split("/")
-        yield DrawnShape(field.upper(), name, (DrawnPiece(shape.start, shape.end),))
+    """Yield bodies where the scene places them."""
+    for shape in bodies_of(scene):
+        field, name = shape.name.split("/", 1)
+        yield DrawnShape(field.upper(), name, _curve(RailShape(name, shape.material, shape.pieces)))
 
 
 def _marks(scene: Scene) -> Iterator[DrawnShape]:

@@ -38,9 +38,9 @@ LIMITS: dict[str, tuple[Limit, ...]] = {
         ),
         Limit(
             "liquid in bottles",
-            "A bottle is a rigid body of constant mass. A station that fills it does not change its mass.",
+            "A bottle is a rigid body. Its mass changes only when a station gives it another type (`changes`).",
             "Sloshing, foam and spilling are missing. Filled bottles brake and tip differently.",
-            "Give the line behind the filler a scene with the full mass. Test accelerations with real bottles.",
+            "Test accelerations with real bottles.",
         ),
         Limit(
             "shapes other than circles",
@@ -152,7 +152,7 @@ LIMITS: dict[str, tuple[Limit, ...]] = {
     "Drives, sensors and machines": (
         Limit(
             "dynamics of drives below the ramp",
-            "A drive follows its ramp exactly under any load. Only gates, pushers and diverters have a force limit.",
+            "A drive follows its ramp exactly under any load. Only rails that move and axes have a limit.",
             "Slip of motors, controllers that overshoot and overload trips of a jammed chain are missing.",
             "Inject the fault `trip`. Compare the work of belts in the energy ledger with the rating of the drive.",
         ),

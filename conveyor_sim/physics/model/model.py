@@ -167,6 +167,7 @@ def build_model(scene: Scene) -> Model:
         grid=plant_grid(
             plant.rails_at_rest,
             plant.surfaces if "belts" in on else (),
+            plant.sweeps,
             float(radius.max()),
             _largest(laws.base_radius),
             skin,

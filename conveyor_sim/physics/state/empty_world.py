@@ -18,7 +18,7 @@ from conveyor_sim.engine.arrays.impulses import (
 )
 from conveyor_sim.engine.arrays.integrators import Blocks, Linear, PairTangent, Slopes, Stage, Triple
 from conveyor_sim.engine.arrays.lists import Near, NearSprings, Neighbourhood
-from conveyor_sim.engine.arrays.moving import MovingRails, MovingSprings
+from conveyor_sim.engine.arrays.moving import MovingBodies
 from conveyor_sim.engine.arrays.observers import GuardProbe, LedgerArrays
 from conveyor_sim.engine.arrays.riding import Riding
 from conveyor_sim.engine.arrays.support import Footing, Ring, StaticFriction, Surface
@@ -73,6 +73,11 @@ def empty_near(model: Model, slots: int, entries: int) -> Near:
     return Near(np.zeros(slots + 1, np.uint32), np.zeros(entries, np.uint32), springs, impulses)
 
 
+def near_bodies(slots: int, entries: int) -> Near:
+    """Return an empty list for `entries` bodies near bottles. Their springs are not stored by entry."""
+    return Near(np.zeros(slots + 1, np.uint32), np.zeros(entries, np.uint32), None)
+
+
 def empty_world(model: Model, slots: int) -> World:
     """Return a World for `slots` bottles; its lists are stale."""
     entries = 4 * slots
@@ -125,6 +130,7 @@ def empty_world(model: Model, slots: int) -> World:
         arcs=model.arcs,
         near_arcs=empty_near(model, slots, entries) if model.arcs is not None else None,
         moving=_moving(model, slots),
+        near_bodies=near_bodies(slots, slots) if model.has("moving_rails") else None,
         railed=listed(slots) if model.rail_law is not None else None,
         rail_law=model.rail_law,
         belts=belt_arrays(model.plant.surfaces, slots, entries) if model.has("belts") else None,
@@ -138,16 +144,12 @@ def empty_world(model: Model, slots: int) -> World:
     )
 
 
-def _moving(model: Model, slots: int) -> MovingRails | None:
+def _moving(model: Model, slots: int) -> MovingBodies | None:
     if not model.has("moving_rails"):
         return None
-    pieces = sum(len(rail.pieces) for rail in model.plant.rails_at_rest)
-    rails, ledger = len(model.plant.rails_at_rest), model.has("energy_ledger")
-    moving = moving_arrays(model.plant.moving, model.plant.rail_materials, rails, pieces, slots, ledger)
-    if not _has_history(model, model.rail_law):
-        return moving
-    count = len(model.plant.moving)
-    return moving._replace(springs=MovingSprings(np.zeros((slots, count)), np.zeros(count)))
+    surface = sum(len(rail.pieces) for rail in model.plant.rails_at_rest)
+    springs = _has_history(model, model.rail_law)
+    return moving_arrays(model.plant, surface, slots, model.has("energy_ledger"), springs)
 
 
 def _has_history(model: Model, law: ContactLaw | None) -> bool:
@@ -283,7 +285,7 @@ def _riding(model: Model, slots: int) -> Riding:
 
 
 def _ledger(slots: int, model: Model) -> LedgerArrays:
-    units, surfaces, rails = slots // UNIT + 1, len(model.plant.surfaces) + 1, len(model.plant.moving)
+    units, surfaces, rails = slots // UNIT + 1, len(model.plant.surfaces) + 1, len(model.plant.machines)
     return LedgerArrays(
         damping=_triple(slots),
         friction=_triple(slots),

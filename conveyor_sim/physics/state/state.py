@@ -18,7 +18,7 @@ from conveyor_sim.engine.lists.neighbours import drop_springs, fill_column
 from conveyor_sim.engine.lists.rebuild import rebuild
 from conveyor_sim.engine.world_views import lists_of
 from conveyor_sim.physics.model import Model
-from conveyor_sim.physics.state.empty_world import empty_near, empty_pairs, empty_slots, empty_world
+from conveyor_sim.physics.state.empty_world import empty_near, empty_pairs, empty_slots, empty_world, near_bodies
 from conveyor_sim.physics.state.world_arrays import Arrays, changing_arrays, state_arrays, tick_arrays, with_arrays
 from conveyor_sim.physics.state.world_checks import require_valid
 from conveyor_sim.scene.geometry import RailShape
@@ -56,6 +56,11 @@ class State:
         self.held[bottle] = int(world.bottles.type[slot]), theta, loads
         self._free_slot(slot)
         return bottle
+
+    def convert(self, bottle: int, kind: int) -> None:
+        """Change the type of a held bottle. Its angle and loads stay. Raise KeyError if it is not held."""
+        _, theta, loads = self.held[bottle]
+        self.held[bottle] = kind, theta, loads
 
     def give(self, bottle: int, x: float, y: float, vx: float, vy: float) -> None:
         """Return a held bottle to the line at (x, y) m, moving at m/s, with its id and loads.
@@ -239,14 +244,13 @@ class State:
                 yield from (bottle, near.piece[held], rows[held])
 
     def moving_rails(self) -> tuple[RailShape, ...]:
-        """Return the moving rails at their present positions."""
+        """Return the bodies that are present, each as a rail, at their present positions."""
         if self.world.moving is None:
             return ()
-        places = zip(self.model.plant.moving, self.world.moving.position.tolist(), strict=True)
-        return tuple(shape.shape(position) for shape, position in places)
+        return self.model.plant.moving_at(self.world.moving.position.tolist())
 
     def rails(self) -> tuple[RailShape, ...]:
-        """Return all rails by number, at their present positions."""
+        """Return all rails at their present positions: those at rest by number, then bodies."""
         return (*self.model.plant.rails_at_rest, *self.moving_rails())
 
     def make_lists(self) -> None:
@@ -278,9 +282,10 @@ class State:
             pairs=old.pairs,
             near_segments=_for_slots(old.near_segments, slots),
             near_arcs=_for_slots(old.near_arcs, slots),
+            near_bodies=_for_slots(old.near_bodies, slots),
         )
 
-    def _lengthen_lists(self, pairs: int, more: int, segments: int, arcs: int, belts: int) -> None:
+    def _lengthen_lists(self, pairs: int, more: int, segments: int, arcs: int, belts: int, bodies: int) -> None:
         """Lengthen lists that are too short to twice the needed entries. Other lists may hold springs already."""
         world, slots = self.world, self.world.bottles.id.size
         if world.pairs is not None and pairs > world.pairs.i.size:
@@ -297,6 +302,8 @@ class State:
             world = world._replace(near_arcs=_longer(self.model, world.near_arcs, slots, 2 * arcs))
         if world.belts is not None and belts > world.belts.candidate.size:
             world = world._replace(belts=world.belts._replace(candidate=np.zeros(2 * belts, np.uint32)))
+        if world.near_bodies is not None and bodies > world.near_bodies.piece.size:
+            world = world._replace(near_bodies=near_bodies(slots, 2 * bodies))
         self.world = world
 
 

@@ -20,9 +20,15 @@ CONSTANT = frozenset({"settings", "pair_law", "curves", "grid", "segments", "arc
 
 FIXED = (
     *(f"belts.{name}" for name in ("x", "y", "ax", "ay", "length", "width", "sectors.")),
-    *(f"moving.{name}" for name in ("length", "material", "rail", "surface", "home_", "along_", "turning", "sweep")),
-    "moving.ends.joint",
-    *(f"moving.actuators.{name}" for name in ("limit", "mass", "max_", "stroke")),
+    *(f"moving.{name}" for name in ("axis", "lag", "pivot_", "along_", "turning", "account", "sweep", "home_")),
+    *(f"moving.{name}" for name in ("first_cluster", "body")),
+    *(f"moving.clusters.{name}" for name in ("home_", "radius", "segment", "arc")),
+    *(f"moving.segments.{name}" for name in ("length", "material", "rail", "surface", "ends.joint")),
+    *(f"moving.arcs.{name}" for name in ("radius", "reach", "material", "rail", "surface", "ends.joint")),
+    *(f"moving.cams.{name}" for name in ("cam", "second", "across_", "period", "table.")),
+    "moving.springs.column",
+    "moving.springs.first",
+    *(f"moving.actuators.{name}" for name in ("limit", "mass", "max_", "low", "stroke", "account")),
     *(f"damage.scuffing.bins.{name}" for name in ("segment_first", "arc_first", "arc_span")),
     *(f"damage.tipping.{name}" for name in ("contact_lever", "base_lever", "delay")),
     "surface.friction",
@@ -53,6 +59,7 @@ SCRATCH: Mapping[str, str] = {
 UNCHECKED = (
     *SCRATCH,
     "moving.springs.path",
+    "moving.springs.aside",
     *(f"implicit.{name}" for name in ("mobility", "closed", "compliance")),
     "probe.depth",
     *(f"pairs.{name}" for name in ("fx", "fy", "moment", "normal", "touch", "tangent.", "parts.", "law.")),
@@ -65,9 +72,15 @@ UNCHECKED = (
 """Arrays that may hold non-finite numbers, because a failed tick can leave them so. No later tick reads these."""
 
 REMADE = (
-    *(f"{name}." for name in ("neighbourhood", "pairs", "slots", "near_segments", "near_arcs", "railed", "belts")),
+    *(
+        f"{name}."
+        for name in ("neighbourhood", "pairs", "slots", "near_segments", "near_arcs", "near_bodies", "railed", "belts")
+    ),
     "footing.",
     "probe.",
+    *(f"moving.{name}" for name in ("resting", "active", "loaded", "is_near", "near", "pose.", "clusters.", "cams.")),
+    "moving.segments.",
+    "moving.arcs.",
     "moving.actuators.push",
 )
 """Arrays that follow from the positions: rebuilt with the neighbour lists, or in the next evaluation of forces."""

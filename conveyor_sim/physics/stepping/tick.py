@@ -90,7 +90,9 @@ class Integration:
         Raise SimulationError if the guard stops the run; the state is that at the beginning of the tick then.
         """
         seconds = tick * self._model.tick_ns * 1e-9
-        wrong = self._guard.begin(tick, surface_speed, fastest_rail(self._state.world.moving))
+        wrong = self._guard.begin(
+            tick, surface_speed, fastest_rail(self._state.world.moving, self._model.plant.reach_of_axes)
+        )
         if wrong is not None:
             raise self._stopped(tick, wrong, wrong.sentence(seconds, 1))
         if self._state.world.vibration is not None:
@@ -136,7 +138,7 @@ class Integration:
             phase = RESUME
 
     def _set_clock(self, steps: int) -> None:
-        """Put moving rails and vibrating belts where they are after `steps` steps of the tick."""
+        """Put bodies and vibrating belts where they are after `steps` steps of the tick."""
         world = self._state.world
         for group in (world.moving, world.vibration):
             if group is not None:

@@ -10,13 +10,16 @@ from typing import Any
 from conveyor_sim.scene.layout import barriers, entries
 from conveyor_sim.scene.layout.along import (
     Along,
+    AlongAdjustable,
     AlongDiverter,
+    AlongDivider,
     AlongLine,
     AlongPoint,
     AlongPusher,
     AlongRail,
     AlongRegion,
     AlongSlide,
+    AlongSlidingDivider,
     AlongSwing,
 )
 from conveyor_sim.scene.layout.faults import LayoutFault
@@ -27,7 +30,15 @@ from conveyor_sim.scene.part import Part, validated
 from conveyor_sim.scene.parts.counter import Counter
 from conveyor_sim.scene.parts.infeed import Infeed
 from conveyor_sim.scene.parts.inspection import Inspection
-from conveyor_sim.scene.parts.movers import Diverter, Pusher, SlidingGate, SwingingGate
+from conveyor_sim.scene.parts.movers import (
+    AdjustableGuide,
+    Diverter,
+    Pusher,
+    SlidingDivider,
+    SlidingGate,
+    SwingingDivider,
+    SwingingGate,
+)
 from conveyor_sim.scene.parts.outfeed import Outfeed
 from conveyor_sim.scene.parts.photo_eye import PhotoEye
 from conveyor_sim.scene.parts.reject import Reject
@@ -135,6 +146,9 @@ DEVICES = (
     _device("gates", SwingingGate, AlongSwing, _ENDS, barriers.swinging_gate, "swing"),
     _device("pushers", Pusher, AlongPusher, ("direction",), barriers.pusher),
     _device("diverters", Diverter, AlongDiverter, _ENDS, barriers.diverter),
+    _device("dividers", SwingingDivider, AlongDivider, _ENDS, barriers.swinging_divider, "swing"),
+    _device("dividers", SlidingDivider, AlongSlidingDivider, ("direction",), barriers.sliding_divider, "slide"),
+    _device("adjustable", AdjustableGuide, AlongAdjustable, ("direction",), barriers.adjustable),
     Placeable("infeeds", Infeed, AlongPoint, _ENTRY, coordinates=entries.entry),
     _device("outfeeds", Outfeed, AlongRegion, _REGION, region),
     Placeable("machines", Source, AlongPoint, _ENTRY, "source", coordinates=entries.entry),

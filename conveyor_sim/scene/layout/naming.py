@@ -10,12 +10,16 @@ from conveyor_sim.scene.provenance import Sources
 REFERENCES: Mapping[str, tuple[str, ...]] = {
     "after": ("conveyors",),
     "along": ("conveyors",),
+    "axis": ("axes",),
     "backup": ("zones",),
     "belt": ("belts", "conveyors"),
     "beside": ("conveyors",),
     "counter": ("counters",),
     "downstream": ("belts", "conveyors"),
     "drive": ("drives",),
+    "pusher": ("pushers",),
+    "machine": ("machines",),
+    "master": ("axes",),
     "start_zone": ("zones",),
     "zone": ("zones",),
 }

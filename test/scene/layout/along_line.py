@@ -41,6 +41,13 @@ def devices(side: str = "left") -> Data:
         },
         "pushers": {"pusher": {**along, "at": 2.6, "length": 0.12, "side": side, "stroke": 0.05, **MOVES}},
         "diverters": {"diverter": {**along, "at": 0.5, "length": 0.2, "side": side, "angle": "20 deg", **MOVES}},
+        "dividers": {
+            "arm": {"kind": "swing", **along, "at": 0.65, "length": 0.1, "offset": sign * 0.002, **MOVES,
+                    "positions": [sign * -0.1, sign * 0.1], "lane": 1},
+            "shuttle": {"kind": "slide", **along, "from": 2.6, "to": 2.8, **MOVES,
+                        "positions": [sign * 0.3, sign * 0.35]},
+        },
+        "adjustable": {"guide": {**along, "from": 2.2, "to": 2.4, "side": side, "positions": [0.05, 0.055], **MOVES}},
         "infeeds": {"feed": {"bottle": "bottle", **along, "at": 0.1, "offset": sign * 0.001, "rate": 2.0, "count": 3}},
         "outfeeds": {"out": {**along, "at": "end", "length": 0.1}},
         "machines": {
