@@ -205,7 +205,8 @@ def _alarms(scene: Scene) -> Iterator[Problem]:
 def _moving_rails(scene: Scene) -> Iterator[Problem]:
     chosen = scene.accuracy.integrator
     for path, _ in movers_of(scene):
-        if chosen not in MOVE_RAILS:
+        # `impulse_problems` has the problem of integrator impulses, at the rail.
+        if chosen not in (*MOVE_RAILS, "impulses"):
             yield Problem(
                 ("accuracy", "integrator"),
                 f"{shown(chosen)} given, expected {listed(list(MOVE_RAILS))}, as {path[0]}.{path[1]} moves: "

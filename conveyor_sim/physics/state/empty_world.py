@@ -75,7 +75,7 @@ def empty_near(model: Model, slots: int, entries: int) -> Near:
 
 def near_bodies(slots: int, entries: int) -> Near:
     """Return an empty list for `entries` bodies near bottles. Their springs are not stored by entry."""
-    return Near(np.zeros(slots + 1, np.uint32), np.zeros(entries, np.uint32), None)
+    return Near(np.zeros(slots + 1, np.uint32), np.zeros(entries, np.uint32), None, None)
 
 
 def empty_world(model: Model, slots: int) -> World:
