@@ -12,13 +12,16 @@ from conveyor_sim.page.block import FORCE_FRAMES, LEAST_FORCE, LEVELS, MM, SIGNA
 from conveyor_sim.page.drawings.underlay import ShownUnderlay, shown_underlay
 from conveyor_sim.page.story import fields
 from conveyor_sim.scene import Scene
+from conveyor_sim.scene.bodies import BodyShape
 from conveyor_sim.scene.driven import speed_owner
-from conveyor_sim.scene.geometry import BeltShape, named_surfaces, rail_shapes, surface_shapes
+from conveyor_sim.scene.geometry import BeltShape, RailShape, named_surfaces, rail_shapes, surface_shapes
 from conveyor_sim.scene.marks import marks_of
 from conveyor_sim.scene.moving import mover_shape, movers_of
 from conveyor_sim.scene.parts.panel import PanelPart
+from conveyor_sim.scene.wheel_bodies import wheel_bodies
 
 _ARC_POINTS = 96
+_POCKET_POINTS = 16
 _DIGITS = 5
 """Decimal places of lengths in m."""
 
@@ -63,7 +66,7 @@ def _panel_part(name: str, part: PanelPart) -> dict[str, Any]:
 
 
 def plan_head(scene: Scene) -> dict[str, Any]:
-    """Return what the page draws of a scene that does not run: surfaces, rails, moving rails and marks."""
+    """Return what the page draws of a scene that does not run: surfaces, rails, moving rails, bodies and marks."""
     shapes = surface_shapes(scene)
     named = list(named_surfaces(shapes).values())
     return {
@@ -75,15 +78,20 @@ def plan_head(scene: Scene) -> dict[str, Any]:
         "movers": [
             {
                 "name": body.name,
-                "from": body.pieces[0].ends[0],
-                "to": body.pieces[0].ends[1],
+                "from": piece.ends[0],
+                "to": piece.ends[1],
+                "pivot": body.pivot,
+                "present": 1.0 if body.cam is None else body.cam.end / axis.stroke,
                 "along": body.along,
                 "turning": body.turning,
                 "stroke": axis.stroke,
                 "first": axis.first,
             }
-            for body, axis in (mover_shape(path, mover) for path, mover in movers_of(scene))
+            for bodies, axis in (mover_shape(path, mover) for path, mover in movers_of(scene))
+            for body in bodies
+            for piece in body.pieces
         ],
+        "bodies": [_body(body) for body in wheel_bodies(scene)],
         "marks": [
             {
                 "look": mark.look,
@@ -94,6 +102,25 @@ def plan_head(scene: Scene) -> dict[str, Any]:
             }
             for mark in marks_of(scene)
         ],
+    }
+
+
+def _body(body: BodyShape) -> dict[str, Any]:
+    """Return a body of a star wheel, screw or side belt: its outline at displacement 0, and its motion.
+
+    Parts of cams are [u, s, ds/du, d2s/du2]; null without a cam.
+    """
+    return {
+        "name": body.name,
+        "axis": body.axis,
+        "outline": _points(RailShape(body.name, body.material, body.pieces).outline(_POCKET_POINTS)),
+        "pivot": body.pivot,
+        "along": body.along,
+        "turning": body.turning,
+        "lag": body.lag,
+        "period": body.period,
+        "cam": None if body.cam is None else {"parts": body.cam.parts, "end": body.cam.end},
+        "slide": None if body.slide is None else {"direction": body.slide.direction, "parts": body.slide.cam.parts},
     }
 
 

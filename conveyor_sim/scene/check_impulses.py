@@ -4,7 +4,6 @@
 from collections.abc import Iterator
 
 from conveyor_sim.scene.effect_names import EffectName
-from conveyor_sim.scene.moving import movers_of
 from conveyor_sim.scene.problems import Path, Problem
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.scene.words import shown
@@ -39,9 +38,8 @@ def impulse_problems(scene: Scene) -> Iterator[Problem]:
             return
     if accuracy.per_tick is None and accuracy.dt is None:
         yield Problem(("accuracy",), f"neither per_tick nor dt given, expected per_tick, such as 8, {_WITH}")
-    moving = next((path for path, _ in movers_of(scene)), None) or next((("axes", name) for name in scene.axes), None)
-    if moving is not None:
-        yield Problem(moving, f"given, expected no moving rail and no axis {_WITH}")
+    for name in scene.axes:
+        yield Problem(("axes", name), f"given, expected no axis {_WITH}")
     yield from _laws(scene)
     yield from _observers(scene)
 

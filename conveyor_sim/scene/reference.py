@@ -13,7 +13,7 @@ from pydantic.fields import FieldInfo
 from conveyor_sim.scene import accuracy, belts, contacts, drives, failures, limits, schema, vibration
 from conveyor_sim.scene.layout import parts
 from conveyor_sim.scene.layout.devices import PLACEABLE
-from conveyor_sim.scene.parts import machine, work
+from conveyor_sim.scene.parts import machine, star, work
 from conveyor_sim.scene.units import UNITS
 from conveyor_sim.scene.words import expectation, field_names, in_yaml
 
@@ -33,10 +33,14 @@ PAGES: dict[str, tuple[str, ...]] = {
     "machines": ("`machines`", "`acting_times`"),
     "materials": ("`contacts`", "of a contact", "`base`", "`floor`", "`bottle_types`"),
     "dividers": ("`dividers`", "`adjustable`"),
-    "movers": ("`gates`", "`pushers`", "`diverters`"),
+    "movers": ("`gates`", "`pushers`", "`diverters`", "`clamps`"),
     "panel": ("`panel`",),
     "photo_eyes": ("`photo_eyes`",),
     "rails": ("`rails`",),
+    "carousels": ("`carousels`",),
+    "screws": ("`screws`",),
+    "side_belts": ("`side_belts`",),
+    "stars": ("`stars`", "`guide` of a star wheel"),
     "zones": ("`zones`", "`counters`"),
 }
 """Pages of docs/parts/ with fields. A section is on the first page with a part of its title, else in docs/scene.md."""
@@ -76,6 +80,7 @@ BEHIND: dict[str, list[tuple[str, type[BaseModel]]]] = {
         ("`drive` of a belt", drives.Drive),
         ("`vibration` of a belt", vibration.ChainVibration),
     ],
+    "stars": [("`guide` of a star wheel", star.StarGuide)],
     "machines": [
         ("`acting_times` of a machine", machine.ActingTimes),
         ("An entry of `failures` of a machine", failures.Failure),

@@ -119,7 +119,7 @@ class Pose(NamedTuple):
     """Place of the pivot, m."""
     y: F8
     cosine: F8
-    """Of the angle through which it has turned."""
+    """Cosine of the angle through which it has turned."""
     sine: F8
     vx: F8
     """Velocity of the pivot, m/s."""

@@ -96,7 +96,8 @@ class AxisDevice(Device):
     def _drive_tags(self, name: str, first: float, start: float) -> Iterator[Tag]:
         part, top = self._part, self._top
         most = LARGEST_TORQUE if part.torque_limit == "none" else part.torque_limit
-        yield number(f"{name}/position", "actual", "Position.", "rad", 0.0, self._modulus, first % self._modulus)
+        place = "Position." if part.cam is None else "Position, the input of its cam."
+        yield number(f"{name}/position", "actual", place, "rad", 0.0, self._modulus, first % self._modulus)
         yield number(f"{name}/speed", "actual", "Speed.", "rad/s", -top, top, start)
         yield number(
             f"{name}/torque", "actual", "Torque that it exerts on bottles, forward positive.", "N m", -most, most

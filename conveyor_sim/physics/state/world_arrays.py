@@ -20,7 +20,7 @@ CONSTANT = frozenset({"settings", "pair_law", "curves", "grid", "segments", "arc
 
 FIXED = (
     *(f"belts.{name}" for name in ("x", "y", "ax", "ay", "length", "width", "sectors.")),
-    *(f"moving.{name}" for name in ("axis", "lag", "pivot_", "along_", "turning", "account", "sweep", "home_")),
+    *(f"moving.{name}" for name in ("axis", "pivot_", "along_", "turning", "account", "sweep", "home_")),
     *(f"moving.{name}" for name in ("first_cluster", "body")),
     *(f"moving.clusters.{name}" for name in ("home_", "radius", "segment", "arc")),
     *(f"moving.segments.{name}" for name in ("length", "material", "rail", "surface", "ends.joint")),
@@ -101,8 +101,10 @@ BETWEEN_TICKS = (
     "ring.",
     "surface.",
     "vibration.",
+    "moving.lag",
+    "moving.surface_speed",
 )
-"""Arrays that change only between ticks, as bottles come and go or belts change their speed."""
+"""Arrays that change only between ticks, as bottles come and go, belts change their speed, or machines slip."""
 
 OBSERVERS: Mapping[str, str] = {
     "peaks.": "largest forces since the last output; only outputs read them",

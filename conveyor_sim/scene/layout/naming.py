@@ -8,7 +8,7 @@ from conveyor_sim.scene.layout.fragments import LISTS, SHARED, Fragment
 from conveyor_sim.scene.provenance import Sources
 
 REFERENCES: Mapping[str, tuple[str, ...]] = {
-    "after": ("conveyors",),
+    "after": ("conveyors", "stars"),
     "along": ("conveyors",),
     "axis": ("axes",),
     "backup": ("zones",),

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Axes of a scene file: coordinates that drive machines in step, as in motion control (PLCopen).
 
-A cycle of an axis is 2 pi rad. An axis has a drive of its own (`rate`), or follows a named drive, a machine, or another
+A cycle of an axis is 2 pi rad. An axis has an own drive (`rate`), or follows a named drive, a machine, or another
 axis through an electronic gear.
 """
 
@@ -50,7 +50,7 @@ class Axis(DevicePart):
     KIND: ClassVar[str] = "axis"
 
     rate: Number | None = quantity(
-        "Cycles per time at the start, positive forward, of an axis with a drive of its own.", "1/s", default=None
+        "Cycles per time at the start, positive forward, of an axis with an own drive.", "1/s", default=None
     )
     rate_limit: Positive | None = quantity(
         "Largest rate that a command may set, forward and backward, with `rate`. Left out: the size of `rate`.",
@@ -76,7 +76,7 @@ class Axis(DevicePart):
     )
     in_gear: Flag = quantity("True: in gear with `master` at the start.", default=True)
     acceleration: Positive = quantity(
-        "Acceleration of its own drive: at changes of speed out of gear, and when it gears in or shifts its phase.",
+        "Acceleration of its drive: at changes of speed out of gear, and when it gears in or shifts its phase.",
         "rad/s^2",
         default=10.0,
     )
@@ -128,6 +128,11 @@ class Axis(DevicePart):
             yield from self._gear_problems(path, others["axes"])
         if self.cam is not None:
             yield from _cam_problems((*path, "cam"), self.cam)
+            for field in ("belts", "screws"):
+                for name, part in others.get(field, {}).items():
+                    if getattr(part, "axis", None) == path[-1]:
+                        text = f"given, expected none: {field}.{name} needs an axis without a cam"
+                        yield Problem((*path, "cam"), text)
         if self.torque_limit != "none" and self.acceleration * self.inertia > self.torque_limit:
             most = self.torque_limit / self.inertia
             yield Problem(

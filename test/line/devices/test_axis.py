@@ -334,6 +334,14 @@ def test_fields_of_a_belt_that_contradict_its_axis_are_refused(changes: dict[str
         simulation(base=base(0.9), belts=table(**changes), axes={"star": {"rate": 1.0}}, bottles=[bottle(0.4, 0.0)])
 
 
+def test_a_belt_needs_an_axis_without_a_cam() -> None:
+    star = {"master": "block", "cam": [[0.0, 0.0], [1.0, 1.0], [2.0, 0.0]]}
+    with pytest.raises(
+        SceneError, match=r"axes\.star\.cam: given, expected none: belts\.table needs an axis without a cam"
+    ):
+        simulation(base=base(0.9), belts=table(), axes={"block": {"rate": 1.0}, "star": star}, bottles=[bottle(0.4, 0)])
+
+
 SCRIPT = {
     5: ("axes/star/gear_out", 1.0), 60: ("axes/star/jog_forward", 1.0), 90: ("axes/star/jog_forward", 0.0),
     120: ("axes/star/gear_in", 1.0), 190: ("axes/star/phase_shift", -0.15), 197: ("axes/block/rate", 0.3 * RATE),
