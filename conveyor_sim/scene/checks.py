@@ -8,6 +8,7 @@ from itertools import chain, combinations_with_replacement, islice
 from conveyor_sim.scene.accuracy import CHOICES
 from conveyor_sim.scene.belts import CurvedBelt, CurvedSurface, PathBelt
 from conveyor_sim.scene.check_contacts import contact_problems
+from conveyor_sim.scene.check_impulses import impulse_problems
 from conveyor_sim.scene.check_shapes import shape_problems
 from conveyor_sim.scene.check_wheels import wheel_problems
 from conveyor_sim.scene.moving import movers_of
@@ -16,9 +17,6 @@ from conveyor_sim.scene.problems import Path, Problem
 from conveyor_sim.scene.schema import Grid, Scene
 from conveyor_sim.scene.types import TOUCH, is_whole_nanoseconds, nanoseconds
 from conveyor_sim.scene.words import listed, shown, some_of
-
-WHEEL_FIELDS = ("stars", "screws", "side_belts")
-"""Fields of a scene with bodies of other parts than movers."""
 
 
 def accuracy_problems(scene: Scene) -> Iterator[Problem]:
@@ -61,11 +59,16 @@ MOVE_RAILS = ("leapfrog", "semi_implicit_euler", "velocity_verlet")
 """Integrators with moving rails. The others evaluate forces within a step, or solve for forces of rails at rest."""
 
 
+WHEEL_FIELDS = ("stars", "screws", "side_belts")
+"""Fields of machines whose surfaces move, beside movers."""
+
+
 def problems_of(scene: Scene) -> list[Problem]:
     """Return up to MOST_SAID + 1 problems of a scene whose fields are each valid by themselves."""
     checks = (
         _times,
         accuracy_problems,
+        impulse_problems,
         contact_problems,
         _repeated,
         _missing_contacts,
@@ -214,14 +217,13 @@ def _alarms(scene: Scene) -> Iterator[Problem]:
 def _moving_rails(scene: Scene) -> Iterator[Problem]:
     chosen = scene.accuracy.integrator
     wheels = ((field, name) for field in WHEEL_FIELDS for name in getattr(scene, field))
-    for path in (*(path for path, _ in movers_of(scene)), *wheels):
-        if chosen not in MOVE_RAILS:
-            yield Problem(
-                ("accuracy", "integrator"),
-                f"{shown(chosen)} given, expected {listed(list(MOVE_RAILS))}, as {path[0]}.{path[1]} moves: "
-                "the other integrators take rails to be at rest within a step",
-            )
-            return
+    path = next(chain((path for path, _ in movers_of(scene)), wheels), None)
+    if path is not None and chosen not in MOVE_RAILS:
+        yield Problem(
+            ("accuracy", "integrator"),
+            f"{shown(chosen)} given, expected {listed(list(MOVE_RAILS))}, as {path[0]}.{path[1]} moves: "
+            "the other integrators take rails to be at rest within a step",
+        )
 
 
 def _vibrations(scene: Scene) -> Iterator[Problem]:

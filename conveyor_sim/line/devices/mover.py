@@ -21,6 +21,7 @@ WORDS = {
     "gates": ("open", "is_closed", "is_open", "closed", "open"),
     "pushers": ("push", "retracted", "extended", "retracted", "extended"),
     "diverters": ("divert", "at_home", "diverting", "at home", "diverting"),
+    "clamps": ("close", "is_open", "is_closed", "open", "closed"),
 }
 """By kind: the command, the end switches at home and at the end of the stroke, and the words for these positions."""
 
