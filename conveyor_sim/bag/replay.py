@@ -207,11 +207,11 @@ def _simulation(bag: Bag) -> Simulation:
             f"{bag.path}: format 4 with implicit friction and {model.integrator}, expected another format, solver or "
             "integrator: this version evaluates the friction under bottles at another time of the step"
         )
-    for shape in model.plant.moving:
-        if f"{shape.name}/blocked" not in bag.line.signal_names:
+    for axis in model.plant.axes:
+        if axis.kind == "position" and f"{axis.name}/blocked" not in bag.line.signal_names:
             raise BagError(
-                f"{bag.path}: recorded when {shape.name} pushed with unlimited force, expected a recording with the "
-                f"signal {shape.name}/blocked: by this version it would be another run"
+                f"{bag.path}: recorded when {axis.name} pushed with unlimited force, expected a recording with the "
+                f"signal {axis.name}/blocked: by this version it would be another run"
             )
     return simulation
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Changeover to another format in a run: the commands that set its speeds, rates and bottle types."""
+"""Changeover to another format in a run: the commands that set its speeds, rates, bottle types and guides."""
 
 from collections.abc import Iterator
 from contextlib import suppress
@@ -17,7 +17,7 @@ from conveyor_sim.scene.words import shown
 
 
 def changeover(scene: Scene, format: str) -> dict[str, float]:
-    """Return commands by name that give a running line of a scene the speeds, rates and bottle types of a format.
+    """Return commands by name that set speeds, rates, bottle types and guides of a running line to a format.
 
     They set everything in which the formats differ, so they do not depend on the format that the line has now.
     Raise SceneError, in one sentence, for an unknown format, and for one that differs in other fields.
@@ -32,8 +32,8 @@ def changeover(scene: Scene, format: str) -> dict[str, float]:
     if other is not None:
         field, now, then = other
         raise SceneError(
-            f"{scene.source_name}: formats.{format}: changes {field} from {now} to {then}, expected only speeds, rates "
-            "and bottle types in a run: choose it at the start"
+            f"{scene.source_name}: formats.{format}: changes {field} from {now} to {then}, expected only speeds, "
+            "rates, bottle types and settings of guides in a run: choose it at the start"
         )
     wanted = dict(_changeable(target))
     changed = [path for path, value in wanted.items() if any(version.get(path) != value for version in versions)]
@@ -50,8 +50,10 @@ def _changeable(scene: Scene) -> Iterator[tuple[Path, Any]]:
     for name, drive in scene.drives.items():
         yield ("drives", name, "speed"), drive.speed
     for name, belt in scene.belts.items():
-        if belt.drive_name is None:
+        if not belt.has_foreign_drive:
             yield ("belts", name, "speed"), belt.speed
+    for name, guide in scene.adjustable.items():
+        yield ("adjustable", name, "setting"), guide.setting
     for path, part in scene.devices():
         if (rate := getattr(part, "rate", None)) is not None:
             yield (*path, "rate"), rate
@@ -76,6 +78,7 @@ def _taken(part: Any, other: Any) -> Any:
     fields = {
         "drive": ("speed",),
         "belt": ("speed",),
+        "adjustable": ("setting",),
         "infeed": ("rate", "bottle", "speed") if getattr(part, "gap", None) is None else ("bottle",),
         "source": ("rate", "bottle", "speed"),
         "sink": ("rate",),
@@ -93,6 +96,8 @@ def _command(scene: Scene, format: str, path: Path, value: Any) -> tuple[str, fl
     place = f"{scene.source_name}: formats.{format}: {dotted(path)}: {shown(value)} given, expected"
     if what == "speed":
         return f"{field}/{name}/cmd_speed", value
+    if what == "setting":
+        return f"{field}/{name}/cmd_setting", float(value)
     if what == "rate":
         most = part.rate_limit if isinstance(part, Infeed) or part.rate_limit is not None else part.rate
         if most is None or value > most:

@@ -17,7 +17,7 @@ from conveyor_sim.engine.support.footing import find_carriers
 from conveyor_sim.line.alarms.declaration import Declared
 from conveyor_sim.line.tag import COMMANDS, SIGNALS, Tag, of_roles
 from conveyor_sim.physics.state import State
-from conveyor_sim.scene.parts.station import BAD
+from conveyor_sim.scene.parts.work import BAD
 
 
 @dataclass
@@ -132,6 +132,9 @@ class ScanContext:
 class Device:
     """One device of a running line. Public attributes last from tick to tick (checkpoints)."""
 
+    takes_bottles = True
+    """False if `take` changes the line without taking bottles off."""
+
     blocked_ticks = 0
     """Number of ticks with a bottle to put onto the line and no room."""
 
@@ -235,6 +238,26 @@ class Device:
     def rehearse(self, now: ScanContext) -> None:
         """Call engine functions that it needs in some ticks only, without any effect on the state."""
 
+    @property
+    def axis(self) -> int:
+        """Index of the axis whose bottles wake it; -1 without one."""
+        return -1
+
+    def rests(self, now: ScanContext) -> bool:
+        """Return True if `begin`, `end` and `states` change nothing until it is woken (`idle.py`)."""
+        return False
+
+    def on_wake(self, wakes: Callable[[Device], None]) -> None:
+        """Take a function that is called when the device has something to do again."""
+        self._wakes = wakes
+
+    def wake(self) -> None:
+        """End its rest."""
+        if self._wakes is not None:
+            self._wakes(self)
+
+    _wakes: Callable[[Device], None] | None = None
+
     def begin(self, now: ScanContext) -> None:
         """Act before the steps of a tick.
 
@@ -261,6 +284,11 @@ class Device:
     def read(self) -> Callable[[ScanContext], Sequence[float]]:
         """Function that reads all signal values, in the order of the signals in `tags`."""
         return self._read
+
+    @property
+    def cycle_rate(self) -> float:
+        """Present rate of cycles, 1/s; 0 for a device without cycles."""
+        return 0.0
 
     def counts(self) -> tuple[int, int, int] | None:
         """Return processed, defective and rejected bottles; None if the device has no such counts."""

@@ -29,6 +29,7 @@ panel:
   stack: {kind: stack_light}
   number: {kind: numeric, unit: m/s, limits: [0, 1], written_by: both}
 drives: {m: {acceleration: 1.0, pulses_per_metre: 1000}}
+axes: {a: {rate: 1, rate_limit: 2}, f: {drive: m, travel: 1}, s: {master: a, torque_limit: 20}}
 belts:
   b:
     {kind: straight, start: [0, 0], angle: 0, length: 10, width: 1, material: chain,
@@ -37,9 +38,31 @@ gates:
   g:
     {kind: slide, from: [1, 0], to: [1, 1], direction: 90 deg, stroke: 1, max_speed: 1, acceleration: 5, material: rail}
 pushers:
-  p: {from: [2, 0], to: [3, 0], direction: 90 deg, stroke: 0.5, max_speed: 1, acceleration: 5, material: rail}
+  p: {from: [2, 0], to: [3, 0], direction: 90 deg, stroke: 0.5, max_speed: 1, acceleration: 5, material: rail, zone: z}
 diverters:
   d: {from: [4, 0], to: [4.5, 0], angle: 45 deg, max_speed: 1, acceleration: 5, material: rail}
+dividers:
+  v:
+    {kind: swing, from: [4, 0.5], to: [4.5, 0.5], positions: [-20 deg, 0 deg, 20 deg], max_speed: 1,
+     acceleration: 5, material: rail}
+adjustable:
+  a:
+    {from: [7, 0.1], to: [7.5, 0.1], direction: 90 deg, positions: [0, 10 mm], max_speed: 1, acceleration: 5,
+     material: rail}
+clamps:
+  k:
+    {from: [6.2, 0.2], to: [6.4, 0.2], direction: 90 deg, opening: 0.1, stroke: 0.03, max_speed: 1, acceleration: 5,
+     material: rail}
+stars:
+  st:
+    {centre: [1, 5], turn: left, entry: -90 deg, pockets: 12, pitch_radius: 0.3, pocket_radius: 34 mm, axis: a,
+     material: rail}
+carousels:
+  ca: {star: st, from: 30 deg, to: 120 deg, sets: {test: {to: 1}}, tests: {test: {low: 1}}}
+screws:
+  sc: {from: [2, 5], to: [2.6, 5], side: left, pitch: [[0, 70 mm]], pocket_radius: 34 mm, axis: a, material: rail}
+side_belts:
+  sb: {from: [3, 5], to: [4, 5], material: rail}
 infeeds:
   i: {bottle: bottle, types: [bottle], position: [0.1, 0.5], direction: 0, speed: 0.5, rate: 1, rate_limit: 2}
 outfeeds: {o: {region: [[9.5, 0], [10, 0], [10, 1]]}}
@@ -49,6 +72,9 @@ machines:
   station:
     {kind: station, region: [[3, 0.6], [3.2, 0.6], [3.2, 1]], position: [3.5, 0.8], direction: 0, speed: 0.5, rate: 1,
      sets: {test: {to: 1}}, tests: {test: {low: 1}}}
+  carrier:
+    {kind: station, region: [[3.6, 0.6], [3.8, 0.6], [3.8, 1]], position: [3.9, 0.8], direction: 0, speed: 0.5, rate: 1,
+     capacity: 3, hold: 2}
   inspection: {kind: inspection, from: [5, 0], to: [5, 1]}
   reject: {kind: reject, region: [[6, 0], [6.1, 0], [6.1, 1]]}
 spills: {s: {bottle: bottle, position: [7, 0.5], count: 3}}
@@ -60,10 +86,16 @@ indicators: {i: {counter: c, zone: z, belt: b, backup: z, jam_time: 5}}
 """Scene with one device of each kind, and all its optional features."""
 
 PAGES: dict[str, dict[str, tuple[str, ...]]] = {
+    "parts/axes": {"axes": ("axes",)},
     "parts/belts": {"belts": ("belts", "drives")},
     "parts/infeeds": {"feeds": ("infeeds", "outfeeds"), "spills": ("spills",)},
     "parts/machines": {"machines": ("machines",)},
-    "parts/movers": {"movers": ("gates", "pushers", "diverters")},
+    "parts/movers": {"movers": ("gates", "pushers", "diverters", "clamps")},
+    "parts/dividers": {"dividers": ("dividers", "adjustable")},
+    "parts/carousels": {"carousels": ("carousels",)},
+    "parts/stars": {"stars": ("stars",)},
+    "parts/screws": {"screws": ("screws",)},
+    "parts/side_belts": {"side_belts": ("side_belts",)},
     "parts/photo_eyes": {"photo_eyes": ("photo_eyes",)},
     "parts/zones": {"zones": ("zones",), "counters": ("counters",)},
     "parts/indicators": {"indicators": ("indicators",)},

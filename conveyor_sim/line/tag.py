@@ -33,6 +33,9 @@ UNITS: Mapping[str, UnitOfMeasure] = {
     "1/m^2": UnitOfMeasure("C93", "reciprocal square metre"),
     "N": UnitOfMeasure("NEW", "newton"),
     "J": UnitOfMeasure("JOU", "joule"),
+    "rad": UnitOfMeasure("C81", "radian"),
+    "rad/s": UnitOfMeasure("2A", "radian per second"),
+    "N m": UnitOfMeasure("NU", "newton metre"),
     "%": UnitOfMeasure("P1", "percent"),
 }
 """Units by their symbols in tags."""

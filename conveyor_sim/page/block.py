@@ -72,7 +72,8 @@ def levels(force: Floats) -> Integers:
 def _bottles(frames: Sequence[tuple[int, BottleColumns]], start: int) -> tuple[Integers, list[Integers]]:
     """Return the ids of all bottles, ascending, and: ticks; id, type, first frame, frame count, x, y, forces per track.
 
-    A track is a bottle over consecutive frames. A bottle that a machine has held in between has two tracks.
+    A track is a bottle of one type over consecutive frames. A bottle that a machine has held in between, or whose type
+    has changed, has two tracks.
     """
     ticks = np.array([tick for tick, _ in frames], dtype=np.int64)
     if not frames:
@@ -81,10 +82,11 @@ def _bottles(frames: Sequence[tuple[int, BottleColumns]], start: int) -> tuple[I
     frame = np.repeat(np.arange(len(frames)), [len(bottles.id) for _, bottles in frames])
     # By bottle, then by time, so that neighbouring values are similar.
     order = np.lexsort((frame, column))
+    kinds = np.concatenate([bottles.type for _, bottles in frames]).astype(np.int64)[order]
     column, frame = column[order], frame[order]
-    first = np.flatnonzero((np.diff(column, prepend=-1) != 0) | (np.diff(frame, prepend=-1) != 1))
+    changed = (np.diff(column, prepend=-1) != 0) | (np.diff(kinds, prepend=-1) != 0)
+    first = np.flatnonzero(changed | (np.diff(frame, prepend=-1) != 1))
     count = np.diff(first, append=len(column))
-    kinds = np.concatenate([bottles.type for _, bottles in frames]).astype(np.int64)[order][first]
     x, y, force = (
         np.concatenate([getattr(bottles, name) for _, bottles in frames])[order] for name in ("x", "y", "peak_force")
     )
@@ -93,8 +95,8 @@ def _bottles(frames: Sequence[tuple[int, BottleColumns]], start: int) -> tuple[I
     peaks = np.maximum.reduceat(force, begins) if len(begins) else force
     moves = [_bends(np.round(axis * MM).astype(np.int64), first) for axis in (x, y)]
     steps = differences(levels(peaks))
-    ids = column[first]
-    return np.unique(ids), [differences(ticks - start), differences(ids), kinds, frame[first], count, *moves, steps]
+    ids, types = column[first], kinds[first]
+    return np.unique(ids), [differences(ticks - start), differences(ids), types, frame[first], count, *moves, steps]
 
 
 def _bends(values: Integers, first: Integers) -> Integers:

@@ -12,12 +12,16 @@ from conveyor_sim.page.block import FORCE_FRAMES, LEAST_FORCE, LEVELS, MM, SIGNA
 from conveyor_sim.page.drawings.underlay import ShownUnderlay, shown_underlay
 from conveyor_sim.page.story import fields
 from conveyor_sim.scene import Scene
-from conveyor_sim.scene.geometry import BeltShape, named_surfaces, rail_shapes, surface_shapes
+from conveyor_sim.scene.bodies import BodyShape
+from conveyor_sim.scene.driven import speed_owner
+from conveyor_sim.scene.geometry import BeltShape, RailShape, named_surfaces, rail_shapes, surface_shapes
 from conveyor_sim.scene.marks import marks_of
-from conveyor_sim.scene.moving import moving_shapes
+from conveyor_sim.scene.moving import mover_shape, movers_of
 from conveyor_sim.scene.parts.panel import PanelPart
+from conveyor_sim.scene.wheel_bodies import wheel_bodies
 
 _ARC_POINTS = 96
+_POCKET_POINTS = 16
 _DIGITS = 5
 """Decimal places of lengths in m."""
 
@@ -36,7 +40,9 @@ def head(line: Any, scene: Scene) -> dict[str, Any]:
             for name, radius in zip(line.bottle_types, line.type_radius, strict=True)
         ],
         "drives": {
-            f"belts/{name}": f"drives/{belt.drive_name}" for name, belt in scene.belts.items() if belt.drive_name
+            f"belts/{name}": "/".join(map(str, speed_owner(scene, name)))
+            for name, belt in scene.belts.items()
+            if belt.has_foreign_drive
         },
         "signals": signals,
         "commands": list(line.command_names),
@@ -60,7 +66,7 @@ def _panel_part(name: str, part: PanelPart) -> dict[str, Any]:
 
 
 def plan_head(scene: Scene) -> dict[str, Any]:
-    """Return what the page draws of a scene that does not run: surfaces, rails, moving rails and marks."""
+    """Return what the page draws of a scene that does not run: surfaces, rails, moving rails, bodies and marks."""
     shapes = surface_shapes(scene)
     named = list(named_surfaces(shapes).values())
     return {
@@ -71,16 +77,21 @@ def plan_head(scene: Scene) -> dict[str, Any]:
         "rails": [_points(shape.outline(_ARC_POINTS)) for shape in rail_shapes(scene)],
         "movers": [
             {
-                "name": shape.name,
-                "from": shape.start,
-                "to": shape.end,
-                "along": shape.along,
-                "turning": shape.turning,
-                "stroke": shape.stroke,
-                "first": shape.first,
+                "name": body.name,
+                "from": piece.ends[0],
+                "to": piece.ends[1],
+                "pivot": body.pivot,
+                "present": 1.0 if body.cam is None else body.cam.end / axis.stroke,
+                "along": body.along,
+                "turning": body.turning,
+                "stroke": axis.stroke,
+                "first": axis.first,
             }
-            for shape in moving_shapes(scene)
+            for bodies, axis in (mover_shape(path, mover) for path, mover in movers_of(scene))
+            for body in bodies
+            for piece in body.pieces
         ],
+        "bodies": [_body(body) for body in wheel_bodies(scene)],
         "marks": [
             {
                 "look": mark.look,
@@ -91,6 +102,25 @@ def plan_head(scene: Scene) -> dict[str, Any]:
             }
             for mark in marks_of(scene)
         ],
+    }
+
+
+def _body(body: BodyShape) -> dict[str, Any]:
+    """Return a body of a star wheel, screw or side belt: its outline at displacement 0, and its motion.
+
+    Parts of cams are [u, s, ds/du, d2s/du2]; null without a cam.
+    """
+    return {
+        "name": body.name,
+        "axis": body.axis,
+        "outline": _points(RailShape(body.name, body.material, body.pieces).outline(_POCKET_POINTS)),
+        "pivot": body.pivot,
+        "along": body.along,
+        "turning": body.turning,
+        "lag": body.lag,
+        "period": body.period,
+        "cam": None if body.cam is None else {"parts": body.cam.parts, "end": body.cam.end},
+        "slide": None if body.slide is None else {"direction": body.slide.direction, "parts": body.slide.cam.parts},
     }
 
 

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from conveyor_sim.scene.bodies import AxisShape, BodyShape
 from conveyor_sim.scene.driven import belt_speeds
 from conveyor_sim.scene.geometry import (
     ArcPiece,
@@ -21,8 +22,9 @@ from conveyor_sim.scene.geometry import (
     rail_shapes,
     surface_shapes,
 )
-from conveyor_sim.scene.moving import MovingShape, moving_shapes
+from conveyor_sim.scene.moving import axes_of, bodies_at, bodies_of
 from conveyor_sim.scene.overlaps import near_pieces
+from conveyor_sim.scene.parts.work import Working
 from conveyor_sim.scene.problems import Path
 from conveyor_sim.scene.schema import Scene, Single
 
@@ -42,8 +44,10 @@ class Plant:
     """Surfaces of belts, in the order of the belts, then plates."""
     rails_at_rest: tuple[RailShape, ...]
     """Rails in the scene's order, then those of curved belts; arcs with narrow mouths are cut in halves."""
-    moving: tuple[MovingShape, ...]
-    """Rails that move; their numbers follow those of `rails_at_rest`."""
+    moving: tuple[BodyShape, ...]
+    """Bodies; bodies of one machine follow each other."""
+    axes: tuple[AxisShape, ...]
+    """Axes of the bodies."""
     bottles: tuple[InitialBottle, ...]
     """Bottles at the start of a run."""
 
@@ -55,7 +59,8 @@ class Plant:
             scene=scene,
             surfaces=tuple(surface_shapes(scene)),
             rails_at_rest=tuple(cut_at_mouths(rail_shapes(scene), largest)),
-            moving=tuple(moving_shapes(scene)),
+            moving=tuple(_cut_body(shape, largest) for shape in bodies_of(scene)),
+            axes=tuple(axes_of(scene)),
             bottles=tuple(initial_bottles(scene)),
         )
 
@@ -78,9 +83,53 @@ class Plant:
         return len(self.surfaces) == len(self.scene.belts)
 
     @cached_property
+    def machines(self) -> tuple[str, ...]:
+        """Names of the machines with bodies; their rail numbers follow those of `rails_at_rest`."""
+        return tuple(dict.fromkeys(shape.name for shape in self.moving))
+
+    @cached_property
+    def machine_of_body(self) -> tuple[int, ...]:
+        """Index of the machine of each body."""
+        return tuple(self.machines.index(shape.name) for shape in self.moving)
+
+    @cached_property
+    def axis_of_body(self) -> tuple[int, ...]:
+        """Index of the axis of each body; -1 for a body at rest."""
+        names = [axis.name for axis in self.axes]
+        return tuple(names.index(shape.axis) if shape.axis else -1 for shape in self.moving)
+
+    @cached_property
+    def sweeps(self) -> tuple[NDArray[np.float64], ...]:
+        """Box of all places of each body, (4,): least x and y, greatest x and y, m."""
+        strokes = [0.0 if axis < 0 else self.axes[axis].stroke for axis in self.axis_of_body]
+        return tuple(shape.sweep(stroke) for shape, stroke in zip(self.moving, strokes, strict=True))
+
+    @cached_property
+    def reach_of_axes(self) -> NDArray[np.float64]:
+        """Path of the fastest point of any body per change of each axis's position, (axes,)."""
+        reach = np.zeros(len(self.axes))
+        for axis, shape in zip(self.axis_of_body, self.moving, strict=True):
+            if axis >= 0:
+                reach[axis] = max(reach[axis], shape.fastest_point)
+        return reach
+
+    def moving_at(self, positions: Sequence[float]) -> tuple[RailShape, ...]:
+        """Return the bodies that are present, each as a rail, at positions (m or rad) of the axes."""
+        return bodies_at(self.moving, {axis.name: at for axis, at in zip(self.axes, positions, strict=True)})
+
+    @cached_property
     def rails(self) -> tuple[RailShape, ...]:
-        """All rails by number, moving ones at their initial positions."""
-        return (*self.rails_at_rest, *(shape.shape(shape.first) for shape in self.moving))
+        """All rails by number, those of machines with all pieces of their bodies at the initial positions."""
+        bodies = self.moving_at([axis.first for axis in self.axes])
+        machines = (
+            RailShape(
+                name,
+                next(shape.material for shape in self.moving if shape.name == name),
+                tuple(piece for shape in bodies if shape.name == name for piece in shape.pieces),
+            )
+            for name in self.machines
+        )
+        return (*self.rails_at_rest, *machines)
 
     @cached_property
     def rail_materials(self) -> tuple[str, ...]:
@@ -91,7 +140,7 @@ class Plant:
     def supply(self) -> dict[str, float]:
         """Largest number of bottles of each type in a run, by type name; infinite for an infeed without end.
 
-        Types without bottles are left out.
+        Types without bottles are left out. Stations and carousels give bottles other types.
         """
         supply: dict[str, float] = {}
         for name, *_ in self.bottles:
@@ -99,7 +148,18 @@ class Plant:
         for _, entry in self.scene.entries():
             for kind in entry.kinds:
                 supply[kind] = supply.get(kind, 0.0) + (math.inf if entry.most is None else entry.most)
-        return supply
+        return self._after_changes(supply)
+
+    def _after_changes(self, supply: dict[str, float]) -> dict[str, float]:
+        """Return the supply of each type, with that of all types that stations and carousels turn into it."""
+        sources = {kind: {kind} for kind in supply}
+        workers = [part for _, part in self.scene.devices() if isinstance(part, Working)]
+        changes = [change for worker in workers for change in worker.changes.items()]
+        for _ in self.scene.bottle_types:  # a type is reached by that many changes at most
+            for before, after in changes:
+                if before in sources:
+                    sources[after] = sources.get(after, set()) | sources[before]
+        return {kind: sum(supply[source] for source in sorted(some)) for kind, some in sources.items()}
 
     @property
     def most_bottles(self) -> int | None:
@@ -123,7 +183,8 @@ class Plant:
         speeds += [giver.heading[1] for _, giver in self.scene.givers()]
         single = (entry.velocity for entry in self.scene.bottles if isinstance(entry, Single))
         speeds.append(math.hypot(*np.ptp(np.array([(0.0, 0.0), *single]), axis=0)))
-        rails = [shape.max_speed * shape.fastest_point for shape in self.moving]
+        rails = [axis.max_speed * reach for axis, reach in zip(self.axes, self.reach_of_axes.tolist(), strict=True)]
+        rails += [abs(shape.surface_speed or 0.0) for shape in self.moving]
         return max(speeds) + max(rails, default=0.0) or SPEED_AT_REST
 
 
@@ -142,6 +203,12 @@ def cut_at_mouths(rails: Sequence[RailShape], radius: float) -> list[RailShape]:
         place += len(rail.pieces)
         result.append(replace(rail, pieces=tuple(half for part in parts for half in part)))
     return result
+
+
+def _cut_body(shape: BodyShape, radius: float) -> BodyShape:
+    """Cut C-shaped arcs of a body in halves (`cut_at_mouths`)."""
+    (cut,) = cut_at_mouths([RailShape(shape.name, shape.material, shape.pieces)], radius)
+    return shape if cut.pieces == shape.pieces else replace(shape, pieces=cut.pieces, clusters=())
 
 
 def _is_narrow(arc: ArcPiece, radius: float) -> bool:

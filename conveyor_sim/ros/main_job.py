@@ -26,6 +26,8 @@ with while_importing():
     from conveyor_sim.ros.observer import Observer
     from conveyor_sim.scene import Scene, load_scene
     from conveyor_sim.scene.choices import choices, settings_of
+    from conveyor_sim.scene.driven import speed_owner
+    from conveyor_sim.scene.problems import dotted
     from conveyor_sim.support.garbage import collected_later
     from conveyor_sim.support.printable import printable_lines
     from conveyor_sim.support.progress import ProgressBar, told_if_long
@@ -60,10 +62,10 @@ def run_in_lockstep(
     if duration is not None:
         overrides["duration"] = duration
     scene = load_scene(file, overrides, outside_tables)
-    driven = [belt for belt in CONTROLLED if belt in scene.belts and scene.belts[belt].drive_name is not None]
+    driven = [belt for belt in CONTROLLED if belt in scene.belts and scene.belts[belt].has_foreign_drive]
     if driven:
         raise ConveyorError(
-            f"{file}: belts.{driven[0]} is moved by drives.{scene.belts[driven[0]].drive_name}, expected a belt that "
+            f"{file}: belts.{driven[0]} is moved by {dotted(speed_owner(scene, driven[0]))}, expected a belt that "
             f"the controller can command; without a controller: conveyor-sim run {scene_name}"
         )
     missing = [belt for belt in CONTROLLED if belt not in scene.belts]

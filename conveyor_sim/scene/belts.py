@@ -31,7 +31,7 @@ _Drive = Annotated[
 ]
 
 _OF_DRIVE = ("speed", "speed_limits", "watchdog")
-"""Fields that belong to the drive if a belt names one."""
+"""Fields that belong to the drive or axis if a belt names one."""
 
 
 class _Belt(SpeedSetpoint):
@@ -43,7 +43,18 @@ class _Belt(SpeedSetpoint):
         "the speed_limits and the watchdog. Left out: the belt reaches the commanded speed within one tick.",
         default=None,
     )
-    ratio: Positive = quantity("Speed of the belt divided by the speed of the drive that it names.", "1", default=1.0)
+    ratio: Positive = quantity(
+        "Speed of the belt divided by the speed of the drive that it names. With `axis`, for a curved belt: angular "
+        "speed divided by that of the axis.",
+        "1",
+        default=1.0,
+    )
+    axis: Name | None = quantity(
+        "Axis that moves it, instead of `drive`. A curved belt turns with it, as the table of a carousel does; other "
+        "belts need `travel`.",
+        default=None,
+    )
+    travel: Positive | None = quantity("Travel per cycle of the `axis`, at the centre line.", "m", default=None)
     vibration: ChainVibration | None = quantity("Vibration of the chain. Left out: none.", default=None)
 
     @property
@@ -51,27 +62,49 @@ class _Belt(SpeedSetpoint):
         """Name of the drive from `drives` that moves it; None without one."""
         return self.drive if isinstance(self.drive, str) else None
 
+    @property
+    def has_foreign_drive(self) -> bool:
+        """True if a named drive or an axis moves it, so that it takes no commands."""
+        return self.drive_name is not None or self.axis is not None
+
     @model_serializer(mode="wrap")
     def _without_foreign_fields(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """Leave out the fields that this belt can't have, so that a scene can be read again from its fields."""
-        foreign = ("ratio",) if self.drive_name is None else _OF_DRIVE
+        foreign = set(_OF_DRIVE if self.has_foreign_drive else ("ratio",))
+        foreign |= {name for name in ("axis", "travel") if getattr(self, name) is None}
+        if self.axis is not None:
+            foreign |= {"drive", *(("ratio",) if self.travel is not None else ())}
         return {name: value for name, value in handler(self).items() if name not in foreign}
 
     def problems(self, path: Path, others: Others) -> Iterator[Problem]:
         """Yield problems of speeds and limits, of an unknown drive, and of fields that belong to a drive."""
         yield from super().problems(path, others)
         yield from name_problems((*path, "drive"), self.drive_name, "drives", others)
-        if self.drive_name is None:
+        yield from name_problems((*path, "axis"), self.axis, "axes", others)
+        yield from self._axis_problems(path)
+        if not self.has_foreign_drive:
             if "ratio" in self.model_fields_set:
                 text = f"{shown(self.ratio)} given, expected it only with the name of a drive from `drives`"
                 yield Problem((*path, "ratio"), text)
             return
+        owner = f"drives.{self.drive_name}" if self.axis is None else f"axes.{self.axis}"
         for field in _OF_DRIVE:
             if field in self.model_fields_set:
                 value = getattr(self, field)
-                yield Problem(
-                    (*path, field), f"{shown(value)} given, expected none here: drives.{self.drive_name} has it"
-                )
+                yield Problem((*path, field), f"{shown(value)} given, expected none here: {owner} has it")
+
+    def _axis_problems(self, path: Path) -> Iterator[Problem]:
+        """Yield problems of fields that go with an axis."""
+        turns = isinstance(self, CurvedBelt)
+        if self.axis is None:
+            if self.travel is not None:
+                yield Problem((*path, "travel"), f"{shown(self.travel)} given, expected it only with axis")
+        elif self.drive is not None:
+            yield Problem((*path, "axis"), f"{shown(self.axis)} given with drive, expected one of them")
+        elif self.travel is None and not turns:
+            yield Problem((*path, "travel"), "none given with axis, expected the travel per cycle of the axis (m)")
+        elif "ratio" in self.model_fields_set and self.travel is not None:
+            yield Problem((*path, "ratio"), f"{shown(self.ratio)} given with travel, expected one of them")
 
 
 class StraightBelt(StraightArea, _Belt):
@@ -94,6 +127,11 @@ class CurvedBelt(CurvedArea, _Belt):
 
     turn: Turn = quantity(TURN_TEXT, default="left")
     rails: BeltRails = quantity("Rails along the arcs.", default=BeltRails.model_construct())
+
+    @property
+    def middle_radius(self) -> float:
+        """Radius of the centre line, m, where the speed of the belt holds."""
+        return self.inner_radius + self.width / 2
 
 
 class StraightSurface(StraightArea):

@@ -20,12 +20,13 @@ from conveyor_sim.scene.geometry import (
     rail_pieces,
     rails_of_curved,
 )
-from conveyor_sim.scene.moving import movers_of, moving_shape
+from conveyor_sim.scene.moving import mover_shape, movers_of
 from conveyor_sim.scene.overlaps import near_pieces, overlapping
 from conveyor_sim.scene.parts.device_part import Entry, Giver
 from conveyor_sim.scene.problems import Path, Problem
 from conveyor_sim.scene.rails import PolylineRail, SegmentRail
 from conveyor_sim.scene.schema import Grid, Scene, Single
+from conveyor_sim.scene.star_places import guide_rails
 from conveyor_sim.scene.types import COORDINATE_LIMIT, TOUCH, XY
 from conveyor_sim.scene.words import shown
 
@@ -130,13 +131,15 @@ def _valid_rails(scene: Scene, wrong: set[Path]) -> list[RailShape]:
     for name, belt in scene.belts.items():
         if isinstance(belt, CurvedBelt) and ("belts", name) not in wrong:
             shapes.extend(rails_of_curved(area_shape(name, belt), belt))
+    shapes += [RailShape(name, rail.material, rail_pieces(rail)) for name, rail in guide_rails(scene.stars).items()]
     return shapes
 
 
 def _valid_moving(scene: Scene) -> list[RailShape]:
     """Return the moving rails with a valid geometry, at their initial positions."""
-    moving = [moving_shape(path, mover) for path, mover in movers_of(scene) if not any(mover.shape_problems(path))]
-    return [shape.shape(shape.first) for shape in moving]
+    moving = [mover_shape(path, mover) for path, mover in movers_of(scene) if not any(mover.shape_problems(path))]
+    shapes = (body.shape(axis.first) for bodies, axis in moving for body in bodies)
+    return [shape for shape in shapes if shape.pieces]
 
 
 @dataclass(frozen=True)

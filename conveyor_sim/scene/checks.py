@@ -8,7 +8,9 @@ from itertools import chain, combinations_with_replacement, islice
 from conveyor_sim.scene.accuracy import CHOICES
 from conveyor_sim.scene.belts import CurvedBelt, CurvedSurface, PathBelt
 from conveyor_sim.scene.check_contacts import contact_problems
+from conveyor_sim.scene.check_impulses import impulse_problems
 from conveyor_sim.scene.check_shapes import shape_problems
+from conveyor_sim.scene.check_wheels import wheel_problems
 from conveyor_sim.scene.moving import movers_of
 from conveyor_sim.scene.problem_count import MOST_SAID
 from conveyor_sim.scene.problems import Path, Problem
@@ -57,11 +59,16 @@ MOVE_RAILS = ("leapfrog", "semi_implicit_euler", "velocity_verlet")
 """Integrators with moving rails. The others evaluate forces within a step, or solve for forces of rails at rest."""
 
 
+WHEEL_FIELDS = ("stars", "screws", "side_belts")
+"""Fields of machines whose surfaces move, beside movers."""
+
+
 def problems_of(scene: Scene) -> list[Problem]:
     """Return up to MOST_SAID + 1 problems of a scene whose fields are each valid by themselves."""
     checks = (
         _times,
         accuracy_problems,
+        impulse_problems,
         contact_problems,
         _repeated,
         _missing_contacts,
@@ -71,6 +78,7 @@ def problems_of(scene: Scene) -> list[Problem]:
         _devices,
         _alarms,
         _moving_rails,
+        wheel_problems,
         _vibrations,
         limit_problems,
         shape_problems,
@@ -140,6 +148,12 @@ def _touching(scene: Scene) -> Iterator[tuple[frozenset[str], str]]:
             first.setdefault(belt.rails.material, f"rails of belt {name}")
     for path, mover in movers_of(scene):
         first.setdefault(mover.material, f"{path[0]}.{path[1]}")
+    for field in WHEEL_FIELDS:
+        for name, part in getattr(scene, field).items():
+            first.setdefault(part.material, f"{field}.{name}")
+    for name, star in scene.stars.items():
+        if star.guide is not None:
+            first.setdefault(star.guide.material, f"guide of stars.{name}")
     for material, what in first.items():
         for one in bottles:
             yield frozenset((one, material)), f"bottle of {one} and {what} of {material}"
@@ -202,14 +216,14 @@ def _alarms(scene: Scene) -> Iterator[Problem]:
 
 def _moving_rails(scene: Scene) -> Iterator[Problem]:
     chosen = scene.accuracy.integrator
-    for path, _ in movers_of(scene):
-        if chosen not in MOVE_RAILS:
-            yield Problem(
-                ("accuracy", "integrator"),
-                f"{shown(chosen)} given, expected {listed(list(MOVE_RAILS))}, as {path[0]}.{path[1]} moves: "
-                "the other integrators take rails to be at rest within a step",
-            )
-            return
+    wheels = ((field, name) for field in WHEEL_FIELDS for name in getattr(scene, field))
+    path = next(chain((path for path, _ in movers_of(scene)), wheels), None)
+    if path is not None and chosen not in MOVE_RAILS:
+        yield Problem(
+            ("accuracy", "integrator"),
+            f"{shown(chosen)} given, expected {listed(list(MOVE_RAILS))}, as {path[0]}.{path[1]} moves: "
+            "the other integrators take rails to be at rest within a step",
+        )
 
 
 def _vibrations(scene: Scene) -> Iterator[Problem]:
@@ -246,3 +260,8 @@ def _rail_names(scene: Scene) -> Iterator[Problem]:
                         f"{shown(derived)} given as a name, expected another one: "
                         f"the {side} rail of belt {name} is called so",
                     )
+    for name, star in scene.stars.items():
+        derived = f"{name}_guide"
+        if star.guide is not None and derived in scene.rails:
+            text = f"{shown(derived)} given as a name, expected another one: the guide of stars.{name} is called so"
+            yield Problem(("rails", derived), text)

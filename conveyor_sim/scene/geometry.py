@@ -15,6 +15,7 @@ from conveyor_sim.scene.areas import CurvedArea, StraightArea
 from conveyor_sim.scene.belts import Belt, CurvedBelt, CurvedSurface, PathBelt, StraightSurface
 from conveyor_sim.scene.rails import ArcRail, PolylineRail, Rail
 from conveyor_sim.scene.schema import Grid, GridOfBottles, Scene
+from conveyor_sim.scene.star_places import guide_rails
 from conveyor_sim.scene.types import TOUCH, XY
 from conveyor_sim.scene.vibration import ChainVibration
 
@@ -132,6 +133,11 @@ class SegmentPiece:
         """Both end points."""
         return self.p1, self.p2
 
+    @property
+    def length(self) -> float:
+        """Length, m."""
+        return math.dist(self.p1, self.p2)
+
     def points(self, n: int = 64) -> Array:
         """Return the end points, (2, 2)."""
         return np.array([self.p1, self.p2])
@@ -158,6 +164,11 @@ class ArcPiece:
     radius: float
     start_angle: float
     span: float
+
+    @property
+    def length(self) -> float:
+        """Length along the arc, m."""
+        return self.radius * self.span
 
     @property
     def ends(self) -> tuple[XY, XY]:
@@ -196,8 +207,20 @@ class RailShape:
     pieces: tuple[Piece, ...]
 
     def outline(self, n: int = 64) -> Array:
-        """Return points along the rail, (k, 2); an arc has n points."""
-        return np.vstack([self.pieces[0].points(n), *(piece.points(n)[1:] for piece in self.pieces[1:])])
+        """Return points along the rail, (k, 2); an arc has n points. Arcs are passed in the direction of the rail."""
+        lines = [piece.points(n) for piece in self.pieces]
+        if len(lines) > 1 and _joins(lines[0][0], lines[1]) and not _joins(lines[0][-1], lines[1]):
+            lines[0] = lines[0][::-1]
+        for index in range(1, len(lines)):
+            end = lines[index - 1][-1]
+            if not math.dist(end, lines[index][0]) <= TOUCH and math.dist(end, lines[index][-1]) <= TOUCH:
+                lines[index] = lines[index][::-1]
+        return np.vstack([lines[0], *(line[1:] for line in lines[1:])])
+
+
+def _joins(point: Array, line: Array) -> bool:
+    """Return True if a point is an end of a line."""
+    return math.dist(point, line[0]) <= TOUCH or math.dist(point, line[-1]) <= TOUCH
 
 
 def arc_points(centre: XY, radius: float, start_angle: float, span: float, n: int) -> Array:
@@ -328,11 +351,15 @@ def rails_of_curved(shape: BeltShape, belt: CurvedBelt) -> Iterator[RailShape]:
 
 
 def rail_shapes(scene: Scene) -> list[RailShape]:
-    """Return the scene's rails in its order, then those of its curved belts. The index is the number of a rail."""
+    """Return the scene's rails in its order, then those of its curved belts, then the guides around star wheels.
+
+    The index is the number of a rail.
+    """
     shapes = [RailShape(name, rail.material, rail_pieces(rail)) for name, rail in scene.rails.items()]
     for name, belt in scene.belts.items():
         if isinstance(belt, CurvedBelt):
             shapes.extend(rails_of_curved(area_shape(name, belt), belt))
+    shapes.extend(RailShape(name, rail.material, rail_pieces(rail)) for name, rail in guide_rails(scene.stars).items())
     return shapes
 
 

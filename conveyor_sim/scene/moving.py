@@ -1,108 +1,151 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shapes of moving rails at a position of their stroke. Pure functions; m and rad."""
+"""Moving parts of a scene: its bodies and its axes, in the order of their numbers."""
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 
-import numpy as np
-
-from conveyor_sim.scene.geometry import Array, RailShape, SegmentPiece
-from conveyor_sim.scene.parts.movers import Diverter, Mover, Pusher, SwingingGate
+from conveyor_sim.scene.bodies import AxisShape, BodyShape, Cam, moved_piece
+from conveyor_sim.scene.cam_table import cam_through
+from conveyor_sim.scene.gearing import first_position, top_speed
+from conveyor_sim.scene.geometry import Piece, RailShape, SegmentPiece
+from conveyor_sim.scene.parts.movers import (
+    Clamp,
+    Diverter,
+    LiftingGate,
+    Mover,
+    Positioned,
+    SlidingDivider,
+    SlidingGate,
+    SwingingDivider,
+    SwingingGate,
+)
 from conveyor_sim.scene.problems import Path
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.scene.types import XY
+from conveyor_sim.scene.wheel_bodies import wheel_bodies
 
-
-@dataclass(frozen=True)
-class MovingShape:
-    """A straight rail from `start` to `end` at home, which slides along a direction or swings about its start."""
-
-    name: str
-    """Name such as `gates/exit`."""
-    material: str
-    start: XY
-    end: XY
-    along: XY
-    """Unit vector along which it slides, (0, 0) if it swings."""
-    turning: float
-    """1 swings counter-clockwise, -1 clockwise; 0 slides."""
-    stroke: float
-    """Largest position, m or rad; 0 is home."""
-    max_speed: float
-    """m/s, or rad/s."""
-    acceleration: float
-    """m/s^2, or rad/s^2."""
-    first: float
-    """Position at the beginning of the run."""
-    limit: float | None
-    """Largest force or torque of its drive, N or N m; None without limit."""
-    mass: float
-    """kg, or kg m^2 about its start."""
-
-    @property
-    def length(self) -> float:
-        """Length of the rail, m."""
-        return math.dist(self.start, self.end)
-
-    @property
-    def fastest_point(self) -> float:
-        """Path of its fastest point per change of position."""
-        return self.length if self.turning else 1.0
-
-    def at(self, position: float) -> SegmentPiece:
-        """Return the rail at a position (m or rad)."""
-        (x, y), (dx, dy) = self.start, (self.end[0] - self.start[0], self.end[1] - self.start[1])
-        x, y = x + self.along[0] * position, y + self.along[1] * position
-        cos, sin = math.cos(self.turning * position), math.sin(self.turning * position)
-        return SegmentPiece((x, y), (x + dx * cos - dy * sin, y + dx * sin + dy * cos))
-
-    def sweep(self) -> Array:
-        """Return the box of all its places, (4,): least x and y, greatest x and y."""
-        places = [0.0, self.stroke]
-        if self.turning:
-            # Its end is farthest along an axis where it crosses the axis.
-            home = math.atan2(self.end[1] - self.start[1], self.end[0] - self.start[0])
-            crossings = (self.turning * (quarter * math.pi / 2.0 - home) for quarter in range(-12, 13))
-            places += [place for place in crossings if 0.0 < place < self.stroke]
-        points = np.concatenate([self.at(place).points() for place in places])
-        return np.concatenate([points.min(axis=0), points.max(axis=0)])
-
-    def shape(self, position: float) -> RailShape:
-        """Return the rail at a position (m or rad) as a RailShape."""
-        return RailShape(self.name, self.material, (self.at(position),))
+MOVER_FIELDS = ("gates", "pushers", "diverters", "dividers", "adjustable", "clamps")
+"""Fields of a scene with movers, in the order of their rails' numbers."""
 
 
 def movers_of(scene: Scene) -> Iterator[tuple[Path, Mover]]:
-    """Yield every gate, pusher and diverter with its path, in the order of their rails' numbers."""
-    for field, movers in (("gates", scene.gates), ("pushers", scene.pushers), ("diverters", scene.diverters)):
-        for name, mover in movers.items():
+    """Yield every mover with its path, in the order of their rails' numbers."""
+    for field in MOVER_FIELDS:
+        for name, mover in getattr(scene, field).items():
             yield (field, name), mover
 
 
-def moving_shape(path: Path, mover: Mover) -> MovingShape:
-    """Return the shape of a mover."""
-    if isinstance(mover, (SwingingGate, Diverter)):
-        along, turning, stroke = (0.0, 0.0), math.copysign(1.0, mover.angle), abs(mover.angle)
-    else:
-        along, turning, stroke = (math.cos(mover.direction), math.sin(mover.direction)), 0.0, mover.stroke
-    starts_open = not isinstance(mover, (Pusher, Diverter)) and mover.open
-    return MovingShape(
-        name="/".join(str(part) for part in path),
-        material=mover.material,
-        start=mover.from_,
-        end=mover.to,
-        along=along,
-        turning=turning,
+def mover_shape(path: Path, mover: Mover) -> tuple[tuple[BodyShape, ...], AxisShape]:
+    """Return the bodies of a mover, which are one machine, and the axis that moves only these bodies.
+
+    A mover with several positions is at home at the least of them. A lifting gate is absent above half of its stroke.
+    """
+    name = "/".join(str(part) for part in path)
+    along, turning, least, stroke, first = _motion(mover)
+    shift = along[0] * least, along[1] * least
+    pieces: tuple[Piece, ...] = _pieces(mover)
+    if least:  # without rounding where there is nothing to move
+        pieces = tuple(moved_piece(piece, mover.from_, shift, turning * least) for piece in pieces)
+    pivot = mover.from_[0] + shift[0], mover.from_[1] + shift[1]
+    body = BodyShape(name, mover.material, pieces, axis=name, pivot=pivot, along=along, turning=turning)
+    if isinstance(mover, LiftingGate):
+        body = replace(body, cam=Cam(((0.0, 0.0, 0.0, 0.0),), 0.5 * stroke))
+    bodies: tuple[BodyShape, ...] = (body,)
+    if isinstance(mover, Clamp):
+        away = along[0] * mover.opening, along[1] * mover.opening
+        opposite = tuple(moved_piece(piece, mover.from_, away, 0.0) for piece in pieces)
+        bodies = (body, replace(body, pieces=opposite, along=(-along[0], -along[1])))
+    axis = AxisShape(
+        name=name,
+        kind="position",
         stroke=stroke,
         max_speed=mover.max_speed,
         acceleration=mover.acceleration,
-        first=stroke if starts_open else 0.0,
-        limit=mover.drive_limit,
-        mass=mover.drive_mass,
+        first=first,
+        limit=None if isinstance(mover, LiftingGate) else mover.drive_limit,  # no bottle acts on a lift
+        inertia=mover.drive_mass,
+    )
+    return bodies, axis
+
+
+def _motion(mover: Mover) -> tuple[XY, float, float, float, float]:
+    """Return direction, turning, displacement at home, stroke and initial position."""
+    if isinstance(mover, Positioned):
+        least = min(mover.positions)
+        first = mover.positions[min(mover.index, len(mover.positions) - 1)] - least
+        stroke = max(mover.positions) - least
+        if isinstance(mover, SwingingDivider):
+            return (0.0, 0.0), 1.0, least, stroke, first
+        return (math.cos(mover.direction), math.sin(mover.direction)), 0.0, least, stroke, first
+    opens = isinstance(mover, (SlidingGate, SwingingGate, LiftingGate)) and mover.open
+    if isinstance(mover, (SwingingGate, Diverter)):
+        stroke = abs(mover.angle)
+        return (0.0, 0.0), math.copysign(1.0, mover.angle), 0.0, stroke, stroke if opens else 0.0
+    stroke = mover.stroke
+    along = (0.0, 0.0) if isinstance(mover, LiftingGate) else (math.cos(mover.direction), math.sin(mover.direction))
+    return along, 0.0, 0.0, stroke, stroke if opens else 0.0
+
+
+def _pieces(mover: Mover) -> tuple[SegmentPiece, ...]:
+    """Return the rail of a mover as its fields place it, or both rails of a divider with a clearance."""
+    piece = SegmentPiece(mover.from_, mover.to)
+    if not isinstance(mover, (SwingingDivider, SlidingDivider)) or mover.clearance is None:
+        return (piece,)
+    half = 0.5 * mover.clearance / piece.length
+    left = -half * (mover.to[1] - mover.from_[1]), half * (mover.to[0] - mover.from_[0])
+    right = -left[0], -left[1]
+    return tuple(
+        SegmentPiece((mover.from_[0] + x, mover.from_[1] + y), (mover.to[0] + x, mover.to[1] + y))
+        for x, y in (right, left)
     )
 
 
-def moving_shapes(scene: Scene) -> list[MovingShape]:
-    """Return the moving rails. Their numbers follow those of the rails at rest."""
-    return [moving_shape(path, mover) for path, mover in movers_of(scene)]
+def bodies_of(scene: Scene) -> list[BodyShape]:
+    """Return all bodies. Bodies of one machine follow each other; machines have the rail numbers after rails at rest.
+
+    Those of gates, pushers and diverters come first, then those of star wheels, screws and side belts.
+    """
+    movers = [body for path, mover in movers_of(scene) for body in mover_shape(path, mover)[0]]
+    return [_on_cam(scene, body) for body in (*movers, *wheel_bodies(scene))]
+
+
+def _on_cam(scene: Scene, body: BodyShape) -> BodyShape:
+    """Return a body with the cam of its axis, if that has one."""
+    axis = scene.axes.get(body.axis.removeprefix("axes/")) if body.axis.startswith("axes/") else None
+    if axis is None or axis.cam is None:
+        return body
+    cam = cam_through(axis.cam)
+    return replace(body, cam=cam, period=cam.end)
+
+
+def axes_of(scene: Scene) -> list[AxisShape]:
+    """Return all axes in the order of their numbers: those of gates, pushers and diverters, then named ones."""
+    own = [mover_shape(path, mover)[1] for path, mover in movers_of(scene)]
+    return [*own, *(axis_shape(scene, name) for name in scene.axes)]
+
+
+def axis_shape(scene: Scene, name: str) -> AxisShape:
+    """Return a named axis, which has no end stops."""
+    axis = scene.axes[name]
+    return AxisShape(
+        name=f"axes/{name}",
+        kind="velocity",
+        stroke=math.inf,
+        max_speed=top_speed(scene, name) + axis.jog_speed,
+        acceleration=axis.acceleration,
+        first=first_position(scene, name),
+        limit=None if axis.torque_limit == "none" else axis.torque_limit,
+        inertia=axis.inertia,
+    )
+
+
+def positions_of(axes: Sequence[AxisShape], value: Callable[[str], float]) -> dict[str, float]:
+    """Return the position (m or rad) of each axis, by name. value: returns the value of a signal."""
+    return {axis.name: axis.position(value(f"{axis.name}/position")) for axis in axes}
+
+
+def bodies_at(bodies: Iterable[BodyShape], positions: Mapping[str, float]) -> tuple[RailShape, ...]:
+    """Return the bodies that are present, each as a rail, at positions (m or rad) of their axes, by name."""
+    shapes = (shape.shape(positions.get(shape.axis, 0.0)) for shape in bodies)
+    return tuple(shape for shape in shapes if shape.pieces)

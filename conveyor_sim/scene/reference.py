@@ -13,12 +13,13 @@ from pydantic.fields import FieldInfo
 from conveyor_sim.scene import accuracy, belts, contacts, drives, failures, limits, schema, vibration
 from conveyor_sim.scene.layout import parts
 from conveyor_sim.scene.layout.devices import PLACEABLE
-from conveyor_sim.scene.parts import machine, station
+from conveyor_sim.scene.parts import machine, star, work
 from conveyor_sim.scene.units import UNITS
 from conveyor_sim.scene.words import expectation, field_names, in_yaml
 
 PAGES: dict[str, tuple[str, ...]] = {
     "along": ("Along a conveyor:",),
+    "axes": ("`axes`",),
     "failures": ("`failures`", "Times of a failure", "`planned_stops`"),
     "stations": ("`kind: station`", "of a station"),
     "belts": ("`drives`", "`belts`", "curved belt", "path belt", "of a belt", "`plates`"),
@@ -31,10 +32,15 @@ PAGES: dict[str, tuple[str, ...]] = {
     "infeeds": ("`infeeds`", "`outfeeds`", "`spills`"),
     "machines": ("`machines`", "`acting_times`"),
     "materials": ("`contacts`", "of a contact", "`base`", "`floor`", "`bottle_types`"),
-    "movers": ("`gates`", "`pushers`", "`diverters`"),
+    "dividers": ("`dividers`", "`adjustable`"),
+    "movers": ("`gates`", "`pushers`", "`diverters`", "`clamps`"),
     "panel": ("`panel`",),
     "photo_eyes": ("`photo_eyes`",),
     "rails": ("`rails`",),
+    "carousels": ("`carousels`",),
+    "screws": ("`screws`",),
+    "side_belts": ("`side_belts`",),
+    "stars": ("`stars`", "`guide` of a star wheel"),
     "zones": ("`zones`", "`counters`"),
 }
 """Pages of docs/parts/ with fields. A section is on the first page with a part of its title, else in docs/scene.md."""
@@ -74,6 +80,7 @@ BEHIND: dict[str, list[tuple[str, type[BaseModel]]]] = {
         ("`drive` of a belt", drives.Drive),
         ("`vibration` of a belt", vibration.ChainVibration),
     ],
+    "stars": [("`guide` of a star wheel", star.StarGuide)],
     "machines": [
         ("`acting_times` of a machine", machine.ActingTimes),
         ("An entry of `failures` of a machine", failures.Failure),
@@ -81,8 +88,8 @@ BEHIND: dict[str, list[tuple[str, type[BaseModel]]]] = {
         ("Times of a failure: `kind: weibull`", failures.Weibull),
         ("Times of a failure: `kind: list`", failures.FixedTimes),
         ("An entry of `planned_stops` of a machine", failures.PlannedStop),
-        ("An entry of `sets` of a station", station.AttributeRule),
-        ("An entry of `tests` of a station", station.Acceptance),
+        ("An entry of `sets` of a station", work.AttributeRule),
+        ("An entry of `tests` of a station", work.Acceptance),
     ],
 }
 """Sections that follow those of a mapping's parts."""

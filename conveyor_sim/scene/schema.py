@@ -20,19 +20,24 @@ from conveyor_sim.scene.layout.plan import LayoutPlan
 from conveyor_sim.scene.limits import Limits as DamageLimits
 from conveyor_sim.scene.part import Part, one_of
 from conveyor_sim.scene.parts.alarm import MeasuredAlarm
+from conveyor_sim.scene.parts.axis import Axis
+from conveyor_sim.scene.parts.carousel import Carousel
 from conveyor_sim.scene.parts.counter import Counter
 from conveyor_sim.scene.parts.device_part import DevicePart, Entry, Exit, Giver
 from conveyor_sim.scene.parts.indicator import Indicator
 from conveyor_sim.scene.parts.infeed import Infeed
 from conveyor_sim.scene.parts.inspection import Inspection
-from conveyor_sim.scene.parts.movers import Diverter, Gate, Pusher
+from conveyor_sim.scene.parts.movers import AdjustableGuide, Clamp, Diverter, Divider, Gate, Pusher
 from conveyor_sim.scene.parts.outfeed import Outfeed
 from conveyor_sim.scene.parts.panel import Button, EmergencyStop, Horn, Lamp, NumberField, Selector, StackLight
 from conveyor_sim.scene.parts.photo_eye import PhotoEye
 from conveyor_sim.scene.parts.reject import Reject
+from conveyor_sim.scene.parts.screw import Screw
+from conveyor_sim.scene.parts.side_belt import SideBelt
 from conveyor_sim.scene.parts.sink import Sink
 from conveyor_sim.scene.parts.source import Source
 from conveyor_sim.scene.parts.spill import Spill
+from conveyor_sim.scene.parts.star import Star
 from conveyor_sim.scene.parts.station import Station
 from conveyor_sim.scene.parts.zone import Zone
 from conveyor_sim.scene.plates import Plate
@@ -233,8 +238,8 @@ class Scene(Part):
     )
     accuracy: Annotated[
         Accuracy,
-        OrText(get_args(Preset)),
-        Holds('"draft", "standard", "fine", or a mapping with the fields ' + ", ".join(Accuracy.model_fields)),
+        OrText((*get_args(Preset), "fast")),
+        Holds('"fast", "draft", "standard", "fine", or a mapping with the fields ' + ", ".join(Accuracy.model_fields)),
     ] = quantity(
         "Accuracy of the integration of a tick: a preset such as `fine`, or a mapping.",
         default=Accuracy.model_construct(),
@@ -271,6 +276,9 @@ class Scene(Part):
     drives: Annotated[dict[Name, NamedDrive], _named("drives")] = quantity(
         "Drives that move several belts.", default={}
     )
+    axes: Annotated[dict[Name, Axis], _named("axes")] = quantity(
+        "Axes that move machines in step: star wheels, screws, turn-tables.", default={}
+    )
     belts: Annotated[dict[Name, Belt], _named("belts")] = quantity(
         "Belts. Where belts overlap, the last one in the list carries.", default={}
     )
@@ -288,6 +296,27 @@ class Scene(Part):
     )
     diverters: Annotated[dict[Name, Diverter], _named("diverters")] = quantity(
         "Rails that swing into the path of bottles on command and return.", default={}
+    )
+    dividers: Annotated[dict[Name, Divider], _named("dividers")] = quantity(
+        "Lane dividers and lane switches: rails that move between the positions of several lanes.", default={}
+    )
+    adjustable: Annotated[dict[Name, AdjustableGuide], _named("adjustable guides")] = quantity(
+        "Guides that a drive sets to one of several positions, such as those of formats.", default={}
+    )
+    clamps: Annotated[dict[Name, Clamp], _named("clamps")] = quantity(
+        "Pairs of jaws that close on bottles on command.", default={}
+    )
+    stars: Annotated[dict[Name, Star], _named("star wheels")] = quantity(
+        "Wheels that carry bottles in pockets.", default={}
+    )
+    carousels: Annotated[dict[Name, Carousel], _named("carousels")] = quantity(
+        "Tools of star wheels that work on bottles: fillers, cappers, labellers.", default={}
+    )
+    screws: Annotated[dict[Name, Screw], _named("infeed screws")] = quantity(
+        "Screws that space bottles to a pitch.", default={}
+    )
+    side_belts: Annotated[dict[Name, SideBelt], _named("side belts")] = quantity(
+        "Belts on edge beside the path of bottles: timing belts, side grippers.", default={}
     )
     floor: Annotated[
         Annotated[Floor, Tag("(floor)")] | Annotated[Literal["none"], Tag("(none)")],

@@ -102,6 +102,7 @@ Tolerance = Annotated[
     float, Strict(), AllowInfNan(False), Gt(0), Le(0.5), Says("a number greater than 0, at most 0.5"), _sound
 ]
 Count = Annotated[int, Strict(), Ge(1), Says("a whole number, 1 or greater")]
+Index = Annotated[int, Strict(), Ge(0), Says("a whole number, 0 or greater")]
 Seed = Annotated[int, Strict(), Ge(0), Le(2**64 - 1), Says("a whole number from 0 to 2^64 - 1")]
 Flag = Annotated[bool, Strict(), Says("true or false")]
 Text = Annotated[str, Says("a text")]

@@ -54,11 +54,12 @@ class MapError(ConveyorError):
     """A Modbus map that can't be read, or that does not fit a line: file, line, field, value and what was expected."""
 
 
-_WHOLE: dict[Type, tuple[int, int]] = {
+WHOLE: dict[Type, tuple[int, int]] = {
     "uint16": (0, 2**16 - 1),
     "uint32": (0, 2**32 - 1),
     "int32": (-(2**31), 2**31 - 1),
 }
+"""Ranges of the integer types."""
 _MOST_FLOAT32 = float(np.finfo(np.float32).max)
 
 
@@ -77,9 +78,10 @@ class Row:
     """Unit of the tag; values are not scaled."""
     access: Access
     low: float
-    """Range of the tag."""
+    """Range of the tag, within the range of the type."""
     high: float
     description: str
+    """Description of the tag, with the texts of an enumeration."""
 
     @property
     def words(self) -> int:
@@ -102,7 +104,7 @@ def encode(row: Row, value: float) -> list[int]:
     """
     if row.type == "bool":
         return [int(value != 0.0)]
-    if limits := _WHOLE.get(row.type):
+    if limits := WHOLE.get(row.type):
         value = min(limits[1], max(limits[0], int(value))) if math.isfinite(value) else 0
     elif row.type == "float32" and math.isfinite(value):
         value = max(-_MOST_FLOAT32, min(_MOST_FLOAT32, value))
@@ -141,7 +143,7 @@ def to_csv(rows: Iterable[Row]) -> str:
 
 
 def _shown(value: str | int | float) -> str:
-    return f"{value:.17g}" if isinstance(value, float) else str(value)
+    return repr(value).removesuffix(".0") if isinstance(value, float) else str(value)
 
 
 def read_map(path: Path) -> list[Row]:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from fuzz.axis_invariants import AxisWatch
 from fuzz.crossing import crossed
 from fuzz.violation import Violation
 from numpy.typing import NDArray
@@ -13,8 +14,9 @@ from numpy.typing import NDArray
 from conveyor_sim.columns.bottles import BottleColumns
 from conveyor_sim.line.commands.inputs import INJECT, CommandOutcome
 from conveyor_sim.line.machines.packml import PackMLState
+from conveyor_sim.scene.bodies import AxisShape, BodyShape
 from conveyor_sim.scene.geometry import SegmentPiece
-from conveyor_sim.scene.moving import MovingShape, moving_shapes
+from conveyor_sim.scene.moving import mover_shape, movers_of
 from conveyor_sim.scene.parts.inspection import Inspection
 from conveyor_sim.scene.parts.machine import PackmlPart
 from conveyor_sim.scene.parts.reject import Reject
@@ -48,9 +50,10 @@ class DeviceWatch:
         self._scene = simulation.scene
         self._injected: dict[str, float] = {}
         """The last accepted value of each injected fault."""
-        self._shapes = moving_shapes(simulation.scene) if simulation.model.has("moving_rails") else []
+        self._movers = [mover_shape(*mover) for mover in movers_of(simulation.scene)]
         self._now = self._before = self._values()
-        self._still = dict.fromkeys((shape.name for shape in self._shapes), 0)
+        self._axes = AxisWatch(simulation)
+        self._still = dict.fromkeys((axis.name for _, axis in self._movers), 0)
         """Ticks for which each moving rail has stood."""
         ledger = simulation.ledger()
         self._work = None if ledger is None else ledger.rail_work.copy()
@@ -69,15 +72,19 @@ class DeviceWatch:
         self._lines(before, now)
         self._zones(now)
         self._eyes(before, now)
-        self._movers()
+        self._check_movers()
+        self._axes.check(self._before, self._now, outcomes)
         self._ledger()
 
     def in_frames(self, before: F8, after: F8) -> list[tuple[str, SegmentPiece, F8, F8]]:
         """Each moving rail at home, with the places before and after a tick, (n, 2), as seen from it."""
         return [
-            (shape.name, shape.at(0.0), _seen(shape, self._place(shape, self._before), before),
-             _seen(shape, self._place(shape, self._now), after))
-            for shape in self._shapes
+            (axis.name, piece, _seen(body, self._place(axis, self._before), before),
+             _seen(body, self._place(axis, self._now), after))
+            for bodies, axis in self._movers
+            for body in bodies
+            if body.cam is None  # a gate that lifts lets bottles pass
+            for piece in body.at(0.0)
         ]  # fmt: skip
 
     def _values(self) -> dict[str, float]:
@@ -87,8 +94,8 @@ class DeviceWatch:
         """Return the value of an injected fault, 0 if it was never injected."""
         return self._injected.get(name, 0.0)
 
-    def _place(self, shape: MovingShape, values: dict[str, float]) -> float:
-        return values[f"{shape.name}/position"] * shape.stroke
+    def _place(self, axis: AxisShape, values: dict[str, float]) -> float:
+        return axis.position(values[f"{axis.name}/position"])
 
     def _image(self) -> None:
         """Every signal is of its type."""
@@ -98,7 +105,7 @@ class DeviceWatch:
             if signal.kind == "bool":
                 good = value in (0.0, 1.0)
             elif signal.kind == "count":
-                good = float(value).is_integer() and (value >= 0.0 or signal.name.endswith("/pulses"))
+                good = float(value).is_integer() and (value >= signal.low or signal.name.endswith("/pulses"))
             if not good:
                 raise Violation("signal of another type", f"{signal.name} is {value} ({signal.kind})")
 
@@ -126,7 +133,10 @@ class DeviceWatch:
                 if now[f"{place}/rejected_bad"] + now[f"{place}/rejected_good"] != now[f"{place}/rejected"]:
                     raise Violation("bad and good", f"{place}: not all rejected are one or the other")
             elif isinstance(machine, Station):
-                held += now[f"{place}/holds"]
+                inside = now[f"{place}/held"] if machine.carries else now[f"{place}/holds"]
+                if inside > machine.capacity or (inside > 0.0) != now[f"{place}/holds"]:
+                    raise Violation("too full", f"{place} holds {inside}, {machine.capacity} at most")
+                held += inside
                 if now[f"{place}/good"] + now[f"{place}/defective"] != now[f"{place}/processed"]:
                     raise Violation("bad and good", f"{place}: not all processed are good or defective")
             else:
@@ -221,21 +231,21 @@ class DeviceWatch:
             if max(rose, fell) > self._sim.time + 1e-9:
                 raise Violation("eye", f"{name}: an edge at {rose} or {fell} s, at {self._sim.time} s")
 
-    def _movers(self) -> None:
+    def _check_movers(self) -> None:
         """No rail is off its course, or faster than it can, unless its drive is held up; none leaves its end stops."""
-        for n, shape in enumerate(self._shapes):
-            before, now = self._place(shape, self._before), self._place(shape, self._now)
-            position, held_up = self._now[f"{shape.name}/position"], self._held_up(n)
+        for n, (_, axis) in enumerate(self._movers):
+            before, now = self._place(axis, self._before), self._place(axis, self._now)
+            position, held_up = self._now[f"{axis.name}/position"], self._held_up(n)
             if not 0.0 <= position <= 1.0:
-                raise Violation("off its course", f"{shape.name} at {position} of its stroke")
-            most = shape.max_speed * self._scene.tick * (1.0 + 1e-9) + 1e-12 * shape.stroke
+                raise Violation("off its course", f"{axis.name} at {position} of its stroke")
+            most = axis.max_speed * self._scene.tick * (1.0 + 1e-9) + 1e-12 * axis.stroke
             if abs(now - before) > most and not held_up:
-                raise Violation("off its course", f"{shape.name} went {now - before} in a tick, {most} at most")
-            if self._now[f"{shape.name}/blocked"] and not held_up:
-                raise Violation("blocked by nothing", f"{shape.name} at tick {self._sim.tick}")
-            if held_up and shape.limit is None:
-                raise Violation("off its course", f"{shape.name} is held up, and has no limit")
-            self._still[shape.name] = self._still[shape.name] + 1 if now == before and not held_up else 0
+                raise Violation("off its course", f"{axis.name} went {now - before} in a tick, {most} at most")
+            if self._now[f"{axis.name}/blocked"] and not held_up:
+                raise Violation("blocked by nothing", f"{axis.name} at tick {self._sim.tick}")
+            if held_up and axis.limit is None:
+                raise Violation("off its course", f"{axis.name} is held up, and has no limit")
+            self._still[axis.name] = self._still[axis.name] + 1 if now == before and not held_up else 0
 
     def _held_up(self, n: int) -> bool:
         """Whether the drive of a moving rail was at its limit in the last tick."""
@@ -249,9 +259,9 @@ class DeviceWatch:
             return
         if not np.isfinite([ledger.residual, ledger.turnover, *ledger.rail_work, *ledger.belt_work]).all():
             raise Violation("not finite", f"the ledger at tick {self._sim.tick}")
-        for n, shape in enumerate(self._shapes):
-            if self._still[shape.name] > 1 and ledger.rail_work[n] != self._work[n]:
-                raise Violation("work of a rail at rest", f"{shape.name} at tick {self._sim.tick}")
+        for n, (_, axis) in enumerate(self._movers):
+            if self._still[axis.name] > 1 and ledger.rail_work[n] != self._work[n]:
+                raise Violation("work of a rail at rest", f"{axis.name} at tick {self._sim.tick}")
         self._work = ledger.rail_work.copy()
 
 
@@ -289,9 +299,9 @@ def _winds(corners: F8, at: F8) -> NDArray[np.bool_]:
     return np.asarray(np.abs(turned) > math.pi)
 
 
-def _seen(shape: MovingShape, position: float, points: F8) -> F8:
-    """Points (n, 2) as seen from a moving rail at a position (m or rad): as if it were at home."""
-    start = np.array(shape.start)
-    moved = points - start - np.array(shape.along) * position
-    cos, sin = math.cos(-shape.turning * position), math.sin(-shape.turning * position)
+def _seen(body: BodyShape, position: float, points: F8) -> F8:
+    """Points (n, 2) as seen from a mover at a position (m or rad): as if it were at home."""
+    start = np.array(body.pivot)
+    moved = points - start - np.array(body.along) * position
+    cos, sin = math.cos(-body.turning * position), math.sin(-body.turning * position)
     return np.asarray(start + moved @ np.array([[cos, sin], [-sin, cos]]))

@@ -60,6 +60,31 @@ def drives(draw: st.DrawFn, frame: Frame, belts: Data) -> Data:
 
 
 @st.composite
+def axes(draw: st.DrawFn, frame: Frame, belts: Data, drives: Data) -> Data:
+    """Axes with gears, and belts that they move; the fields `axes` and `belts`."""
+    top = frame.speed / frame.unit
+    found: Data = {"axis_0": {"rate": top / 6.3 * draw(between(-1.0, 1.0)), "rate_limit": top / 6.3}}
+    for n in range(1, draw(st.integers(2, 4))):
+        if drives and draw(st.integers(0, 3)) == 3:
+            axis = {"drive": draw(st.sampled_from(sorted(drives))), "travel": 6.3 * frame.unit}
+        else:
+            ratio = draw(st.sampled_from([1.0, -0.5, "1/12", "-2/3", 0.3819660112501051]))
+            axis = {"master": draw(st.sampled_from(sorted(found))), "ratio": ratio, "in_gear": draw(st.booleans())}
+            axis["phase"] = draw(between(-math.pi, math.pi))
+        found[f"axis_{n}"] = axis
+    for axis in found.values():
+        axis["acceleration"] = top / (frame.tick * draw(st.sampled_from([0.5, 4.0, 30.0])))
+        axis["jog_speed"] = top * draw(between(0.1, 0.5))
+        axis["following_limit"] = draw(st.sampled_from(["none", 0.1, 3.0]))
+    moved = dict(belts)
+    for name, belt in belts.items():
+        if "drive" not in belt and draw(st.booleans()):
+            rest = {field: value for field, value in belt.items() if field not in OF_DRIVE}
+            moved[name] = {**rest, "axis": draw(st.sampled_from(sorted(found))), "travel": 6.3 * frame.unit}
+    return {"axes": found, "belts": moved}
+
+
+@st.composite
 def _drive(draw: st.DrawFn, frame: Frame) -> Data:
     """Ramps and encoder of a drive."""
     ticks = draw(st.sampled_from([0.5, 3.0, 17.0]))
@@ -71,29 +96,60 @@ def _drive(draw: st.DrawFn, frame: Frame) -> Data:
     return drive
 
 
+POSITIONED = {"dividers": "lane", "adjustable": "setting"}
+"""Fields of movers with several positions, and their field for the initial one."""
+
+
 @st.composite
-def movers(draw: st.DrawFn, frame: Frame, material: str) -> Data:
-    """Gates, pushers and diverters; at least one."""
-    found: dict[str, dict[str, Data]] = {"gates": {}, "pushers": {}, "diverters": {}}
+def movers(draw: st.DrawFn, frame: Frame, material: str, lifts: bool) -> Data:
+    """Gates, pushers, diverters, dividers, adjustable guides and clamps; at least one."""
+    fields = ("gates", "pushers", "diverters", *POSITIONED, "clamps")
+    found: dict[str, dict[str, Data]] = {field: {} for field in fields}
     for n in range(draw(st.integers(1, 3))):
-        field = draw(st.sampled_from(sorted(found)))
+        is_lift = lifts and n == 0
+        field = "gates" if is_lift else draw(st.sampled_from(sorted(found)))
         start, angle = draw(frame.points), draw(between(-math.pi, math.pi))
         length = frame.unit * draw(st.integers(1, 6))
         end = [start[0] + length * math.cos(angle), start[1] + length * math.sin(angle)]
         speed = frame.speed * draw(between(0.1, 0.7))
-        swings = field == "diverters" or (field == "gates" and draw(st.booleans()))
+        swings = field == "diverters" or (not is_lift and field in ("gates", "dividers") and draw(st.booleans()))
         rail: Data = {"from": start, "to": end, "material": material}
         if field == "gates":
-            rail |= {"kind": "swing" if swings else "slide", "open": draw(st.booleans())}
-        if swings:
-            rail |= {"angle": draw(between(0.2, 2.0)) * draw(st.sampled_from([1.0, -1.0])), "max_speed": speed / length}
+            kind = "swing" if swings else "lift" if is_lift else "slide"
+            rail |= {"kind": kind, "open": draw(st.booleans())}
+        if field == "dividers":
+            rail |= {"kind": "swing" if swings else "slide"}
+            rail |= draw(st.sampled_from([{}, {"clearance": 3.0 * frame.unit}]))
+        if field in POSITIONED:
+            count, unit = draw(st.integers(2, 4)), 0.3 if swings else frame.unit
+            steps = [draw(st.integers(-4, 4)) for _ in range(count - 1)]
+            rail |= {
+                "positions": [unit * place for place in (*steps, 5)],
+                POSITIONED[field]: draw(st.integers(0, count - 1)),
+            }
+        elif swings:
+            rail |= {"angle": draw(between(0.2, 2.0)) * draw(st.sampled_from([1.0, -1.0]))}
         else:
-            rail |= {"direction": draw(between(-math.pi, math.pi)), "stroke": frame.unit * draw(between(0.3, 5.0))}
-            rail["max_speed"] = speed
+            rail |= {"stroke": frame.unit * draw(between(0.3, 5.0))}
+        rail["max_speed"] = speed / length if swings else speed
+        if field == "clamps":
+            rail["opening"] = 2.0 * rail["stroke"] + frame.unit * draw(between(0.1, 3.0))
+        if not swings and rail.get("kind") != "lift":
+            rail["direction"] = draw(between(-math.pi, math.pi))
         rail["acceleration"] = rail["max_speed"] / (frame.tick * draw(st.sampled_from([0.5, 4.0, 30.0])))
         rail |= draw(_drives(frame, swings, length, rail["acceleration"]))
         found[field][f"mover_{n}"] = rail
     return found
+
+
+@st.composite
+def row_pushers(draw: st.DrawFn, frame: Frame, pushers: Data, zones: Data) -> None:
+    """Let some pushers push by themselves."""
+    for pusher in pushers.values():
+        if draw(st.booleans()):
+            pusher["zone"] = draw(st.sampled_from(sorted(zones)))
+            pusher["settle"] = frame.tick * draw(st.sampled_from([0.0, 3.5]))
+            zones[pusher["zone"]].setdefault("full_at", 2)
 
 
 @st.composite
@@ -133,15 +189,28 @@ def machines(draw: st.DrawFn, frame: Frame, clear: Clear) -> Data:
             entry |= draw(st.sampled_from([{}, WORK]))
         else:
             entry = {"kind": what, "region": draw(_regions(frame))}
+            if what == "sink":
+                entry |= draw(st.sampled_from([{}, {"at_once": 3}]))
         if what in ("source", "sink", "station"):
             entry["rate"] = draw(scaled(0.02, 2.0)) / frame.tick
             entry |= draw(st.sampled_from([{}, {"rate_limit": 3.0 * entry["rate"]}]))
+            if what == "station":
+                entry |= draw(_insides(entry["rate"], sorted(frame.types)))
             entry |= draw(_habits(frame.tick))
         elif what == "reject":
             entry |= {"delay": frame.tick * draw(st.sampled_from([0.0, 2.5])),
                       "window": frame.tick * draw(st.sampled_from([0.5, 4.0]))}  # fmt: skip
         found["machines"][f"machine_{n}"] = entry
     return found
+
+
+@st.composite
+def _insides(draw: st.DrawFn, rate: float, types: list[str]) -> Data:
+    """How many bottles a station holds and for how long, and what becomes of their types."""
+    capacity = draw(st.integers(1, 5))
+    found = draw(st.sampled_from([{}, {"capacity": capacity}, {"capacity": capacity, "hold": 0.6 * capacity / rate}]))
+    changes = {before: after for before in types if (after := draw(st.sampled_from(types))) != before}
+    return {**found, "changes": changes} if draw(st.booleans()) else found
 
 
 @st.composite

@@ -28,6 +28,7 @@ class ExpectedBelts:
         self._moved = [
             (f"belts/{name}", moves[f"drives/{belt.drive}" if belt.drive_name else f"belts/{name}"], belt.ratio)
             for name, belt in scene.belts.items()
+            if belt.axis is None
         ]
         """Place, mover and ratio of each belt."""
 
@@ -55,7 +56,9 @@ class ExpectedBelts:
         image = dict(zip(self._sim.process_image.signal_names, self._sim.signals().tolist(), strict=True))
         for mover in self._movers:
             mover.check(image, self._sim.tick)
-        for n, (place, mover, ratio) in enumerate(self._moved):
+        numbers = {f"belts/{name}": n for n, name in enumerate(self._sim.scene.belts)}
+        for place, mover, ratio in self._moved:
+            n = numbers[place]
             commanded, actual = float(speeds.commanded[n]), float(speeds.actual[n])
             if commanded != ratio * mover.setpoint or not actual == image[f"{place}/speed"] == ratio * mover.speed:
                 found = f"{commanded} and {actual} for {ratio} x {mover.setpoint} and {mover.speed} m/s"

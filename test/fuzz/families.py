@@ -53,10 +53,13 @@ class Family:
     outfeeds: bool = False
     drives: bool = False
     movers: bool = False
+    lifts: bool = False
+    """One of the movers leaves the plane."""
     machines: bool = False
     sensors: bool = False
     ledger: bool = False
     vibration: bool = False
+    axes: bool = False
     effects: tuple[tuple[str, str], ...] = ()
 
     def __str__(self) -> str:
@@ -67,7 +70,9 @@ class Family:
             if getattr(self, name)
         ]
         parts += [
-            name for name in ("drives", "movers", "machines", "sensors", "ledger", "vibration") if getattr(self, name)
+            name
+            for name in ("drives", "movers", "lifts", "machines", "sensors", "ledger", "vibration", "axes")
+            if getattr(self, name)
         ]
         parts += [*(f"{kind} belts" for kind in self.belts), *(f"{kind}s" for kind in self.rails)]
         parts += [f"{self.types} types", *(f"{name} {value}" for name, value in self.effects)]
@@ -98,7 +103,7 @@ def random_family(seed: int) -> Family:
         effects=tuple(draw.choice(FORCED if draw.random() < 0.5 else FORCED[:1]).items()),
     )
     move = integrator in MOVING
-    return replace(
+    family = replace(
         family,
         base_springs=move and family.base_friction and not family.ring and draw.random() < 0.4,
         drives=draw.random() < 0.5,
@@ -107,7 +112,9 @@ def random_family(seed: int) -> Family:
         sensors=draw.random() < 0.5,
         ledger=draw.random() < 0.3,
         vibration=move and draw.random() < 0.3,
+        axes=draw.random() < 0.3,
     )
+    return replace(family, lifts=family.movers and draw.random() < 0.3)
 
 
 def _some(draw: random.Random, names: tuple[str, ...], least: int = 1) -> tuple[str, ...]:
@@ -128,7 +135,7 @@ _PLAIN = Family(
 
 CI_FAMILIES = (
     _PLAIN,
-    replace(_PLAIN, drives=True, machines=True, sensors=True),
-    Family(types=2, drives=True, movers=True, machines=True, sensors=True, ledger=True, vibration=True),
+    replace(_PLAIN, drives=True, machines=True, sensors=True, axes=True),
+    Family(types=2, drives=True, movers=True, lifts=True, machines=True, sensors=True, ledger=True, vibration=True),
 )
 """Two mixtures of effects, so that CI compiles few kernels: devices call for none but rails that move."""

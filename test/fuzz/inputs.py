@@ -9,6 +9,8 @@ from dataclasses import dataclass
 
 from conveyor_sim.scene import Scene
 from conveyor_sim.scene.drives import NamedDrive, SpeedSetpoint
+from conveyor_sim.scene.gearing import top_speed
+from conveyor_sim.scene.parts.axis import CYCLE
 from conveyor_sim.scene.parts.machine import PackmlPart
 from conveyor_sim.scene.parts.reject import Reject
 
@@ -29,13 +31,14 @@ class Input:
 
 Table = Mapping[str, Input]
 
-MOVERS = (("gates", "open"), ("pushers", "push"), ("diverters", "divert"))
+MOVERS = (("gates", "open"), ("pushers", "push"), ("diverters", "divert"), ("clamps", "close"))
+POSITIONED = (("dividers", "cmd_lane"), ("adjustable", "cmd_setting"))
 
 
 def speed_parts(scene: Scene) -> list[tuple[str, SpeedSetpoint]]:
     """Named drives, then belts without one, by their tags."""
     drives = [(f"drives/{name}", drive) for name, drive in scene.drives.items()]
-    return [*drives, *((f"belts/{name}", belt) for name, belt in scene.belts.items() if belt.drive_name is None)]
+    return [*drives, *((f"belts/{name}", belt) for name, belt in scene.belts.items() if not belt.has_foreign_drive)]
 
 
 def has_drive(part: SpeedSetpoint) -> bool:
@@ -52,6 +55,19 @@ def commands_of(scene: Scene) -> Table:
             table |= {f"{place}/{what}": Input() for what in ("run", "reverse", "reset")}
     for field, order in MOVERS:
         table |= {f"{field}/{name}/{order}": Input() for name in getattr(scene, field)}
+    for field, order in POSITIONED:
+        for name, part in getattr(scene, field).items():
+            table[f"{field}/{name}/{order}"] = Input("count", 0.0, len(part.positions) - 1.0)
+    table |= {f"pushers/{name}/auto": Input() for name, part in scene.pushers.items() if part.zone is not None}
+    for name, axis in scene.axes.items():
+        # Jogging is refused in gear, which the scene alone does not tell.
+        table |= {f"axes/{name}/{what}": Input() for what in ("enable", "reset")}
+        if axis.drive is None and axis.machine is None:
+            most = axis.top_rate if axis.master is None else top_speed(scene, name) / CYCLE
+            table[f"axes/{name}/rate"] = Input("number", -most, most)
+        if axis.master is not None:
+            table |= {f"axes/{name}/{what}": Input() for what in ("gear_in", "gear_out")}
+            table[f"axes/{name}/phase_shift"] = Input("number", -CYCLE, CYCLE)
     for name, machine in scene.machines.items():
         if isinstance(machine, PackmlPart):
             most = machine.rate if machine.rate_limit is None else machine.rate_limit
@@ -64,8 +80,9 @@ def commands_of(scene: Scene) -> Table:
 def faults_of(scene: Scene) -> Table:
     """The faults."""
     table = {f"{place}/trip": Input() for place, part in speed_parts(scene) if has_drive(part)}
-    for field, _ in MOVERS:
+    for field, _ in (*MOVERS, *POSITIONED):
         table |= {f"{field}/{name}/jammed": Input() for name in getattr(scene, field)}
+    table |= {f"axes/{name}/jammed": Input() for name in scene.axes}
     table |= {f"machines/{name}/stop": Input() for name in scene.machines}
     table |= {f"spills/{name}/drop": Input() for name in scene.spills}
     for name in scene.photo_eyes:

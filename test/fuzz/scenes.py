@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 from fuzz.checked import checked
-from fuzz.devices import drives, machines, movers, sensors
+from fuzz.devices import axes, drives, machines, movers, row_pushers, sensors
 from fuzz.draws import Data, between, fractions, scaled, signed
 from fuzz.families import Family
 from hypothesis import strategies as st
 
 from conveyor_sim.scene.geometry import rail_shapes
-from conveyor_sim.scene.moving import moving_shapes
+from conveyor_sim.scene.moving import axes_of, bodies_at, bodies_of
 
 STEEL, CHAIN = "steel", "chain"
 MATERIALS = ("glass", "pet", "glass")
@@ -71,13 +71,17 @@ def scenes(draw: st.DrawFn, family: Family, beyond: bool = True) -> Data:
         data["base"] = [{**base, "tangential": spring} for base in data["base"]]
     if family.drives:
         data |= draw(drives(frame, data["belts"]))
+    if family.axes:
+        data |= draw(axes(frame, data["belts"], data.get("drives", {})))
     if family.movers:
-        data |= draw(movers(frame, STEEL))
+        data |= draw(movers(frame, STEEL, family.lifts))
     clear = _Clear(data, frame)
     if family.machines:
         data |= draw(machines(frame, clear))
     if family.sensors:
         data |= draw(sensors(frame, list(data["belts"])))
+        if family.movers:
+            draw(row_pushers(frame, data["pushers"], data["zones"]))
     if family.ledger:
         data["outputs"]["ledger"] = round(1.0 / frame.tick)
     if family.infeeds:
@@ -325,7 +329,10 @@ class _Clear:
         self._taken: list[tuple[float, float, float]] = []
         scene, rails = checked(data), []
         if scene is not None:
-            rails = [*rail_shapes(scene), *(shape.shape(shape.first) for shape in moving_shapes(scene))]
+            rails = [
+                *rail_shapes(scene),
+                *bodies_at(bodies_of(scene), {axis.name: axis.first for axis in axes_of(scene)}),
+            ]
         self._pieces = [piece for rail in rails for piece in rail.pieces]
 
     def of_rails(self, points: Any, radius: float) -> bool:

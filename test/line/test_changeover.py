@@ -11,6 +11,7 @@ from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.replay import replay
 from conveyor_sim.errors import CommandError, SceneError
 from conveyor_sim.line.changeover import changeover
+from conveyor_sim.line.machines.packml import Command
 from conveyor_sim.physics.plant import Plant
 from conveyor_sim.scene import Scene, parse_scene
 from conveyor_sim.simulation import Simulation
@@ -134,6 +135,92 @@ def test_a_checkpoint_after_a_changeover_goes_on_exactly(line: Scene, tmp_path: 
     assert one.full_state_hash() == other.full_state_hash()
 
 
+PANEL = """\
+panel:
+  estop: {kind: emergency_stop, cuts: [drives, machines], deceleration: 1 m/s^2}
+"""
+MOVED = ("belts/lane", "belts/other", "belts/packed")
+
+
+def stopped(plant: Scenario, first: str) -> None:
+    """Press the emergency stop and change the format. first: of both; or `braking`, `latched`: when the format changes.
+
+    Return when the belts stand.
+    """
+    if first == "changeover":
+        plant.changeover("half")
+    plant.panel.press("estop")
+    plant.run_for({"braking": 0.1, "latched": 1.0}.get(first, 0.0))
+    if first != "changeover":
+        plant.changeover("half")
+    plant.run_for(1.0)
+    assert "panel/estop/pressed" in plant.alarms
+
+
+def restart(plant: Scenario) -> None:
+    """Give the start commands of drives, belts without a drive, and the machine."""
+    plant.command("machines/filler/cntrl_cmd", Command.CLEAR)
+    for on in (0.0, 1.0):
+        plant.run_for(0.1)
+        plant.command("drives/m1/run", on)
+        plant.command("machines/filler/run", on)
+        for belt in ("other", "packed"):
+            plant.command(f"belts/{belt}/cmd_speed", 0.3 * on)
+
+
+def stands(plant: Scenario) -> bool:
+    present = plant.signals
+    return all(present[f"{belt}/speed"] == 0.0 for belt in MOVED) and not present["machines/filler/running"]
+
+
+@pytest.mark.parametrize("first", ["stop", "changeover", "braking", "latched"])
+def test_an_emergency_stop_during_a_changeover(tmp_path: Path, first: str) -> None:
+    """The format that was commanded without power is in force after the restart, and nothing starts before."""
+    with Scenario(parse_scene(LINE + PANEL, "line.yaml"), bag=tmp_path / "bag") as plant:
+        plant.run_for(2.0)
+        stopped(plant, first)
+        assert stands(plant)
+        produced = plant.signals["machines/filler/produced"]
+        plant.panel.reset("estop")
+        plant.run_for(1.0)
+        assert stands(plant) and plant.alarms == {"machines/filler/fault"}
+        assert plant.signals["machines/filler/produced"] == produced
+        restart(plant)
+        plant.run_for(4.0)
+        made = plant.signals["machines/filler/produced"] - produced
+        speeds = [plant.signals[f"{belt}/speed"] for belt in MOVED]
+    assert speeds == [0.4, 0.3, 0.3]
+    assert made == pytest.approx(4 * 5, abs=2)
+    report = replay(tmp_path / "bag")
+    assert report.exact and report.difference is None
+    with open_bag(tmp_path / "bag") as bag:
+        kinds, frames = list(bag.line.bottle_types), [frame.data for frame in bag.bottles()]
+    born = {
+        int(n): (round(float(y)), kinds[kind])
+        for frame in frames
+        for n, y, kind in zip(frame.id, frame.y, frame.type, strict=True)
+    }
+    for lane in range(3):
+        order = [kind for _, (y, kind) in sorted(born.items()) if y == lane]
+        assert order == sorted(order) and set(order) == {"full", "half"}
+
+
+def test_a_checkpoint_between_stop_and_restart_of_a_changeover_goes_on_exactly(tmp_path: Path) -> None:
+    line = parse_scene(LINE + PANEL, "line.yaml")
+    with Scenario(line) as one:
+        one.run_for(2.0)
+        stopped(one, "braking")
+        one.save(tmp_path / "latched.npz")
+        with Scenario(line, start=tmp_path / "latched.npz") as other:
+            for plant in (one, other):
+                plant.panel.reset("estop")
+                plant.run_for(0.1)
+                restart(plant)
+                plant.run_for(2.0)
+            assert one.simulation.full_state_hash() == other.simulation.full_state_hash()
+            assert one.signals["machines/filler/produced"] == other.signals["machines/filler/produced"] > 6
+
+
 def test_a_rate_of_zero_stops_and_is_not_caught_up(line: Scene) -> None:
     simulation = Simulation(line)
 
@@ -220,3 +307,40 @@ def test_the_model_knows_all_types_that_can_enter(line: Scene) -> None:
             parse_scene(LINE.replace("types: [full, half], ", "").replace("types: [half, full], ", ""), "line.yaml")
         ).model.steps_per_tick
     )
+
+
+GUIDED = """\
+name: guided
+duration: 10
+parameters: {speed: 0.3 m/s, size: 0}
+contacts:
+  - {between: [glass, glass], stiffness: 20 kN/m, damping: {law: normal, restitution: 0.5}}
+  - {between: [glass, steel], stiffness: 20 kN/m, damping: {law: normal, restitution: 0.5}}
+base: [{between: [glass, chain], friction: 0.3}]
+bottle_types: {full: {radius: 35 mm, mass: 400 g, material: glass}, half: {radius: 25 mm, mass: 200 g, material: glass}}
+conveyors: {lane: {start: [0, 0], path: [{straight: 3}], width: 0.1, material: chain, speed: speed}}
+adjustable:
+  left: &guide {along: lane, from: 1, to: 2, side: left, positions: [40 mm, 30 mm], setting: size, max_speed: 0.05,
+    acceleration: 0.5, material: steel}
+  right: {<<: *guide, side: right, positions: [40 mm, 40 mm, 35 mm], setting: 0}
+infeeds: {inlet: {along: lane, at: 0.2, bottle: full, types: [full, half], rate: 1 /s}}
+formats:
+  full: {bottle: full}
+  half: {bottle: half, set: {size: 1}}
+format: full
+"""
+
+
+def test_a_changeover_moves_guides_to_their_setting_of_the_format() -> None:
+    """Only guides whose setting depends on the format move; bottles then pass between them."""
+    scene = parse_scene(GUIDED, "guided.yaml")
+    commands = changeover(scene, "half")
+    assert commands == {"infeeds/inlet/cmd_bottle": 1.0, "adjustable/left/cmd_setting": 1.0}
+    assert changeover(scene, "full") == {"infeeds/inlet/cmd_bottle": 0.0, "adjustable/left/cmd_setting": 0.0}
+    simulation = Simulation(scene)
+    simulation.command(list(commands), list(commands.values()))
+    simulation.advance(100)
+    left, right = (shape.pieces[0] for shape in simulation.moving_rails())
+    assert (left.p1[1], left.p2[1]) == pytest.approx((0.03, 0.03), abs=1e-9)
+    assert (right.p1[1], right.p2[1]) == pytest.approx((-0.04, -0.04), abs=1e-9)
+    assert parse_scene(GUIDED, "guided.yaml", {"format": "half"}).adjustable["left"].setting == 1

@@ -73,6 +73,21 @@ def test_a_minute_of_a_crowd_that_is_pushed_about_stays_below_a_megabyte() -> No
     assert size * 4 / 3 < ALLOWED
 
 
+def test_a_bottle_whose_type_changes_has_a_track_of_each_type() -> None:
+    """Three frames of one bottle that is filled on its way; the page draws the type of the track."""
+    content, one = BlockContent(), np.ones(1)
+    for frame, kind in enumerate((0, 0, 1)):
+        columns = BottleColumns(
+            np.array([7], np.uint64), np.array([kind], np.uint16), frame * one, one, one, one, one, one,
+            np.array([0], np.int32), one, one,
+        )  # fmt: skip
+        content.bottles.append((4 * frame, columns))
+    numbers = iter(read_varints(pack(content, 0)))
+    ticks, ids, types, first, count, x, *_ = ([next(numbers) for _ in range(next(numbers))] for _ in range(6))
+    assert (ticks, ids, types) == ([0, 4, 4], [7, 0], [0, 1])
+    assert (first, count, x) == ([0, 2], [2, 1], [0, 1000, 2000])
+
+
 def test_the_end_alone_is_drawn_and_all_that_happened_is_listed(bag: Path, tmp_path: Path) -> None:
     whole, end = write_page(bag, tmp_path / "whole.html"), write_page(bag, tmp_path / "end.html", last=6.0)
     assert end.stat().st_size < whole.stat().st_size

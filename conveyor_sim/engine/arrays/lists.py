@@ -3,6 +3,7 @@
 
 from typing import NamedTuple
 
+from conveyor_sim.engine.arrays.impulses import NearImpulses
 from conveyor_sim.engine.arrays.types import F8, I8, U4
 from conveyor_sim.engine.compiler.groups import group
 
@@ -30,11 +31,12 @@ class NearSprings(NamedTuple):
 
 @group
 class Near(NamedTuple):
-    """Rail pieces near each bottle: slot s has piece[start[s]:start[s + 1]], in order."""
+    """Rail pieces, or bodies, near each bottle: slot s has piece[start[s]:start[s + 1]], in order."""
 
     start: U4
     piece: U4
     springs: NearSprings | None
+    impulse: NearImpulses | None
 
 
 @group
@@ -56,7 +58,7 @@ class Neighbourhood(NamedTuple):
 
 @group
 class StaticGrid(NamedTuple):
-    """Cells over the plant; each lists the pieces and belts within reach of a bottle whose axis is in it."""
+    """Cells over the plant; each lists the parts within reach of a bottle whose axis is in it."""
 
     x: float
     y: float
@@ -69,3 +71,5 @@ class StaticGrid(NamedTuple):
     arc: U4
     belt_start: U4
     belt: U4
+    body_start: U4
+    body: U4

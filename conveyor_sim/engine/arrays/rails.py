@@ -71,6 +71,6 @@ class RailContacts(NamedTuple):
     rail: U4
     surface: U4
     entry: I8
-    """Entry of the Near list of segments; -1 - entry for arcs; MOVING or more on a moving rail."""
+    """Entry of the Near list of segments; -1 - entry for arcs; MOVING or more at a body."""
     solution: F8
     """Effective overlaps while they are solved for."""

@@ -69,8 +69,9 @@ def _reset_rails(moving: Any) -> None:
 def _clear(springs: Any) -> None:
     if springs is None:
         return
-    for q in range(springs.path.size):
-        springs.path[q] = 0.0
+    springs.elapsed[0] = 0.0
+    for b in range(springs.path.size):
+        springs.path[b] = springs.aside[b] = 0.0
 
 
 @part

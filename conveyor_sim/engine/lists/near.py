@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rail pieces near each bottle, within its radius and half the skin; listed at each rebuild.
+"""Rail pieces and bodies near each bottle, within its radius and half the skin; listed at each rebuild.
 
 Tangential springs at rails are stored by piece: a bottle that passes a joint from one piece of a surface to the next
 starts a new spring there.
@@ -11,8 +11,9 @@ from typing import Any
 from conveyor_sim.engine.arrays.bodies import Bottles
 from conveyor_sim.engine.arrays.lists import BottleList, Near
 from conveyor_sim.engine.compiler.compile import kernel, part
+from conveyor_sim.engine.impulses.carry import restore_near, store_near
 from conveyor_sim.engine.lists.static_grid import static_cell
-from conveyor_sim.engine.rails.moving import near_sweep
+from conveyor_sim.engine.rails.poses import list_near_axes
 from conveyor_sim.engine.threads.workers import UNIT
 
 
@@ -22,6 +23,7 @@ def list_near_segments(bottles: Bottles, grid: Any, segments: Any, near: Any, ma
     if segments is None:
         return 0
     _copy_springs(near, near.springs)
+    store_near(near, near.impulse)
     count = 0
     for i in range(bottles.x.size):
         near.start[i] = min(count, near.piece.size)
@@ -44,6 +46,7 @@ def list_near_segments(bottles: Bottles, grid: Any, segments: Any, near: Any, ma
     near.start[bottles.x.size] = min(count, near.piece.size)
     if count <= near.piece.size:
         _restore_springs(near, near.springs)
+        restore_near(near, near.impulse)
     return count
 
 
@@ -53,6 +56,7 @@ def list_near_arcs(bottles: Bottles, grid: Any, arcs: Any, near: Any, margin: fl
     if arcs is None:
         return 0
     _copy_springs(near, near.springs)
+    store_near(near, near.impulse)
     count = 0
     for i in range(bottles.x.size):
         near.start[i] = min(count, near.piece.size)
@@ -72,19 +76,50 @@ def list_near_arcs(bottles: Bottles, grid: Any, arcs: Any, near: Any, margin: fl
     near.start[bottles.x.size] = min(count, near.piece.size)
     if count <= near.piece.size:
         _restore_springs(near, near.springs)
+        restore_near(near, near.impulse)
     return count
 
 
 @part
-def list_railed(bottles: Bottles, near_segments: Any, near_arcs: Any, moving: Any, railed: Any, margin: float) -> None:
-    """List the bottles with any rail within radius + margin (m), by unit."""
+def list_near_bodies(bottles: Bottles, grid: Any, moving: Any, near: Any, margin: float) -> int:
+    """List the bodies whose sweep is within radius + margin of each bottle, and the axes of these bodies.
+
+    Return the number of entries needed.
+    """
+    if moving is None:
+        return 0
+    for b in range(moving.is_near.size):
+        moving.is_near[b] = 0
+    count = 0
+    for i in range(bottles.x.size):
+        near.start[i] = min(count, near.piece.size)
+        home = static_cell(grid, bottles.x[i], bottles.y[i]) if bottles.id[i] >= 0 else -1
+        if home < 0:
+            continue
+        reach = bottles.radius[i] + margin
+        for entry in range(grid.body_start[home], grid.body_start[home + 1]):
+            b = grid.body[entry]
+            inside_x = moving.sweep[b, 0] - reach <= bottles.x[i] <= moving.sweep[b, 2] + reach
+            if inside_x and moving.sweep[b, 1] - reach <= bottles.y[i] <= moving.sweep[b, 3] + reach:
+                moving.is_near[b] = 1
+                if count < near.piece.size:
+                    near.piece[count] = b
+                count += 1
+    near.start[bottles.x.size] = min(count, near.piece.size)
+    list_near_axes(moving)
+    return count
+
+
+@part
+def list_railed(bottles: Bottles, near_segments: Any, near_arcs: Any, near_bodies: Any, railed: Any) -> None:
+    """List the bottles with any rail or body near, by unit."""
     if railed is None:
         return
     count = 0
     for i in range(bottles.x.size):
         if i % UNIT == 0:
             railed.first[i // UNIT] = count
-        if _has_near(near_segments, i) or _has_near(near_arcs, i) or near_sweep(moving, bottles, i, margin):
+        if _has_near(near_segments, i) or _has_near(near_arcs, i) or _has_near(near_bodies, i):
             railed.bottle[count] = i
             count += 1
     end_list(railed, bottles.x.size, count)

@@ -13,15 +13,17 @@ from conveyor_sim.engine.arrays.lists import Neighbourhood
 from conveyor_sim.engine.arrays.world import World
 from conveyor_sim.engine.compiler.compile import copy, kernel, part
 from conveyor_sim.engine.contact.slots import fill_slots
-from conveyor_sim.engine.lists.near import list_near_arcs, list_near_segments, list_railed
+from conveyor_sim.engine.impulses.carry import order_pairs
+from conveyor_sim.engine.lists.near import list_near_arcs, list_near_bodies, list_near_segments, list_railed
 from conveyor_sim.engine.lists.neighbours import list_pairs
+from conveyor_sim.engine.rails.poses import place_bodies
 from conveyor_sim.engine.support.belts import list_belts
 from conveyor_sim.engine.support.footing import refresh_footing
 
 
 @kernel
-def rebuild(world: World) -> tuple[int, int, int, int, int]:
-    """Rebuild all lists; return the numbers of entries that pairs, slots, segments, arcs and belts need.
+def rebuild(world: World) -> tuple[int, int, int, int, int, int]:
+    """Rebuild all lists; return the numbers of entries that pairs, slots, segments, arcs, belts and bodies need.
 
     Coefficients by pair are not filled, so that this is compiled once for all laws: `fill_laws` must follow. If a list
     needs more than its capacity, the lists are incomplete and `neighbourhood.stale` is set: enlarge them and call
@@ -33,16 +35,27 @@ def rebuild(world: World) -> tuple[int, int, int, int, int]:
     more = fill_slots(world.pairs, world.slots)
     segments = list_near_segments(bottles, world.grid, world.segments, world.near_segments, 0.5 * skin)
     arcs = list_near_arcs(bottles, world.grid, world.arcs, world.near_arcs, 0.5 * skin)
-    list_railed(bottles, world.near_segments, world.near_arcs, world.moving, world.railed, 0.5 * skin)
+    bodies = list_near_bodies(bottles, world.grid, world.moving, world.near_bodies, 0.5 * skin)
+    list_railed(bottles, world.near_segments, world.near_arcs, world.near_bodies, world.railed)
     belts = list_belts(bottles, world.grid, world.belts, world.ring, _floor(world.surface), 0.5 * skin)
     copy(bottles.x, hood.x)
     copy(bottles.y, hood.y)
     fits = _fits_pairs(pairs, more, world.pairs, world.slots) and _fits_near(segments, world.near_segments)
     fits = fits and _fits_near(arcs, world.near_arcs) and _fits_belts(belts, world.belts)
+    fits = fits and _fits_near(bodies, world.near_bodies)
     hood.stale[0] = 0 if fits else 1
     if fits:
         refresh_footing(bottles, world.belts, world.surface, world.footing, world.ring)
-    return pairs, more, segments, arcs, belts
+        order_pairs(bottles, world.pairs, world.impulses)
+    _place(world.moving)
+    return pairs, more, segments, arcs, belts, bodies
+
+
+@part
+def _place(moving: Any) -> None:
+    """Place the bodies that have become near to a bottle."""
+    if moving is not None:
+        place_bodies(moving, True)
 
 
 @part

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Grid over the plant, made once: rail pieces and belts within reach of a bottle whose axis is in a cell."""
+"""Grid over the plant, made once: rail pieces, belts and bodies within reach of a bottle whose axis is in a cell."""
 
 import math
 from typing import Any
@@ -17,17 +17,19 @@ def build_static_grid(
     segments: NDArray[np.float64],
     arcs: NDArray[np.float64],
     belts: NDArray[np.float64],
+    bodies: NDArray[np.float64],
     rail_reach: float,
     belt_reach: float,
     cell: float,
 ) -> StaticGrid:
     """Build the grid.
 
-    segments, arcs, belts: (n, 4) bounding boxes x_min, y_min, x_max, y_max, m. rail_reach: m, largest distance of an
-    axis from a rail at which the rail matters (radius and skin); belt_reach likewise for belts. cell: m, desired edge
-    of a cell; it is larger if the plant would need more than MOST_CELLS. Rails are listed in order, belts in reverse.
+    segments, arcs, belts, bodies: (n, 4) bounding boxes x_min, y_min, x_max, y_max, m, of the sweep of a body.
+    rail_reach: m, largest distance of an axis from a rail or a body at which it matters (radius and skin); belt_reach
+    likewise for belts. cell: m, desired edge of a cell; it is larger if the plant would need more than MOST_CELLS.
+    Rails and bodies are listed in order, belts in reverse.
     """
-    rails = np.concatenate([segments, arcs]) + np.array([-rail_reach, -rail_reach, rail_reach, rail_reach])
+    rails = np.concatenate([segments, arcs, bodies]) + np.array([-rail_reach, -rail_reach, rail_reach, rail_reach])
     carriers = belts + np.array([-belt_reach, -belt_reach, belt_reach, belt_reach])
     boxes = np.concatenate([rails, carriers])
     x, y = float(boxes[:, 0].min()), float(boxes[:, 1].min())
@@ -50,11 +52,14 @@ def build_static_grid(
         start[1:] = np.cumsum(np.bincount(cells, minlength=columns * rows))
         return start, items[np.argsort(cells, kind="stable")]
 
-    count = len(segments)
-    segment_start, segment = fill(rails[:count], range(count))
-    arc_start, arc = fill(rails[count:], range(len(arcs)))
+    straight, fixed = len(segments), len(segments) + len(arcs)
+    segment_start, segment = fill(rails[:straight], range(straight))
+    arc_start, arc = fill(rails[straight:fixed], range(len(arcs)))
+    body_start, body = fill(rails[fixed:], range(len(bodies)))
     belt_start, belt = fill(carriers, range(len(belts) - 1, -1, -1))
-    return StaticGrid(x, y, size, columns, rows, segment_start, segment, arc_start, arc, belt_start, belt)
+    return StaticGrid(
+        x, y, size, columns, rows, segment_start, segment, arc_start, arc, belt_start, belt, body_start, body
+    )
 
 
 @part

@@ -1,118 +1,169 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Moving rails: their positions at every step, their contacts, and the velocity of the rail at a contact.
+"""Bodies under axes: their motion at every step, their contacts, and the velocity of their surface at a contact.
 
-A rail's motion profile is a closed form of time, constant accelerations one after another, so it moves within a tick,
+An axis's motion profile is a closed form of time, constant accelerations one after another, so it moves within a tick,
 and a tick can be repeated in shorter steps. It leaves its profile if bottles overload its drive (`actuators.py`). A
-contact identifies a moving rail by an entry of MOVING or more. There are few moving rails. So every bottle near the box
-that a rail sweeps tests it, and no list depends on the rail's position.
+rebuild lists the bodies whose sweep, the box of all their places, is near a bottle. So no list depends on the position
+of a body. Of these bodies a bottle tests the pieces in whose circle it is (`Clusters`). A contact identifies a piece of
+a body by an entry of MOVING or more.
 """
 
 import math
 from typing import Any
 
 from conveyor_sim.engine.arrays.bodies import Bottles
-from conveyor_sim.engine.arrays.moving import MovingRails
+from conveyor_sim.engine.arrays.moving import MovingBodies
 from conveyor_sim.engine.arrays.rails import RailContacts
 from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import part
-from conveyor_sim.engine.rails.actuators import add_push, add_push_parts, clear_push, drive_rails, is_off_profile
+from conveyor_sim.engine.rails.actuators import (
+    add_push,
+    add_push_parts,
+    clear_all,
+    clear_push,
+    drive_axes,
+)
+from conveyor_sim.engine.rails.arc import arc_contact
+from conveyor_sim.engine.rails.cams import is_present
 from conveyor_sim.engine.rails.deepest_contacts import keep_deepest
-from conveyor_sim.engine.rails.motion_profile import phase_at
+from conveyor_sim.engine.rails.poses import list_active, move_axes, note_resting, place_bodies
 from conveyor_sim.engine.rails.segment import segment_contact
 from conveyor_sim.engine.threads.workers import UNIT, units, wait_for_all
 
 MOVING = 1 << 40
-"""Offset of the number of a moving rail in `RailContacts.entry`."""
+"""Offset of the number of a piece in `RailContacts.entry`."""
 
 
 @part
 def place_rails(moving: Any, worker: Worker, dt: float) -> None:
-    """Move the rails to their positions at time `clock` x dt of the tick. dt: step, s.
+    """Move axes and bodies to their positions at time `clock` x dt of the tick. dt: step, s.
 
     Other workers see the new positions after the next `wait_for_all`.
     """
     if moving is None:
         return
     if worker.rank == 0:
-        _place(moving, moving.clock[0] * dt)
+        clear_all(moving.actuators, moving.clock[0] == 0.0)
+        note_resting(moving)
+        list_active(moving)
+        move_axes(moving, moving.clock[0] * dt)
+        place_bodies(moving, True)
 
 
 @part
 def pass_step(moving: Any, ledger: Any, worker: Worker, dt: float, centred: bool) -> None:
-    """Move the rails by a step, right after a `wait_for_all`; on return all see it. centred: see `drive_rails`."""
+    """Move the bodies by a step, right after a `wait_for_all`; on return all see it. centred: see `drive_axes`."""
     if moving is None:
         return
     if worker.rank == 0:
-        _note_path(moving, moving.springs, -1.0)
-        drive_rails(moving.actuators, moving, ledger, moving.clock[0] * dt, dt, centred)
+        _note_path(moving, moving.springs, moving.cams, dt, -1.0)
+        drive_axes(moving.actuators, moving, ledger, moving.clock[0] * dt, dt, centred)
         moving.clock[0] += 1.0
-        _place(moving, moving.clock[0] * dt)
-        _note_path(moving, moving.springs, 1.0)
+        move_axes(moving, moving.clock[0] * dt)
+        place_bodies(moving, False)
+        _note_path(moving, moving.springs, moving.cams, dt, 1.0)
     wait_for_all(worker)
 
 
 @part
-def _note_path(moving: MovingRails, springs: Any, sign: float) -> None:
+def _note_path(moving: MovingBodies, springs: Any, cams: Any, dt: float, sign: float) -> None:
     """Update displacements. Called before and after a step, because they are differences of positions."""
     if springs is None:
         return
-    for q in range(moving.x.size):
-        springs.path[q] = (springs.path[q] if sign > 0.0 else 0.0) + sign * moving.position[q]
+    springs.elapsed[0] = dt
+    for entry in range(moving.nears[0]):
+        b = moving.near[entry]
+        springs.path[b] = (springs.path[b] if sign > 0.0 else 0.0) + sign * moving.pose.displacement[b]
+        _note_slide(springs, cams, b, sign)
 
 
 @part
-def _place(moving: MovingRails, time: float) -> None:
-    for q in range(moving.x.size):
-        position, speed = moving.position[q], moving.speed[q]
-        if not is_off_profile(moving.actuators, q):
-            k = phase_at(moving.course, q, time)
-            since, acceleration = time - moving.course[q, k, 0], moving.course[q, k, 3]
-            position = moving.course[q, k, 1] + (moving.course[q, k, 2] + 0.5 * acceleration * since) * since
-            speed = moving.course[q, k, 2] + acceleration * since
-        cosine, sine = math.cos(moving.turning[q] * position), math.sin(moving.turning[q] * position)
-        x = moving.home_x[q] + moving.along_x[q] * position
-        y = moving.home_y[q] + moving.along_y[q] * position
-        tx = moving.home_tx[q] * cosine - moving.home_ty[q] * sine
-        ty = moving.home_tx[q] * sine + moving.home_ty[q] * cosine
-        moving.x[q], moving.y[q], moving.tx[q], moving.ty[q] = x, y, tx, ty
-        moving.ends.x[q, 0], moving.ends.y[q, 0] = x, y
-        moving.ends.x[q, 1], moving.ends.y[q, 1] = x + moving.length[q] * tx, y + moving.length[q] * ty
-        moving.vx[q], moving.vy[q] = moving.along_x[q] * speed, moving.along_y[q] * speed
-        moving.turn[q] = moving.turning[q] * speed
-        moving.position[q], moving.speed[q] = position, speed
+def _note_slide(springs: Any, cams: Any, b: int, sign: float) -> None:
+    if cams is None:
+        return
+    springs.aside[b] = (springs.aside[b] if sign > 0.0 else 0.0) + sign * cams.aside[b]
+    # A body that was absent has come from elsewhere: NaN until the end of the step, then no displacement.
+    if sign < 0.0:
+        if not is_present(cams, b):
+            springs.path[b] = math.nan
+    elif math.isnan(springs.path[b]):
+        springs.path[b] = springs.aside[b] = 0.0
 
 
 @part
-def near_sweep(moving: Any, bottles: Bottles, i: int, margin: float) -> bool:
-    """Return True if bottle i, moved by up to margin (m), can touch a rail at any of its positions."""
-    if moving is None:
-        return False
-    if bottles.id[i] < 0:
-        return False
-    reach = bottles.radius[i] + margin
-    for q in range(moving.x.size):
-        inside_x = moving.sweep[q, 0] - reach <= bottles.x[i] <= moving.sweep[q, 2] + reach
-        if inside_x and moving.sweep[q, 1] - reach <= bottles.y[i] <= moving.sweep[q, 3] + reach:
-            return True
-    return False
-
-
-@part
-def moving_contacts(i: int, bottles: Bottles, moving: Any, contacts: RailContacts, count: int) -> int:
-    """Append the contacts of bottle i with moving rails to the first `count`; return their new number."""
+def moving_contacts(i: int, bottles: Bottles, moving: Any, near: Any, contacts: RailContacts, count: int) -> int:
+    """Append the contacts of bottle i with bodies to the first `count`; return their new number."""
     if moving is None:
         return count
-    for q in range(moving.x.size):
-        overlap, nx, ny = segment_contact(moving, q, bottles.x[i], bottles.y[i], bottles.radius[i])
-        if overlap > 0.0:
-            material, rail, surface = moving.material[q], moving.rail[q], moving.surface[q]
-            count = keep_deepest(contacts, count, overlap, nx, ny, material, rail, surface, MOVING + q)
+    clusters, x, y, radius = moving.clusters, bottles.x[i], bottles.y[i], bottles.radius[i]
+    for entry in range(near.start[i], near.start[i + 1]):
+        b = near.piece[entry]
+        if is_present(moving.cams, b):
+            for k in range(moving.first_cluster[b], moving.first_cluster[b + 1]):
+                dx, dy, reach = clusters.x[k] - x, clusters.y[k] - y, clusters.radius[k] + radius
+                if dx * dx + dy * dy <= reach * reach:
+                    count = _segment_contacts(moving, moving.segments, k, x, y, radius, contacts, count)
+                    count = _arc_contacts(moving, moving.segments, moving.arcs, k, x, y, radius, contacts, count)
     return count
 
 
 @part
+def _segment_contacts(
+    moving: MovingBodies,
+    segments: Any,
+    k: int,
+    x: float,
+    y: float,
+    radius: float,
+    contacts: RailContacts,
+    count: int,
+) -> int:
+    """Append the contacts with the straight pieces of cluster k."""
+    if segments is None:
+        return count
+    for g in range(moving.clusters.segment[k], moving.clusters.segment[k + 1]):
+        overlap, nx, ny = segment_contact(segments, g, x, y, radius)
+        if overlap > 0.0:
+            material, rail, surface = segments.material[g], segments.rail[g], segments.surface[g]
+            count = keep_deepest(contacts, count, overlap, nx, ny, material, rail, surface, MOVING + g)
+    return count
+
+
+@part
+def _arc_contacts(
+    moving: MovingBodies,
+    segments: Any,
+    arcs: Any,
+    k: int,
+    x: float,
+    y: float,
+    radius: float,
+    contacts: RailContacts,
+    count: int,
+) -> int:
+    """Append the contacts with the arcs of cluster k."""
+    if arcs is None:
+        return count
+    first = _count(segments)
+    for g in range(moving.clusters.arc[k], moving.clusters.arc[k + 1]):
+        overlap, nx, ny = arc_contact(arcs, g, x, y, radius)
+        if overlap > 0.0:
+            material, rail, surface = arcs.material[g], arcs.rail[g], arcs.surface[g]
+            count = keep_deepest(contacts, count, overlap, nx, ny, material, rail, surface, MOVING + first + g)
+    return count
+
+
+@part
+def _count(segments: Any) -> int:
+    """Return the number of straight pieces, after which arcs are numbered."""
+    if segments is None:
+        return 0
+    return segments.x.size
+
+
+@part
 def moves(moving: Any, entry: int) -> bool:
-    """Return True if a contact is with a moving rail, by its entry."""
+    """Return True if a contact is with a body, by its entry."""
     if moving is None:
         return False
     return entry >= MOVING
@@ -126,31 +177,95 @@ def surface_velocity(moving: Any, contacts: RailContacts, c: int, bottles: Bottl
     q = contacts.entry[c] - MOVING
     if q < 0:
         return 0.0, 0.0
+    b, pose = moving.body[q], moving.pose
+    dx, dy = _arm(moving, contacts, c, b, bottles, i)
+    ux, uy = pose.vx[b] - pose.turn[b] * dy, pose.vy[b] + pose.turn[b] * dx
+    return _with_surface(moving, moving.surface_speed, contacts, c, b, bottles, i, ux, uy, 1.0)
+
+
+@part
+def _arm(moving: MovingBodies, contacts: RailContacts, c: int, b: int, bottles: Bottles, i: int) -> tuple[float, float]:
+    """Return the vector from the pivot of body b to contact c of bottle i, m."""
     arm = bottles.radius[i] - contacts.overlap[c]
-    dx = bottles.x[i] + arm * contacts.nx[c] - moving.x[q]
-    dy = bottles.y[i] + arm * contacts.ny[c] - moving.y[q]
-    return moving.vx[q] - moving.turn[q] * dy, moving.vy[q] + moving.turn[q] * dx
+    dx = bottles.x[i] + arm * contacts.nx[c] - moving.pose.x[b]
+    dy = bottles.y[i] + arm * contacts.ny[c] - moving.pose.y[b]
+    return dx, dy
+
+
+@part
+def _with_surface(
+    moving: MovingBodies,
+    speeds: Any,
+    contacts: RailContacts,
+    c: int,
+    b: int,
+    bottles: Bottles,
+    i: int,
+    x: float,
+    y: float,
+    time: float,
+) -> tuple[float, float]:
+    """Add the path of the surface in a time (s) at contact c of bottle i to a displacement (m).
+
+    A belt runs round the ends of its rail, so its surface never moves along the normal.
+    """
+    if speeds is None:
+        return x, y
+    if speeds[b] == 0.0:
+        return x, y
+    q = contacts.entry[c] - MOVING
+    nx, ny = contacts.nx[c], contacts.ny[c]
+    tx, ty = _tangent(
+        moving.segments, moving.arcs, q, bottles.x[i] + bottles.radius[i] * nx, bottles.y[i] + bottles.radius[i] * ny
+    )
+    path = speeds[b] * time if ty * nx >= tx * ny else -speeds[b] * time
+    return x - path * ny, y + path * nx
+
+
+@part
+def _tangent(segments: Any, arcs: Any, q: int, x: float, y: float) -> tuple[float, float]:
+    """Return a vector along piece q at a point (m), from its first to its last end."""
+    straight = _count(segments)
+    if q < straight:
+        return _along_segment(segments, q)
+    return _along_arc(arcs, q - straight, x, y)
+
+
+@part
+def _along_segment(segments: Any, g: int) -> tuple[float, float]:
+    if segments is None:
+        return 0.0, 0.0
+    return segments.tx[g], segments.ty[g]
+
+
+@part
+def _along_arc(arcs: Any, k: int, x: float, y: float) -> tuple[float, float]:
+    if arcs is None:
+        return 0.0, 0.0
+    return arcs.y[k] - y, x - arcs.x[k]
 
 
 @part
 def clear_rail_push(moving: Any, first: int, end: int) -> None:
-    """Reset the forces of bottles first to end on moving rails."""
+    """Reset the forces of bottles first to end on axes."""
     if moving is None:
         return
-    clear_push(moving.actuators, first, end)
+    clear_push(moving.actuators, moving, first, end)
 
 
 @part
 def add_rail_push(
     moving: Any, contacts: RailContacts, c: int, bottles: Bottles, i: int, normal: float, tangential: float
 ) -> None:
-    """Add the force of contact c of bottle i on its rail, if it is a moving one; N and T on the bottle, N."""
+    """Add the force of contact c of bottle i on its rail, if it is that of a body; N and T on the bottle, N."""
     if moving is None:
         return
     q = contacts.entry[c] - MOVING
     if q < 0:
         return
-    add_push(moving, contacts, c, q, bottles, i, normal, tangential)
+    b = moving.body[q]
+    dx, dy = _arm(moving, contacts, c, b, bottles, i)
+    add_push(moving, contacts, c, b, dx, dy, i, normal, tangential)
 
 
 @part
@@ -161,34 +276,45 @@ def surface_path(moving: Any, contacts: RailContacts, c: int, bottles: Bottles, 
     q = contacts.entry[c] - MOVING
     if q < 0:
         return 0.0, 0.0
-    arm, path = bottles.radius[i] - contacts.overlap[c], moving.springs.path[q]
-    turned = moving.turning[q] * path
-    dx = bottles.x[i] + arm * contacts.nx[c] - moving.x[q]
-    dy = bottles.y[i] + arm * contacts.ny[c] - moving.y[q]
-    return moving.along_x[q] * path - turned * dy, moving.along_y[q] * path + turned * dx
+    b = moving.body[q]
+    path = moving.springs.path[b]
+    turned = moving.turning[b] * path
+    dx, dy = _arm(moving, contacts, c, b, bottles, i)
+    x, y = moving.along_x[b] * path - turned * dy, moving.along_y[b] * path + turned * dx
+    x, y = _with_slide(moving.springs, moving.cams, b, x, y)
+    return _with_surface(moving, moving.surface_speed, contacts, c, b, bottles, i, x, y, moving.springs.elapsed[0])
+
+
+@part
+def _with_slide(springs: Any, cams: Any, b: int, x: float, y: float) -> tuple[float, float]:
+    if cams is None:
+        return x, y
+    return x + cams.across_x[b] * springs.aside[b], y + cams.across_y[b] * springs.aside[b]
 
 
 @part
 def moving_spring(moving: Any, i: int, entry: int) -> float:
-    """Return the elongation (m) of the spring of bottle i at a moving rail, by the entry of the contact."""
+    """Return the elongation (m) of the spring of bottle i at a body, by the entry of the contact."""
     if moving is None:
         return 0.0
-    return moving.springs.elongation[i, entry - MOVING]
+    return moving.springs.elongation[i, moving.springs.column[entry - MOVING]]
 
 
 @part
 def set_moving_spring(moving: Any, i: int, entry: int, elongation: float) -> None:
     """Store the elongation (m) of that spring."""
     if moving is not None:
-        moving.springs.elongation[i, entry - MOVING] = elongation
+        moving.springs.elongation[i, moving.springs.column[entry - MOVING]] = elongation
 
 
 @part
-def reset_moving_springs(moving: Any, i: int) -> None:
-    """Reset the springs of bottle i at all moving rails."""
+def reset_moving_springs(moving: Any, near: Any, i: int) -> None:
+    """Reset the springs of bottle i at all bodies near it."""
     if moving is not None:
-        for q in range(moving.x.size):
-            moving.springs.elongation[i, q] = 0.0
+        for entry in range(near.start[i], near.start[i + 1]):
+            b = near.piece[entry]
+            for column in range(moving.springs.first[b], moving.springs.first[b + 1]):
+                moving.springs.elongation[i, column] = 0.0
 
 
 @part
@@ -230,8 +356,10 @@ def add_rail_power(
     ux, uy = surface_velocity(moving, contacts, c, world.bottles, i)
     ahead = ux * contacts.nx[c] + uy * contacts.ny[c]
     aside = uy * contacts.nx[c] - ux * contacts.ny[c]
-    unit, rails = i // UNIT, moving.x.size
-    ledger.rail_power[unit, q] += tangential * aside - normal * ahead
+    unit, rails = i // UNIT, ledger.rail_power.shape[1] - 2
+    ledger.rail_power[unit, moving.account[moving.body[q]]] += tangential * aside - normal * ahead
     ledger.rail_power[unit, rails] += drag * aside - damped * ahead
     ledger.rail_power[unit, rails + 1] += across * aside
-    add_push_parts(moving, contacts, c, q, world.bottles, i, damped, drag, across)
+    b = moving.body[q]
+    dx, dy = _arm(moving, contacts, c, b, world.bottles, i)
+    add_push_parts(moving, contacts, c, b, dx, dy, i, damped, drag, across)

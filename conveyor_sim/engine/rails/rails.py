@@ -60,7 +60,7 @@ def find_rail_contacts(i: int, world: World, contacts: RailContacts) -> int:
     """Write the contacts of bottle i with rails, shares included; return their number."""
     count = _segment_contacts(i, world.bottles, world.segments, world.near_segments, contacts, 0)
     count = _arc_contacts(i, world.bottles, world.arcs, world.near_arcs, contacts, count)
-    count = moving_contacts(i, world.bottles, world.moving, contacts, count)
+    count = moving_contacts(i, world.bottles, world.moving, world.near_bodies, contacts, count)
     if count == 1:
         contacts.share[0] = 1.0
     elif count > 1:
@@ -285,7 +285,7 @@ def _store_springs(world: World, contacts: RailContacts, count: int, i: int) -> 
             return
     _reset_springs(world.near_segments, i)
     _reset_springs(world.near_arcs, i)
-    reset_moving_springs(world.moving, i)
+    reset_moving_springs(world.moving, world.near_bodies, i)
     for c in range(count):
         if moves(world.moving, contacts.entry[c]):
             set_moving_spring(world.moving, i, contacts.entry[c], contacts.solution[c])

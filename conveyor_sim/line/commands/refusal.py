@@ -10,16 +10,16 @@ from conveyor_sim.scene.parts.alarm import PREFIX
 from conveyor_sim.support.printable import printable
 
 _TEXT = "Speed of the surface, {ratio:g} times {drive}/speed."
-_PATTERN = re.compile(r"Speed of the surface, \S+ times (drives/\w+)/speed\.")
+_PATTERN = re.compile(r"Speed of the surface, \S+ times ((?:drives|axes)/\w+)/speed\.")
 
 
 def moved_text(drive: str, ratio: float) -> str:
-    """Return the description of the speed of a belt that a drive ("drives/m1") moves."""
+    """Return the description of the speed of a belt that a drive ("drives/m1") or an axis ("axes/a") moves."""
     return _TEXT.format(drive=drive, ratio=ratio)
 
 
 def moved_belts(tags: Sequence[Tag]) -> dict[str, str]:
-    """Return the drive of each belt that a named drive moves: {"belts/one": "drives/m1"}."""
+    """Return the drive or axis of each belt that one moves: {"belts/one": "drives/m1"}."""
     matches = ((tag.device, _PATTERN.fullmatch(tag.description)) for tag in tags if tag.device_class == "belt")
     return {belt: match[1] for belt, match in matches if match is not None}
 

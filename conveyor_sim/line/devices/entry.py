@@ -84,11 +84,11 @@ class Scattering:
         if self._angular:
             self.deflection = float(self.random.uniform(-self._angular, self._angular))
 
-    def place(self, ahead: float = 0.0) -> XY:
-        """Return the position (m) of the next bottle, moved ahead by a distance (m)."""
-        along, across = self._direction, (-self._direction[1], self._direction[0])
-        x = self._middle[0] + ahead * along[0] + self.offset * across[0]
-        y = self._middle[1] + ahead * along[1] + self.offset * across[1]
+    def place(self, ahead: float = 0.0, aside: float = 0.0) -> XY:
+        """Return the position (m) of the next bottle, moved ahead and to the left by distances (m)."""
+        along, across, left = self._direction, (-self._direction[1], self._direction[0]), self.offset + aside
+        x = self._middle[0] + ahead * along[0] + left * across[0]
+        y = self._middle[1] + ahead * along[1] + left * across[1]
         return x, y
 
 

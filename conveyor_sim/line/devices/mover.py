@@ -9,18 +9,19 @@ from typing import Any
 
 import numpy as np
 
-from conveyor_sim.engine.arrays.moving import HELD, OFF_PROFILE, ON_PROFILE, PHASES, MovingRails
+from conveyor_sim.engine.arrays.moving import HELD, OFF_PROFILE, ON_PROFILE, PHASES, MovingBodies
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.engine.rails.motion_profile import plan_profile
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.devices.setup import DeviceSetup
-from conveyor_sim.line.tag import number, switch
+from conveyor_sim.line.tag import Tag, number, switch
 from conveyor_sim.scene.parts.movers import Mover as MoverPart
 
 WORDS = {
     "gates": ("open", "is_closed", "is_open", "closed", "open"),
     "pushers": ("push", "retracted", "extended", "retracted", "extended"),
     "diverters": ("divert", "at_home", "diverting", "at home", "diverting"),
+    "clamps": ("close", "is_open", "is_closed", "open", "closed"),
 }
 """By kind: the command, the end switches at home and at the end of the stroke, and the words for these positions."""
 
@@ -37,28 +38,11 @@ class Mover(Device):
     """
 
     def __init__(self, name: str, part: MoverPart, setup: DeviceSetup) -> None:
-        shapes = setup.model.plant.moving
-        index = [shape.name for shape in shapes].index(name)
-        shape = shapes[index]
-        order, home, away, at_home, at_end = WORDS[name.split("/")[0]]
-        share = shape.first / shape.stroke
-        super().__init__(
-            name,
-            (
-                number(f"{name}/position", "actual", f"From 0, {at_home}, to 1, {at_end}.", "1", 0.0, 1.0, share),
-                switch(f"{name}/{home}", "status", f"It is {at_home}.", float(share <= SWITCHED)),
-                switch(f"{name}/{away}", "status", f"It is {at_end}.", float(share >= 1.0 - SWITCHED)),
-                switch(f"{name}/blocked", "status", "Bottles hold it up, or have pushed it away.", adds_to="state"),
-                switch(
-                    f"{name}/{order}",
-                    "command",
-                    f"On: moves until {at_end}. Off: moves until {at_home}.",
-                    round(share),
-                ),
-                switch(f"{name}/jammed", "fault", "Stands still, against any load."),
-            ),
-        )
-        self._number, self._shape = index, shape
+        axes = setup.model.plant.axes
+        index = [axis.name for axis in axes].index(name)
+        shape = axes[index]
+        self._number, self._shape, self._part = index, shape, part
+        super().__init__(name, self.own_tags(name, shape.first / shape.stroke))
         self.target = self.position = shape.first
         """Target position, m or rad."""
         self.speed = 0.0
@@ -71,12 +55,34 @@ class Mover(Device):
         self.blocked = False
         """True from when the drive can't stay near the motion profile, until it has followed it for one tick."""
 
+    def own_tags(self, name: str, share: float) -> Sequence[Tag]:
+        """Return the tags. share: initial part of the stroke."""
+        order, home, away, at_home, at_end = WORDS[name.split("/")[0]]
+        text = f"On: moves until {at_end}. Off: moves until {at_home}."
+        return (
+            number(f"{name}/position", "actual", f"From 0, {at_home}, to 1, {at_end}.", "1", 0.0, 1.0, share),
+            switch(f"{name}/{home}", "status", f"It is {at_home}.", float(share <= SWITCHED)),
+            switch(f"{name}/{away}", "status", f"It is {at_end}.", float(share >= 1.0 - SWITCHED)),
+            switch(f"{name}/blocked", "status", "Bottles hold it up, or have pushed it away.", adds_to="state"),
+            switch(f"{name}/{order}", "command", text, round(share)),
+            switch(f"{name}/jammed", "fault", "Stands still, against any load."),
+        )
+
+    def target_of(self, value: float) -> float:
+        """Return the position (m or rad) that a value of the command stands for."""
+        return self._shape.stroke if value != 0.0 else 0.0
+
     def command(self, name: str, value: float, now: ScanContext) -> None:
         """Move to the other end, jam, or become free, from the present position."""
         if name == self.faults[0].name:
             self.jammed = value != 0.0
         else:
-            self.target = self._shape.stroke if value != 0.0 else 0.0
+            self.target = self.target_of(value)
+        self.plan(now)
+
+    def plan(self, now: ScanContext) -> None:
+        """Start the motion profile from the present position and speed to the target, or rest if jammed."""
+        self.wake()
         self.since = now.tick
         if self.jammed:
             self.course = resting(self.position)
@@ -84,6 +90,29 @@ class Mover(Device):
             shape = self._shape
             speed = self.speed
             self.course = profile_to(self.position, speed, self.target, shape.max_speed, shape.acceleration)
+
+    @property
+    def axis(self) -> int:
+        """Index of its axis."""
+        return self._number
+
+    def rests(self, now: ScanContext) -> bool:
+        """Return True if it stands at its target, and no bottle is near that its drive could be too weak for."""
+        rails, number = self._rails(now), self._number
+        if self.jammed or self.limited or self.blocked or self.position != self.target or self.speed != 0.0:
+            return False
+        if (actuators := rails.actuators) is not None and (
+            actuators.mode[number] != ON_PROFILE or actuators.left[number] or rails.loaded[number]
+        ):
+            return False
+        self.course = resting(self.position)
+        rails.course[number] = self.course
+        return True
+
+    @property
+    def is_home(self) -> bool:
+        """True if it is at home, and stays there."""
+        return self.target == 0.0 and self.position <= SWITCHED * self._shape.stroke
 
     def begin(self, now: ScanContext) -> None:
         """Set the motion profile of this tick in the engine."""
@@ -118,7 +147,7 @@ class Mover(Device):
         """Return blocked."""
         return [self.blocked]
 
-    def _rails(self, now: ScanContext) -> MovingRails:
+    def _rails(self, now: ScanContext) -> MovingBodies:
         moving = now.state.world.moving
         assert moving is not None
         return moving

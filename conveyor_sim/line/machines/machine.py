@@ -46,7 +46,10 @@ EXECUTE, SUSPENDED, HELD = int(PackMLState.EXECUTE), int(PackMLState.SUSPENDED),
 
 
 class MachineDevice(Device):
-    """Machine that works in cycles of one bottle and follows the PackML state model. It runs at the start."""
+    """Machine that works in cycles of one bottle, or of a batch, and follows the PackML state model.
+
+    It runs at the start.
+    """
 
     def __init__(
         self,
@@ -308,6 +311,9 @@ class MachineDevice(Device):
         if self.state not in WORKING:
             self.speed = 0.0 if self._ramp else self.speed
 
+    _batch = 1
+    """Bottles of a cycle."""
+
     _working: Collection[int] = (EXECUTE,)
     """States in which the machine works on bottles."""
 
@@ -323,7 +329,7 @@ class MachineDevice(Device):
         """
         ran = now.tick > 0 if self._counts_starts else self._category == "running"
         if self._works and ran and now.tick > 0:
-            self.cycle += (self.speed if self._ramp else self.rate) * now.length
+            self.cycle += (self.speed if self._ramp else self.rate) * now.length / self._batch
         return self._works and self.cycle >= 1.0 - ROUNDING
 
     def wait(self) -> None:
@@ -371,10 +377,14 @@ class MachineDevice(Device):
         """State, category and stop reason."""
         return self._shown[:3]
 
+    @property
+    def cycle_rate(self) -> float:
+        """Present rate, 1/s; 0 while it does not work."""
+        return (self.speed if self._ramp else self.rate) if self._works and not self._waits else 0.0
+
     def status(self) -> Sequence[float]:
         """Return state, category, stop_reason, fault, failures and cur_rate (1/s)."""
-        rate = (self.speed if self._ramp else self.rate) if self._works and not self._waits else 0.0
-        return *self._shown, self.failures, rate
+        return *self._shown, self.failures, self.cycle_rate
 
     def waited_time(self, category: Category, ticks: int, now: ScanContext) -> float:
         """Return the total time starved or blocked, s. ticks: number of ticks at whose end it waited."""
@@ -382,8 +392,8 @@ class MachineDevice(Device):
 
     @property
     def begun_part(self) -> float:
-        """Part of the present cycle that is done; 0 without a bottle."""
-        return self.cycle
+        """Bottles of the present cycle that are done, a part of them; 0 without a bottle."""
+        return self.cycle * self._batch
 
     def _draws(self, setup: DeviceSetup, times: Times, purpose: str) -> Draws:
         return Draws(times, setup.random(self.name, purpose), self._tick)

@@ -6,11 +6,13 @@ from collections.abc import Sequence
 from conveyor_sim.line.device import ScanContext
 from conveyor_sim.line.devices.entry import Quality, Scattering
 from conveyor_sim.line.devices.infeed import CMD_BOTTLE, Switching, type_tags
+from conveyor_sim.line.devices.mover import Mover
 from conveyor_sim.line.devices.setup import BAD, JITTER, DeviceSetup
 from conveyor_sim.line.machines.machine import MachineDevice
 from conveyor_sim.line.machines.stop_reason import BLOCKED, NONE
 from conveyor_sim.line.tag import count, seconds, switch
 from conveyor_sim.scene.parts.source import Source
+from conveyor_sim.scene.types import XY
 
 
 class SourceDevice(MachineDevice, Scattering, Switching):
@@ -25,6 +27,12 @@ class SourceDevice(MachineDevice, Scattering, Switching):
         ]
         self.switch_among(source, setup)
         super().__init__(name, source, setup, signals)
+        layer = source.layer
+        self._offsets = ((0.0, 0.0),) if layer is None else layer.offsets()
+        self._batch = len(self._offsets)
+        self._pusher = None
+        if layer is not None and layer.pusher is not None:
+            self._pusher = setup.device(Mover, f"pushers/{layer.pusher}")
         self.quality = Quality(source, setup.random(name, BAD))
         self.scatter(source, lambda: setup.random(name, JITTER))
         # The first bottle takes a cycle, as all others do.
@@ -45,22 +53,29 @@ class SourceDevice(MachineDevice, Scattering, Switching):
         self.check_type()
 
     def feed(self, now: ScanContext) -> None:
-        """Feed the bottle that is due, if there is room."""
+        """Feed the bottles that are due, if there is room for all of them."""
         if self._busy:
             self.advance(now)
         cause = NONE
         if self.turn(now):
-            place = self.place()
-            if not self._entry.has_room(now.state, *place):
+            places = [self.place(*offset) for offset in self._offsets]
+            if not self._has_room(places, now):
                 cause = BLOCKED
                 self.blocked_ticks += 1
                 self.wait()
             elif self.goes_on():
-                self.quality.judge(self._entry.enter(now.state, *place, self.deflection), now)
+                for place in places:
+                    self.quality.judge(self._entry.enter(now.state, *place, self.deflection), now)
                 self.draw_scatter()
-                self.fed += 1
+                self.fed += len(places)
                 self.cycle -= 1.0
         self.conclude(cause, now)
+
+    def _has_room(self, places: Sequence[XY], now: ScanContext) -> bool:
+        """Return True if a layer or bottle can be set down at places (m), and its pusher is retracted."""
+        if self._pusher is not None and not self._pusher.is_home:
+            return False
+        return all(self._entry.has_room(now.state, *place) for place in places)
 
     def counts(self) -> tuple[int, int, int]:
         """Return fed bottles, and bad ones among them."""

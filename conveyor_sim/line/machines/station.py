@@ -5,11 +5,9 @@ Stations work on a bottle for one cycle, and give it back at another place.
 """
 
 from collections.abc import Mapping, Sequence
-from types import SimpleNamespace
-
-import numpy as np
 
 from conveyor_sim.line.device import ScanContext
+from conveyor_sim.line.devices.bottle_work import BottleWork, work_tags
 from conveyor_sim.line.devices.entry import Scattering, has_room, velocity
 from conveyor_sim.line.devices.region import Region, ZoneDevice
 from conveyor_sim.line.devices.setup import JITTER, DeviceSetup
@@ -19,7 +17,7 @@ from conveyor_sim.line.machines.stop_reason import BLOCKED, NONE, STARVED
 from conveyor_sim.line.tag import Tag, count, seconds, switch
 from conveyor_sim.scene.parts.machine import TakingPart
 from conveyor_sim.scene.parts.sink import Sink
-from conveyor_sim.scene.parts.station import BAD, Acceptance, AttributeRule, Station
+from conveyor_sim.scene.parts.station import Station
 
 FILLS = frozenset({PackMLState.STARTING, PackMLState.UNSUSPENDING})
 
@@ -75,7 +73,12 @@ class TakingDevice(MachineDevice):
 
 
 class SinkDevice(TakingDevice):
-    """Downstream machine that takes bottles at a rate. Starved: a bottle is due, and none is in its region."""
+    """Downstream machine that takes bottles at a rate. Starved: they are due, and not all of them are in its region."""
+
+    holds: bool | int
+    """Bottles that it works on; with one at a time, True or False."""
+    holds_bad: bool | int
+    """Bad ones among them."""
 
     def __init__(self, name: str, sink: Sink, setup: DeviceSetup) -> None:
         signals = [
@@ -90,45 +93,46 @@ class SinkDevice(TakingDevice):
                 count(f"{name}/defective", "counter", "Bad bottles among them."),
             ]
         super().__init__(name, sink, setup, signals)
+        self._batch = sink.at_once
         self.removed = 0
         self.removed_bad = 0
         self.processed = self.defective = 0
         self.holds = self.holds_bad = False
-        """True while it works on a bottle, and on a bad one."""
         self.starved_ticks = 0
 
     def take(self, now: ScanContext) -> None:
-        """Take the bottle that has waited longest, if one is due."""
+        """Take the bottles that have waited longest, if they are due and all there."""
         if self._busy:
             self.advance(now)
         slot_of = self.queue(now)
         cause = NONE
         if self.turn(now):
             self._complete()
-            if not self.waiting:
+            if len(self.waiting) < self._batch:
                 cause = STARVED
                 self.starved_ticks += 1
                 self.wait()
             elif self.goes_on():
-                first, *others = self.waiting
-                self.holds, self.holds_bad = True, first in now.bad
-                now.state.remove(slot_of[first])
-                self.waiting = tuple(others)
-                self.removed += 1
-                self.removed_bad += first in now.bad
+                taken, self.waiting = self.waiting[: self._batch], self.waiting[self._batch :]
+                bad = sum(bottle in now.bad for bottle in taken)
+                self.holds, self.holds_bad = (len(taken), bad) if self._batch > 1 else (True, bool(bad))
+                for bottle in taken:
+                    now.state.remove(slot_of[bottle])
+                self.removed += len(taken)
+                self.removed_bad += bad
                 self.cycle -= 1.0
         self.conclude(cause, now)
 
     def _complete(self) -> None:
-        """Count the bottle whose cycle is complete."""
+        """Count the bottles whose cycle is complete."""
         self.processed += self.holds
         self.defective += self.holds_bad
         self.holds = self.holds_bad = False
 
     @property
     def begun_part(self) -> float:
-        """Part of the present cycle that is done; 0 without a bottle."""
-        return self.cycle if self.holds else self.cycle - 1.0
+        """Bottles of the present cycle that are done, a part of them; 0 without a bottle."""
+        return (self.cycle if self.holds else self.cycle - 1.0) * self._batch
 
     def counts(self) -> tuple[int, int, int]:
         """Return processed bottles, and bad ones among them."""
@@ -146,30 +150,15 @@ class SinkDevice(TakingDevice):
         return [self.works, self.cause == STARVED, *self.condition]
 
 
-EMPTY = -1
+class ProcessingDevice(BottleWork, TakingDevice, Scattering):
+    """Station of a running line: work on bottles, and their return."""
 
-
-class StationDevice(TakingDevice, Scattering):
-    """Station of a running line.
-
-    Starved: it is empty, and no bottle waits. Blocked: it is done, and there is no room for the bottle.
-    """
-
-    defects: dict[str, int]
-    """Number of defective bottles, by test."""
-
-    def __init__(self, name: str, station: Station, setup: DeviceSetup) -> None:
+    def __init__(self, name: str, station: Station, setup: DeviceSetup, own: Sequence[Tag]) -> None:
+        """Build the tags. own: signals that show the bottles inside."""
         signals = [
             count(f"{name}/processed", "counter", "Bottles given back."),
-            count(f"{name}/good", "counter", "Bottles that passed all tests."),
-            count(f"{name}/defective", "counter", "Bottles that failed a test."),
-            count(f"{name}/false_accepts", "counter", "Tests passed by values outside their limits."),
-            count(f"{name}/false_rejects", "counter", "Tests failed by values within their limits."),
-            *(
-                count(f"{name}/defect_{test}", "counter", f"Bottles that failed the test `{test}`.")
-                for test in station.tests
-            ),
-            switch(f"{name}/holds", "status", "A bottle is in the station."),
+            *work_tags(name, station),
+            *own,
             switch(f"{name}/starved", "status", "A bottle is due, and none is there.", adds_to="state"),
             switch(f"{name}/blocked", "status", "A bottle is done, and there is no room.", adds_to="state"),
             seconds(f"{name}/starved_time", "counter", "Total time starved."),
@@ -179,26 +168,68 @@ class StationDevice(TakingDevice, Scattering):
         self._heading = station.heading
         self.scatter(station, lambda: setup.random(name, JITTER))
         self._radii = setup.model.type_radius.tolist()
-        self._sets = [
-            AttributeSetting(what, setting, setup.random(name, f"sets/{what}"))
-            for what, setting in station.sets.items()
-        ]
-        self._tests = [
-            AttributeTest(what, test, setup.random(name, f"tests/{what}")) for what, test in station.tests.items()
-        ]
-        named = {f"sets_{setting.attribute}": setting.random for setting in self._sets}
-        self.streams = SimpleNamespace(**named, **{f"tests_{test.attribute}": test.random for test in self._tests})
-        """Random streams of settings and tests."""
+        self.work_as(name, station, setup)
+        self.starved_ticks = 0
+        self.blocked_ticks = 0
+
+    def give_back(self, bottle: int, now: ScanContext) -> int:
+        """Return a finished bottle to the line, unless the machine can't go on. Return BLOCKED without room, else NONE.
+
+        Its new type decides whether there is room.
+        """
+        place, before = self.place(), now.state.held[bottle][0]
+        after = self.type_after(before)
+        if not has_room(now.state, *place, self._radii[after]):
+            self.blocked_ticks += 1
+            return BLOCKED
+        if self.goes_on():
+            self.finish(bottle, now)
+            if after != before:
+                now.state.convert(bottle, after)
+            direction, speed = self._heading
+            now.state.give(bottle, *place, *velocity(speed, direction + self.deflection))
+            self.draw_scatter()
+        return NONE
+
+    def inside(self) -> Sequence[float]:
+        """Return the values of the signals that show the bottles inside."""
+        raise NotImplementedError
+
+    def values(self, now: ScanContext) -> Sequence[float]:
+        """Return the values in the order of the signals."""
+        return (
+            self.works,
+            self.processed,
+            *self.work_values(),
+            *self.inside(),
+            self.cause == STARVED,
+            self.cause == BLOCKED,
+            self.waited_time("starved", self.starved_ticks, now),
+            self.waited_time("blocked", self.blocked_ticks, now),
+            *self.status(),
+        )
+
+    def states(self, now: ScanContext) -> list[float]:
+        """Return running, starved, blocked, state, category and stop reason."""
+        return [self.works, self.cause == STARVED, self.cause == BLOCKED, *self.condition]
+
+
+EMPTY = -1
+
+
+class StationDevice(ProcessingDevice):
+    """Station with one bottle at a time.
+
+    Starved: it is empty, and no bottle waits. Blocked: it is done, and there is no room for the bottle.
+    """
+
+    def __init__(self, name: str, station: Station, setup: DeviceSetup) -> None:
+        super().__init__(name, station, setup, [switch(f"{name}/holds", "status", "A bottle is in the station.")])
         self.holding = EMPTY
         """Id of the bottle in the station."""
         self.begun = 0
         """First tick of the work on it."""
         self.cycle = 0.0
-        self.processed = self.good = 0
-        self.false_accepts = self.false_rejects = 0
-        self.defects = dict.fromkeys(station.tests, 0)
-        self.starved_ticks = 0
-        self.blocked_ticks = 0
 
     @property
     def held(self) -> Sequence[int]:
@@ -226,105 +257,19 @@ class StationDevice(TakingDevice, Scattering):
                 cause = STARVED
                 self.starved_ticks += 1
         elif now.tick > self.begun and self.turn(now):
-            place = self.place()
-            if not has_room(now.state, *place, self._radii[now.state.held[self.holding][0]]):
-                cause = BLOCKED
-                self.blocked_ticks += 1
+            cause = self.give_back(self.holding, now)
+            if cause == BLOCKED:
                 self.wait()
-            elif self.goes_on():
-                self._finish(self.holding, now)
-                direction, speed = self._heading
-                now.state.give(self.holding, *place, *velocity(speed, direction + self.deflection))
-                self.draw_scatter()
+            elif self.holding not in now.state.held:
                 self.holding = EMPTY
                 self.cycle = 0.0 if self.cause == BLOCKED else min(self.cycle - 1.0, 1.0)
         self.conclude(cause, now)
-
-    def _finish(self, bottle: int, now: ScanContext) -> None:
-        """Set the attributes of a bottle, and test it."""
-        self.processed += 1
-        for setting in self._sets:
-            if (value := setting.value(self.processed)) is not None:
-                now.set_attribute(bottle, setting.attribute, value)
-        defective = False
-        for test in self._tests:
-            within = test.within(now.attribute(bottle, test.attribute))
-            passed = test.passes(within)
-            self.false_accepts += passed and not within
-            self.false_rejects += within and not passed
-            self.defects[test.attribute] += not passed
-            defective = defective or not passed
-        if defective:
-            now.set_attribute(bottle, BAD, 1.0)
-        self.good += not defective
 
     @property
     def begun_part(self) -> float:
         """Part of the present cycle that is done; 0 without a bottle."""
         return 0.0 if self.holding == EMPTY and self.cause == STARVED else self.cycle
 
-    def counts(self) -> tuple[int, int, int]:
-        """Return processed bottles, and defective ones among them."""
-        return self.processed, self.processed - self.good, 0
-
-    def values(self, now: ScanContext) -> Sequence[float]:
-        """Return the values in the order of the signals."""
-        return (
-            self.works,
-            self.processed,
-            self.good,
-            self.processed - self.good,
-            self.false_accepts,
-            self.false_rejects,
-            *self.defects.values(),
-            self.holding != EMPTY,
-            self.cause == STARVED,
-            self.cause == BLOCKED,
-            self.waited_time("starved", self.starved_ticks, now),
-            self.waited_time("blocked", self.blocked_ticks, now),
-            *self.status(),
-        )
-
-    def states(self, now: ScanContext) -> list[float]:
-        """Return running, starved, blocked, state, category and stop reason."""
-        return [self.works, self.cause == STARVED, self.cause == BLOCKED, *self.condition]
-
-
-class AttributeSetting:
-    """Setting of one attribute by a station."""
-
-    def __init__(self, attribute: str, setting: AttributeRule, random: np.random.Generator) -> None:
-        self.attribute, self.random = attribute, random
-        self._setting, self._at = setting, frozenset(setting.at)
-
-    def value(self, number: int) -> float | None:
-        """Return the new value for the bottle of a number (from 1), None if it keeps its value."""
-        setting = self._setting
-        # Random numbers are drawn only if they decide.
-        chosen = setting.every is None or number % setting.every == 0
-        chosen = chosen and (not self._at or number in self._at)
-        if chosen and setting.share < 1.0:
-            chosen = float(self.random.uniform()) < setting.share
-        spread = setting.deviation * float(self.random.standard_normal()) if setting.deviation else 0.0
-        return setting.to + spread if chosen else None
-
-
-class AttributeTest:
-    """Test of one attribute by a station."""
-
-    def __init__(self, attribute: str, test: Acceptance, random: np.random.Generator) -> None:
-        self.attribute, self.random = attribute, random
-        self._test = test
-
-    def within(self, value: float) -> bool:
-        """Return True if a value is within the limits."""
-        test = self._test
-        return (test.low is None or value >= test.low) and (test.high is None or value <= test.high)
-
-    def passes(self, within: bool) -> bool:
-        """Return True if the test passes.
-
-        within: True for a value within the limits. A false accept or reject inverts the result.
-        """
-        wrong = self._test.false_reject if within else self._test.false_accept
-        return within != (wrong > 0.0 and float(self.random.uniform()) < wrong)
+    def inside(self) -> Sequence[float]:
+        """Return True if a bottle is in the station."""
+        return (self.holding != EMPTY,)

@@ -15,9 +15,10 @@ from conveyor_sim.scene.geometry import ArcPiece, BeltShape, RailShape, rail_sha
 from conveyor_sim.scene.layout.plan import ConveyorPlan
 from conveyor_sim.scene.layout.routes import Bend
 from conveyor_sim.scene.marks import marks_of
-from conveyor_sim.scene.moving import moving_shapes
+from conveyor_sim.scene.moving import mover_shape, movers_of
 from conveyor_sim.scene.parts.device_part import Mark
 from conveyor_sim.scene.schema import Scene
+from conveyor_sim.scene.star_places import wheels_of
 from conveyor_sim.scene.types import XY
 
 LAYERS: dict[str, tuple[str, int]] = {
@@ -28,6 +29,12 @@ LAYERS: dict[str, tuple[str, int]] = {
     "GATES": ("#a3447f", 6),
     "PUSHERS": ("#a3447f", 6),
     "DIVERTERS": ("#a3447f", 6),
+    "DIVIDERS": ("#a3447f", 6),
+    "ADJUSTABLE": ("#a3447f", 6),
+    "CLAMPS": ("#a3447f", 6),
+    "STARS": ("#a3447f", 6),
+    "SCREWS": ("#a3447f", 6),
+    "SIDE_BELTS": ("#a3447f", 6),
     "PHOTO_EYES": ("#0e5a8a", 5),
     "COUNTERS": ("#5b21b6", 30),
     "INSPECTIONS": ("#5b21b6", 30),
@@ -79,7 +86,7 @@ class DrawnShape:
 
 def plan_of(scene: Scene) -> list[DrawnShape]:
     """Return the shapes of a scene's plan, by layer in the order of LAYERS."""
-    shapes = [*_belts(scene), *_rails(scene), *_movers(scene), *_marks(scene)]
+    shapes = [*_belts(scene), *_rails(scene), *_movers(scene), *_wheels(scene), *_marks(scene)]
     order = {layer: index for index, layer in enumerate(LAYERS)}
     return sorted(shapes, key=lambda shape: order[shape.layer])
 
@@ -134,10 +141,21 @@ def _curve(shape: RailShape) -> tuple[DrawnPiece, ...]:
 
 
 def _movers(scene: Scene) -> Iterator[DrawnShape]:
-    """Yield gates, pushers and diverters where the scene gives their ends."""
-    for shape in moving_shapes(scene):
-        field, name = shape.name.split("/")
-        yield DrawnShape(field.upper(), name, (DrawnPiece(shape.start, shape.end),))
+    """Yield gates, pushers and other movers where the scene places them."""
+    for path, mover in movers_of(scene):
+        field, name = map(str, path)
+        for body in mover_shape(path, mover)[0]:
+            yield from (DrawnShape(field.upper(), name, (DrawnPiece(*piece.ends),)) for piece in body.pieces)
+
+
+def _wheels(scene: Scene) -> Iterator[DrawnShape]:
+    """Yield pitch circles of star wheels, and the lines of bottles at screws and side belts."""
+    for name, wheel in wheels_of(scene.stars).items():
+        circle = ArcPiece(wheel.centre, wheel.part.pitch_radius, wheel.entry, 2.0 * math.pi)
+        yield DrawnShape("STARS", name, tuple(_arc(circle)), is_closed=True)
+    for field in ("screws", "side_belts"):
+        for name, part in getattr(scene, field).items():
+            yield DrawnShape(field.upper(), name, (DrawnPiece(part.from_, part.to),))
 
 
 def _marks(scene: Scene) -> Iterator[DrawnShape]:

@@ -151,17 +151,62 @@ function drawEntry(context, camera, colours, view, mark, device) {
 
 // Returns the ends of a moving rail.
 export function moverEnds(mover, position) {
-  const [x, y] = [mover.from[0] + mover.along[0] * position, mover.from[1] + mover.along[1] * position];
-  const [dx, dy] = [mover.to[0] - mover.from[0], mover.to[1] - mover.from[1]];
+  const [px, py] = mover.pivot ?? mover.from; // recordings of earlier versions have no pivot
   const cos = Math.cos(mover.turning * position), sin = Math.sin(mover.turning * position);
-  return [[x, y], [x + dx * cos - dy * sin, y + dx * sin + dy * cos]];
+  return [mover.from, mover.to].map(([x, y]) => [
+    px + mover.along[0] * position + (x - px) * cos - (y - py) * sin,
+    py + mover.along[1] * position + (x - px) * sin + (y - py) * cos,
+  ]);
+}
+
+// Returns the value of a cam at a coordinate.
+function camAt(parts, at) {
+  const [u, s, slope, curvature] = parts.findLast(([start]) => start <= at) ?? parts[0];
+  return s + (slope + 0.5 * curvature * (at - u)) * (at - u);
+}
+
+// Returns the outline of a star wheel, a pocket of a screw or a side belt at a position of its axis; null if it is absent.
+export function bodyPoints(body, position) {
+  let at = position - body.lag, aside = [0, 0];
+  if (body.period) at -= body.period * Math.floor(at / body.period);
+  if (body.cam) {
+    if (at < body.cam.parts[0][0] || at > body.cam.end) return null;
+    if (body.slide) aside = body.slide.direction.map((part) => part * camAt(body.slide.parts, at));
+    at = camAt(body.cam.parts, at);
+  }
+  const cos = Math.cos(body.turning * at), sin = Math.sin(body.turning * at), [px, py] = body.pivot;
+  const [sx, sy] = [body.along[0] * at + aside[0], body.along[1] * at + aside[1]];
+  return body.outline.map(([x, y]) => [px + sx + (x - px) * cos - (y - py) * sin, py + sy + (x - px) * sin + (y - py) * cos]);
+}
+
+// Returns the bodies that are present, each with its name and its points.
+export function bodiesNow(view) {
+  return view.recording.head.bodies
+    .map((body) => ({ device: body.name, points: bodyPoints(body, view.signal(`${body.axis}/position`) ?? 0) }))
+    .filter(({ points }) => points);
+}
+
+export function drawBodies(context, camera, colours, view) {
+  const named = new Set();
+  for (const { device, points } of bodiesNow(view)) {
+    outline(context, camera, points, false);
+    context.lineWidth = Math.max(2, 0.006 * camera.scale);
+    context.strokeStyle = colours.mover;
+    context.stroke();
+    if (named.has(device)) continue;
+    named.add(device);
+    const [x, y] = middle(points);
+    view.labels.add(device, short(device.split("/")[1]), camera.toX(x), camera.toY(y), { importance: view.device === device ? CHOSEN : 4, reach: 6, colour: colours.mover });
+  }
 }
 
 export function drawMovers(context, camera, colours, view) {
   for (const mover of view.recording.head.movers) {
     const share = view.signal(`${mover.name}/position`);
     const position = share === undefined ? mover.first : share * mover.stroke;
-    for (const [at, width, alpha] of [[0, 1, 0.5], [mover.stroke, 1, 0.5], [position, Math.max(4, 0.014 * camera.scale), 1]]) {
+    const isPresent = position <= (mover.present ?? 1) * mover.stroke; // a lifted gate touches nothing
+    const drawn = [[0, 1, 0.5], [mover.stroke, 1, 0.5], ...(isPresent ? [[position, Math.max(4, 0.014 * camera.scale), 1]] : [])];
+    for (const [at, width, alpha] of drawn) {
       outline(context, camera, moverEnds(mover, at), false);
       context.globalAlpha = alpha;
       context.setLineDash(alpha < 1 ? [3, 4] : []);

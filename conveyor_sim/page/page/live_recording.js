@@ -81,7 +81,7 @@ export class LiveRecording extends Recording {
       const frame = block.times.push(read.times[0]) - 1, slot = Math.floor(frame / forceFrames);
       for (const { id, type, x, y, force } of read.tracks) {
         let track = block.last.get(id);
-        if (!track || track.first + track.count !== frame) { // a machine may have held it in between
+        if (!track || track.type !== type || track.first + track.count !== frame) { // a machine may have held or changed it
           track = { id, type, first: frame, count: 0, x: [], y: [], force: [], firstSlot: slot, place: track?.place ?? block.last.size };
           block.tracks.push(track);
           block.last.set(id, track);

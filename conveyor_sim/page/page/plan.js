@@ -4,7 +4,7 @@
 import { Surfaces, parallel } from "./surfaces.js";
 import { COLOURINGS, palette } from "./colours.js";
 import { Crowd, MANY } from "./crowd.js";
-import { CHOSEN, drawAreas, drawLines, drawMovers } from "./devices.js";
+import { CHOSEN, drawAreas, drawBodies, drawLines, drawMovers } from "./devices.js";
 import { byId, short } from "./dom.js";
 import { Labels, outside, placeAt } from "./labels.js";
 import { drawSelection, outlinesOf } from "./selection.js";
@@ -73,6 +73,7 @@ export class Plan {
     if (frame) this._bottles(frame, colours);
     if (frame && view.showForces) this._forces(frame, colours);
     drawMovers(context, camera, colours, view);
+    drawBodies(context, camera, colours, view);
     drawLines(context, camera, colours, view);
     this._beltNames(colours, speeds);
     if (frame) this._selected(frame, colours);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Shapes of devices on the plan: for clicks, for the outline of the selected device, and to zoom to it.
 
-import { deviceOf, moverEnds } from "./devices.js";
+import { bodiesNow, deviceOf, moverEnds } from "./devices.js";
 import { awayFrom, inside, signedArea } from "./shapes.js";
 
 const ROOM = 0.4; // m, least distance from the middle of a device to the edges of the window that shows it
@@ -16,7 +16,7 @@ function smallDevices(view) {
     const share = view.signal(`${mover.name}/position`);
     return { device: mover.name, points: moverEnds(mover, share === undefined ? mover.first : share * mover.stroke) };
   });
-  return [...movers, ...head.marks.map((mark) => ({ device: deviceOf(mark), points: mark.points }))];
+  return [...movers, ...bodiesNow(view), ...head.marks.map((mark) => ({ device: deviceOf(mark), points: mark.points }))];
 }
 
 // Returns the outlines of a device, each a list of points, m. A drive has those of its belts.

@@ -198,8 +198,8 @@ export class View {
     this.clock.pause();
     this.clock.seek(time);
     if (bottle >= 0) this.selectBottle(bottle, false);
-    const { marks, movers, surfaces } = this.recording.head;
-    const devices = [...marks.map(deviceOf), ...movers.map(({ name }) => name), ...surfaces.map(({ name }) => `belts/${name}`)];
+    const { bodies, marks, movers, surfaces } = this.recording.head;
+    const devices = [...marks.map(deviceOf), ...[...movers, ...bodies].map(({ name }) => name), ...surfaces.map(({ name }) => `belts/${name}`)];
     const device = devices.find((name) => tag && (tag === name || tag.startsWith(`${name}/`)));
     if (device) this.selectDevice(device);
   }

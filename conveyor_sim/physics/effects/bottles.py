@@ -44,7 +44,8 @@ def _prevented(plant: Plant, on: Collection[str]) -> str:
 
 
 def _infeed(plant: Plant, on: Collection[str]) -> Cause | None:
-    return next((Cause(path) for path, _ in plant.scene.givers()), None)
+    carousels = ((("carousels", name), part) for name, part in plant.scene.carousels.items())
+    return next((Cause(path) for path, _ in (*plant.scene.givers(), *carousels)), None)
 
 
 def _outfeed(plant: Plant, on: Collection[str]) -> Cause | None:
@@ -68,16 +69,17 @@ RIDING = Effect(
     source="added",
     called_for=_riding,
     absent="no straight belt has friction, bottles stand on springs (static_friction), a belt vibrates, or the "
-    "integrator is rk4, dormand_prince or linearly_implicit",
+    "integrator is rk4, dormand_prince, linearly_implicit or impulses",
     absent_here=_prevented,
     needs="velocities of the previous step; ranges of slots whose bottles are stepped",
 )
 INFEED = Effect(
     name="infeed",
-    law="bottles enter one behind the other, at a gap or a rate; stations return the bottles that they took",
+    law="bottles enter one behind the other, at a gap or a rate; stations return the bottles that they "
+    "took, and carousels change the types of bottles",
     source="added",
     called_for=_infeed,
-    absent="no infeed, source, spill or station",
+    absent="no infeed, source, spill, station or carousel",
     needs="counters and random draws of each entry; storage that grows with the number of bottles",
 )
 OUTFEED = Effect(

@@ -79,19 +79,22 @@ def _stable(name: str, stiffness: Callable[[Meeting, Terms], tuple[float, str]])
 
 
 def _mover_bounds(meeting: Meeting, stiffness: float, terms: Terms) -> list[tuple[float, str]]:
-    """Return a bound (s) and its reason for each moving rail with a limited drive and the meeting's material.
+    """Return a bound (s) and its reason for each axis with a limited drive and a body of the meeting's material.
 
-    The bound assumes that bottles stop the rail: as many as fit along it. stiffness: N/m.
+    The bound assumes that bottles stop the axis: as many as fit along the pieces of its bodies. stiffness: N/m.
     """
     materials = terms.plant.rail_materials
     bounds = []
-    for shape in terms.plant.moving:
-        if shape.limit is None or shape.material != materials[meeting.entry % len(materials)]:
+    reaches = terms.plant.reach_of_axes.tolist()
+    for index, (axis, reach) in enumerate(zip(terms.plant.axes, reaches, strict=True)):
+        bodies = [shape for of, shape in zip(terms.plant.axis_of_body, terms.plant.moving, strict=True) if of == index]
+        if axis.limit is None or materials[meeting.entry % len(materials)] not in {shape.material for shape in bodies}:
             continue
-        most = 2 * (1 + math.floor(shape.length / (2.0 * meeting.first.radius)))
+        length = sum(piece.length for shape in bodies for piece in shape.pieces)
+        most = 2 * (1 + math.floor(length / (2.0 * meeting.first.radius)))
         # A force at the end of an arm accelerates it like a mass of J / L^2.
-        mass = shape.mass / shape.fastest_point**2
-        reason = f"{most} bottles that stop {shape.name}, a body of {mass:.3g} kg, at k = {stiffness:.3g} N/m"
+        mass = axis.inertia / reach**2
+        reason = f"{most} bottles that stop {axis.name}, a body of {mass:.3g} kg, at k = {stiffness:.3g} N/m"
         bounds.append((mover_bound(stiffness, meeting.reduced_mass, mass, most), reason))
     return bounds
 

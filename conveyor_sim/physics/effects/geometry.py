@@ -7,7 +7,6 @@ from functools import partial
 from conveyor_sim.physics.effects.declaration import Cause, Effect
 from conveyor_sim.physics.plant import Plant
 from conveyor_sim.scene.geometry import ArcPiece
-from conveyor_sim.scene.moving import movers_of
 
 
 def _rail(plant: Plant, on: Collection[str], *, arc: bool) -> Cause | None:
@@ -21,7 +20,7 @@ def _rail(plant: Plant, on: Collection[str], *, arc: bool) -> Cause | None:
 
 
 def _moving(plant: Plant, on: Collection[str]) -> Cause | None:
-    return next((Cause(path) for path, _ in movers_of(plant.scene)), None)
+    return next((Cause(tuple(shape.name.split("/", 1))) for shape in plant.moving), None)
 
 
 def _radii(plant: Plant, on: Collection[str]) -> Cause | None:
@@ -55,14 +54,15 @@ ARC_RAILS = Effect(
 )
 MOVING_RAILS = Effect(
     name="moving_rails",
-    law="straight rails that slide or swing in every step, on profiles of constant accelerations. Damping and friction "
-    "use the velocity of the rail at the contact. If the force limit of the drive does not suffice for the profile, "
-    "the rail moves as a body, M a = F + Q: F is the force of the drive at its limit, Q the force of the bottles",
+    law="bodies of straight pieces and arcs that slide, turn or follow a cam in every step, under axes with profiles "
+    "of constant accelerations. Damping and friction use the velocity of the surface at the contact. If the force "
+    "limit of the drive does not suffice for the profile, the axis moves as a mass, M a = F + Q: F is the force of the "
+    "drive at its limit, Q the force of the bottles on all bodies of the axis",
     source="added",
     called_for=_moving,
-    absent="no gate, pusher or diverter",
-    needs="profile and position of each rail, and the box that it sweeps; if a drive has a force limit, the sum of "
-    "forces of bottles on each rail; in the scene, a contact for each pair of materials, and leapfrog, "
+    absent="no gate, pusher or diverter, and no other machine with moving rails",
+    needs="profile and position of each axis, and the box that each body sweeps; if a drive has a force limit, the sum "
+    "of forces of bottles on each axis; in the scene, a contact for each pair of materials, and leapfrog, "
     "semi_implicit_euler or velocity_verlet as integrator",
     can_force_off=False,
 )

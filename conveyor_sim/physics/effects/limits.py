@@ -38,9 +38,9 @@ LIMITS: dict[str, tuple[Limit, ...]] = {
         ),
         Limit(
             "liquid in bottles",
-            "A bottle is a rigid body of constant mass. A station that fills it does not change its mass.",
+            "A bottle is a rigid body. Its mass changes only when a station gives it another type (`changes`).",
             "Sloshing, foam and spilling are missing. Filled bottles brake and tip differently.",
-            "Give the line behind the filler a scene with the full mass. Test accelerations with real bottles.",
+            "Test accelerations with real bottles.",
         ),
         Limit(
             "shapes other than circles",
@@ -143,16 +143,22 @@ LIMITS: dict[str, tuple[Limit, ...]] = {
             "Reduce the stiffness of contacts with the material of the guide.",
         ),
         Limit(
-            "star wheels, screws and robots",
-            "Rails move along straight lines or about a pivot. Stations take bottles and return them.",
-            "Forces in the infeed of a filler or labeller are missing.",
-            "Use a station with the cycle of the machine. Study the infeed separately.",
+            "the third dimension of star wheels and screws",
+            "A wheel, its guide and the thread of a screw touch bottles at one height, and are rigid.",
+            "Bottles do not lean in pockets. A turning screw does not rub across the path, lift or spin bottles.",
+            "Choose the friction of the contact, and the play of pockets, as measured with bottles of the format.",
+        ),
+        Limit(
+            "robots",
+            "Bodies move along straight lines, about a pivot, or on a cam. Stations take bottles and return them.",
+            "Forces of grippers that pick bottles up are missing.",
+            "Use a station with the cycle of the machine.",
         ),
     ),
     "Drives, sensors and machines": (
         Limit(
             "dynamics of drives below the ramp",
-            "A drive follows its ramp exactly under any load. Only gates, pushers and diverters have a force limit.",
+            "A drive follows its ramp exactly under any load. Only rails that move and axes have a limit.",
             "Slip of motors, controllers that overshoot and overload trips of a jammed chain are missing.",
             "Inject the fault `trip`. Compare the work of belts in the energy ledger with the rating of the drive.",
         ),

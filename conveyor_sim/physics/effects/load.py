@@ -49,7 +49,7 @@ def contact_load(plant: Plant, laws: Laws) -> Load:
     """Return the largest load that is expected from the bottles and belts of a scene.
 
     It is the smaller of two loads: from all belts full of bottles one behind the other, and from all bottles of a run.
-    The force of a mover's drive (`MovingShape.limit`, hundreds of newtons) is not included. It would determine the
+    The force of a mover's drive (`AxisShape.limit`, hundreds of newtons) is not included. It would determine the
     steps of every scene with a gate, although only a stuck bottle bears it. The end of a run reports such loads
     (`force_check.Pressed`).
     """

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from conveyor_sim.physics.laws.coefficients import base_friction, base_springs
 from conveyor_sim.physics.plant import Plant
-from conveyor_sim.scene.driven import belt_speeds, speed_limits
+from conveyor_sim.scene.driven import belt_speeds, speed_limits, speed_owner
 from conveyor_sim.scene.geometry import BeltShape
 from conveyor_sim.scene.problems import Path
 from conveyor_sim.scene.schema import BottleType, Scene
@@ -85,14 +85,13 @@ def _curves(plant: Plant, row: int, on: Collection[str]) -> frozenset[str]:
 def _speeds(plant: Plant, shape: BeltShape) -> Iterator[tuple[Path, str, float]]:
     """Yield nominal speed and least speed of a moved surface (m/s): field of the scene, place in words, speed."""
     scene, name = plant.scene, shape.belt_name
-    drive = scene.belts[name].drive_name
-    path: Path = ("belts", name) if drive is None else ("drives", drive)
+    path = speed_owner(scene, name)
     share, inside = shape.ratio, ""
     if shape.kind == "curved":
         # The axis of a bottle within its radius of the centre of a disc turns in place.
         share *= max(shape.inner_radius, _smallest(scene).radius) / shape.centre_radius
         inside = " at its inner radius" if share < shape.ratio else ""
-    yield (*path, "speed"), inside, share * abs(belt_speeds(scene)[name])
+    yield (*path, "rate" if path[0] == "axes" else "speed"), inside, share * abs(belt_speeds(scene)[name])
     least, greatest = speed_limits(scene, name)
     if least * greatest > 0.0:
         yield (

@@ -184,18 +184,23 @@ def listed(slots: int) -> BottleList:
 def plant_grid(
     rails: Sequence[RailShape],
     surfaces: Sequence[BeltShape],
+    sweeps: Sequence[F8],
     largest_radius: float,
     largest_base_radius: float,
     skin: float,
 ) -> StaticGrid | None:
-    """Build the static grid over all rails and surfaces; return None without any."""
-    if not rails and not surfaces:
+    """Build the static grid over all rails, surfaces and sweeps of bodies; return None without any.
+
+    sweeps: boxes, (4,) each: least x and y, greatest x and y, m.
+    """
+    if not rails and not surfaces and not sweeps:
         return None
     pieces = [piece for rail in rails for piece in rail.pieces]
     return build_static_grid(
         _boxes([piece.points(2) for piece in pieces if isinstance(piece, SegmentPiece)]),
         _boxes([_arc_extremes(piece) for piece in pieces if isinstance(piece, ArcPiece)]),
         _boxes([_surface_extremes(shape) for shape in surfaces]),
+        np.array(sweeps).reshape(-1, 4),
         rail_reach=largest_radius + skin,
         belt_reach=skin + largest_base_radius,
         cell=4.0 * largest_radius,

@@ -67,7 +67,7 @@ def rail_places(model: Model) -> RailPlaces:
         bins = _bins(piece)
         middle = (np.arange(bins) + 0.5) / bins
         rail += [index] * bins
-        length += [_length(piece) / bins] * bins
+        length += [piece.length / bins] * bins
         if isinstance(piece, ArcPiece):
             angle = piece.start_angle + piece.span * middle
             x += (piece.centre[0] + piece.radius * np.cos(angle)).tolist()
@@ -104,11 +104,7 @@ def _rail_bins(model: Model, slots: int) -> RailBins | None:
 
 
 def _bins(piece: Piece) -> int:
-    return max(1, math.ceil(_length(piece) / BIN - 1e-9))
-
-
-def _length(piece: Piece) -> float:
-    return piece.radius * piece.span if isinstance(piece, ArcPiece) else math.dist(piece.p1, piece.p2)
+    return max(1, math.ceil(piece.length / BIN - 1e-9))
 
 
 def _levers(model: Model) -> tuple[F8, F8, F8]:

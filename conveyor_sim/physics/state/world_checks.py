@@ -10,7 +10,7 @@ from conveyor_sim.engine.arrays.world import World
 from conveyor_sim.engine.contact.slots import WIDTH
 from conveyor_sim.engine.lists.riding import PLANNED, STEPPED
 from conveyor_sim.physics.model import Model
-from conveyor_sim.physics.state.empty_world import empty_near, empty_pairs, empty_slots, empty_world
+from conveyor_sim.physics.state.empty_world import empty_near, empty_pairs, empty_slots, empty_world, near_bodies
 from conveyor_sim.physics.state.world_arrays import FIXED, UNCHECKED, Arrays, changing_arrays
 
 
@@ -34,9 +34,12 @@ def require_valid(world: World, model: Model, next_id: int) -> None:
         array = arrays.get(name, np.zeros(0))
         if array.size and not low <= int(array.min()) <= int(array.max()) <= high:
             raise ValueError(f"array {name} holds {int(array.min())} to {int(array.max())}, expected {low} to {high}")
-    for name in (*(f"{list_}.start" for list_ in ("near_segments", "near_arcs", "belts")), "slots.more_start"):
+    for name in (
+        *(f"{list_}.start" for list_ in ("near_segments", "near_arcs", "near_bodies", "belts")),
+        "slots.more_start",
+    ):
         _require_starts(name, arrays)
-    for name in ("railed.first", "belts.uncertain.first", "neighbourhood.bucket"):
+    for name in ("railed.first", "belts.uncertain.first", "neighbourhood.bucket", "pairs.impulse.start"):
         _require_starts(name, arrays)
     _require_bottles(world, model)
 
@@ -53,6 +56,8 @@ def _alike(world: World, model: Model) -> World:
         alike = alike._replace(near_segments=empty_near(model, slots, world.near_segments.piece.size))
     if world.near_arcs is not None:
         alike = alike._replace(near_arcs=empty_near(model, slots, world.near_arcs.piece.size))
+    if world.near_bodies is not None:
+        alike = alike._replace(near_bodies=near_bodies(slots, world.near_bodies.piece.size))
     if world.belts is not None and alike.belts is not None:
         candidate = np.zeros_like(world.belts.candidate)
         alike = alike._replace(belts=alike.belts._replace(candidate=candidate))
@@ -62,6 +67,7 @@ def _alike(world: World, model: Model) -> World:
 def ranges(world: World, model: Model, next_id: int) -> dict[str, tuple[int, int]]:
     """Return the smallest and largest values of arrays of indices and counts, by name."""
     slots, surfaces = world.bottles.id.size, len(model.plant.surfaces)
+    axes, bodies = len(model.plant.axes), len(model.plant.moving)
     limits: dict[str, tuple[int, int]] = {
         "bottles.type": (0, len(model.bottle_types) - 1),
         "bottles.id": (-1, next_id - 1),
@@ -78,6 +84,14 @@ def ranges(world: World, model: Model, next_id: int) -> dict[str, tuple[int, int
         "belts.uncertain.bottle": (0, slots - 1),
         "belts.uncertain.first": (0, slots),
         "footing.carrier": (0, surfaces),
+        "moving.resting": (0, 1),
+        "moving.loaded": (0, 1),
+        "moving.is_near": (0, 1),
+        "moving.active": (0, max(0, axes - 1)),
+        "moving.actives": (0, axes),
+        "moving.near": (0, max(0, bodies - 1)),
+        "moving.nears": (0, bodies),
+        "moving.cams.present": (0, 1),
         "moving.actuators.mode": (ON_PROFILE, HELD),
         "moving.actuators.left": (0, 1),
         "static_friction.belt": (-1, surfaces),
@@ -86,6 +100,8 @@ def ranges(world: World, model: Model, next_id: int) -> dict[str, tuple[int, int
         "riding.end": (0, slots),
         "riding.runs": (0, slots),
         "riding.progress": (STEPPED, PLANNED),
+        "impulses.anew": (0, 1),
+        "impulses.mask": (0, 2**63 - 1),
     }
     if world.belts is not None:
         limits["belts.start"] = (0, world.belts.candidate.size)
@@ -99,6 +115,15 @@ def ranges(world: World, model: Model, next_id: int) -> dict[str, tuple[int, int
             "pairs.spring.kept_i": (0, slots - 1),
             "pairs.spring.kept_j": (0, slots - 1),
             "pairs.spring.kept_count": (-1, pairs),
+            "pairs.impulse.i": (0, slots - 1),
+            "pairs.impulse.j": (0, slots - 1),
+            "pairs.impulse.kind": (0, len(model.bottle_types) ** 2 - 1),
+            "pairs.impulse.place": (0, pairs - 1),
+            "pairs.impulse.start": (0, int(world.pairs.used[0])),
+            "pairs.impulse.next": (0, pairs),
+            "pairs.impulse.kept_i": (0, slots - 1),
+            "pairs.impulse.kept_j": (0, slots - 1),
+            "pairs.impulse.kept_count": (-1, pairs),
             "slots.entry": (0, 2 * pairs),
             "slots.more_bottle": (0, slots - 1),
             "slots.more_entry": (0, 2 * pairs),
@@ -109,6 +134,7 @@ def ranges(world: World, model: Model, next_id: int) -> dict[str, tuple[int, int
     for name, near, pieces in (
         ("near_segments", world.near_segments, 0 if model.segments is None else model.segments.x.size),
         ("near_arcs", world.near_arcs, 0 if model.arcs is None else model.arcs.x.size),
+        ("near_bodies", world.near_bodies, bodies),
     ):
         if near is not None:
             limits |= {
@@ -117,6 +143,9 @@ def ranges(world: World, model: Model, next_id: int) -> dict[str, tuple[int, int
                 f"{name}.springs.kept_bottle": (0, slots - 1),
                 f"{name}.springs.kept_piece": (0, max(0, pieces - 1)),
                 f"{name}.springs.kept_count": (-1, near.piece.size),
+                f"{name}.impulse.kept_bottle": (0, slots - 1),
+                f"{name}.impulse.kept_piece": (0, max(0, pieces - 1)),
+                f"{name}.impulse.kept_count": (-1, near.piece.size),
             }
     return limits
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -15,6 +16,7 @@ from conveyor_sim.support.modbus_rows import (
     GONE,
     MOST_ADDRESSES,
     TABLES,
+    WHOLE,
     Access,
     MapError,
     Row,
@@ -98,11 +100,18 @@ def _row(tag: Tag, word_order: WordOrder) -> Row:
         kind: Type = "bool"
     else:
         table, kind = "holding register" if writes else "input register", _type(tag)
-    return Row(tag.name, table, 0, kind, word_order, tag.unit, access, tag.low, tag.high, tag.description)
+    least, most = WHOLE.get(kind, (-math.inf, math.inf))
+    low, high = max(tag.low, float(least)), min(tag.high, float(most))
+    return Row(tag.name, table, 0, kind, word_order, tag.unit, access, low, high, _described(tag, tag.description))
+
+
+def _described(tag: Tag, description: str) -> str:
+    """Return a description with the texts of an enumeration, because Modbus names no values."""
+    return f"{description} {tag.listed_texts}." if tag.texts else description
 
 
 def _mode_row(tag: Tag, word_order: WordOrder) -> Row:
-    name, what = f"{tag.device}{SET_MODE}", "Puts it into a mode; reads as the present one."
+    name, what = f"{tag.device}{SET_MODE}", _described(tag, "Puts it into a mode; reads as the present one.")
     return Row(name, "holding register", 0, "uint16", word_order, tag.unit, "read and write", tag.low, tag.high, what)
 
 

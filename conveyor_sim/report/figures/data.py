@@ -16,7 +16,7 @@ from conveyor_sim.page.drawings.underlay import ShownUnderlay, shown_underlay
 from conveyor_sim.scene.driven import belt_speeds
 from conveyor_sim.scene.geometry import BeltShape, RailShape, initial_bottles, rail_shapes, surface_shapes
 from conveyor_sim.scene.marks import marks_of
-from conveyor_sim.scene.moving import moving_shapes
+from conveyor_sim.scene.moving import axes_of, bodies_at, bodies_of
 from conveyor_sim.scene.parts.device_part import Look, Mark
 
 if TYPE_CHECKING:
@@ -33,17 +33,21 @@ class StaticGeometry:
     surfaces: tuple[BeltShape, ...]
     speeds: Floats
     rails: tuple[RailShape, ...]
+    """Rails at rest, then bodies."""
     marks: tuple[Mark, ...] = ()
     underlay: ShownUnderlay | None = None
+    resting: int = 0
+    """Number of rails at rest."""
 
     @classmethod
     def of(cls, scene: Scene) -> StaticGeometry:
         """Return the static geometry of `scene`."""
-        underlay = shown_underlay(scene)
+        underlay, resting = shown_underlay(scene), rail_shapes(scene)
         return cls(
             surfaces=tuple(surface_shapes(scene)),
             speeds=np.array([*belt_speeds(scene).values()], dtype=np.float64),
-            rails=(*rail_shapes(scene), *(shape.shape(shape.first) for shape in moving_shapes(scene))),
+            rails=(*resting, *bodies_at(bodies_of(scene), {axis.name: axis.first for axis in axes_of(scene)})),
+            resting=len(resting),
             marks=tuple(marks_of(scene)),
             underlay=underlay if isinstance(underlay, ShownUnderlay) else None,
         )
@@ -53,8 +57,8 @@ class StaticGeometry:
         return [mark for mark in self.marks if mark.look == look]
 
     def with_moving(self, moving: Sequence[RailShape]) -> StaticGeometry:
-        """Return a copy with the moving rails, which come last, at other positions."""
-        return replace(self, rails=(*self.rails[: len(self.rails) - len(moving)], *moving))
+        """Return a copy with the bodies at other positions; unchanged without any."""
+        return replace(self, rails=(*self.rails[: self.resting], *moving)) if moving else self
 
     def surface_speeds(self, speeds: Floats) -> Floats:
         """Speeds (surfaces,) along travel in m/s at speeds (belts,) of the belts; 0 for plates."""

@@ -33,7 +33,7 @@ from conveyor_sim.report.figures.data import (
 )
 from conveyor_sim.scene import Scene, parse_again, parse_overrides
 from conveyor_sim.scene.geometry import RailShape, initial_bottles
-from conveyor_sim.scene.moving import moving_shapes
+from conveyor_sim.scene.moving import axes_of, bodies_at, bodies_of
 
 Integers = NDArray[np.int64]
 
@@ -224,24 +224,24 @@ class Recording:
 
     @cached_property
     def _position_records(self) -> tuple[Integers, Floats]:
-        """Ticks (n,) and positions (n, movers), m or rad, of the recorded process images."""
-        shapes = moving_shapes(self.scene)
+        """Ticks (n,) and positions (n, axes), m or rad, of the recorded process images."""
+        axes = axes_of(self.scene)
         names = list(self._bag.line.signal_names)
-        columns = [names.index(f"{shape.name}/position") for shape in shapes]
-        frames = list(self._bag.messages("signals")) if shapes else []
-        found = [to_image(frame.data).truth[columns] for frame in frames]
-        shares = np.array(found, dtype=np.float64).reshape(len(frames), len(shapes))
+        columns = [names.index(f"{axis.name}/position") for axis in axes]
+        frames = list(self._bag.messages("signals")) if axes else []
+        values = [to_image(frame.data).truth[columns] for frame in frames]
+        positions = [[axis.position(value) for axis, value in zip(axes, row, strict=True)] for row in values]
         ticks = np.array([frame.tick for frame in frames], dtype=np.int64)
-        return ticks, shares * np.array([shape.stroke for shape in shapes])
+        return ticks, np.array(positions, dtype=np.float64).reshape(len(frames), len(axes))
 
     def _moving(self, tick: int) -> tuple[RailShape, ...]:
-        """Rails that move where they were last recorded up to `tick`; none before, when they are as at first."""
+        """Bodies where they were last recorded up to `tick`; none before, when they are as at first."""
         ticks, positions = self._position_records
         last = int(np.searchsorted(ticks, tick, side="right")) - 1
         if last < 0:
             return ()
-        shapes = moving_shapes(self.scene)
-        return tuple(shape.shape(float(at)) for shape, at in zip(shapes, positions[last], strict=True))
+        names = (axis.name for axis in axes_of(self.scene))
+        return bodies_at(bodies_of(self.scene), dict(zip(names, positions[last].tolist(), strict=True)))
 
     @cached_property
     def _summary(self) -> _Summary:

@@ -11,6 +11,7 @@ import numpy as np
 from conveyor_sim.report.flow.finding import Finding, at, in_mm
 from conveyor_sim.report.flow.surfaces import NONE, SurfaceMap
 from conveyor_sim.report.flow.trace import Leg
+from conveyor_sim.scene.driven import speed_owner
 from conveyor_sim.scene.geometry import Array
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.scene.words import some_of
@@ -66,9 +67,8 @@ def backward_belts(scene: Scene, surfaces: SurfaceMap) -> Iterator[Finding]:
     if backwards:
         names = some_of(dict.fromkeys(surface.name for surface in backwards))
         text = f"negative speed, against the listed direction of travel: {names}"
-        drive = scene.belts[str(backwards[0].path[1])].drive_name
-        path = backwards[0].path if drive is None else ("drives", drive)
-        yield Finding((*path, "speed"), text, "note")
+        path = speed_owner(scene, str(backwards[0].path[1]))
+        yield Finding((*path, "rate" if path[0] == "axes" else "speed"), text, "note")
 
 
 def watchdogs(scene: Scene) -> Iterator[Finding]:

@@ -12,7 +12,7 @@ from conveyor_sim.report.flow.finding import Finding, at
 from conveyor_sim.report.flow.surfaces import NONE, SurfaceMap
 from conveyor_sim.report.flow.trace import Leg
 from conveyor_sim.scene.geometry import Array
-from conveyor_sim.scene.moving import movers_of, moving_shape
+from conveyor_sim.scene.moving import mover_shape, movers_of
 from conveyor_sim.scene.parts.counter import Counter
 from conveyor_sim.scene.parts.device_part import Exit, Giver
 from conveyor_sim.scene.parts.inspection import Inspection
@@ -42,8 +42,9 @@ def devices_beside(scene: Scene, surfaces: SurfaceMap) -> Iterator[Finding]:
                 break
     reach = max(kind.radius for kind in scene.bottle_types.values())
     for place_of, mover in movers_of(scene):
-        shape = moving_shape(place_of, mover)
-        ends = [_line(*shape.at(place).ends) for place in (0.0, 0.5 * shape.stroke, shape.stroke)]
+        bodies, axis = mover_shape(place_of, mover)
+        places = (0.0, 0.5 * axis.stroke, axis.stroke)
+        ends = [_line(*piece.ends) for place in places for body in bodies for piece in body.at(place)]
         if not _near(surfaces, np.vstack(ends), reach):
             middle = ends[0].mean(axis=0)
             yield Finding(place_of, f"stands beside all belts: none is at {at((middle[0], middle[1]))}")

@@ -19,6 +19,8 @@ from conveyor_sim.report.flow.stretches import Bottleneck, Stretch, bottleneck, 
 from conveyor_sim.report.flow.surfaces import SurfaceMap, surfaces_of
 from conveyor_sim.report.flow.trace import trace, traced_scene
 from conveyor_sim.report.flow.trace_scene import guide_pieces
+from conveyor_sim.report.flow.wheel_findings import wrong_phases
+from conveyor_sim.report.flow.wheels_as_belts import with_wheels_as_belts
 from conveyor_sim.run.compilation import Compilation
 from conveyor_sim.scene.schema import Scene
 
@@ -47,6 +49,7 @@ def compile_traces(scene: Scene, say: Callable[[str], object]) -> None:
 
     Ctrl-C interrupts it within a moment.
     """
+    scene = with_wheels_as_belts(scene)
     traced = traced_scene(scene, surfaces_of(scene))
     if traced is not None:
         Compilation(traced, say).run()
@@ -54,6 +57,8 @@ def compile_traces(scene: Scene, say: Callable[[str], object]) -> None:
 
 def flow_of(scene: Scene) -> LineFlow:
     """Trace a lone bottle from every entry of a scene, and return routes, capacities and findings."""
+    wheels = list(wrong_phases(scene))
+    scene = with_wheels_as_belts(scene)
     surfaces = surfaces_of(scene)
     guides = Guides(guide_pieces(scene))
     legs = trace(scene, surfaces, guides)
@@ -71,6 +76,7 @@ def flow_of(scene: Scene) -> LineFlow:
         *perfect_columns(scene, surfaces, legs, clearances),
         *watchdogs(scene),
         *backward_belts(scene, surfaces),
+        *wheels,
         *hidden_underlay(scene),
     ]
     return LineFlow(surfaces, routes, stretches, bottleneck(scene, routes, stretches), tuple(findings))

@@ -15,7 +15,7 @@ from conveyor_sim.report.flow.guides import Guides, left_of
 from conveyor_sim.report.flow.surfaces import NONE, SurfaceMap
 from conveyor_sim.report.flow.trace import Leg
 from conveyor_sim.scene.geometry import Array, RailShape, rail_shapes
-from conveyor_sim.scene.moving import movers_of, moving_shape
+from conveyor_sim.scene.moving import mover_shape, movers_of
 from conveyor_sim.scene.parts.reject import Reject
 from conveyor_sim.scene.problems import Path
 from conveyor_sim.scene.schema import Scene
@@ -146,8 +146,9 @@ def _openings(scene: Scene) -> list[Array]:
     """Return places (m) at which bottles are meant to leave sideways."""
     places = [np.array(part.region).mean(axis=0) for part in scene.machines.values() if isinstance(part, Reject)]
     for path, mover in movers_of(scene):
-        shape = moving_shape(path, mover)
-        places += [np.mean(shape.at(place).ends, axis=0) for place in (0.0, shape.stroke)]
+        bodies, axis = mover_shape(path, mover)
+        pieces = (piece for place in (0.0, axis.stroke) for body in bodies for piece in body.at(place))
+        places += [np.mean(piece.ends, axis=0) for piece in pieces]
     return places
 
 

@@ -67,7 +67,7 @@ def _contents(scene: Scene, model: Model) -> str:
     counts = [
         (len(layout.conveyors), "conveyor") if layout is not None else (len(scene.belts), "belt"),
         (len(model.plant.rails_at_rest), "rail"),
-        (len(model.plant.moving), "moving rail"),
+        (len(model.plant.machines), "moving rail"),
     ]
     entries = [
         f"{'endless' if part.most is None else part.most}" for path, part in scene.entries() if path[0] == "infeeds"

@@ -66,6 +66,7 @@ def routes_of(scene: Scene, legs: Sequence[Leg]) -> tuple[TransitRoute, ...]:
                 break
             chain.append(following)
         passed.update(one.start.path for one in chain[1:])
-        rates = [scene.machines[str(one.start.path[1])] for one in chain[1:]]
-        routes.append(TransitRoute(tuple(chain), sum(1.0 / part.rate for part in rates if isinstance(part, Station))))
+        parts = [scene.machines[str(one.start.path[1])] for one in chain[1:]]
+        inside = sum(part.holding_time for part in parts if isinstance(part, Station))
+        routes.append(TransitRoute(tuple(chain), inside))
     return tuple(routes)

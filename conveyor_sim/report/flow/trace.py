@@ -331,8 +331,9 @@ def _velocity(start: Entrance) -> XY:
 
 
 def _bottle_of(scene: Scene, part: object) -> str:
-    """Return the type of bottles from a part; a station returns any type, so the first one stands for all."""
-    return str(getattr(part, "bottle", None) or next(iter(scene.bottle_types)))
+    """Return the type of bottles from a part; a station may return several types, so the first one stands for all."""
+    types = (*part.changes.values(), *scene.bottle_types) if isinstance(part, Station) else scene.bottle_types
+    return str(getattr(part, "bottle", None) or next(iter(types)))
 
 
 def _initial(scene: Scene) -> list[Entrance]:

@@ -15,10 +15,10 @@ import numpy as np
 from conveyor_sim.scene.accuracy import Accuracy
 from conveyor_sim.scene.belts import BeltRails, CurvedBelt, StraightBelt
 from conveyor_sim.scene.contacts import Base, Contact, Damping
-from conveyor_sim.scene.geometry import Piece, rail_shapes, surface_shapes
+from conveyor_sim.scene.geometry import Piece, RailShape, rail_shapes, surface_shapes
 from conveyor_sim.scene.limits import Limits as DamageLimits
-from conveyor_sim.scene.moving import MovingShape, movers_of, moving_shape
-from conveyor_sim.scene.parts.movers import SlidingGate, SwingingGate
+from conveyor_sim.scene.moving import mover_shape, movers_of
+from conveyor_sim.scene.parts.movers import LiftingGate, SlidingGate, SwingingGate
 from conveyor_sim.scene.rails import ArcRail, SegmentRail
 from conveyor_sim.scene.schema import Outputs, Scene, Single
 
@@ -32,28 +32,36 @@ _SPARE = "(spare)"
 """Name of spare parts and their material; names in a scene file have no brackets."""
 
 
-def resting_movers(scene: Scene) -> list[MovingShape]:
-    """Return the moving rails of a trace, which stand at their initial places. Closed gates are left out.
+def resting_movers(scene: Scene) -> list[RailShape]:
+    """Return the moving rails of a trace at their initial places. Closed gates are left out.
 
     A controller opens gates; a lone bottle would wait for it.
     """
-    movers = ((mover, moving_shape(path, mover)) for path, mover in movers_of(scene))
-    return [shape for mover, shape in movers if not isinstance(mover, (SlidingGate, SwingingGate)) or mover.open]
+    movers = ((mover, *mover_shape(path, mover)) for path, mover in movers_of(scene))
+    shapes = (
+        body.shape(axis.first)
+        for mover, bodies, axis in movers
+        if not isinstance(mover, (SlidingGate, SwingingGate, LiftingGate)) or mover.open
+        for body in bodies
+    )
+    return [shape for shape in shapes if shape.pieces]
 
 
 def guide_pieces(scene: Scene) -> list[Piece]:
     """Return the rail pieces of a trace."""
     pieces = [piece for rail in rail_shapes(scene) for piece in rail.pieces]
-    return [*pieces, *(shape.at(shape.first) for shape in resting_movers(scene))]
+    return [*pieces, *(piece for shape in resting_movers(scene) for piece in shape.pieces)]
 
 
 def trace_scene(scene: Scene, bottles: Sequence[Single], tick: float) -> Scene:
     """Return the scene in which lone bottles are traced. bottles: at their entries. tick: s."""
     spare = _beside(scene, bottles)
     rails = {
-        shape.name: SegmentRail.model_construct(kind="segment", from_=piece.p1, to=piece.p2, material=shape.material)
+        f"{shape.name} {number}": SegmentRail.model_construct(
+            kind="segment", from_=piece.ends[0], to=piece.ends[1], material=shape.material
+        )
         for shape in resting_movers(scene)
-        for piece in (shape.at(shape.first),)
+        for number, piece in enumerate(shape.pieces)
     }
     rails[_SPARE] = SegmentRail.model_construct(
         kind="segment", from_=(spare, 0.0), to=(spare + 1.0, 0.0), material=_SPARE

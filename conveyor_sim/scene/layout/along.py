@@ -136,3 +136,47 @@ class AlongDiverter(Along):
         "m",
         default=None,
     )
+
+
+class AlongDivider(Along):
+    """A divider that swings, along travel from its pivot at an angle of 0. Positive angles are to the left."""
+
+    at: PathStation = quantity(
+        'Station of its pivot; a negative number counts from the end, "end" is the end.',
+        "m",
+    )
+    length: Positive = quantity("Length from the pivot to the other end, with travel.", "m")
+    offset: Number = quantity(
+        "Distance of its pivot from the middle of the path, positive to the left.", "m", default=0.0
+    )
+
+
+class AlongSlidingDivider(_Stretch):
+    """A divider that slides across a straight part of a conveyor.
+
+    Its positions are distances from the middle of the path, positive to the left.
+    """
+
+
+class AlongAdjustable(_Stretch):
+    """An adjustable guide beside a straight part of a conveyor.
+
+    Its positions are distances from the middle of the path.
+    """
+
+    side: Side = quantity("Side on which it is.")
+
+
+class AlongLift(_Across):
+    """A lifting gate across a conveyor."""
+
+
+class AlongClamp(_Stretch):
+    """A clamp whose jaws stand along a straight part of a conveyor, and close across."""
+
+    offset: Number = quantity(
+        "Distance of its middle from the middle of the path, positive to the left.", "m", default=0.0
+    )
+    opening: Positive | None = quantity(
+        "Distance of the jaws while they are open. Left out: the clear width between the guides.", "m", default=None
+    )

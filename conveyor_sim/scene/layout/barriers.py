@@ -1,22 +1,35 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Moving rails and rails along a conveyor: gates, pushers, diverters, and rails at rest."""
+"""Moving rails and rails along a conveyor: gates, pushers, diverters, dividers, guides, and rails at rest."""
 
 import math
 from collections.abc import Iterator
 from typing import Any
 
-from conveyor_sim.scene.layout.along import AlongDiverter, AlongLine, AlongPusher, AlongRail, AlongSlide, AlongSwing
+from conveyor_sim.scene.layout.along import (
+    AlongAdjustable,
+    AlongClamp,
+    AlongDiverter,
+    AlongDivider,
+    AlongLift,
+    AlongLine,
+    AlongPusher,
+    AlongRail,
+    AlongSlide,
+    AlongSlidingDivider,
+    AlongSwing,
+)
 from conveyor_sim.scene.layout.faults import LayoutFault
 from conveyor_sim.scene.layout.frames import turned
 from conveyor_sim.scene.layout.plan import GuideProfile, Side
 from conveyor_sim.scene.layout.profile_rails import rails_along
+from conveyor_sim.scene.layout.routes import Bend
 from conveyor_sim.scene.layout.site import Coordinate, Site
 from conveyor_sim.scene.words import shown
 
 _QUARTER = 0.5 * math.pi
 
 
-def line(site: Site[AlongLine]) -> list[Coordinate]:
+def line(site: Site[AlongLine] | Site[AlongLift]) -> list[Coordinate]:
     """Return a line across, from the right to the left. Raise LayoutFault."""
     s = site.station()
     right, left = site.across(s)
@@ -68,6 +81,50 @@ def diverter(site: Site[AlongDiverter]) -> list[Coordinate]:
         Coordinate("from", site.within_limits(pivot.xy), "at"),
         Coordinate("to", site.within_limits(pivot.point(place.length, 0.0)), "length"),
         Coordinate("angle", -place.angle if place.side == "left" else place.angle, "angle"),
+    ]
+
+
+def swinging_divider(site: Site[AlongDivider]) -> list[Coordinate]:
+    """Return a divider that swings about its pivot. Raise LayoutFault."""
+    pivot = site.conveyor.route.frame(site.station()).moved(0.0, site.place.offset)
+    return [
+        Coordinate("from", site.within_limits(pivot.xy), "at"),
+        Coordinate("to", site.within_limits(pivot.point(site.place.length, 0.0)), "length"),
+    ]
+
+
+def sliding_divider(site: Site[AlongSlidingDivider]) -> list[Coordinate]:
+    """Return a divider in the middle of the path that slides across. Raise LayoutFault."""
+    return _across_straight(site, "left")
+
+
+def adjustable(site: Site[AlongAdjustable]) -> list[Coordinate]:
+    """Return a guide in the middle of the path that slides to its side. Raise LayoutFault."""
+    return _across_straight(site, site.place.side)
+
+
+def clamp(site: Site[AlongClamp]) -> list[Coordinate]:
+    """Return a clamp whose first jaw is on the right. Raise LayoutFault."""
+    begin, _, field = site.stretch()
+    right, left = site.clear(begin)
+    opening = left - right if site.place.opening is None else site.place.opening
+    return [
+        *_across_straight(site, "left", site.place.offset - 0.5 * opening),
+        Coordinate("opening", opening, field if site.place.opening is None else "opening"),
+    ]
+
+
+def _across_straight(site: Site[Any], side: Side, offset: float = 0.0) -> list[Coordinate]:
+    """Return a rail at an offset (m) along a straight part of the path that slides to a side. Raise LayoutFault."""
+    begin, end, field = site.stretch()
+    route = site.conveyor.route
+    if any(isinstance(piece, Bend) for piece in route.between(begin, end).pieces):
+        text = f"a bend lies between {begin:.6g} m and {end:.6g} m, expected a straight part of conveyor"
+        raise LayoutFault((*site.path, field), f"{text} {site.conveyor.name}")
+    return [
+        Coordinate("from", site.point(begin, offset), field),
+        Coordinate("to", site.point(end, offset), field),
+        Coordinate("direction", _sideways(site, begin, side), "side" if "side" in site.raw else field),
     ]
 
 

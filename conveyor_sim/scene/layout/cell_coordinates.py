@@ -14,7 +14,7 @@ POINTS = ("centre", "from", "origin", "position", "start", "to")
 """Fields that hold a point [x, y]; one number in such a field is a time or a station."""
 POINT_LISTS = ("points", "region")
 """Fields that hold a list of points."""
-DIRECTIONS = ("angle", "direction", "heading", "start_angle")
+DIRECTIONS = ("angle", "direction", "entry", "heading", "start_angle")
 """Fields that hold a direction in the plan."""
 VECTORS = ("velocity",)
 """Fields that hold a vector [vx, vy]."""

@@ -60,8 +60,9 @@ _MOST_SURFACES = 20_000
 _LISTED = 20
 """Largest number of names of a circle that a message lists."""
 _OWN = ("speed", "speed_limits", "watchdog")
-"""Fields of a belt that a named drive has instead."""
-_DRIVEN = (*_OWN, "drive", "ratio")
+"""Fields of a belt that a named drive or an axis has instead."""
+_OF_OTHERS = ("drive", "ratio", "axis", "travel")
+_DRIVEN = (*_OWN, *_OF_OTHERS)
 _OF_BELT = ("material", "vibration")
 
 
@@ -208,14 +209,16 @@ def _end(section: ConveyorSection, begin: float, length: float, last: bool, path
 def _fields(raw: Mapping[str, Any], section: Mapping[str, Any]) -> dict[str, tuple[Any, bool]]:
     """Return the fields of a belt as written, each with True if it is the section's, False if the conveyor's.
 
-    A section with a speed or a drive is not moved by the conveyor's drive, and a section with a named drive doesn't
-    take the conveyor's speed.
+    A section with a speed, a drive or an axis is not moved by those of the conveyor, and a section with a named drive
+    or an axis doesn't take the conveyor's speed.
     """
     own = {name: section[name] for name in (*_OF_BELT, *_DRIVEN) if section.get(name) is not None}
     inherited = {name: raw[name] for name in (*_OF_BELT, *_DRIVEN) if raw.get(name) is not None}
-    if isinstance(own.get("drive"), str):
+    if isinstance(own.get("drive"), str) or "axis" in own:
         inherited = {name: value for name, value in inherited.items() if name not in _DRIVEN}
-    elif isinstance(inherited.get("drive"), str) and any(name in own for name in (*_OWN, "drive")):
-        inherited = {name: value for name, value in inherited.items() if name not in ("drive", "ratio")}
+    elif any(name in own for name in (*_OWN, "drive")) and (
+        isinstance(inherited.get("drive"), str) or "axis" in inherited
+    ):
+        inherited = {name: value for name, value in inherited.items() if name not in _OF_OTHERS}
     fields = {name: (value, False) for name, value in inherited.items()}
     return fields | {name: (value, True) for name, value in own.items()}

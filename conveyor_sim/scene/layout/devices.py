@@ -10,30 +10,49 @@ from typing import Any
 from conveyor_sim.scene.layout import barriers, entries
 from conveyor_sim.scene.layout.along import (
     Along,
+    AlongAdjustable,
+    AlongClamp,
     AlongDiverter,
+    AlongDivider,
+    AlongLift,
     AlongLine,
     AlongPoint,
     AlongPusher,
     AlongRail,
     AlongRegion,
     AlongSlide,
+    AlongSlidingDivider,
     AlongSwing,
 )
 from conveyor_sim.scene.layout.faults import LayoutFault
 from conveyor_sim.scene.layout.plan import LayoutPlan
 from conveyor_sim.scene.layout.routes import Bend, Route
 from conveyor_sim.scene.layout.site import Coordinate, Site
+from conveyor_sim.scene.layout.wheels import AlongScrew, AlongSideBelt, AlongStar, line_along, star
 from conveyor_sim.scene.part import Part, validated
 from conveyor_sim.scene.parts.counter import Counter
 from conveyor_sim.scene.parts.infeed import Infeed
 from conveyor_sim.scene.parts.inspection import Inspection
-from conveyor_sim.scene.parts.movers import Diverter, Pusher, SlidingGate, SwingingGate
+from conveyor_sim.scene.parts.movers import (
+    AdjustableGuide,
+    Clamp,
+    Diverter,
+    LiftingGate,
+    Pusher,
+    SlidingDivider,
+    SlidingGate,
+    SwingingDivider,
+    SwingingGate,
+)
 from conveyor_sim.scene.parts.outfeed import Outfeed
 from conveyor_sim.scene.parts.photo_eye import PhotoEye
 from conveyor_sim.scene.parts.reject import Reject
+from conveyor_sim.scene.parts.screw import Screw
+from conveyor_sim.scene.parts.side_belt import SideBelt
 from conveyor_sim.scene.parts.sink import Sink
 from conveyor_sim.scene.parts.source import Source
 from conveyor_sim.scene.parts.spill import Spill
+from conveyor_sim.scene.parts.star import Star
 from conveyor_sim.scene.parts.station import Station
 from conveyor_sim.scene.parts.zone import Zone
 from conveyor_sim.scene.problems import Path, Problem
@@ -133,8 +152,16 @@ GRID = _device("bottles", GridOfBottles, AlongPoint, ("origin", "angle"), entrie
 DEVICES = (
     _device("gates", SlidingGate, AlongSlide, (*_ENDS, "direction"), barriers.sliding_gate, "slide"),
     _device("gates", SwingingGate, AlongSwing, _ENDS, barriers.swinging_gate, "swing"),
+    _device("gates", LiftingGate, AlongLift, _ENDS, barriers.line, "lift"),
     _device("pushers", Pusher, AlongPusher, ("direction",), barriers.pusher),
     _device("diverters", Diverter, AlongDiverter, _ENDS, barriers.diverter),
+    _device("dividers", SwingingDivider, AlongDivider, _ENDS, barriers.swinging_divider, "swing"),
+    _device("dividers", SlidingDivider, AlongSlidingDivider, ("direction",), barriers.sliding_divider, "slide"),
+    _device("adjustable", AdjustableGuide, AlongAdjustable, ("direction",), barriers.adjustable),
+    _device("clamps", Clamp, AlongClamp, ("direction",), barriers.clamp),
+    Placeable("stars", Star, AlongStar, ("centre", "turn", "entry"), coordinates=star),
+    _device("screws", Screw, AlongScrew, (), line_along),
+    _device("side_belts", SideBelt, AlongSideBelt, (), line_along),
     Placeable("infeeds", Infeed, AlongPoint, _ENTRY, coordinates=entries.entry),
     _device("outfeeds", Outfeed, AlongRegion, _REGION, region),
     Placeable("machines", Source, AlongPoint, _ENTRY, "source", coordinates=entries.entry),

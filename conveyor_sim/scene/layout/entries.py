@@ -73,8 +73,27 @@ def _speed(conveyor: ConveyorPlan, s: float, offset: float, scene: Mapping[str, 
     if isinstance(drive, str):
         speed = _mapping(_mapping(scene.get("drives")).get(drive)).get("speed", 0.0)
         ratio = _number(belt.get("ratio", 1.0), "1")
+    if isinstance(belt.get("axis"), str):
+        speed = _axis_rate(belt["axis"], scene, 0) * _number(belt.get("travel", 0.0), "m")
     lane = next((lane.ratio for lane in conveyor.lanes if lane.right <= offset <= lane.left), 1.0)
     return max(_number(speed, "m/s") * ratio * lane, 0.0)
+
+
+_LONGEST_TRAIN = 100
+"""Largest number of masters of an axis that are followed. A circle is reported by the axes."""
+
+
+def _axis_rate(name: str, scene: Mapping[str, Any], masters: int) -> float:
+    """Return the initial rate of an axis, 1/s."""
+    axis = _mapping(_mapping(scene.get("axes")).get(name))
+    master, drive = axis.get("master"), axis.get("drive")
+    if isinstance(master, str) and axis.get("in_gear", True) is True and masters < _LONGEST_TRAIN:
+        return _number(axis.get("ratio", 1.0), "1") * _axis_rate(master, scene, masters + 1)
+    if isinstance(drive, str):
+        speed = _number(_mapping(_mapping(scene.get("drives")).get(drive)).get("speed", 0.0), "m/s")
+        travel = _number(axis.get("travel", 0.0), "m")
+        return speed / travel if travel else 0.0
+    return _number(axis.get("rate", 0.0), "1/s")
 
 
 def _mapping(value: Any) -> Mapping[str, Any]:

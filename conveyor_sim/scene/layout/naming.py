@@ -8,14 +8,18 @@ from conveyor_sim.scene.layout.fragments import LISTS, SHARED, Fragment
 from conveyor_sim.scene.provenance import Sources
 
 REFERENCES: Mapping[str, tuple[str, ...]] = {
-    "after": ("conveyors",),
+    "after": ("conveyors", "stars"),
     "along": ("conveyors",),
+    "axis": ("axes",),
     "backup": ("zones",),
     "belt": ("belts", "conveyors"),
     "beside": ("conveyors",),
     "counter": ("counters",),
     "downstream": ("belts", "conveyors"),
     "drive": ("drives",),
+    "pusher": ("pushers",),
+    "machine": ("machines",),
+    "master": ("axes",),
     "start_zone": ("zones",),
     "zone": ("zones",),
 }

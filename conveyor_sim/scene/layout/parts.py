@@ -90,6 +90,8 @@ class _Driven(Part):
     ratio: Positive | None = quantity(
         "Speed divided by the speed of the drive that it names. Left out: 1.", "1", default=None
     )
+    axis: Name | None = quantity("Axis that moves it, instead of `drive`; needs `travel`.", default=None)
+    travel: Positive | None = quantity("Travel per cycle of the `axis`.", "m", default=None)
     vibration: ChainVibration | None = quantity("Vibration of the chain. Left out: none.", default=None)
 
 

@@ -105,6 +105,8 @@ def drawn(rng: random.Random) -> Scene:
                 "failures": {"jam": drawn_failure(rng)} if rng.random() < 0.5 else {},
                 "planned_stops": {f"stop_{n}": drawn_stop(rng) for n in range(rng.choice([0, 0, 1, 3]))},
             }
+            if machine["kind"] == "station":
+                machine |= rng.choice([{}, {"capacity": 1 + rng.randrange(4)}])
             if machine["kind"] == "sink":
                 machine |= {"run_down": rng.choice([0.0, 0.2])}
                 machine.pop("start_fill", None)

@@ -31,8 +31,12 @@ LOADED: dict[str, Any] = {
 def stationed(supply: float = 2.0, machines: dict[str, Any] | None = None, **given: Any) -> Simulation:
     """Return a filler, a station in the middle of the belt before a rail across it, and a packer."""
     more = {
-        name: given.pop(name) for name in ("belts", "rails", "outputs", "contacts", "seed", "limits") if name in given
-    }
+        name: given.pop(name)
+        for name in (
+            "accuracy", "belts", "bottle_types", "contacts", "limits", "outputs", "panel", "rails", "seed",
+        )
+        if name in given
+    }  # fmt: skip
     found = {"filler": source(supply), "capper": station(BEFORE, BEHIND, **given), "packer": sink(4.0)}
     return line(machines={**found, **(machines or {})}, duration=200.0, **{"rails": RAILS, **more})
 

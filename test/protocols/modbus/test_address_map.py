@@ -56,6 +56,18 @@ def test_each_kind_of_tag_has_its_table_and_type() -> None:
     }  # and no fault: Modbus knows no users
 
 
+def test_the_map_holds_ranges_of_its_types_and_the_texts_of_values() -> None:
+    """A SCADA system that imports the map refuses a range beyond the type, and knows no other names of values."""
+    steps = number("belts/a/rate", "setpoint", "Rate.", "1/s", 0.1, 1.6)
+    mode = choice("belts/a/mode", "status", "Control mode.", {1: "Automatic", 3: "Manual"}, 1)
+    lines = {line.split(",")[0]: line for line in to_csv(modbus_map([*TAGS, steps, mode])).splitlines()}
+    assert ",0.1,1.6,Rate." in lines[steps.name]
+    assert ",0,4294967295,Bottles inside." in lines[COUNT.name]
+    assert ",-2147483648,2147483647,Pulses of the encoder." in lines[PULSES.name]
+    assert '"State. 0 off, 9 aborted."' in lines[STATE.name]
+    assert "1 Automatic, 3 Manual." in lines[mode.name]
+
+
 def test_no_two_tags_share_an_address() -> None:
     rows = modbus_map(TAGS * 1 + [replace(SPEED, name=f"belts/b{i}/speed") for i in range(300)])
     taken = [(row.table, address) for row in rows for address in row.addresses]

@@ -7,6 +7,8 @@ import os
 import re
 import signal
 import socket
+import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -59,6 +61,32 @@ def test_a_scene_is_served_until_ctrl_c_and_what_an_operator_did_replays(
         given = [frame.data for frame in bag.outcomes() if frame.data.writer_kind == "operator"]
     writer = f"mqtt 127.0.0.1:{broker.port}"
     assert [(outcome.writer, outcome.accepted) for outcome in given] == [(writer, True)] * 2
+
+
+EXAMPLE = Path(__file__).parents[3] / "examples" / "scada" / "sparkplug_host.py"
+
+
+def test_the_example_of_a_host_shows_a_birth_and_reports_mistakes(
+    command: Callable[..., Served], broker: Mosquitto, host: Host, tmp_path: Path
+) -> None:
+    """The output is that of docs/scada.md. Unknown metrics and missing brokers are named."""
+    command(SCENE, "--mqtt", broker.url, "--mqtt-role", "operator", "--no-record")
+    until(lambda: host.alive["line"], "births")
+    patterns = ["belts/zone1/*speed", "belts/zone1/mode"]
+    example = [sys.executable, "-u", str(EXAMPLE), "zoned_line/zoned_line", *patterns, "--set", "belts/zone9/mode=3"]
+    with (tmp_path / "out").open("w") as out, (tmp_path / "errors").open("w") as errors:
+        process = subprocess.Popen([*example, "--port", str(broker.port)], stdout=out, stderr=errors)
+    try:
+        until(lambda: "belts/zone9/mode: not in the birth" in (tmp_path / "errors").read_text(), "its sentence")
+    finally:
+        process.kill()
+        process.wait()
+    shown = (tmp_path / "out").read_text().splitlines()
+    assert shown[:4] == [
+        "belts/zone1/speed = 0.5", "belts/zone1/cmd_speed = 0.5", "belts/zone1/at_speed = True", "belts/zone1/mode = 1",
+    ]  # fmt: skip
+    alone = subprocess.run([*example, "--port", "1"], capture_output=True, text=True)
+    assert alone.returncode == 1 and alone.stderr.startswith("mqtt://127.0.0.1:1: the broker can't be reached")
 
 
 def test_an_edge_node_that_is_killed_is_born_again_and_counts_on(

@@ -14,7 +14,7 @@ from scenes import scene
 
 from conveyor_sim.scene.layout.devices import PLACEABLE
 from conveyor_sim.scene.layout.expand import expand
-from conveyor_sim.scene.moving import moving_shape
+from conveyor_sim.scene.moving import mover_shape
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.scene.types import XY
 from conveyor_sim.scene.words import field_names
@@ -29,7 +29,7 @@ def test_a_device_of_each_kind_is_placed() -> None:
     """No kind of the registry is missing in the line that the tests use."""
     given: Data = devices()
     kinds = {
-        (field, device.get("kind") if field in ("gates", "machines") else None, key)
+        (field, device.get("kind") if field in ("gates", "dividers", "machines") else None, key)
         for field, entries in given.items()
         for device in (entries.values() if isinstance(entries, dict) else entries)
         for key in ("along", "out", "grid")
@@ -37,7 +37,8 @@ def test_a_device_of_each_kind_is_placed() -> None:
     }
     grids = {("bottles", None, "grid")}
     registered = {(one.field, one.kind, one.within or "along") for one in PLACEABLE}
-    assert kinds - grids == registered
+    under_axes = {(field, None, "along") for field in ("stars", "screws", "side_belts")}  # test_wheels.py
+    assert kinds - grids == registered - under_axes
     assert all("along" in field_names(one.place) for one in PLACEABLE)
     placed(**devices())
 
@@ -117,6 +118,8 @@ def coordinates(scene_: Scene, point: Callable[[XY], XY], turn: Callable[[float]
 
     result: dict[Any, Any] = {}
     for path, part in scene_.devices():
+        if path[0] == "clamps":
+            continue  # its first jaw is on the right whatever its side
         for name, value in part:
             if name in ("from_", "to") and path[0] != "diverters" and path[1] != "swing":
                 result.setdefault((*path, "ends"), set()).add(moved(value))
@@ -126,7 +129,9 @@ def coordinates(scene_: Scene, point: Callable[[XY], XY], turn: Callable[[float]
                 result[(*path, name)] = {moved(corner) for corner in value}
             elif name == "direction":
                 angle = turn(value)
-                result[(*path, name)] = (round(math.cos(angle), 9) + 0.0, round(math.sin(angle), 9) + 0.0)
+                # A divider slides to the left whatever its side; the signs of its positions say where it stands.
+                sign = math.copysign(1.0, part.positions[0]) if path[0] == "dividers" else 1.0
+                result[(*path, name)] = (round(sign * math.cos(angle), 9) + 0.0, round(sign * math.sin(angle), 9) + 0.0)
             elif name in ("speed", "lateral_jitter", "angular_jitter", "stroke"):
                 result[(*path, name)] = pytest.approx(value)
     return result
@@ -146,6 +151,7 @@ def test_a_mirrored_layout_mirrors_its_devices() -> None:
     for field, name in (("gates", "swing"), ("diverters", "diverter")):
         one, other = (getattr(result, field)[name].angle for result in (left, right))
         assert one == -other
+    assert left.dividers["arm"].positions == tuple(-angle for angle in right.dividers["arm"].positions)
 
 
 @pytest.mark.parametrize("heading", [0.7, "90 deg"])
@@ -173,8 +179,8 @@ def test_moving_rails_move_as_their_place_says(turn: str, side: str) -> None:
 
     def seen(field: str, name: str, s: float) -> np.ndarray:
         """Ends at the end of the stroke as (along, left) of the path at a station, (2, 2)."""
-        shape = moving_shape((field, name), getattr(result, field)[name])
-        return np.array([route.frame(s).seen_from(end) for end in shape.at(shape.stroke).ends])
+        (body, *_), axis = mover_shape((field, name), getattr(result, field)[name])
+        return np.array([route.frame(s).seen_from(end) for end in body.at(axis.stroke)[0].ends])
 
     slid = seen("gates", "slide", 2.9)
     assert np.allclose(np.sort(sign * slid[:, 1]), [HALF, HALF + CLEARANCE])
@@ -187,6 +193,13 @@ def test_moving_rails_move_as_their_place_says(turn: str, side: str) -> None:
     assert np.allclose(diverted[0], [0.0, sign * HALF])
     assert sign * diverted[1][1] == pytest.approx(HALF - 0.2 * math.sin(math.radians(20.0)))
     assert diverted[1][0] > 0.0
+    guided = seen("adjustable", "guide", 2.4)
+    assert np.allclose(guided, [[-0.2, sign * 0.055], [0.0, sign * 0.055]])
+    jaws, clamp = mover_shape(("clamps", "clamp"), result.clamps["clamp"])
+    closed = [[route.frame(3.0).seen_from(end) for end in jaw.at(clamp.stroke)[0].ends] for jaw in jaws]
+    assert np.allclose(closed, [[[-0.1, y], [0.0, y]] for y in (0.005 - HALF, HALF - 0.005)])
+    shifted = seen("dividers", "shuttle", 2.8)
+    assert np.allclose(np.abs(shifted[:, 1]), 0.35 if sign > 0.0 else 0.3)
 
 
 @pytest.mark.parametrize("turn", ["left", "right"])

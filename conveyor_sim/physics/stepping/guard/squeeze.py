@@ -1,19 +1,26 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Gate, pusher or diverter that presses on a bottle, and the object that holds the bottle against it."""
+"""Mover that presses on a bottle, and the object that holds the bottle against it."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.engine.arrays.moving import MovingRails
+from conveyor_sim.engine.arrays.moving import MovingBodies
 from conveyor_sim.engine.arrays.rails import RailContacts
 from conveyor_sim.engine.arrays.world import World
 from conveyor_sim.engine.observers.contact_list import BOTTLE_BOTTLE, BOTTLE_RAIL, closed_contacts
 from conveyor_sim.physics.model import Model
-from conveyor_sim.scene.moving import MovingShape
+from conveyor_sim.scene.bodies import AxisShape, BodyShape
 
-ACTIONS = {"gates": "gate {} closes on", "pushers": "pusher {} pushes", "diverters": "diverter {} swings against"}
+ACTIONS = {
+    "gates": "gate {} closes on",
+    "pushers": "pusher {} pushes",
+    "diverters": "diverter {} swings against",
+    "dividers": "divider {} moves against",
+    "clamps": "clamp {} closes on",
+    "adjustable": "adjustable guide {} moves against",
+}
 """Verb phrases of movers, by kind."""
 
 
@@ -42,22 +49,25 @@ def squeeze_of(model: Model, world: World, found: RailContacts, slot: int) -> Sq
     kind, (a, b), values = closed_contacts(world, found)
     normal = values[2:4].T
     cluster = _cluster(slot, kind, a, b)
-    fixed, pushers = len(model.plant.rails_at_rest), []
+    plant = model.plant
+    fixed, pushers = len(plant.rails_at_rest), []
     for c in np.flatnonzero((kind == BOTTLE_RAIL) & (b >= fixed)).tolist():
-        q = int(b[c]) - fixed
-        if int(a[c]) in cluster and _moves(moving, q):
-            pushers.append((model.plant.moving[q].limit is not None, int(a[c]) != slot, c))
+        body = plant.machine_of_body.index(int(b[c]) - fixed)
+        axis = plant.axis_of_body[body]
+        if int(a[c]) in cluster and axis >= 0 and _moves(moving, axis):
+            pushers.append((plant.axes[axis].limit is not None, int(a[c]) != slot, c, body))
     if not pushers:
         return None
-    _, _, c = min(pushers)
-    q, bottle = int(b[c]) - fixed, int(a[c])
-    shape = model.plant.moving[q]
+    _, _, c, body = min(pushers)
+    shape, bottle = plant.moving[body], int(a[c])
     section, name = shape.name.split("/")
-    what = f"{ACTIONS[section].format(name)} bottle {int(world.bottles.id[bottle])}"
+    what = f"{ACTIONS.get(section, section + ' {} presses on').format(name)} bottle {int(world.bottles.id[bottle])}"
     held = _held_by(model, world, bottle, c, kind, a, b, normal)
     what += f" against {held}" if held else ""
     limit = "torque_limit" if shape.turning else "force_limit"
-    return Squeeze(what, limit, _force(shape, moving, q, values[:2, c]), bool(held))
+    return Squeeze(
+        what, limit, _force(shape, plant.axes[plant.axis_of_body[body]], moving, body, values[:2, c]), bool(held)
+    )
 
 
 def _cluster(slot: int, kind: NDArray[np.uint8], a: NDArray[np.int64], b: NDArray[np.int64]) -> set[int]:
@@ -71,14 +81,20 @@ def _cluster(slot: int, kind: NDArray[np.uint8], a: NDArray[np.int64], b: NDArra
         cluster = touching
 
 
-def _moves(moving: MovingRails, q: int) -> bool:
-    return bool(moving.speed[q] != 0.0 or (moving.course[q, :, 2] != 0.0).any())
+def _moves(moving: MovingBodies, axis: int) -> bool:
+    return bool(moving.speed[axis] != 0.0 or (moving.course[axis, :, 2] != 0.0).any())
 
 
-def _force(shape: MovingShape, moving: MovingRails, q: int, place: NDArray[np.float64]) -> float | None:
-    if shape.limit is None or not shape.turning:
-        return shape.limit
-    return shape.limit / max(1e-3 * shape.length, float(np.hypot(place[0] - moving.x[q], place[1] - moving.y[q])))
+def _force(
+    shape: BodyShape, axis: AxisShape, moving: MovingBodies, body: int, place: NDArray[np.float64]
+) -> float | None:
+    """Return the largest force at a place (m); the axis of a body with a cam moves it by at most its steepest part."""
+    if axis.limit is None:
+        return None
+    if not shape.turning:
+        return axis.limit / shape.fastest_point
+    arm = float(np.hypot(place[0] - moving.pose.x[body], place[1] - moving.pose.y[body]))
+    return axis.limit / max(1e-3 * shape.farthest, arm)
 
 
 def _held_by(

@@ -117,12 +117,19 @@ class Words:
         return self._id(slot), float(self._bottles.x[slot]), float(self._bottles.y[slot])
 
     def _velocity_of_rail(self, rail: int, slot: int) -> tuple[float, float]:
-        """Return the velocity of a rail at a bottle's axis, m/s."""
-        moving, q = self._world.moving, rail - len(self._model.plant.rails_at_rest)
-        if moving is None or q < 0:
+        """Return the velocity of a rail, or of the nearest body of a machine, at a bottle's axis, m/s."""
+        moving, machine, plant = self._world.moving, rail - len(self._model.plant.rails_at_rest), self._model.plant
+        if moving is None or machine < 0:
             return 0.0, 0.0
-        dx, dy = self._bottles.x[slot] - moving.x[q], self._bottles.y[slot] - moving.y[q]
-        return float(moving.vx[q] - moving.turn[q] * dy), float(moving.vy[q] + moving.turn[q] * dx)
+        place = np.array([[self._bottles.x[slot], self._bottles.y[slot]]])
+        apart = {}
+        for body in np.flatnonzero(moving.account == machine).tolist():
+            axis = plant.axis_of_body[body]
+            pieces = plant.moving[body].at(0.0 if axis < 0 else float(moving.position[axis]))
+            apart[body] = min((float(piece.distance(place)[0]) for piece in pieces), default=np.inf)
+        body, pose = min(apart, key=lambda b: (apart[b], b)), moving.pose
+        dx, dy = place[0, 0] - pose.x[body], place[0, 1] - pose.y[body]
+        return float(pose.vx[body] - pose.turn[body] * dy), float(pose.vy[body] + pose.turn[body] * dx)
 
     def _forced(self, pressed: bool = False) -> str:
         """Return a clause on a moving rail that presses without force limit, else "". pressed: by a steady force."""
@@ -146,6 +153,9 @@ class Words:
         stopped = float(np.sqrt(2.0 * most / mass))
         if forced := self._forced(speed <= CAME_FAST * stopped):
             return forced
+        if self._model.sweeps:
+            sweeps = f"{self._model.steps_per_tick} steps a tick with {self._model.sweeps} sweeps"
+            return f"{sweeps} do not resolve the contact with {what}; choose more steps or sweeps"
         if speed > CAME_FAST * stopped:
             needed = mass * (speed / (REMEDY_DEPTH * radius)) ** 2
             return (

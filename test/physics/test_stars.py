@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Star wheels: hand-over in phase without knocks, the blow out of phase, faults, and equal bits."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from study_page import load_study
+from wheel_lines import (
+    MASS,
+    MU,
+    PITCH_RADIUS,
+    POCKET_RADIUS,
+    POCKETS,
+    RADIUS,
+    RATE,
+    SPEED,
+    STIFFNESS,
+    star_line,
+)
+
+from conveyor_sim.scene import parse_scene
+from conveyor_sim.simulation import Simulation
+
+PAGE = Path(__file__).parents[2] / "docs" / "parts" / "stars.md"
+OMEGA = SPEED / PITCH_RADIUS
+CENTRIPETAL = MASS * OMEGA**2 * PITCH_RADIUS
+DRAG = MU * MASS * 9.81
+HALF_TURN = 0.5 * POCKETS / RATE
+"""s."""
+
+
+def peak(sim: Simulation, seconds: float) -> float:
+    """Return the largest contact force of any bottle over some time, N."""
+    largest = 0.0
+    for _ in range(round(seconds / sim.scene.tick)):
+        sim.advance()
+        largest = max(largest, float(sim.bottles().peak_force.max()))
+    return largest
+
+
+def blow(speed: float) -> float:
+    """Return the force of an undamped impact at a speed (m/s), N."""
+    return speed * math.sqrt(STIFFNESS * MASS)
+
+
+def test_bottle_in_phase_is_carried_without_knocks() -> None:
+    """No force exceeds m omega^2 r, the drag of the belt, and the blow by the bottle's play."""
+    sim = star_line()
+    play = POCKET_RADIUS - RADIUS
+    largest = peak(sim, 0.5 / SPEED + HALF_TURN + 0.5 / SPEED)
+    assert 0.5 * CENTRIPETAL < largest < CENTRIPETAL + DRAG + blow(SPEED * math.sqrt(2.0 * play / PITCH_RADIUS))
+    bottles = sim.bottles()
+    assert bottles.y[0] == pytest.approx(2.0 * PITCH_RADIUS, abs=0.003) and bottles.x[0] < 0.6
+    assert bottles.vx[0] == pytest.approx(-SPEED, rel=0.01)
+
+
+def test_carried_bottle_moves_on_the_pitch_circle() -> None:
+    """Its axis stays within its play of the circle and of the middle of its pocket."""
+    sim = star_line()
+    play = POCKET_RADIUS - RADIUS
+    sim.advance(round((0.5 / SPEED + 0.3 * HALF_TURN) / sim.scene.tick))
+    for _ in range(20):
+        sim.advance()
+        (x,), (y,) = sim.bottles().x, sim.bottles().y
+        assert math.hypot(x - 1.0, y - PITCH_RADIUS) == pytest.approx(PITCH_RADIUS, abs=2.5 * play)
+        turned = OMEGA * (sim.time - 0.5 / SPEED)
+        assert math.atan2(x - 1.0, PITCH_RADIUS - y) == pytest.approx(turned, abs=2.5 * play / PITCH_RADIUS)
+
+
+def test_bottle_out_of_phase_is_hit_by_the_rim() -> None:
+    """Half a pitch out of phase, its first blow is that of its approach to the rim."""
+    sim = star_line(late=0.5, guided=False, damped=False, friction=0.0)
+    star = sim.scene.stars["in"]
+    reach = star.tip_radius + RADIUS
+    before = math.sqrt(reach**2 - PITCH_RADIUS**2)
+    approach = SPEED * before / reach
+    largest = peak(sim, (0.5 - before) / SPEED + 0.05)
+    assert largest == pytest.approx(blow(approach), rel=0.03)
+
+
+def test_slip_makes_a_wrong_phase() -> None:
+    """A wheel that slips by an angle lags its axis by it, and a bottle that met its pocket is hit."""
+    sim = star_line()
+    names = sim.process_image.signal_names
+    before = dict(zip(names, sim.signals(), strict=True))
+    assert before["stars/in/angle"] == pytest.approx((-sim.scene.stars["in"].phase) % (2.0 * math.pi))
+    sim.inject("stars/in/slip", 0.002)
+    sim.advance(10)
+    now = dict(zip(names, sim.signals(), strict=True))
+    turned = (now["axes/star/position"] - now["stars/in/angle"] - sim.scene.stars["in"].phase) % (2.0 * math.pi)
+    assert turned == pytest.approx(0.002, abs=1e-9)
+
+
+def test_jammed_wheel_blocks_its_axis() -> None:
+    """Wheel and axis stand, and the axis falls behind its master."""
+    sim = star_line()
+    sim.advance(10)
+    sim.inject("stars/in/jammed", 1.0)
+    sim.advance(2)
+    names = sim.process_image.signal_names
+    first = dict(zip(names, sim.signals(), strict=True))
+    sim.advance(3)
+    now = dict(zip(names, sim.signals(), strict=True))
+    assert now["stars/in/angle"] == first["stars/in/angle"]
+    assert now["axes/star/speed"] == 0.0
+    assert now["axes/star/following_error"] > first["axes/star/following_error"] > 0.0
+
+
+def test_worn_pocket_leaves_more_play() -> None:
+    """A bottle in a pocket of a radius larger by 5 mm lags behind the middle of the pocket by more."""
+    lags = []
+    for worn in (0.0, 0.005):
+        sim = star_line(worn=worn)
+        sim.advance(round((0.5 / SPEED + 0.5 * HALF_TURN) / sim.scene.tick))
+        (x,), (y,) = sim.bottles().x, sim.bottles().y
+        angle = math.atan2(x - 1.0, PITCH_RADIUS - y)
+        lags.append(PITCH_RADIUS * (OMEGA * (sim.time - 0.5 / SPEED) - angle))
+    assert lags[1] > lags[0] + 0.002
+
+
+def test_results_have_equal_bits_with_threads_and_after_checkpoints(tmp_path: Path) -> None:
+    """The state after the hand-over is that of one uninterrupted run on one thread, faults included."""
+    runs = [star_line(threads=threads) for threads in (1, 2)]
+    for sim in runs:
+        sim.inject("stars/in/slip", 0.001)
+        sim.advance(60)
+    runs[1].save(tmp_path / "half_way.checkpoint")
+    runs.append(Simulation.load(tmp_path / "half_way.checkpoint"))
+    for sim in runs:
+        sim.advance(60)
+    assert len({sim.state_hash() for sim in runs}) == 1
+    assert np.hypot(*(getattr(runs[0].bottles(), name)[0] for name in ("vx", "vy"))) > 0.5 * SPEED
+
+
+def test_queue_is_handed_over_without_knocks() -> None:
+    """Bottles from a queue pass screw, wheel and discharge at the rate of the axis; the wheel exerts small forces."""
+    sim = Simulation(parse_scene(load_study("part_pictures").scene_text(PAGE)), threads=1)
+    sim.advance(500)
+    names = sim.process_image.signal_names
+    before, largest = float(sim.signals()[names.index("outfeeds/packer/removed")]), 0.0
+    for _ in range(1500):
+        sim.advance()
+        contacts = sim.contacts()
+        at_wheel = (contacts.x > 1.75) | (contacts.y > 0.1)
+        largest = max(largest, float(contacts.normal_force[at_wheel].max(initial=0.0)))
+    passed = float(sim.signals()[names.index("outfeeds/packer/removed")]) - before
+    assert passed == pytest.approx(15.0 * RATE, abs=1.0)
+    play = POCKET_RADIUS - RADIUS
+    assert largest < CENTRIPETAL + DRAG + blow(SPEED * math.sqrt(2.0 * play / PITCH_RADIUS))
