@@ -58,6 +58,7 @@ class Family:
     ledger: bool = False
     vibration: bool = False
     axes: bool = False
+    panel: bool = False
     effects: tuple[tuple[str, str], ...] = ()
 
     def __str__(self) -> str:
@@ -69,7 +70,7 @@ class Family:
         ]
         parts += [
             name
-            for name in ("drives", "movers", "machines", "sensors", "ledger", "vibration", "axes")
+            for name in ("drives", "movers", "machines", "sensors", "ledger", "vibration", "axes", "panel")
             if getattr(self, name)
         ]
         parts += [*(f"{kind} belts" for kind in self.belts), *(f"{kind}s" for kind in self.rails)]
@@ -111,6 +112,7 @@ def random_family(seed: int) -> Family:
         ledger=draw.random() < 0.3,
         vibration=move and draw.random() < 0.3,
         axes=draw.random() < 0.3,
+        panel=draw.random() < 0.4,
     )
 
 
@@ -132,7 +134,7 @@ _PLAIN = Family(
 
 CI_FAMILIES = (
     _PLAIN,
-    replace(_PLAIN, drives=True, machines=True, sensors=True, axes=True),
+    replace(_PLAIN, drives=True, machines=True, sensors=True, axes=True, panel=True),
     Family(types=2, drives=True, movers=True, machines=True, sensors=True, ledger=True, vibration=True),
 )
 """Two mixtures of effects, so that CI compiles few kernels: devices call for none but rails that move."""
