@@ -132,6 +132,9 @@ class ScanContext:
 class Device:
     """One device of a running line. Public attributes last from tick to tick (checkpoints)."""
 
+    takes_bottles = True
+    """False if `take` changes the line without taking bottles off."""
+
     blocked_ticks = 0
     """Number of ticks with a bottle to put onto the line and no room."""
 
@@ -234,6 +237,26 @@ class Device:
 
     def rehearse(self, now: ScanContext) -> None:
         """Call engine functions that it needs in some ticks only, without any effect on the state."""
+
+    @property
+    def axis(self) -> int:
+        """Index of the axis whose bottles wake it; -1 without one."""
+        return -1
+
+    def rests(self, now: ScanContext) -> bool:
+        """Return True if `begin`, `end` and `states` change nothing until it is woken (`idle.py`)."""
+        return False
+
+    def on_wake(self, wakes: Callable[[Device], None]) -> None:
+        """Take a function that is called when the device has something to do again."""
+        self._wakes = wakes
+
+    def wake(self) -> None:
+        """End its rest."""
+        if self._wakes is not None:
+            self._wakes(self)
+
+    _wakes: Callable[[Device], None] | None = None
 
     def begin(self, now: ScanContext) -> None:
         """Act before the steps of a tick.

@@ -7,12 +7,14 @@ from typing import Any
 from conveyor_sim.line.device import Device
 from conveyor_sim.line.devices.axis import AxisDevice
 from conveyor_sim.line.devices.belt import belt_device
+from conveyor_sim.line.devices.carousel import CarouselDevice
 from conveyor_sim.line.devices.crossing import CounterDevice, InspectionDevice
 from conveyor_sim.line.devices.divider import PositionedDevice
 from conveyor_sim.line.devices.drive import NamedDriveDevice
 from conveyor_sim.line.devices.geared_machine import ScrewDevice, StarDevice
 from conveyor_sim.line.devices.indicator import IndicatorDevice
 from conveyor_sim.line.devices.infeed import InfeedDevice
+from conveyor_sim.line.devices.lifting_gate import gate_device
 from conveyor_sim.line.devices.mover import Mover
 from conveyor_sim.line.devices.panel import (
     ButtonDevice,
@@ -45,12 +47,14 @@ DEVICES: Mapping[str, Callable[[str, Any, DeviceSetup], Device]] = {
     "drive": NamedDriveDevice,
     "axis": AxisDevice,
     "belt": belt_device,
-    "gate": Mover,
+    "gate": gate_device,
     "pusher": pusher_device,
     "diverter": Mover,
     "divider": PositionedDevice,
     "adjustable": PositionedDevice,
+    "clamp": Mover,
     "star": StarDevice,
+    "carousel": CarouselDevice,
     "screw": ScrewDevice,
     "side_belt": SideBeltDevice,
     "infeed": InfeedDevice,

@@ -2,7 +2,7 @@
 """`Line`: the devices of a scene, and the commands and faults that reach them at ticks."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import fields, replace
 from typing import Any, NamedTuple
 
@@ -28,6 +28,7 @@ from conveyor_sim.line.device_kinds import build_devices
 from conveyor_sim.line.devices.belt_surfaces import BeltSurfaces
 from conveyor_sim.line.devices.photo_eye import PhotoEyeDevice
 from conveyor_sim.line.devices.setpoint import SetpointDevice
+from conveyor_sim.line.idle import CalledDevices
 from conveyor_sim.line.machines.counters import RESET_COUNTERS, ProductionCounters
 from conveyor_sim.line.run_state import RUN_TAGS
 from conveyor_sim.line.tag import PANEL, Adds, ProcessImage
@@ -61,6 +62,7 @@ class EventLog:
             for device in devices
             if (states := [signal for signal in device.signals if signal.adds_to == "state"])
         ]
+        self._watched = self._machines
         self.events = []
         self.total = 0
         """Number of events so far."""
@@ -70,6 +72,10 @@ class EventLog:
     def begin(self) -> None:
         """Start a tick without events."""
         self.events = []
+
+    def leave_out(self, resting: Collection[str]) -> None:
+        """Don't read the states of resting devices, by name, which don't change."""
+        self._watched = [machine for machine in self._machines if machine[0] not in resting]
 
     def note(self, at: int, kind: Kind, name: str, value: float, bottle: int = -1, text: str = "") -> None:
         """Add an event."""
@@ -106,7 +112,7 @@ class EventLog:
     def note_states(self, now: ScanContext) -> None:
         """Add events of changed states at the end of a tick."""
         stored = self.states
-        for name, device, states in self._machines:
+        for name, device, states in self._watched:
             before, present = stored[name], device.states(now)
             if before != present:
                 stored[name] = [float(value) for value in present]
@@ -155,9 +161,11 @@ class Line:
         self._eyes = [device for device in devices if isinstance(device, PhotoEyeDevice)]
         self._reading = [device.read for device in devices]
         # Only overridden methods are called.
-        self._beginning = [device for device in devices if type(device).begin is not Device.begin]
-        self._ending = [device for device in devices if type(device).end is not Device.end]
-        self._taking = [device for device in devices if type(device).take is not Device.take]
+        self._called = CalledDevices(devices, self._log.leave_out)
+        exits = state.model.has("outfeed")
+        self._taking = [
+            device for device in devices if type(device).take is not Device.take and (exits or not device.takes_bottles)
+        ]
         self._feeding = [device for device in devices if type(device).feed is not Device.feed]
         # Devices that count bottles, with the indices of the counting signals.
         self._counting = {
@@ -168,8 +176,8 @@ class Line:
             ]
             for adds_to in ("fed", "removed", "rejected")
         }
-        self.takes = bool(self._taking) and state.model.has("outfeed")
-        """True if any device takes bottles off the line."""
+        self.takes = bool(self._taking)
+        """True if any device takes bottles off the line, or changes what bottles touch."""
         self.feeds = bool(self._feeding) and state.model.has("infeed")
         """True if any device puts bottles onto the line."""
         self._outcomes: list[CommandOutcome] = []
@@ -327,7 +335,7 @@ class Line:
                 self.read_back.note(stopped, tick)
                 self._log.note(tick, "machine_state", name, 0.0, text="stopped: its watchdog received no command")
         before = self.now.speeds.tolist()
-        for device in self._beginning:
+        for device in self._called.beginning:
             device.begin(self.now)
         self._alarms.take(self.now)
         if before != self.now.speeds.tolist():
@@ -336,7 +344,8 @@ class Line:
     def end(self, tick: int) -> None:
         """Let the devices evaluate the steps up to a tick."""
         self._at(tick)
-        for device in self._ending:
+        self._called.wake_loaded(self.now)
+        for device in self._called.ending:
             device.end(self.now)
         if tick == 0:
             self._alarms.take(self.now)
@@ -372,6 +381,7 @@ class Line:
         for limit in passed:
             self._log.note(limit.tick, "limit_passed", limit.kind, limit.value, limit.bottle, limit.text)
         self._log.note_states(self.now)
+        self._called.review(self.now)
         forced = {name: value for name, value, _ in self.forcing.forces} if self.forcing.forces else {}
         self._alarms.close(self.now, passed, clogged, forced)
 
@@ -447,6 +457,7 @@ class Line:
         self.now.attributes = {name: dict(values) for name, values in attributes.items()}
         for name, part in self._parts.items():
             part.restore(tick, memory[name])
+        self._called.wake_all()
 
     @property
     def held(self) -> list[int]:

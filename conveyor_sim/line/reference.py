@@ -49,10 +49,16 @@ adjustable:
   a:
     {from: [7, 0.1], to: [7.5, 0.1], direction: 90 deg, positions: [0, 10 mm], max_speed: 1, acceleration: 5,
      material: rail}
+clamps:
+  k:
+    {from: [6.2, 0.2], to: [6.4, 0.2], direction: 90 deg, opening: 0.1, stroke: 0.03, max_speed: 1, acceleration: 5,
+     material: rail}
 stars:
   st:
     {centre: [1, 5], turn: left, entry: -90 deg, pockets: 12, pitch_radius: 0.3, pocket_radius: 34 mm, axis: a,
      material: rail}
+carousels:
+  ca: {star: st, from: 30 deg, to: 120 deg, sets: {test: {to: 1}}, tests: {test: {low: 1}}}
 screws:
   sc: {from: [2, 5], to: [2.6, 5], side: left, pitch: [[0, 70 mm]], pocket_radius: 34 mm, axis: a, material: rail}
 side_belts:
@@ -84,8 +90,9 @@ PAGES: dict[str, dict[str, tuple[str, ...]]] = {
     "parts/belts": {"belts": ("belts", "drives")},
     "parts/infeeds": {"feeds": ("infeeds", "outfeeds"), "spills": ("spills",)},
     "parts/machines": {"machines": ("machines",)},
-    "parts/movers": {"movers": ("gates", "pushers", "diverters")},
+    "parts/movers": {"movers": ("gates", "pushers", "diverters", "clamps")},
     "parts/dividers": {"dividers": ("dividers", "adjustable")},
+    "parts/carousels": {"carousels": ("carousels",)},
     "parts/stars": {"stars": ("stars",)},
     "parts/screws": {"screws": ("screws",)},
     "parts/side_belts": {"side_belts": ("side_belts",)},

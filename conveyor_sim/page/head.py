@@ -78,14 +78,18 @@ def plan_head(scene: Scene) -> dict[str, Any]:
         "movers": [
             {
                 "name": body.name,
-                "from": body.pieces[0].ends[0],
-                "to": body.pieces[0].ends[1],
+                "from": piece.ends[0],
+                "to": piece.ends[1],
+                "pivot": body.pivot,
+                "present": 1.0 if body.cam is None else body.cam.end / axis.stroke,
                 "along": body.along,
                 "turning": body.turning,
                 "stroke": axis.stroke,
                 "first": axis.first,
             }
-            for body, axis in (mover_shape(path, mover) for path, mover in movers_of(scene))
+            for bodies, axis in (mover_shape(path, mover) for path, mover in movers_of(scene))
+            for body in bodies
+            for piece in body.pieces
         ],
         "bodies": [_body(body) for body in wheel_bodies(scene)],
         "marks": [

@@ -24,6 +24,7 @@ from conveyor_sim.scene.geometry import (
 )
 from conveyor_sim.scene.moving import axes_of, bodies_at, bodies_of
 from conveyor_sim.scene.overlaps import near_pieces
+from conveyor_sim.scene.parts.work import Working
 from conveyor_sim.scene.problems import Path
 from conveyor_sim.scene.schema import Scene, Single
 
@@ -139,7 +140,7 @@ class Plant:
     def supply(self) -> dict[str, float]:
         """Largest number of bottles of each type in a run, by type name; infinite for an infeed without end.
 
-        Types without bottles are left out. A station may give all bottles of a type another one.
+        Types without bottles are left out. Stations and carousels give bottles other types.
         """
         supply: dict[str, float] = {}
         for name, *_ in self.bottles:
@@ -150,9 +151,10 @@ class Plant:
         return self._after_changes(supply)
 
     def _after_changes(self, supply: dict[str, float]) -> dict[str, float]:
-        """Return the supply of each type, with that of all types that stations turn into it."""
+        """Return the supply of each type, with that of all types that stations and carousels turn into it."""
         sources = {kind: {kind} for kind in supply}
-        changes = [change for part in self.scene.machines.values() for change in getattr(part, "changes", {}).items()]
+        workers = [part for _, part in self.scene.devices() if isinstance(part, Working)]
+        changes = [change for worker in workers for change in worker.changes.items()]
         for _ in self.scene.bottle_types:  # a type is reached by that many changes at most
             for before, after in changes:
                 if before in sources:

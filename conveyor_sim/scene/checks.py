@@ -58,6 +58,10 @@ MOVE_RAILS = ("leapfrog", "semi_implicit_euler", "velocity_verlet")
 """Integrators with moving rails. The others evaluate forces within a step, or solve for forces of rails at rest."""
 
 
+WHEEL_FIELDS = ("stars", "screws", "side_belts")
+"""Fields of machines whose surfaces move, beside movers."""
+
+
 def problems_of(scene: Scene) -> list[Problem]:
     """Return up to MOST_SAID + 1 problems of a scene whose fields are each valid by themselves."""
     checks = (
@@ -142,7 +146,7 @@ def _touching(scene: Scene) -> Iterator[tuple[frozenset[str], str]]:
             first.setdefault(belt.rails.material, f"rails of belt {name}")
     for path, mover in movers_of(scene):
         first.setdefault(mover.material, f"{path[0]}.{path[1]}")
-    for field in ("stars", "screws", "side_belts"):
+    for field in WHEEL_FIELDS:
         for name, part in getattr(scene, field).items():
             first.setdefault(part.material, f"{field}.{name}")
     for name, star in scene.stars.items():
@@ -210,14 +214,14 @@ def _alarms(scene: Scene) -> Iterator[Problem]:
 
 def _moving_rails(scene: Scene) -> Iterator[Problem]:
     chosen = scene.accuracy.integrator
-    for path, _ in movers_of(scene):
-        if chosen not in MOVE_RAILS:
-            yield Problem(
-                ("accuracy", "integrator"),
-                f"{shown(chosen)} given, expected {listed(list(MOVE_RAILS))}, as {path[0]}.{path[1]} moves: "
-                "the other integrators take rails to be at rest within a step",
-            )
-            return
+    wheels = ((field, name) for field in WHEEL_FIELDS for name in getattr(scene, field))
+    path = next(chain((path for path, _ in movers_of(scene)), wheels), None)
+    if path is not None and chosen not in MOVE_RAILS:
+        yield Problem(
+            ("accuracy", "integrator"),
+            f"{shown(chosen)} given, expected {listed(list(MOVE_RAILS))}, as {path[0]}.{path[1]} moves: "
+            "the other integrators take rails to be at rest within a step",
+        )
 
 
 def _vibrations(scene: Scene) -> Iterator[Problem]:

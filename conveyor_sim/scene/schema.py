@@ -21,12 +21,13 @@ from conveyor_sim.scene.limits import Limits as DamageLimits
 from conveyor_sim.scene.part import Part, one_of
 from conveyor_sim.scene.parts.alarm import MeasuredAlarm
 from conveyor_sim.scene.parts.axis import Axis
+from conveyor_sim.scene.parts.carousel import Carousel
 from conveyor_sim.scene.parts.counter import Counter
 from conveyor_sim.scene.parts.device_part import DevicePart, Entry, Exit, Giver
 from conveyor_sim.scene.parts.indicator import Indicator
 from conveyor_sim.scene.parts.infeed import Infeed
 from conveyor_sim.scene.parts.inspection import Inspection
-from conveyor_sim.scene.parts.movers import AdjustableGuide, Diverter, Divider, Gate, Pusher
+from conveyor_sim.scene.parts.movers import AdjustableGuide, Clamp, Diverter, Divider, Gate, Pusher
 from conveyor_sim.scene.parts.outfeed import Outfeed
 from conveyor_sim.scene.parts.panel import Button, EmergencyStop, Horn, Lamp, NumberField, Selector, StackLight
 from conveyor_sim.scene.parts.photo_eye import PhotoEye
@@ -302,8 +303,14 @@ class Scene(Part):
     adjustable: Annotated[dict[Name, AdjustableGuide], _named("adjustable guides")] = quantity(
         "Guides that a drive sets to one of several positions, such as those of formats.", default={}
     )
+    clamps: Annotated[dict[Name, Clamp], _named("clamps")] = quantity(
+        "Pairs of jaws that close on bottles on command.", default={}
+    )
     stars: Annotated[dict[Name, Star], _named("star wheels")] = quantity(
         "Wheels that carry bottles in pockets.", default={}
+    )
+    carousels: Annotated[dict[Name, Carousel], _named("carousels")] = quantity(
+        "Tools of star wheels that work on bottles: fillers, cappers, labellers.", default={}
     )
     screws: Annotated[dict[Name, Screw], _named("infeed screws")] = quantity(
         "Screws that space bottles to a pitch.", default={}

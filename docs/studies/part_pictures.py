@@ -33,12 +33,15 @@ MOMENTS = {
     "alarms": 14.0,
     "axes": 14.0,
     "bottles": 0.5,
+    "carousels": 18.0,
     "failures": 120.0,
     "rows": 17.1,
     "stations": 20.0,
     "zones": 14.0,
 }
 """Simulated times of pages whose scenes show more at another time, s."""
+COMMANDS = {"stoppers": {5.0: "clamps/grip/close"}}
+"""Commands that are switched on at simulated times, s, by page."""
 WIDTH = 960
 """Width of a picture, px."""
 
@@ -54,7 +57,11 @@ def scene_text(page: Path) -> str:
 def draw(page: Path) -> Path:
     """Simulate the scene of a page and draw it. Return the picture."""
     simulation = Simulation(parse_scene(scene_text(page)), threads=1)
-    simulation.advance(round(MOMENTS.get(page.stem, MOMENT) / simulation.scene.tick))
+    ticks = round(MOMENTS.get(page.stem, MOMENT) / simulation.scene.tick)
+    for time, command in COMMANDS.get(page.stem, {}).items():
+        simulation.advance(round(time / simulation.scene.tick) - simulation.tick)
+        simulation.command([command], [1.0])
+    simulation.advance(ticks - simulation.tick)
     return draw_state(simulation, IMAGES / f"{page.stem}.webp")
 
 

@@ -80,9 +80,12 @@ class DeviceWatch:
     def in_frames(self, before: F8, after: F8) -> list[tuple[str, SegmentPiece, F8, F8]]:
         """Each moving rail at home, with the places before and after a tick, (n, 2), as seen from it."""
         return [
-            (axis.name, *body.at(0.0), _seen(body, self._place(axis, self._before), before),
+            (axis.name, piece, _seen(body, self._place(axis, self._before), before),
              _seen(body, self._place(axis, self._now), after))
-            for body, axis in self._movers
+            for bodies, axis in self._movers
+            for body in bodies
+            if body.cam is None  # a gate that lifts lets bottles pass
+            for piece in body.at(0.0)
         ]  # fmt: skip
 
     def _values(self) -> dict[str, float]:

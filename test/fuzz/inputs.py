@@ -32,7 +32,7 @@ class Input:
 
 Table = Mapping[str, Input]
 
-MOVERS = (("gates", "open"), ("pushers", "push"), ("diverters", "divert"))
+MOVERS = (("gates", "open"), ("pushers", "push"), ("diverters", "divert"), ("clamps", "close"))
 POSITIONED = (("dividers", "cmd_lane"), ("adjustable", "cmd_setting"))
 
 

@@ -46,6 +46,11 @@ class Invariants:
             if on[type(piece).__name__]
         ]
         self._regions = {name: np.array(feed.region) for name, feed in simulation.scene.outfeeds.items()}
+        self._changes = {
+            (model.bottle_types.index(one), model.bottle_types.index(other))
+            for carousel in simulation.scene.carousels.values()
+            for one, other in carousel.changes.items()
+        }
         self._belts = ExpectedBelts(simulation)
         self._devices = DeviceWatch(simulation, self._belts.panel)
         self._stable = model.dt <= min((bound.dt for bound in model.bounds if bound.stability), default=math.inf)
@@ -105,8 +110,10 @@ class Invariants:
             )
         if self._first + counts.fed - counts.removed != counts.present + counts.held:
             raise Violation("lost bottle", f"{self._first} at first, {counts} at tick {self._sim.tick}")
-        kept = np.isin(ids, before)
-        if not np.array_equal(now.type[kept], self._before.type[np.isin(before, ids)]):
+        types = zip(
+            self._before.type[np.isin(before, ids)].tolist(), now.type[np.isin(ids, before)].tolist(), strict=True
+        )
+        if not {(was, kind) for was, kind in types if was != kind} <= self._changes:
             raise Violation("doubled bottle", f"a bottle changed its type at tick {self._sim.tick}")
         self._next_id = max(self._next_id, _after(now))
         return fresh | np.isin(ids, list(back))

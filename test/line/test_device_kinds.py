@@ -12,8 +12,20 @@ from conveyor_sim.scene.marks import marks_of
 from conveyor_sim.scene.parts.device_part import DevicePart, Entry, Exit
 from conveyor_sim.support.resources import scene_path
 
-BY_SHAPE = {"belt", "gate", "pusher", "diverter", "divider", "adjustable"}
-"""Kinds that are drawn as belts and rails."""
+BY_SHAPE = {
+    "belt",
+    "gate",
+    "pusher",
+    "diverter",
+    "divider",
+    "adjustable",
+    "clamp",
+    "star",
+    "screw",
+    "side_belt",
+    "carousel",
+}
+"""Kinds that are drawn as belts and rails, or along them."""
 ON_PANEL = {"button", "selector", "emergency_stop", "lamp", "horn", "stack_light", "numeric"}
 PLACELESS = {"axis", "drive", "indicator", *ON_PANEL}
 """Kinds without a place. A drive and an axis move others, an indicator uses a counter and a zone, which are drawn. The

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from study_page import load_study
 from wheel_lines import (
     MASS,
     MU,
@@ -19,8 +20,10 @@ from wheel_lines import (
     star_line,
 )
 
+from conveyor_sim.scene import parse_scene
 from conveyor_sim.simulation import Simulation
 
+PAGE = Path(__file__).parents[2] / "docs" / "parts" / "stars.md"
 OMEGA = SPEED / PITCH_RADIUS
 CENTRIPETAL = MASS * OMEGA**2 * PITCH_RADIUS
 DRAG = MU * MASS * 9.81
@@ -129,3 +132,20 @@ def test_results_have_equal_bits_with_threads_and_after_checkpoints(tmp_path: Pa
         sim.advance(60)
     assert len({sim.state_hash() for sim in runs}) == 1
     assert np.hypot(*(getattr(runs[0].bottles(), name)[0] for name in ("vx", "vy"))) > 0.5 * SPEED
+
+
+def test_queue_is_handed_over_without_knocks() -> None:
+    """Bottles from a queue pass screw, wheel and discharge at the rate of the axis; the wheel exerts small forces."""
+    sim = Simulation(parse_scene(load_study("part_pictures").scene_text(PAGE)), threads=1)
+    sim.advance(500)
+    names = sim.process_image.signal_names
+    before, largest = float(sim.signals()[names.index("outfeeds/packer/removed")]), 0.0
+    for _ in range(1500):
+        sim.advance()
+        contacts = sim.contacts()
+        at_wheel = (contacts.x > 1.75) | (contacts.y > 0.1)
+        largest = max(largest, float(contacts.normal_force[at_wheel].max(initial=0.0)))
+    passed = float(sim.signals()[names.index("outfeeds/packer/removed")]) - before
+    assert passed == pytest.approx(15.0 * RATE, abs=1.0)
+    play = POCKET_RADIUS - RADIUS
+    assert largest < CENTRIPETAL + DRAG + blow(SPEED * math.sqrt(2.0 * play / PITCH_RADIUS))

@@ -37,7 +37,7 @@ def line(turn: float = 0.0, **fields: Any) -> Scene:
     """Return a scene with a conveyor in a direction (rad) and two axes, and other fields."""
     steel = {"material": "steel"}
     parts = {
-        field: {name: {**steel, **part} for name, part in parts.items()} if field != "axes" else parts
+        field: {name: {**steel, **part} for name, part in parts.items()} if field not in ("axes", "accuracy") else parts
         for field, parts in fields.items()
     }
     if "screws" in parts:
@@ -271,6 +271,20 @@ def test_pitch_within_the_play_of_a_pocket_is_accepted() -> None:
     """157.08 mm of a wheel fit a last pitch of 157 mm."""
     scene = line(stars={"in": {**STAR, "along": "infeed", "at": 2.0, "side": "left"}}, screws={"in": SCREW})
     assert abs(scene.stars["in"].pitch - scene.screws["in"].last_pitch) < 1e-4
+
+
+@pytest.mark.parametrize("field", ["stars", "screws", "side_belts"])
+def test_integrators_without_moving_rails_are_refused(field: str) -> None:
+    """The other integrators take rails to be at rest within a step."""
+    parts: dict[str, dict[str, Any]] = {
+        "stars": {**STAR, "along": "infeed", "at": 2.0, "side": "left"},
+        "screws": SCREW,
+        "side_belts": {"along": "infeed", "from": 1.0, "to": 2.0, "offset": 0.04},
+    }
+    with pytest.raises(SceneError) as error:
+        line(accuracy={"integrator": "rk4"}, **{field: {"in": parts[field]}})
+    assert 'accuracy.integrator: "rk4" given, expected leapfrog' in str(error.value)
+    assert f"{field}.in moves" in str(error.value)
 
 
 @pytest.mark.parametrize(

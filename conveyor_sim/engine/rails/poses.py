@@ -7,9 +7,10 @@ Only bodies near bottles have poses, and only those of axes that move are placed
 import math
 from typing import Any
 
-from conveyor_sim.engine.arrays.moving import PHASES, MovingBodies
+from conveyor_sim.engine.arrays.moving import OFF_PROFILE, PHASES, MovingBodies
 from conveyor_sim.engine.arrays.rails import Arcs, Ends, Segments
-from conveyor_sim.engine.compiler.compile import part
+from conveyor_sim.engine.arrays.types import F8
+from conveyor_sim.engine.compiler.compile import kernel, part
 from conveyor_sim.engine.rails.actuators import is_off_profile
 from conveyor_sim.engine.rails.cams import find_displacement, is_present
 from conveyor_sim.engine.rails.joint import FREE
@@ -73,6 +74,30 @@ def move_axes(moving: MovingBodies, time: float) -> None:
             since, acceleration = time - moving.course[a, k, 0], moving.course[a, k, 3]
             moving.position[a] = moving.course[a, k, 1] + (moving.course[a, k, 2] + 0.5 * acceleration * since) * since
             moving.speed[a] = moving.course[a, k, 2] + acceleration * since
+
+
+@kernel
+def fastest_point(moving: MovingBodies, reach: F8) -> float:
+    """Return the largest speed (m/s) that a point of a body can have in this tick without bottles.
+
+    reach: path of the fastest point per change of each axis's position, (A,).
+    """
+    fastest = 0.0
+    for a in range(reach.size):
+        speed = 0.0
+        for k in range(PHASES):
+            speed = max(speed, abs(moving.course[a, k, 2]))
+        fastest = max(fastest, reach[a] * max(speed, _off_profile_speed(moving, moving.actuators, a)))
+    return fastest
+
+
+@part
+def _off_profile_speed(moving: MovingBodies, actuators: Any, a: int) -> float:
+    if actuators is None:
+        return 0.0
+    if actuators.mode[a] != OFF_PROFILE:
+        return 0.0
+    return max(abs(moving.speed[a]), actuators.max_speed[a])
 
 
 @part

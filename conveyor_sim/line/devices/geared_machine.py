@@ -70,9 +70,14 @@ class GearedMachine(Device):
             for place, lag in zip(self._numbers, self._lags, strict=True):
                 moving.lag[place] = lag + self.slipped
 
+    @property
+    def angle(self) -> float:
+        """Angle from its phase, rad, from 0 to a turn."""
+        return (self._axis.actual_position - self._lags[0] - self.slipped) % TURN
+
     def values(self, now: ScanContext) -> Sequence[float]:
         """Return the angle."""
-        return ((self._axis.actual_position - self._lags[0] - self.slipped) % TURN,)
+        return (self.angle,)
 
 
 class ScrewDevice(GearedMachine):

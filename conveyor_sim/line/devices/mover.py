@@ -21,6 +21,7 @@ WORDS = {
     "gates": ("open", "is_closed", "is_open", "closed", "open"),
     "pushers": ("push", "retracted", "extended", "retracted", "extended"),
     "diverters": ("divert", "at_home", "diverting", "at home", "diverting"),
+    "clamps": ("close", "is_open", "is_closed", "open", "closed"),
 }
 """By kind: the command, the end switches at home and at the end of the stroke, and the words for these positions."""
 
@@ -81,6 +82,7 @@ class Mover(Device):
 
     def plan(self, now: ScanContext) -> None:
         """Start the motion profile from the present position and speed to the target, or rest if jammed."""
+        self.wake()
         self.since = now.tick
         if self.jammed:
             self.course = resting(self.position)
@@ -88,6 +90,24 @@ class Mover(Device):
             shape = self._shape
             speed = self.speed
             self.course = profile_to(self.position, speed, self.target, shape.max_speed, shape.acceleration)
+
+    @property
+    def axis(self) -> int:
+        """Index of its axis."""
+        return self._number
+
+    def rests(self, now: ScanContext) -> bool:
+        """Return True if it stands at its target, and no bottle is near that its drive could be too weak for."""
+        rails, number = self._rails(now), self._number
+        if self.jammed or self.limited or self.blocked or self.position != self.target or self.speed != 0.0:
+            return False
+        if (actuators := rails.actuators) is not None and (
+            actuators.mode[number] != ON_PROFILE or actuators.left[number] or rails.loaded[number]
+        ):
+            return False
+        self.course = resting(self.position)
+        rails.course[number] = self.course
+        return True
 
     @property
     def is_home(self) -> bool:

@@ -39,6 +39,10 @@ class RowPusherDevice(Mover):
         else:
             super().command(name, value, now)
 
+    def rests(self, now: ScanContext) -> bool:
+        """Return False, because it must see when its zone is full."""
+        return False
+
     def begin(self, now: ScanContext) -> None:
         """Start a stroke or return if it is time, then set the motion profile of this tick."""
         stroke = self._shape.stroke

@@ -7,10 +7,10 @@ Stations work on a bottle for one cycle, and give it back at another place.
 from collections.abc import Mapping, Sequence
 
 from conveyor_sim.line.device import ScanContext
+from conveyor_sim.line.devices.bottle_work import BottleWork, work_tags
 from conveyor_sim.line.devices.entry import Scattering, has_room, velocity
 from conveyor_sim.line.devices.region import Region, ZoneDevice
 from conveyor_sim.line.devices.setup import JITTER, DeviceSetup
-from conveyor_sim.line.machines.bottle_work import BottleWork, work_tags
 from conveyor_sim.line.machines.machine import MachineDevice
 from conveyor_sim.line.machines.packml import PackMLState
 from conveyor_sim.line.machines.stop_reason import BLOCKED, NONE, STARVED

@@ -151,10 +151,12 @@ function drawEntry(context, camera, colours, view, mark, device) {
 
 // Returns the ends of a moving rail.
 export function moverEnds(mover, position) {
-  const [x, y] = [mover.from[0] + mover.along[0] * position, mover.from[1] + mover.along[1] * position];
-  const [dx, dy] = [mover.to[0] - mover.from[0], mover.to[1] - mover.from[1]];
+  const [px, py] = mover.pivot ?? mover.from; // recordings of earlier versions have no pivot
   const cos = Math.cos(mover.turning * position), sin = Math.sin(mover.turning * position);
-  return [[x, y], [x + dx * cos - dy * sin, y + dx * sin + dy * cos]];
+  return [mover.from, mover.to].map(([x, y]) => [
+    px + mover.along[0] * position + (x - px) * cos - (y - py) * sin,
+    py + mover.along[1] * position + (x - px) * sin + (y - py) * cos,
+  ]);
 }
 
 // Returns the value of a cam at a coordinate.
@@ -202,7 +204,9 @@ export function drawMovers(context, camera, colours, view) {
   for (const mover of view.recording.head.movers) {
     const share = view.signal(`${mover.name}/position`);
     const position = share === undefined ? mover.first : share * mover.stroke;
-    for (const [at, width, alpha] of [[0, 1, 0.5], [mover.stroke, 1, 0.5], [position, Math.max(4, 0.014 * camera.scale), 1]]) {
+    const isPresent = position <= (mover.present ?? 1) * mover.stroke; // a lifted gate touches nothing
+    const drawn = [[0, 1, 0.5], [mover.stroke, 1, 0.5], ...(isPresent ? [[position, Math.max(4, 0.014 * camera.scale), 1]] : [])];
+    for (const [at, width, alpha] of drawn) {
       outline(context, camera, moverEnds(mover, at), false);
       context.globalAlpha = alpha;
       context.setLineDash(alpha < 1 ? [3, 4] : []);

@@ -44,7 +44,8 @@ def _prevented(plant: Plant, on: Collection[str]) -> str:
 
 
 def _infeed(plant: Plant, on: Collection[str]) -> Cause | None:
-    return next((Cause(path) for path, _ in plant.scene.givers()), None)
+    carousels = ((("carousels", name), part) for name, part in plant.scene.carousels.items())
+    return next((Cause(path) for path, _ in (*plant.scene.givers(), *carousels)), None)
 
 
 def _outfeed(plant: Plant, on: Collection[str]) -> Cause | None:
@@ -74,10 +75,11 @@ RIDING = Effect(
 )
 INFEED = Effect(
     name="infeed",
-    law="bottles enter one behind the other, at a gap or a rate; stations return the bottles that they took",
+    law="bottles enter one behind the other, at a gap or a rate; stations return the bottles that they "
+    "took, and carousels change the types of bottles",
     source="added",
     called_for=_infeed,
-    absent="no infeed, source, spill or station",
+    absent="no infeed, source, spill, station or carousel",
     needs="counters and random draws of each entry; storage that grows with the number of bottles",
 )
 OUTFEED = Effect(

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conveyor_sim.engine.arrays.moving import (
-    OFF_PROFILE,
     PHASES,
     UNLIMITED,
     Actuators,
@@ -21,7 +20,8 @@ from conveyor_sim.engine.arrays.moving import (
     Pose,
 )
 from conveyor_sim.engine.arrays.rails import Arcs, Segments
-from conveyor_sim.engine.arrays.types import F8
+from conveyor_sim.engine.compiler.numba_internals.machine_code import entry
+from conveyor_sim.engine.rails.poses import fastest_point
 from conveyor_sim.engine.threads.workers import UNIT
 from conveyor_sim.physics.model.plant_arrays import rail_arrays
 from conveyor_sim.physics.plant import Plant
@@ -217,18 +217,18 @@ def _actuators(plant: Plant, slots: int, ledger: bool) -> Actuators | None:
     )
 
 
-def fastest_rail(moving: MovingBodies | None, reach: F8) -> float:
-    """Return the largest speed (m/s) of any point of the bodies and surfaces without bottles; 0 if none moves.
+class FastestRail:
+    """Largest speed of any point of the bodies and surfaces of one scene."""
 
-    reach: path of the fastest point of any body per change of each axis's position, (A,).
-    """
-    if moving is None:
-        return 0.0
-    surface = 0.0 if moving.surface_speed is None else float(np.abs(moving.surface_speed).max())
-    if not reach.size:
-        return surface
-    speed, actuators = np.abs(moving.course[:, :, 2]).max(axis=1), moving.actuators
-    if actuators is not None:
-        free = np.maximum(np.abs(moving.speed), actuators.max_speed)
-        speed = np.where(actuators.mode == OFF_PROFILE, np.maximum(speed, free), speed)
-    return max(surface, float((reach * speed).max()))
+    def __init__(self, plant: Plant) -> None:
+        self._reach = plant.reach_of_axes
+        self._find: Any = None
+
+    def speed(self, moving: MovingBodies | None) -> float:
+        """Return the largest speed (m/s) in this tick without bottles; 0 if nothing moves."""
+        if moving is None:
+            return 0.0
+        self._find = self._find or entry(fastest_point, moving, self._reach)
+        surface = 0.0 if moving.surface_speed is None else float(np.abs(moving.surface_speed).max())
+        fastest: float = self._find(moving, self._reach)
+        return max(surface, fastest)

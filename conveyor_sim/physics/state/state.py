@@ -60,6 +60,12 @@ class State:
         _, theta, loads = self.held[bottle]
         self.held[bottle] = kind, theta, loads
 
+    def change_type(self, slot: int, kind: int) -> None:
+        """Give the bottle in a slot another type of the same radius. Its motion, angle and loads stay."""
+        self.world.bottles.type[slot] = kind
+        self._equip(slice(slot, slot + 1))
+        self.world.neighbourhood.stale[0] = 1
+
     def give(self, bottle: int, x: float, y: float, vx: float, vy: float) -> None:
         """Return a held bottle to the line at (x, y) m, moving at m/s, with its id and loads.
 

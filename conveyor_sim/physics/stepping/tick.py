@@ -12,7 +12,7 @@ from conveyor_sim.engine.support.vibration import start_tick
 from conveyor_sim.engine.threads.thread_choice import ThreadChoice
 from conveyor_sim.engine.threads.thread_pool import ThreadPool
 from conveyor_sim.errors import SimulationError
-from conveyor_sim.physics.model.moving_rails import fastest_rail
+from conveyor_sim.physics.model.moving_rails import FastestRail
 from conveyor_sim.physics.state import State
 from conveyor_sim.physics.state.snapshot import restore, snapshot
 from conveyor_sim.physics.stepping.guard import chatter
@@ -37,6 +37,7 @@ class Integration:
         self._choice = ThreadChoice(cores) if threads is None else None
         self._shorter = SHORTER if shorten else ()
         self._guard = Guard(state, self.found)
+        self._rails = FastestRail(state.model.plant)
         self._memory = self._guard.memory
         self._chatter_ticks = self._ticks_between_checks()
         self._kernel_seconds = 0.0
@@ -90,9 +91,7 @@ class Integration:
         Raise SimulationError if the guard stops the run; the state is that at the beginning of the tick then.
         """
         seconds = tick * self._model.tick_ns * 1e-9
-        wrong = self._guard.begin(
-            tick, surface_speed, fastest_rail(self._state.world.moving, self._model.plant.reach_of_axes)
-        )
+        wrong = self._guard.begin(tick, surface_speed, self._rails.speed(self._state.world.moving))
         if wrong is not None:
             raise self._stopped(tick, wrong, wrong.sentence(seconds, 1))
         if self._state.world.vibration is not None:
