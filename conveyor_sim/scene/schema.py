@@ -238,8 +238,8 @@ class Scene(Part):
     )
     accuracy: Annotated[
         Accuracy,
-        OrText(get_args(Preset)),
-        Holds('"draft", "standard", "fine", or a mapping with the fields ' + ", ".join(Accuracy.model_fields)),
+        OrText((*get_args(Preset), "fast")),
+        Holds('"fast", "draft", "standard", "fine", or a mapping with the fields ' + ", ".join(Accuracy.model_fields)),
     ] = quantity(
         "Accuracy of the integration of a tick: a preset such as `fine`, or a mapping.",
         default=Accuracy.model_construct(),
