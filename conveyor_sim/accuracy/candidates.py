@@ -5,7 +5,7 @@ import math
 from typing import Any
 
 from conveyor_sim.accuracy.setting import Setting, scaled_contacts, with_setting
-from conveyor_sim.engine.integrators import INTEGRATORS
+from conveyor_sim.engine.integrators import INTEGRATORS, SWEPT
 from conveyor_sim.errors import SceneError
 from conveyor_sim.physics.model import build_model
 from conveyor_sim.physics.timestep.presets import PRESETS
@@ -26,6 +26,9 @@ ERRORS = {1e-3: 2.0, 1e-4: 1.0, 1e-5: 0.5, 1e-6: 0.25}
 """Settings of dormand_prince: error per step (m/s) and longest step. Peaks are sampled at steps, so a small error with
 long steps would miss them.
 """
+
+SWEEPS = ((4, 1), (8, 1), (8, 2), (16, 1), (16, 2))
+"""Settings of impulses: steps per tick, and sweeps in a step."""
 
 STIFFNESS = (1.0 / 4.0, 1.0 / 16.0, 1.0 / 64.0)
 
@@ -51,7 +54,7 @@ def own_setting(scene: Scene) -> Setting:
     """Return the setting of the scene itself."""
     model = build_model(scene)
     error = model.settings.error if model.integrator == "dormand_prince" else None
-    return Setting(model.integrator, model.steps_per_tick, error=error)
+    return Setting(model.integrator, model.steps_per_tick, error=error, sweeps=model.sweeps or None)
 
 
 def forbidden(scene: Scene, **fields: Any) -> dict[str, str]:
@@ -66,8 +69,11 @@ def forbidden(scene: Scene, **fields: Any) -> dict[str, str]:
 
 
 def compared(scene: Scene) -> list[str]:
-    """Return the integrators that can run the scene, without semi_implicit_euler where leapfrog gives the same bits."""
-    banned = forbidden(scene)
+    """Return the integrators of forces that can run the scene.
+
+    Without semi_implicit_euler where leapfrog gives the same bits.
+    """
+    banned = {*forbidden(scene), *SWEPT}
     same = not any(shape.kind == "curved" for shape in belt_shapes(scene))
     return [name for name in INTEGRATORS if name not in banned and not (same and name == "semi_implicit_euler")]
 
@@ -75,7 +81,8 @@ def compared(scene: Scene) -> list[str]:
 def candidates(scene: Scene) -> list[Setting]:
     """Return the settings to compare.
 
-    These are the scene's setting, the presets, every integrator at several steps around the standard, softer contacts.
+    These are the scene's setting, the presets, every integrator at several steps around the standard, impulses, and
+    softer contacts.
     """
     standard = standard_steps(scene)
     found = [own_setting(scene), *(preset_setting(scene, preset) for preset in PRESETS)]
@@ -84,6 +91,8 @@ def candidates(scene: Scene) -> list[Setting]:
             found += [Setting(integrator, _divided(standard, factor), error=error) for error, factor in ERRORS.items()]
         else:
             found += [Setting(integrator, _divided(standard, factor)) for factor in STEPS[integrator]]
+    swept = () if "impulses" in forbidden(scene) else SWEEPS
+    found += [Setting("impulses", steps, sweeps=sweeps) for steps, sweeps in swept]
     return list(dict.fromkeys([*found, *softer(scene)]))
 
 

@@ -52,6 +52,8 @@ class Setting:
     """Factor on every stiffness, at constant restitution."""
     error: float | None = None
     """m/s, largest error of a step, of a method that chooses its own; None for all others."""
+    sweeps: int | None = None
+    """Sweeps in a step, of the method of impulses; None for all others."""
 
     def dt(self, scene: Scene) -> float:
         """Time step, s."""
@@ -63,6 +65,7 @@ class Setting:
         parts = [self.integrator, str(self.per_tick)]
         parts += [f"k{self.stiffness:g}"] if self.stiffness != 1.0 else []
         parts += [f"e{self.error:g}"] if self.error is not None else []
+        parts += [f"w{self.sweeps}"] if self.sweeps is not None else []
         return " ".join(parts)
 
 
@@ -73,7 +76,7 @@ def with_setting(scene: Scene, setting: Setting, **fields: Any) -> Scene:
     """
     overrides: dict[str, Any] = dict(parse_overrides(scene.overrides_text))
     overrides = _merged(overrides, fields)
-    overrides["accuracy"] = explicit(setting.integrator, setting.per_tick, setting.error)
+    overrides["accuracy"] = explicit(setting.integrator, setting.per_tick, setting.error, setting.sweeps)
     if setting.stiffness != 1.0:
         overrides["contacts"] = scaled_contacts(scene, setting.stiffness)
     return parse_again(scene.source_text, scene.source_name, overrides)

@@ -12,12 +12,13 @@ from conveyor_sim.engine.compiler.groups import fewer
 from conveyor_sim.engine.contact.laws import DAMPING
 
 _INTEGRATORS = frozenset({"peaks", "stage", "slopes", "linear", "damage"})
+_IMPULSES = frozenset({"impulses", "pairs.impulse", "near_segments.impulse", "near_arcs.impulse"})
 _FORCES_OF_PAIRS = frozenset(f"pairs.{name}" for name in ("fx", "fy", "moment", "normal", "touch", "tangent", "parts"))
 NOT_FOR_LISTS = _INTEGRATORS | _FORCES_OF_PAIRS | {
     "spin", "load", "path", "implicit", "riding", "curves", "pair_law", "pairs.law", "rail_law", "static_friction",
     "vibration", "ledger", "moving.actuators", "moving.springs", "settings.atan", "settings.warm",
 }  # fmt: skip
-NOT_FOR_CONTACTS = _INTEGRATORS | _FORCES_OF_PAIRS | {
+NOT_FOR_CONTACTS = _INTEGRATORS | _IMPULSES | _FORCES_OF_PAIRS | {
     "load", "path", "implicit", "riding", "neighbourhood", "probe", "slots", "pairs.reach", "pairs.radius_i",
     "pair_law", "grid", "railed", "moving.actuators", "belts", "surface", "vibration", "footing", "ring",
     "static_friction", "ledger",

@@ -132,6 +132,9 @@ class ScanContext:
 class Device:
     """One device of a running line. Public attributes last from tick to tick (checkpoints)."""
 
+    takes_bottles = True
+    """False if `take` changes the line without taking bottles off."""
+
     blocked_ticks = 0
     """Number of ticks with a bottle to put onto the line and no room."""
 

@@ -14,6 +14,7 @@ from conveyor_sim.line.devices.drive import NamedDriveDevice
 from conveyor_sim.line.devices.geared_machine import ScrewDevice, StarDevice
 from conveyor_sim.line.devices.indicator import IndicatorDevice
 from conveyor_sim.line.devices.infeed import InfeedDevice
+from conveyor_sim.line.devices.lifting_gate import gate_device
 from conveyor_sim.line.devices.mover import Mover
 from conveyor_sim.line.devices.panel import (
     ButtonDevice,
@@ -46,11 +47,12 @@ DEVICES: Mapping[str, Callable[[str, Any, DeviceSetup], Device]] = {
     "drive": NamedDriveDevice,
     "axis": AxisDevice,
     "belt": belt_device,
-    "gate": Mover,
+    "gate": gate_device,
     "pusher": pusher_device,
     "diverter": Mover,
     "divider": PositionedDevice,
     "adjustable": PositionedDevice,
+    "clamp": Mover,
     "star": StarDevice,
     "carousel": CarouselDevice,
     "screw": ScrewDevice,

@@ -162,7 +162,10 @@ class Line:
         self._reading = [device.read for device in devices]
         # Only overridden methods are called.
         self._called = CalledDevices(devices, self._log.leave_out)
-        self._taking = [device for device in devices if type(device).take is not Device.take]
+        exits = state.model.has("outfeed")
+        self._taking = [
+            device for device in devices if type(device).take is not Device.take and (exits or not device.takes_bottles)
+        ]
         self._feeding = [device for device in devices if type(device).feed is not Device.feed]
         # Devices that count bottles, with the indices of the counting signals.
         self._counting = {
@@ -173,8 +176,8 @@ class Line:
             ]
             for adds_to in ("fed", "removed", "rejected")
         }
-        self.takes = bool(self._taking) and state.model.has("outfeed")
-        """True if any device takes bottles off the line."""
+        self.takes = bool(self._taking)
+        """True if any device takes bottles off the line, or changes what bottles touch."""
         self.feeds = bool(self._feeding) and state.model.has("infeed")
         """True if any device puts bottles onto the line."""
         self._outcomes: list[CommandOutcome] = []

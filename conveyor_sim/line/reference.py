@@ -49,6 +49,10 @@ adjustable:
   a:
     {from: [7, 0.1], to: [7.5, 0.1], direction: 90 deg, positions: [0, 10 mm], max_speed: 1, acceleration: 5,
      material: rail}
+clamps:
+  k:
+    {from: [6.2, 0.2], to: [6.4, 0.2], direction: 90 deg, opening: 0.1, stroke: 0.03, max_speed: 1, acceleration: 5,
+     material: rail}
 stars:
   st:
     {centre: [1, 5], turn: left, entry: -90 deg, pockets: 12, pitch_radius: 0.3, pocket_radius: 34 mm, axis: a,
@@ -86,7 +90,7 @@ PAGES: dict[str, dict[str, tuple[str, ...]]] = {
     "parts/belts": {"belts": ("belts", "drives")},
     "parts/infeeds": {"feeds": ("infeeds", "outfeeds"), "spills": ("spills",)},
     "parts/machines": {"machines": ("machines",)},
-    "parts/movers": {"movers": ("gates", "pushers", "diverters")},
+    "parts/movers": {"movers": ("gates", "pushers", "diverters", "clamps")},
     "parts/dividers": {"dividers": ("dividers", "adjustable")},
     "parts/carousels": {"carousels": ("carousels",)},
     "parts/stars": {"stars": ("stars",)},

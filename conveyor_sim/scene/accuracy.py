@@ -11,10 +11,18 @@ from conveyor_sim.scene.part import Part
 from conveyor_sim.scene.types import Positive, Says, Tolerance, quantity
 
 Preset = Literal["draft", "standard", "fine"]
+PresetName = Literal["draft", "standard", "fine", "fast"]
 IntegratorName = Literal[
-    "leapfrog", "semi_implicit_euler", "velocity_verlet", "rk4", "dormand_prince", "linearly_implicit"
+    "leapfrog", "semi_implicit_euler", "velocity_verlet", "rk4", "dormand_prince", "linearly_implicit", "impulses"
 ]
-INTEGRATOR_NAMES: tuple[IntegratorName, ...] = get_args(IntegratorName)
+INTEGRATOR_NAMES: tuple[IntegratorName, ...] = get_args(IntegratorName)[:-1]
+"""Integrators of forces, whose errors follow from the time step. The method of impulses is none."""
+
+FAST: Mapping[str, Any] = {"integrator": "impulses", "per_tick": 8, "sweeps": 2}
+"""Fields of the preset `fast`."""
+
+MOST_SWEEPS = 100
+"""Largest number of sweeps in a substep."""
 
 MOST_STEPS = 1_000_000
 """Largest number of steps in a tick. With 100 bottles (3 us per step) such a tick takes 3 s, a simulated second 5 min.
@@ -27,6 +35,8 @@ MANY_STEPS = 20_000
 
 StepCount = Annotated[int, Strict(), Ge(1), Le(MOST_STEPS), Says(f"a whole number from 1 to {MOST_STEPS}")]
 
+SweepCount = Annotated[int, Strict(), Ge(1), Le(MOST_SWEEPS), Says(f"a whole number from 1 to {MOST_SWEEPS}")]
+
 CHOICES = ("preset", "tolerance", "dt", "per_tick")
 """Fields that choose the time step. At most one may be given."""
 
@@ -34,15 +44,19 @@ CHOICES = ("preset", "tolerance", "dt", "per_tick")
 class Accuracy(Part):
     """Accuracy of the integration of a tick. A word alone is a preset: `accuracy: fine` is `accuracy: {preset: fine}`.
 
-    At most one of `preset`, `tolerance`, `dt` and `per_tick`; without one it is the preset `standard`.
+    At most one of `preset`, `tolerance`, `dt` and `per_tick`; without one it is the preset `standard`. `fast` alone is
+    `{integrator: impulses, per_tick: 8, sweeps: 2}`.
     """
 
-    preset: Preset | None = quantity("A row of the table of presets in docs/accuracy.md.", default=None)
+    preset: PresetName | None = quantity(
+        "A row of the table of presets in docs/accuracy.md; or fast, for flow and counts.", default=None
+    )
     tolerance: Tolerance | None = quantity(
         "Largest relative error in contact force; the time step is derived from it.", "1", default=None
     )
     integrator: IntegratorName = quantity(
-        "Integration method; semi_implicit_euler is the paper's, (5)-(6). docs/accuracy.md helps to choose.",
+        "Integration method; semi_implicit_euler is the paper's, (5)-(6). docs/accuracy.md helps to choose. impulses: "
+        "implicit contacts in few steps per tick, for flow and counts; single forces in a crowd are inaccurate.",
         default="leapfrog",
     )
     dt: Positive | None = quantity(
@@ -54,14 +68,27 @@ class Accuracy(Part):
         "m/s",
         default=None,
     )
+    sweeps: SweepCount | None = quantity(
+        "Sweeps over all contacts in a step, for impulses only. Left out: 2.", "1", default=None
+    )
 
     @model_validator(mode="before")
     @classmethod
     def _from_word(cls, data: Any) -> Any:
-        return {"preset": data} if isinstance(data, str) else data
+        data = {"preset": data} if isinstance(data, str) else data
+        if not isinstance(data, Mapping):
+            return data
+        given = {name: value for name, value in data.items() if value is not None}
+        if given == {"preset": "fast"}:
+            return dict(FAST)
+        if given.get("integrator") == "impulses" and "sweeps" not in given:
+            return {**data, "sweeps": FAST["sweeps"]}
+        return data
 
 
-def explicit(integrator: str, per_tick: int, error: float | None = None) -> Mapping[str, Any]:
+def explicit(
+    integrator: str, per_tick: int, error: float | None = None, sweeps: int | None = None
+) -> Mapping[str, Any]:
     """Return `accuracy` as an override that replaces all fields of the scene."""
     return {
         "preset": None,
@@ -70,4 +97,5 @@ def explicit(integrator: str, per_tick: int, error: float | None = None) -> Mapp
         "dt": None,
         "per_tick": per_tick,
         "error": error,
+        "sweeps": sweeps,
     }

@@ -138,7 +138,8 @@ def _valid_rails(scene: Scene, wrong: set[Path]) -> list[RailShape]:
 def _valid_moving(scene: Scene) -> list[RailShape]:
     """Return the moving rails with a valid geometry, at their initial positions."""
     moving = [mover_shape(path, mover) for path, mover in movers_of(scene) if not any(mover.shape_problems(path))]
-    return [body.shape(axis.first) for body, axis in moving]
+    shapes = (body.shape(axis.first) for bodies, axis in moving for body in bodies)
+    return [shape for shape in shapes if shape.pieces]
 
 
 @dataclass(frozen=True)

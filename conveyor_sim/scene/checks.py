@@ -8,6 +8,7 @@ from itertools import chain, combinations_with_replacement, islice
 from conveyor_sim.scene.accuracy import CHOICES
 from conveyor_sim.scene.belts import CurvedBelt, CurvedSurface, PathBelt
 from conveyor_sim.scene.check_contacts import contact_problems
+from conveyor_sim.scene.check_impulses import impulse_problems
 from conveyor_sim.scene.check_shapes import shape_problems
 from conveyor_sim.scene.check_wheels import wheel_problems
 from conveyor_sim.scene.moving import movers_of
@@ -67,6 +68,7 @@ def problems_of(scene: Scene) -> list[Problem]:
     checks = (
         _times,
         accuracy_problems,
+        impulse_problems,
         contact_problems,
         _repeated,
         _missing_contacts,

@@ -5,16 +5,27 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from conveyor_sim.scene.bodies import AxisShape, BodyShape, moved_piece
+from conveyor_sim.scene.bodies import AxisShape, BodyShape, Cam, moved_piece
 from conveyor_sim.scene.cam_table import cam_through
 from conveyor_sim.scene.gearing import first_position, top_speed
-from conveyor_sim.scene.geometry import RailShape, SegmentPiece
-from conveyor_sim.scene.parts.movers import Diverter, Mover, Positioned, Pusher, SwingingDivider, SwingingGate
+from conveyor_sim.scene.geometry import Piece, RailShape, SegmentPiece
+from conveyor_sim.scene.parts.movers import (
+    Clamp,
+    Diverter,
+    LiftingGate,
+    Mover,
+    Positioned,
+    SlidingDivider,
+    SlidingGate,
+    SwingingDivider,
+    SwingingGate,
+)
 from conveyor_sim.scene.problems import Path
 from conveyor_sim.scene.schema import Scene
+from conveyor_sim.scene.types import XY
 from conveyor_sim.scene.wheel_bodies import wheel_bodies
 
-MOVER_FIELDS = ("gates", "pushers", "diverters", "dividers", "adjustable")
+MOVER_FIELDS = ("gates", "pushers", "diverters", "dividers", "adjustable", "clamps")
 """Fields of a scene with movers, in the order of their rails' numbers."""
 
 
@@ -25,53 +36,69 @@ def movers_of(scene: Scene) -> Iterator[tuple[Path, Mover]]:
             yield (field, name), mover
 
 
-def mover_shape(path: Path, mover: Mover) -> tuple[BodyShape, AxisShape]:
-    """Return the straight rail of a mover, and the axis that moves only this rail."""
-    if isinstance(mover, Positioned):
-        return _positioned_body(path, mover)
-    if isinstance(mover, (SwingingGate, Diverter)):
-        along, turning, stroke = (0.0, 0.0), math.copysign(1.0, mover.angle), abs(mover.angle)
-    else:
-        along, turning, stroke = (math.cos(mover.direction), math.sin(mover.direction)), 0.0, mover.stroke
-    starts_open = not isinstance(mover, (Pusher, Diverter)) and mover.open
+def mover_shape(path: Path, mover: Mover) -> tuple[tuple[BodyShape, ...], AxisShape]:
+    """Return the bodies of a mover, which are one machine, and the axis that moves only these bodies.
+
+    A mover with several positions is at home at the least of them. A lifting gate is absent above half of its stroke.
+    """
     name = "/".join(str(part) for part in path)
-    piece = SegmentPiece(mover.from_, mover.to)
-    body = BodyShape(name, mover.material, (piece,), axis=name, pivot=mover.from_, along=along, turning=turning)
+    along, turning, least, stroke, first = _motion(mover)
+    shift = along[0] * least, along[1] * least
+    pieces: tuple[Piece, ...] = _pieces(mover)
+    if least:  # without rounding where there is nothing to move
+        pieces = tuple(moved_piece(piece, mover.from_, shift, turning * least) for piece in pieces)
+    pivot = mover.from_[0] + shift[0], mover.from_[1] + shift[1]
+    body = BodyShape(name, mover.material, pieces, axis=name, pivot=pivot, along=along, turning=turning)
+    if isinstance(mover, LiftingGate):
+        body = replace(body, cam=Cam(((0.0, 0.0, 0.0, 0.0),), 0.5 * stroke))
+    bodies: tuple[BodyShape, ...] = (body,)
+    if isinstance(mover, Clamp):
+        away = along[0] * mover.opening, along[1] * mover.opening
+        opposite = tuple(moved_piece(piece, mover.from_, away, 0.0) for piece in pieces)
+        bodies = (body, replace(body, pieces=opposite, along=(-along[0], -along[1])))
     axis = AxisShape(
         name=name,
         kind="position",
         stroke=stroke,
         max_speed=mover.max_speed,
         acceleration=mover.acceleration,
-        first=stroke if starts_open else 0.0,
-        limit=mover.drive_limit,
+        first=first,
+        limit=None if isinstance(mover, LiftingGate) else mover.drive_limit,  # no bottle acts on a lift
         inertia=mover.drive_mass,
     )
-    return body, axis
+    return bodies, axis
 
 
-def _positioned_body(path: Path, mover: Positioned) -> tuple[BodyShape, AxisShape]:
-    """Return the rail of a mover with several positions, and its axis. It is at home at the least position."""
-    least, greatest = min(mover.positions), max(mover.positions)
-    if isinstance(mover, SwingingDivider):
-        along, turning = (0.0, 0.0), 1.0
-    else:
-        along, turning = (math.cos(mover.direction), math.sin(mover.direction)), 0.0
-    name = "/".join(str(part) for part in path)
-    shift = along[0] * least, along[1] * least
-    piece = moved_piece(SegmentPiece(mover.from_, mover.to), mover.from_, shift, turning * least)
-    body = BodyShape(name, mover.material, (piece,), axis=name, pivot=piece.ends[0], along=along, turning=turning)
-    axis = AxisShape(
-        name=name,
-        kind="position",
-        stroke=greatest - least,
-        max_speed=mover.max_speed,
-        acceleration=mover.acceleration,
-        first=mover.positions[min(mover.index, len(mover.positions) - 1)] - least,
-        limit=mover.drive_limit,
-        inertia=mover.drive_mass,
+def _motion(mover: Mover) -> tuple[XY, float, float, float, float]:
+    """Return direction, turning, displacement at home, stroke and initial position."""
+    if isinstance(mover, Positioned):
+        least = min(mover.positions)
+        first = mover.positions[min(mover.index, len(mover.positions) - 1)] - least
+        stroke = max(mover.positions) - least
+        if isinstance(mover, SwingingDivider):
+            return (0.0, 0.0), 1.0, least, stroke, first
+        return (math.cos(mover.direction), math.sin(mover.direction)), 0.0, least, stroke, first
+    opens = isinstance(mover, (SlidingGate, SwingingGate, LiftingGate)) and mover.open
+    if isinstance(mover, (SwingingGate, Diverter)):
+        stroke = abs(mover.angle)
+        return (0.0, 0.0), math.copysign(1.0, mover.angle), 0.0, stroke, stroke if opens else 0.0
+    stroke = mover.stroke
+    along = (0.0, 0.0) if isinstance(mover, LiftingGate) else (math.cos(mover.direction), math.sin(mover.direction))
+    return along, 0.0, 0.0, stroke, stroke if opens else 0.0
+
+
+def _pieces(mover: Mover) -> tuple[SegmentPiece, ...]:
+    """Return the rail of a mover as its fields place it, or both rails of a divider with a clearance."""
+    piece = SegmentPiece(mover.from_, mover.to)
+    if not isinstance(mover, (SwingingDivider, SlidingDivider)) or mover.clearance is None:
+        return (piece,)
+    half = 0.5 * mover.clearance / piece.length
+    left = -half * (mover.to[1] - mover.from_[1]), half * (mover.to[0] - mover.from_[0])
+    right = -left[0], -left[1]
+    return tuple(
+        SegmentPiece((mover.from_[0] + x, mover.from_[1] + y), (mover.to[0] + x, mover.to[1] + y))
+        for x, y in (right, left)
     )
-    return body, axis
 
 
 def bodies_of(scene: Scene) -> list[BodyShape]:
@@ -79,7 +106,7 @@ def bodies_of(scene: Scene) -> list[BodyShape]:
 
     Those of gates, pushers and diverters come first, then those of star wheels, screws and side belts.
     """
-    movers = [mover_shape(path, mover)[0] for path, mover in movers_of(scene)]
+    movers = [body for path, mover in movers_of(scene) for body in mover_shape(path, mover)[0]]
     return [_on_cam(scene, body) for body in (*movers, *wheel_bodies(scene))]
 
 

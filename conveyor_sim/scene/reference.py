@@ -33,7 +33,7 @@ PAGES: dict[str, tuple[str, ...]] = {
     "machines": ("`machines`", "`acting_times`"),
     "materials": ("`contacts`", "of a contact", "`base`", "`floor`", "`bottle_types`"),
     "dividers": ("`dividers`", "`adjustable`"),
-    "movers": ("`gates`", "`pushers`", "`diverters`"),
+    "movers": ("`gates`", "`pushers`", "`diverters`", "`clamps`"),
     "panel": ("`panel`",),
     "photo_eyes": ("`photo_eyes`",),
     "rails": ("`rails`",),

@@ -27,7 +27,7 @@ from conveyor_sim.scene.parts.device_part import DevicePart, Entry, Exit, Giver
 from conveyor_sim.scene.parts.indicator import Indicator
 from conveyor_sim.scene.parts.infeed import Infeed
 from conveyor_sim.scene.parts.inspection import Inspection
-from conveyor_sim.scene.parts.movers import AdjustableGuide, Diverter, Divider, Gate, Pusher
+from conveyor_sim.scene.parts.movers import AdjustableGuide, Clamp, Diverter, Divider, Gate, Pusher
 from conveyor_sim.scene.parts.outfeed import Outfeed
 from conveyor_sim.scene.parts.panel import Button, EmergencyStop, Horn, Lamp, NumberField, Selector, StackLight
 from conveyor_sim.scene.parts.photo_eye import PhotoEye
@@ -238,8 +238,8 @@ class Scene(Part):
     )
     accuracy: Annotated[
         Accuracy,
-        OrText(get_args(Preset)),
-        Holds('"draft", "standard", "fine", or a mapping with the fields ' + ", ".join(Accuracy.model_fields)),
+        OrText((*get_args(Preset), "fast")),
+        Holds('"fast", "draft", "standard", "fine", or a mapping with the fields ' + ", ".join(Accuracy.model_fields)),
     ] = quantity(
         "Accuracy of the integration of a tick: a preset such as `fine`, or a mapping.",
         default=Accuracy.model_construct(),
@@ -302,6 +302,9 @@ class Scene(Part):
     )
     adjustable: Annotated[dict[Name, AdjustableGuide], _named("adjustable guides")] = quantity(
         "Guides that a drive sets to one of several positions, such as those of formats.", default={}
+    )
+    clamps: Annotated[dict[Name, Clamp], _named("clamps")] = quantity(
+        "Pairs of jaws that close on bottles on command.", default={}
     )
     stars: Annotated[dict[Name, Star], _named("star wheels")] = quantity(
         "Wheels that carry bottles in pockets.", default={}

@@ -40,6 +40,8 @@ MOMENTS = {
     "zones": 14.0,
 }
 """Simulated times of pages whose scenes show more at another time, s."""
+COMMANDS = {"stoppers": {5.0: "clamps/grip/close"}}
+"""Commands that are switched on at simulated times, s, by page."""
 WIDTH = 960
 """Width of a picture, px."""
 
@@ -55,7 +57,11 @@ def scene_text(page: Path) -> str:
 def draw(page: Path) -> Path:
     """Simulate the scene of a page and draw it. Return the picture."""
     simulation = Simulation(parse_scene(scene_text(page)), threads=1)
-    simulation.advance(round(MOMENTS.get(page.stem, MOMENT) / simulation.scene.tick))
+    ticks = round(MOMENTS.get(page.stem, MOMENT) / simulation.scene.tick)
+    for time, command in COMMANDS.get(page.stem, {}).items():
+        simulation.advance(round(time / simulation.scene.tick) - simulation.tick)
+        simulation.command([command], [1.0])
+    simulation.advance(ticks - simulation.tick)
     return draw_state(simulation, IMAGES / f"{page.stem}.webp")
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scenes import COMMON, SPRINGS_AND_RINGS, base, belt, contact, kind, polyline, scene, with_bends
+from swept import QUEUE
 
 from conveyor_sim.engine.threads.thread_pool import ThreadPool
 from conveyor_sim.engine.threads.workers import BLOCK
@@ -53,6 +54,7 @@ VARIANTS: dict[str, dict[str, Any]] = {
         "accuracy": {"per_tick": 50, "integrator": "velocity_verlet"},
     },
     "springs and rings": SPRINGS_AND_RINGS,
+    "impulses": QUEUE,
 }
 
 

@@ -7,7 +7,7 @@ import math
 
 from fuzz.violation import Violation
 
-from conveyor_sim.line.commands.inputs import CommandOutcome
+from conveyor_sim.line.commands.inputs import INJECT, SET, CommandOutcome
 from conveyor_sim.scene.gearing import travel_per_radian
 from conveyor_sim.scene.parts.axis import CYCLE, Axis
 from conveyor_sim.simulation import Simulation
@@ -27,7 +27,7 @@ class AxisWatch:
     def check(self, before: dict[str, float], now: dict[str, float], outcomes: list[CommandOutcome]) -> None:
         """Check the axes between two ticks. outcomes: of the inputs of the second one."""
         for outcome in outcomes:
-            if outcome.accepted:
+            if outcome.accepted and outcome.operation in (SET, INJECT):
                 self._last |= dict(zip(outcome.names, outcome.values, strict=True))
         for name, axis in self._scene.axes.items():
             place = f"axes/{name}"

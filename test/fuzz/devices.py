@@ -101,21 +101,25 @@ POSITIONED = {"dividers": "lane", "adjustable": "setting"}
 
 
 @st.composite
-def movers(draw: st.DrawFn, frame: Frame, material: str) -> Data:
-    """Gates, pushers, diverters, dividers and adjustable guides; at least one."""
-    found: dict[str, dict[str, Data]] = {field: {} for field in ("gates", "pushers", "diverters", *POSITIONED)}
+def movers(draw: st.DrawFn, frame: Frame, material: str, lifts: bool) -> Data:
+    """Gates, pushers, diverters, dividers, adjustable guides and clamps; at least one."""
+    fields = ("gates", "pushers", "diverters", *POSITIONED, "clamps")
+    found: dict[str, dict[str, Data]] = {field: {} for field in fields}
     for n in range(draw(st.integers(1, 3))):
-        field = draw(st.sampled_from(sorted(found)))
+        is_lift = lifts and n == 0
+        field = "gates" if is_lift else draw(st.sampled_from(sorted(found)))
         start, angle = draw(frame.points), draw(between(-math.pi, math.pi))
         length = frame.unit * draw(st.integers(1, 6))
         end = [start[0] + length * math.cos(angle), start[1] + length * math.sin(angle)]
         speed = frame.speed * draw(between(0.1, 0.7))
-        swings = field == "diverters" or (field in ("gates", "dividers") and draw(st.booleans()))
+        swings = field == "diverters" or (not is_lift and field in ("gates", "dividers") and draw(st.booleans()))
         rail: Data = {"from": start, "to": end, "material": material}
         if field == "gates":
-            rail |= {"kind": "swing" if swings else "slide", "open": draw(st.booleans())}
+            kind = "swing" if swings else "lift" if is_lift else "slide"
+            rail |= {"kind": kind, "open": draw(st.booleans())}
         if field == "dividers":
             rail |= {"kind": "swing" if swings else "slide"}
+            rail |= draw(st.sampled_from([{}, {"clearance": 3.0 * frame.unit}]))
         if field in POSITIONED:
             count, unit = draw(st.integers(2, 4)), 0.3 if swings else frame.unit
             steps = [draw(st.integers(-4, 4)) for _ in range(count - 1)]
@@ -128,7 +132,9 @@ def movers(draw: st.DrawFn, frame: Frame, material: str) -> Data:
         else:
             rail |= {"stroke": frame.unit * draw(between(0.3, 5.0))}
         rail["max_speed"] = speed / length if swings else speed
-        if not swings:
+        if field == "clamps":
+            rail["opening"] = 2.0 * rail["stroke"] + frame.unit * draw(between(0.1, 3.0))
+        if not swings and rail.get("kind") != "lift":
             rail["direction"] = draw(between(-math.pi, math.pi))
         rail["acceleration"] = rail["max_speed"] / (frame.tick * draw(st.sampled_from([0.5, 4.0, 30.0])))
         rail |= draw(_drives(frame, swings, length, rail["acceleration"]))
@@ -225,6 +231,32 @@ def _habits(draw: st.DrawFn, tick: float) -> Data:
     found |= draw(st.sampled_from([{}, {"acting_times": {"holding": 2.0 * tick, "starting": tick}}]))
     found |= draw(st.sampled_from([{}, {"planned_stops": {"rest": {"start": tick, "duration": draw(times)}}}]))
     return found
+
+
+@st.composite
+def panel(draw: st.DrawFn, frame: Frame) -> Data:
+    """Push-buttons, selector switches, emergency stops, lamps, horns, stack lights and numeric fields; at least one."""
+    deceleration = frame.speed / (frame.tick * draw(st.sampled_from([0.5, 3.0, 17.0])))
+    cuts = st.sampled_from([[], ["drives"], ["machines"], ["drives", "machines"]])
+    found: dict[str, Data] = {}
+    for n in range(draw(st.integers(1, 5))):
+        kinds = ["emergency_stop", "button", "emergency_stop", "selector", "lamp", "horn", "stack_light", "numeric"]
+        part: Data = {"kind": draw(st.sampled_from(kinds))}
+        if part["kind"] == "button":
+            part |= {"contact": draw(st.sampled_from(["NO", "NC"]))}
+            part |= {"action": draw(st.sampled_from(["momentary", "maintained"]))}
+            part |= {"bounce": frame.tick * draw(st.sampled_from([0.0, 0.4, 5.0]))}
+        elif part["kind"] == "selector":
+            part |= {"positions": ["off", "hand", "auto"][: draw(st.integers(2, 3))]}
+            part |= draw(st.sampled_from([{}, {"initial": "hand"}]))
+        elif part["kind"] == "emergency_stop":
+            part |= {"cuts": draw(cuts)}
+            part |= {"deceleration": deceleration} if "drives" in part["cuts"] else {}
+        elif part["kind"] == "numeric":
+            part |= {"limits": [draw(between(-2.0, 0.0)), draw(between(0.1, 3.0))]}
+            part |= {"written_by": draw(st.sampled_from(["operator", "controller", "both"]))}
+        found[f"part_{n}"] = part
+    return {"panel": found}
 
 
 @st.composite

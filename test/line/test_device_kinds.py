@@ -12,7 +12,19 @@ from conveyor_sim.scene.marks import marks_of
 from conveyor_sim.scene.parts.device_part import DevicePart, Entry, Exit
 from conveyor_sim.support.resources import scene_path
 
-BY_SHAPE = {"belt", "gate", "pusher", "diverter", "divider", "adjustable", "star", "screw", "side_belt", "carousel"}
+BY_SHAPE = {
+    "belt",
+    "gate",
+    "pusher",
+    "diverter",
+    "divider",
+    "adjustable",
+    "clamp",
+    "star",
+    "screw",
+    "side_belt",
+    "carousel",
+}
 """Kinds that are drawn as belts and rails, or along them."""
 ON_PANEL = {"button", "selector", "emergency_stop", "lamp", "horn", "stack_light", "numeric"}
 PLACELESS = {"axis", "drive", "indicator", *ON_PANEL}

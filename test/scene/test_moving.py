@@ -14,7 +14,8 @@ SWING = {"material": "steel", "max_speed": 1.0, "acceleration": 5.0}
 
 
 def shapes(**fields: object) -> list[tuple[BodyShape, AxisShape]]:
-    return [mover_shape(*mover) for mover in movers_of(scene(contacts=[contact(1e3, "steel")], **fields))]
+    built = scene(contacts=[contact(1e3, "steel")], **fields)
+    return [(body, axis) for bodies, axis in (mover_shape(*mover) for mover in movers_of(built)) for body in bodies]
 
 
 def test_a_sliding_rail_is_shifted_along_its_direction() -> None:

@@ -30,6 +30,7 @@ _LOOKS: Final = {
     "rk4": Look("RK4", style.SERIES[2], "^", (0.0, (3.0, 1.2))),
     "dormand_prince": Look("Dormand-Prince", style.SERIES[3], "D", (0.0, (1.0, 1.2))),
     "linearly_implicit": Look("linearly implicit", style.SERIES[5], "v", (0.0, (5.0, 1.5, 1.0, 1.5))),
+    "impulses": Look("impulses", style.MUTED, "P", "-"),
 }
 
 
@@ -52,6 +53,7 @@ def setting_text(setting: Setting, tick: float) -> str:
     """`velocity Verlet, 40 µs, stiffness x 0.25`; tick in s."""
     parts = [look_of(setting.integrator).name, step_text(tick / setting.per_tick)]
     parts += [f"{digits(setting.error)} m/s a step"] if setting.error is not None else []
+    parts += [f"{setting.sweeps} sweeps"] if setting.sweeps is not None else []
     parts += [f"stiffness x {digits(setting.stiffness)}"] if setting.stiffness != 1.0 else []
     return ", ".join(parts)
 

@@ -125,7 +125,7 @@ def _points(ax: Axes, placed: Sequence[Point]) -> list[Floats]:
         look = look_of(integrator)
         for soft in (False, True):
             own = [p for p in placed if p.setting.integrator == integrator and (p.setting.stiffness != 1.0) == soft]
-            own.sort(key=lambda point: (point.dt, point.setting.error or 0.0))
+            own.sort(key=lambda point: (point.dt, point.setting.error or 0.0, point.setting.sweeps or 0))
             if not own:
                 continue
             gid = f"{integrator} softened" if soft else integrator

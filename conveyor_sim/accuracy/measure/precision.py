@@ -155,7 +155,7 @@ class ChatterProbe:
         # A tick is a whole number of nanoseconds.
         step = max(1, round(scene.tick_ns / setting.per_tick)) * 1e-9
         supply = {name: "off" for name, there in (("infeed", scene.givers()), ("outfeed", scene.exits())) if any(there)}
-        single = Setting(setting.integrator, 1, setting.stiffness, setting.error)
+        single = replace(setting, per_tick=1)
         self._simulation = variant(scene, single, tick=round(step, 9), duration=round(step, 9), effects=supply)
 
     def look(self, state: Simulation) -> str:

@@ -29,7 +29,7 @@ MOST = 512 * MB
 ORIGIN = "origin.json"
 """File with the origin of a folder's results: hashes that a study must share to continue with them."""
 
-_OF_SETTING = ("integrator", "per_tick", "stiffness", "error")
+_OF_SETTING = ("integrator", "per_tick", "stiffness", "error", "sweeps")
 _COLUMNS = (*_OF_SETTING, "seed", *(observable.name for observable in OBSERVABLES), "cpu", "failure", "checksum")
 """The checksum of a line covers its other columns, the scene and the version."""
 OTHER_STUDY = "study.json"
@@ -63,7 +63,7 @@ class SampleFile:
         error = "" if way.error is None else repr(way.error)
         values = [repr(sample.values[item.name]) if item.name in sample.values else "" for item in OBSERVABLES]
         line = _line(
-            (way.integrator, way.per_tick, repr(way.stiffness), error, sample.seed, *values,
+            (way.integrator, way.per_tick, repr(way.stiffness), error, way.sweeps or "", sample.seed, *values,
              repr(sample.cpu), sample.failure)
         )  # fmt: skip
         self._write(line[:-1] + f",{_checksum(line, self._of)}\n")
@@ -182,6 +182,7 @@ def _sample(row: dict[str, str]) -> Sample:
             int(row["per_tick"]),
             float(row["stiffness"]),
             float(row["error"]) if row["error"] else None,
+            int(row["sweeps"]) if row["sweeps"] else None,
         ),
         seed=int(row["seed"]),
         values={item.name: float(row[item.name]) for item in OBSERVABLES if row[item.name]},

@@ -121,7 +121,8 @@ def _sentence(chosen: Point, exacter: Point | None) -> str:
 def _named(point: Point) -> str:
     setting = point.setting
     error = "" if setting.error is None else f", {digits(setting.error)} m/s a step"
-    return f"Δt = {duration(point.dt)}, {setting.integrator}{error}"
+    sweeps = "" if setting.sweeps is None else f", {setting.sweeps} sweeps"
+    return f"Δt = {duration(point.dt)}, {setting.integrator}{error}{sweeps}"
 
 
 def _doubts(

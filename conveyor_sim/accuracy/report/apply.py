@@ -61,7 +61,8 @@ def _copy_underlay(scene: Scene, folder: Path) -> None:
 def line(setting: Setting) -> str:
     """Return a setting as it is written in a scene file."""
     error = "" if setting.error is None else f", error: {setting.error!r}"
-    return f"accuracy: {{integrator: {setting.integrator}, per_tick: {setting.per_tick}{error}}}"
+    sweeps = "" if setting.sweeps is None else f", sweeps: {setting.sweeps}"
+    return f"accuracy: {{integrator: {setting.integrator}, per_tick: {setting.per_tick}{error}{sweeps}}}"
 
 
 def _put(lines: list[str], data: Any, line: str) -> None:

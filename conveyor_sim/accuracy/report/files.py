@@ -242,6 +242,7 @@ def _setting(setting: Setting) -> dict[str, object]:
         "per_tick": setting.per_tick,
         "stiffness": setting.stiffness,
         "error_of_a_step_m_per_s": setting.error,
+        "sweeps": setting.sweeps,
     }
 
 

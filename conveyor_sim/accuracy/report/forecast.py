@@ -94,7 +94,7 @@ def predicted_error(point: Point) -> float:
 
 def seconds(scene: Scene, setting: Setting, bottles: int) -> float:
     """Return the estimated time of one processor per simulated second, s."""
-    work = setting.per_tick * step_cost(setting.integrator, scene.friction_solver)
+    work = setting.per_tick * step_cost(setting.integrator, scene.friction_solver, setting.sweeps)
     return tick_seconds(work, bottles) / scene.tick
 
 
@@ -104,7 +104,7 @@ def _cheapest(points: Iterable[Point], tolerance: float) -> Point | None:
 
 
 def _work(point: Point) -> int:
-    return point.setting.per_tick * STEP_COST[point.setting.integrator]
+    return point.setting.per_tick * STEP_COST[point.setting.integrator] * (point.setting.sweeps or 1)
 
 
 def _unmeasured(scene: Scene, setting: Setting) -> Point:

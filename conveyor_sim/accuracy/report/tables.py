@@ -382,7 +382,8 @@ def _answer(study: AccuracyStudy) -> Block:
 
 
 def _integrator(setting: Setting) -> str:
-    return setting.integrator + ("" if setting.error is None else f" {digits(setting.error)} m/s")
+    sweeps = "" if setting.sweeps is None else f" x {setting.sweeps}"
+    return setting.integrator + sweeps + ("" if setting.error is None else f" {digits(setting.error)} m/s")
 
 
 def _grouped(rows: Iterable[Row], caption: Callable[[Row], str]) -> dict[str, list[Row]]:

@@ -52,6 +52,7 @@ def setting_name(setting: Setting, tick: float) -> str:
     """`velocity_verlet, 40 us, stiffness x 0.1`: as a scene spells them; tick in s."""
     parts = [setting.integrator, duration(tick / setting.per_tick)]
     parts += [f"{digits(setting.error)} m/s a step"] if setting.error is not None else []
+    parts += [f"{setting.sweeps} sweeps"] if setting.sweeps is not None else []
     parts += [f"stiffness x {digits(setting.stiffness)}"] if setting.stiffness != 1.0 else []
     return ", ".join(parts)
 

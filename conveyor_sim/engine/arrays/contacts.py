@@ -4,6 +4,7 @@
 from collections import namedtuple
 from typing import Any, NamedTuple
 
+from conveyor_sim.engine.arrays.impulses import PairImpulses
 from conveyor_sim.engine.arrays.integrators import PairTangent, Triple
 from conveyor_sim.engine.arrays.types import F8, I8, U4
 from conveyor_sim.engine.compiler.groups import group
@@ -90,6 +91,7 @@ class Pairs(NamedTuple):
     """1 for a closed contact, laid out like `fx`; for the implicit solver."""
     spring: PairSprings | None
     tangent: PairTangent | None
+    impulse: PairImpulses | None
     parts: PairParts | None
 
 

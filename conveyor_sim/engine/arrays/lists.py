@@ -3,6 +3,7 @@
 
 from typing import NamedTuple
 
+from conveyor_sim.engine.arrays.impulses import NearImpulses
 from conveyor_sim.engine.arrays.types import F8, I8, U4
 from conveyor_sim.engine.compiler.groups import group
 
@@ -35,6 +36,7 @@ class Near(NamedTuple):
     start: U4
     piece: U4
     springs: NearSprings | None
+    impulse: NearImpulses | None
 
 
 @group

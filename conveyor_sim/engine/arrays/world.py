@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 from conveyor_sim.engine.arrays.bodies import Bottles, ForceSums, Peaks, Spin
 from conveyor_sim.engine.arrays.contacts import ContactLaw, Curves, Gathered, Implicit, Pairs, Slots
 from conveyor_sim.engine.arrays.damage import ContactLoads, DamageArrays
+from conveyor_sim.engine.arrays.impulses import Impulses
 from conveyor_sim.engine.arrays.integrators import Linear, Slopes, Stage, Triple
 from conveyor_sim.engine.arrays.lists import BottleList, Near, Neighbourhood, StaticGrid
 from conveyor_sim.engine.arrays.moving import MovingBodies
@@ -13,7 +14,7 @@ from conveyor_sim.engine.arrays.observers import GuardProbe, LedgerArrays
 from conveyor_sim.engine.arrays.rails import Arcs, RailContacts, Segments
 from conveyor_sim.engine.arrays.riding import Riding
 from conveyor_sim.engine.arrays.support import Belts, Footing, Ring, StaticFriction, Surface, Vibration
-from conveyor_sim.engine.arrays.types import I8
+from conveyor_sim.engine.arrays.types import F8, I8
 from conveyor_sim.engine.compiler.groups import group
 
 
@@ -60,6 +61,7 @@ class World(NamedTuple):
     """Displacement of each bottle since springs were last updated, m, m, rad; None: springs follow the slip."""
     slopes: Slopes | None
     linear: Linear | None
+    impulses: Impulses | None
     implicit: Implicit | None
     riding: Riding | None
     neighbourhood: Neighbourhood
@@ -99,5 +101,7 @@ class Worker(NamedTuple):
     gathered: Gathered
     rail_contacts: RailContacts
     history: ContactLoads
+    chunk: F8
+    """Columns of a chunk of pairs (`impulses/pairs.py`), (COLUMNS * CHUNK,)."""
     callees: I8
     """Addresses of kernels that step kernels call, (2,) (`integrators/callees.py`)."""

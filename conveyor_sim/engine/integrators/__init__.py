@@ -11,7 +11,14 @@ the process crashes.
 from collections.abc import Callable
 
 from conveyor_sim.engine.arrays.world import Worker, World
-from conveyor_sim.engine.integrators import dormand_prince, linearly_implicit, rk4, semi_implicit_euler, velocity_verlet
+from conveyor_sim.engine.integrators import (
+    dormand_prince,
+    impulses,
+    linearly_implicit,
+    rk4,
+    semi_implicit_euler,
+    velocity_verlet,
+)
 from conveyor_sim.engine.integrators.phase import RESUME, START
 
 __all__ = ["INTEGRATORS", "RESUME", "START", "Advance"]
@@ -25,6 +32,7 @@ INTEGRATORS: dict[str, Advance] = {
     "rk4": rk4.advance,
     "dormand_prince": dormand_prince.advance,
     "linearly_implicit": linearly_implicit.advance,
+    "impulses": impulses.advance,
 }
 
 AHEAD = {"leapfrog": (1.0, 0.0), "semi_implicit_euler": (1.0, 0.0), "velocity_verlet": (1.5, 0.5), "rk4": (1.0, 0.5)}
@@ -53,3 +61,6 @@ SLOPES = {"rk4": rk4.STAGES, "dormand_prince": dormand_prince.STAGES}
 
 LINEAR = frozenset({"linearly_implicit"})
 """Integrators that solve a linear system in every step (``World.linear``, ``Pairs.tangent``)."""
+
+SWEPT = frozenset({"impulses"})
+"""Integrators that sweep over impulses of contacts (``World.impulses``, ``Pairs.impulse``, ``Near.impulse``)."""

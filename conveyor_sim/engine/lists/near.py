@@ -11,6 +11,7 @@ from typing import Any
 from conveyor_sim.engine.arrays.bodies import Bottles
 from conveyor_sim.engine.arrays.lists import BottleList, Near
 from conveyor_sim.engine.compiler.compile import kernel, part
+from conveyor_sim.engine.impulses.carry import restore_near, store_near
 from conveyor_sim.engine.lists.static_grid import static_cell
 from conveyor_sim.engine.rails.poses import list_near_axes
 from conveyor_sim.engine.threads.workers import UNIT
@@ -22,6 +23,7 @@ def list_near_segments(bottles: Bottles, grid: Any, segments: Any, near: Any, ma
     if segments is None:
         return 0
     _copy_springs(near, near.springs)
+    store_near(near, near.impulse)
     count = 0
     for i in range(bottles.x.size):
         near.start[i] = min(count, near.piece.size)
@@ -44,6 +46,7 @@ def list_near_segments(bottles: Bottles, grid: Any, segments: Any, near: Any, ma
     near.start[bottles.x.size] = min(count, near.piece.size)
     if count <= near.piece.size:
         _restore_springs(near, near.springs)
+        restore_near(near, near.impulse)
     return count
 
 
@@ -53,6 +56,7 @@ def list_near_arcs(bottles: Bottles, grid: Any, arcs: Any, near: Any, margin: fl
     if arcs is None:
         return 0
     _copy_springs(near, near.springs)
+    store_near(near, near.impulse)
     count = 0
     for i in range(bottles.x.size):
         near.start[i] = min(count, near.piece.size)
@@ -72,6 +76,7 @@ def list_near_arcs(bottles: Bottles, grid: Any, arcs: Any, near: Any, margin: fl
     near.start[bottles.x.size] = min(count, near.piece.size)
     if count <= near.piece.size:
         _restore_springs(near, near.springs)
+        restore_near(near, near.impulse)
     return count
 
 

@@ -11,6 +11,7 @@ from conveyor_sim.engine.arrays.contacts import ContactLaw, Pairs
 from conveyor_sim.engine.arrays.lists import Neighbourhood
 from conveyor_sim.engine.arrays.types import I8, U4
 from conveyor_sim.engine.compiler.compile import kernel, part, written
+from conveyor_sim.engine.impulses.carry import store_pairs
 from conveyor_sim.engine.lists.cells import bucket_of, sort_into_cells
 
 
@@ -23,6 +24,7 @@ def list_pairs(bottles: Bottles, hood: Neighbourhood, pairs: Any, cell: float, s
     if pairs is None:
         return 0
     _copy_springs(pairs, pairs.spring)
+    store_pairs(pairs, pairs.impulse)
     sort_into_cells(bottles, hood, cell)
     buckets = hood.bucket.size - 1
     capacity = pairs.i.size

@@ -13,6 +13,7 @@ from conveyor_sim.engine.arrays.lists import Neighbourhood
 from conveyor_sim.engine.arrays.world import World
 from conveyor_sim.engine.compiler.compile import copy, kernel, part
 from conveyor_sim.engine.contact.slots import fill_slots
+from conveyor_sim.engine.impulses.carry import order_pairs
 from conveyor_sim.engine.lists.near import list_near_arcs, list_near_bodies, list_near_segments, list_railed
 from conveyor_sim.engine.lists.neighbours import list_pairs
 from conveyor_sim.engine.rails.poses import place_bodies
@@ -45,6 +46,7 @@ def rebuild(world: World) -> tuple[int, int, int, int, int, int]:
     hood.stale[0] = 0 if fits else 1
     if fits:
         refresh_footing(bottles, world.belts, world.surface, world.footing, world.ring)
+        order_pairs(bottles, world.pairs, world.impulses)
     _place(world.moving)
     return pairs, more, segments, arcs, belts, bodies
 

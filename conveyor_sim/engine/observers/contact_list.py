@@ -11,6 +11,7 @@ from conveyor_sim.engine.arrays.world import World
 from conveyor_sim.engine.compiler.compile import kernel, part
 from conveyor_sim.engine.contact.contact import contact_force
 from conveyor_sim.engine.contact.pairs import elongation, normal_and_overlap
+from conveyor_sim.engine.impulses.contact_list import list_impulses
 from conveyor_sim.engine.rails.rails import find_rail_contacts, rail_contact, rail_elongation
 from conveyor_sim.engine.world_views import contacts_of
 
@@ -111,10 +112,13 @@ def _write_force(values: F8, c: int, nx: float, ny: float, overlap: float, norma
 
 def closed_contacts(world: World, contacts: RailContacts) -> tuple[NDArray[np.uint8], I8, F8]:
     """Return every closed contact of the present state as in `list_contacts`: kind (C,), ends (2, C), values (7, C)."""
-    world, room = contacts_of(world), 64
+    view, room = contacts_of(world), 64
     while True:
         kind, ends, values = np.zeros(room, np.uint8), np.zeros((2, room), np.int64), np.zeros((7, room))
-        count = list_contacts(world, contacts, kind, ends[0], ends[1], values)
+        if world.impulses is None:
+            count = list_contacts(view, contacts, kind, ends[0], ends[1], values)
+        else:
+            count = list_impulses(world, kind, ends[0], ends[1], values)
         if count <= room:
             return kind[:count], ends[:, :count], values[:, :count]
         room = count

@@ -22,6 +22,12 @@ UNIT = 64
 BLOCK = 8 * UNIT
 """Pairs or bottles that are processed at a time, at most: their scratch fits into the first-level cache."""
 
+CHUNK = 2 * UNIT
+"""Pairs that are processed at a time as impulses."""
+
+COLUMNS = 36
+"""Columns of such a chunk."""
+
 MOST_CONTACTS = 32
 """Largest number of simultaneous rail contacts of one bottle; only the deepest act. A bottle touches more rail pieces
 only in a pocket drawn as a fine polyline."""
@@ -38,7 +44,8 @@ def workers(size: int) -> tuple[Worker, ...]:
     """Return `size` workers of one group."""
     sync, callees = np.zeros(SYNC_SIZE, np.int64), np.zeros(2, np.int64)
     return tuple(
-        Worker(rank, size, sync, _gathered(), _rail_contacts(), empty_history(), callees) for rank in range(size)
+        Worker(rank, size, sync, _gathered(), _rail_contacts(), empty_history(), np.zeros(COLUMNS * CHUNK), callees)
+        for rank in range(size)
     )
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Gates, pushers and diverters: rails that move to and fro on command, with end switches.
+"""Gates, pushers, diverters and clamps: rails that move to and fro on command, with end switches.
 
 A motion profile is an array (PHASES, 4): start time (s), position, speed and acceleration of each phase.
 """
@@ -21,6 +21,7 @@ WORDS = {
     "gates": ("open", "is_closed", "is_open", "closed", "open"),
     "pushers": ("push", "retracted", "extended", "retracted", "extended"),
     "diverters": ("divert", "at_home", "diverting", "at home", "diverting"),
+    "clamps": ("close", "is_open", "is_closed", "open", "closed"),
 }
 """By kind: the command, the end switches at home and at the end of the stroke, and the words for these positions."""
 

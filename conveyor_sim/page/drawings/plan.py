@@ -29,6 +29,9 @@ LAYERS: dict[str, tuple[str, int]] = {
     "GATES": ("#a3447f", 6),
     "PUSHERS": ("#a3447f", 6),
     "DIVERTERS": ("#a3447f", 6),
+    "DIVIDERS": ("#a3447f", 6),
+    "ADJUSTABLE": ("#a3447f", 6),
+    "CLAMPS": ("#a3447f", 6),
     "STARS": ("#a3447f", 6),
     "SCREWS": ("#a3447f", 6),
     "SIDE_BELTS": ("#a3447f", 6),
@@ -139,9 +142,10 @@ def _curve(shape: RailShape) -> tuple[DrawnPiece, ...]:
 
 def _movers(scene: Scene) -> Iterator[DrawnShape]:
     """Yield gates, pushers and other movers where the scene places them."""
-    for shape in (mover_shape(path, mover)[0] for path, mover in movers_of(scene)):
-        field, name = shape.name.split("/", 1)
-        yield DrawnShape(field.upper(), name, _curve(RailShape(name, shape.material, shape.pieces)))
+    for path, mover in movers_of(scene):
+        field, name = map(str, path)
+        for body in mover_shape(path, mover)[0]:
+            yield from (DrawnShape(field.upper(), name, (DrawnPiece(*piece.ends),)) for piece in body.pieces)
 
 
 def _wheels(scene: Scene) -> Iterator[DrawnShape]:

@@ -151,10 +151,12 @@ function drawEntry(context, camera, colours, view, mark, device) {
 
 // Returns the ends of a moving rail.
 export function moverEnds(mover, position) {
-  const [x, y] = [mover.from[0] + mover.along[0] * position, mover.from[1] + mover.along[1] * position];
-  const [dx, dy] = [mover.to[0] - mover.from[0], mover.to[1] - mover.from[1]];
+  const [px, py] = mover.pivot ?? mover.from; // recordings of earlier versions have no pivot
   const cos = Math.cos(mover.turning * position), sin = Math.sin(mover.turning * position);
-  return [[x, y], [x + dx * cos - dy * sin, y + dx * sin + dy * cos]];
+  return [mover.from, mover.to].map(([x, y]) => [
+    px + mover.along[0] * position + (x - px) * cos - (y - py) * sin,
+    py + mover.along[1] * position + (x - px) * sin + (y - py) * cos,
+  ]);
 }
 
 // Returns the value of a cam at a coordinate.
@@ -163,9 +165,9 @@ function camAt(parts, at) {
   return s + (slope + 0.5 * curvature * (at - u)) * (at - u);
 }
 
-// Returns the outline of a star wheel, a pocket of a screw or a side belt at a position of its axis; null if it is absent.
-export function bodyPoints(body, position) {
-  let at = position - body.lag, aside = [0, 0];
+// Returns the outline of a star wheel, a pocket of a screw or a side belt at an angle of its machine; null if it is absent.
+export function bodyPoints(body, angle) {
+  let at = angle - body.lag, aside = [0, 0];
   if (body.period) at -= body.period * Math.floor(at / body.period);
   if (body.cam) {
     if (at < body.cam.parts[0][0] || at > body.cam.end) return null;
@@ -180,7 +182,7 @@ export function bodyPoints(body, position) {
 // Returns the bodies that are present, each with its name and its points.
 export function bodiesNow(view) {
   return view.recording.head.bodies
-    .map((body) => ({ device: body.name, points: bodyPoints(body, view.signal(`${body.axis}/position`) ?? 0) }))
+    .map((body) => ({ device: body.name, points: bodyPoints(body, view.signal(`${body.name}/angle`) ?? 0) }))
     .filter(({ points }) => points);
 }
 
@@ -202,7 +204,9 @@ export function drawMovers(context, camera, colours, view) {
   for (const mover of view.recording.head.movers) {
     const share = view.signal(`${mover.name}/position`);
     const position = share === undefined ? mover.first : share * mover.stroke;
-    for (const [at, width, alpha] of [[0, 1, 0.5], [mover.stroke, 1, 0.5], [position, Math.max(4, 0.014 * camera.scale), 1]]) {
+    const isPresent = position <= (mover.present ?? 1) * mover.stroke; // a lifted gate touches nothing
+    const drawn = [[0, 1, 0.5], [mover.stroke, 1, 0.5], ...(isPresent ? [[position, Math.max(4, 0.014 * camera.scale), 1]] : [])];
+    for (const [at, width, alpha] of drawn) {
       outline(context, camera, moverEnds(mover, at), false);
       context.globalAlpha = alpha;
       context.setLineDash(alpha < 1 ? [3, 4] : []);

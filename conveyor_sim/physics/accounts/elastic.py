@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Elastic energy and depth of contacts."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from conveyor_sim.engine.arrays.contacts import ContactLaw
+from conveyor_sim.engine.arrays.impulses import ROW
 from conveyor_sim.engine.arrays.rails import RailContacts
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.engine.arrays.world import World
@@ -37,6 +40,29 @@ def deepest_overlap(world: World, found: RailContacts) -> float:
     smaller = world.bottles.radius[a]
     smaller[pairs] = np.minimum(smaller[pairs], world.bottles.radius[b[pairs]])
     return float((values[4] / smaller).max(initial=0.0))
+
+
+def impulse_energy(model: Model, world: World) -> float:
+    """Return the energy (J) that the held impulses of a World store in their contacts, F^2 / (2 k)."""
+    if world.impulses is None or world.impulses.step[0] == 0.0:
+        return 0.0
+    stored, step, materials = 0.0, float(world.impulses.step[0]), model.settings.rail_materials
+    if world.pairs is not None and world.pairs.impulse is not None and model.pair_law is not None:
+        used = int(world.pairs.used[0])
+        stored += _stored(world.pairs.impulse.row, step, model.pair_law, world.pairs.impulse.kind[:used])
+    for near, pieces in ((world.near_segments, model.segments), (world.near_arcs, model.arcs)):
+        if near is not None and near.impulse is not None and pieces is not None and model.rail_law is not None:
+            bottle = np.repeat(np.arange(near.start.size - 1), near.start[1:].astype(np.int64) - near.start[:-1])
+            piece = near.piece[: bottle.size]
+            kind = world.bottles.type[bottle].astype(np.int64) * materials + pieces.material[piece]
+            stored += _stored(near.impulse.row, step, model.rail_law, kind)
+    return stored
+
+
+def _stored(rows: F8, step: float, law: ContactLaw, kind: NDArray[Any]) -> float:
+    impulse = rows.reshape(-1, ROW)[: kind.size, :2]
+    stiffness = np.zeros(kind.size) if law.stiffness is None else law.stiffness[kind]
+    return float(((impulse**2).sum(axis=1) / (2.0 * step * step * stiffness)).sum())
 
 
 def rail_entries(model: Model, types: NDArray[np.int64], rails: NDArray[np.int64]) -> NDArray[np.int64]:

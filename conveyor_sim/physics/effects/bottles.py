@@ -69,7 +69,7 @@ RIDING = Effect(
     source="added",
     called_for=_riding,
     absent="no straight belt has friction, bottles stand on springs (static_friction), a belt vibrates, or the "
-    "integrator is rk4, dormand_prince or linearly_implicit",
+    "integrator is rk4, dormand_prince, linearly_implicit or impulses",
     absent_here=_prevented,
     needs="velocities of the previous step; ranges of slots whose bottles are stepped",
 )

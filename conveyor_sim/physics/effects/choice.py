@@ -4,6 +4,7 @@
 from collections.abc import Mapping, Sequence
 from functools import partial
 
+from conveyor_sim.engine.integrators import SWEPT
 from conveyor_sim.errors import SceneError
 from conveyor_sim.physics.effects.base import BASE_FRICTION, BELTS, CURVED_BELTS, RING_BASE
 from conveyor_sim.physics.effects.bottles import INFEED, OUTFEED, RIDING, ROTATION
@@ -12,6 +13,7 @@ from conveyor_sim.physics.effects.damping import DAMPING_EFFECTS
 from conveyor_sim.physics.effects.declaration import Effect, EffectChoice
 from conveyor_sim.physics.effects.friction import ATAN_FRICTION, CONTACT_FRICTION, IMPLICIT_FRICTION, TANGENTIAL_SPRING
 from conveyor_sim.physics.effects.geometry import ARC_RAILS, MOVING_RAILS, SEGMENT_RAILS, UNEQUAL_RADII
+from conveyor_sim.physics.effects.impulses import impulse_bounds, impulse_prediction
 from conveyor_sim.physics.effects.observers import (
     CONTACT_ARRAYS,
     CRUSHING,
@@ -108,12 +110,16 @@ def impacts_of(terms: Terms) -> tuple[Impact, ...]:
 
 def bounds_of(terms: Terms, expected: Sequence[Impact]) -> tuple[Bound, ...]:
     """Return the bounds on dt by effects and impacts, each the tightest over bottle types and materials."""
+    if terms.scene.accuracy.integrator in SWEPT:
+        return impulse_bounds(terms)
     by_effect = [effect.bounds(terms) for effect in EFFECTS if effect.bounds is not None and effect.name in terms.on]
     return (*_impact_bounds(expected, terms.tolerance), *(bound for bounds in by_effect for bound in bounds))
 
 
 def prediction_of(terms: Terms, expected: Sequence[Impact], dt: float) -> Prediction:
     """Return the errors to expect at a time step in s."""
+    if terms.scene.accuracy.integrator in SWEPT:
+        return impulse_prediction(terms, expected, dt)
     on = [effect for effect in EFFECTS if effect.name in terms.on]
     sides = [term for effect in on if effect.side is not None for term in effect.side(terms, dt)]
     resting = [term for effect in on if effect.resting is not None for term in effect.resting(terms, dt)]

@@ -143,10 +143,16 @@ LIMITS: dict[str, tuple[Limit, ...]] = {
             "Reduce the stiffness of contacts with the material of the guide.",
         ),
         Limit(
-            "star wheels, screws and robots",
-            "Rails move along straight lines or about a pivot. Stations take bottles and return them.",
-            "Forces in the infeed of a filler or labeller are missing.",
-            "Use a station with the cycle of the machine. Study the infeed separately.",
+            "the third dimension of star wheels and screws",
+            "A wheel, its guide and the thread of a screw touch bottles at one height, and are rigid.",
+            "Bottles do not lean in pockets. A turning screw does not rub across the path, lift or spin bottles.",
+            "Choose the friction of the contact, and the play of pockets, as measured with bottles of the format.",
+        ),
+        Limit(
+            "robots",
+            "Bodies move along straight lines, about a pivot, or on a cam. Stations take bottles and return them.",
+            "Forces of grippers that pick bottles up are missing.",
+            "Use a station with the cycle of the machine.",
         ),
     ),
     "Drives, sensors and machines": (

@@ -14,7 +14,7 @@ from conveyor_sim.physics.effects.load import Load, contact_load
 from conveyor_sim.physics.laws.coefficients import Laws
 from conveyor_sim.physics.plant import Plant
 from conveyor_sim.physics.timestep.bounds import Bound, least_steps
-from conveyor_sim.physics.timestep.methods import METHODS, STEP_ERROR, Method
+from conveyor_sim.physics.timestep.methods import IMPULSES, METHODS, STEP_ERROR, Method
 from conveyor_sim.scene.schema import BottleType, Scene
 
 
@@ -46,7 +46,7 @@ class Terms:
     @property
     def method(self) -> Method:
         """Error coefficients of the integrator."""
-        return METHODS[self.scene.accuracy.integrator]
+        return METHODS.get(self.scene.accuracy.integrator, IMPULSES)
 
     @property
     def step_error(self) -> float:

@@ -23,20 +23,18 @@ from conveyor_sim.physics.effects.choice import prediction_of
 from conveyor_sim.physics.effects.declaration import EffectChoice
 from conveyor_sim.physics.effects.load import Load
 from conveyor_sim.physics.laws.coefficients import BaseSprings, Laws
+from conveyor_sim.physics.laws.rebounds import Rebounds, build_rebounds
 from conveyor_sim.physics.model.plant_arrays import plant_grid, rail_arrays
 from conveyor_sim.physics.model.remedies import too_many
 from conveyor_sim.physics.model.step_choice import choose_steps
 from conveyor_sim.physics.plant import Plant
 from conveyor_sim.physics.sources_hash import sources_hash
-from conveyor_sim.physics.timestep.bounds import Bound
+from conveyor_sim.physics.timestep.bounds import SKIN, Bound
 from conveyor_sim.physics.timestep.prediction import Impact, Prediction
 from conveyor_sim.scene.accuracy import MOST_STEPS
 from conveyor_sim.scene.effect_names import EffectName
 from conveyor_sim.scene.places import Places
 from conveyor_sim.scene.schema import BottleType, Scene
-
-SKIN = 0.2
-"""Ratio of the neighbour lists' skin to the smallest radius, a compromise between rare rebuilds and short lists."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +57,8 @@ class Model:
     load: Load
     """Largest expected resting load on a contact."""
     integrator: str
+    sweeps: int
+    """Sweeps in a step of integrator impulses; 0 with others."""
     effects: tuple[EffectChoice, ...]
     belts: tuple[str, ...]
     rails: tuple[str, ...]
@@ -79,6 +79,7 @@ class Model:
     """(T * T,), bottle and bottle; None where bottles do not touch bottles."""
     rail_law: ContactLaw | None
     """(T * M,), bottle and rail; None without rails."""
+    rebounds: Rebounds
     curves: Curves | None
     """Tables of force against overlap; None without tables."""
     friction_curve: str
@@ -130,6 +131,7 @@ def build_model(scene: Scene) -> Model:
         prediction=prediction_of(choice.terms, choice.impacts, dt),
         load=choice.terms.load,
         integrator=scene.accuracy.integrator,
+        sweeps=scene.accuracy.sweeps or 0,
         effects=choice.effects,
         belts=tuple(scene.belts),
         rails=tuple(rail.name for rail in plant.rails),
@@ -156,6 +158,7 @@ def build_model(scene: Scene) -> Model:
         ),
         pair_law=laws.pair,
         rail_law=laws.rail,
+        rebounds=build_rebounds(laws.pair, laws.rail, np.array([kind.mass for kind in types])),
         curves=laws.curves,
         friction_curve="atan" if "atan_friction" in on else "polynomial",
         friction_solver="implicit" if "implicit_friction" in on else "explicit",
@@ -188,7 +191,8 @@ def versions_here() -> tuple[str, ...]:
 
 def _given_words(scene: Scene) -> str:
     accuracy = scene.accuracy
-    return f"{accuracy.per_tick} steps a tick" if accuracy.dt is None else f"at most {accuracy.dt * 1e6:g} us"
+    steps = f"{accuracy.per_tick} steps a tick" if accuracy.dt is None else f"at most {accuracy.dt * 1e6:g} us"
+    return steps if accuracy.sweeps is None else f"{steps}, {accuracy.sweeps} sweeps"
 
 
 def _friction_table(laws: Laws) -> F8 | None:

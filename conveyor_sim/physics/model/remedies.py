@@ -40,8 +40,9 @@ STEP_COST: Mapping[str, int] = {
     "rk4": 4,
     "dormand_prince": 12,
     "linearly_implicit": 6,
+    "impulses": 3,
 }
-"""Cost of a step in evaluations of all forces or equal work."""
+"""Cost of a step, or of one sweep with impulses, in evaluations of all forces or equal work."""
 
 IMPLICIT_COST = 2.5
 """Cost of a step with the implicit friction solver over that of a step without it, in queues: 2.4 to 2.5 measured."""
@@ -142,9 +143,9 @@ class StepLimit:
         return f"slow: a simulated second of {self.bottles} bottles will take about {text} s of computing on one core"
 
 
-def step_cost(integrator: str, friction_solver: str) -> float:
+def step_cost(integrator: str, friction_solver: str, sweeps: int | None = None) -> float:
     """Return the relative cost of a step."""
-    return STEP_COST[integrator] * (IMPLICIT_COST if friction_solver == "implicit" else 1.0)
+    return STEP_COST[integrator] * (sweeps or 1) * (IMPLICIT_COST if friction_solver == "implicit" else 1.0)
 
 
 def tick_seconds(work: float, bottles: int) -> float:
@@ -160,7 +161,7 @@ def step_limit(scene: Scene, choice: StepChoice | None = None, bottles: int | No
     choice = choose_steps(Plant.of(scene)) if choice is None else choice
     most = choice.terms.plant.most_bottles if bottles is None else bottles
     bottles = MANY if most is None else max(1, most)
-    cost = step_cost(scene.accuracy.integrator, scene.friction_solver)
+    cost = step_cost(scene.accuracy.integrator, scene.friction_solver, scene.accuracy.sweeps)
     before = tick_seconds(choice.steps * cost, bottles)
     tried = (_tried(scene, *candidate, before, bottles) for candidate in _candidates(scene, choice))
     least = 1.0 / WORTH
@@ -239,7 +240,7 @@ def _tried(scene: Scene, words: str, overrides: Mapping[str, Any], before: float
         steps = choose_steps(Plant.of(changed)).steps
     except SceneError:
         return None
-    cost = step_cost(changed.accuracy.integrator, changed.friction_solver)
+    cost = step_cost(changed.accuracy.integrator, changed.friction_solver, changed.accuracy.sweeps)
     faster = before / tick_seconds(steps * cost, bottles)
     return Remedy(words, overrides, steps, faster) if steps <= MOST_STEPS else None
 

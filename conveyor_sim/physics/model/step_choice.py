@@ -39,6 +39,8 @@ def choose_steps(plant: Plant) -> StepChoice:
     bounds = bounds_of(terms, impacts)
     given = _given_steps(scene)
     steps, reason = steps_per_tick(scene.tick, bounds, given, aim.words)
+    if scene.accuracy.sweeps is not None:
+        reason = f"{steps} steps a tick, {scene.accuracy.sweeps} sweeps each, given in the scene"
     return StepChoice(effects, aim, terms, impacts, bounds, given, steps, reason)
 
 

@@ -7,6 +7,15 @@ import numpy as np
 
 from conveyor_sim.engine.arrays.bodies import Bottles, ForceSums, Peaks, Spin
 from conveyor_sim.engine.arrays.contacts import ContactLaw, Implicit, PairParts, Pairs, PairSprings, Slots
+from conveyor_sim.engine.arrays.impulses import (
+    BODY,
+    COLOURS,
+    CONSTANTS,
+    ROW,
+    Impulses,
+    NearImpulses,
+    PairImpulses,
+)
 from conveyor_sim.engine.arrays.integrators import Blocks, Linear, PairTangent, Slopes, Stage, Triple
 from conveyor_sim.engine.arrays.lists import Near, NearSprings, Neighbourhood
 from conveyor_sim.engine.arrays.moving import MovingBodies
@@ -16,7 +25,7 @@ from conveyor_sim.engine.arrays.support import Footing, Ring, StaticFriction, Su
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.engine.arrays.world import World
 from conveyor_sim.engine.contact.slots import WIDTH
-from conveyor_sim.engine.integrators import LINEAR, ON_PATHS, SLOPES, STAGED
+from conveyor_sim.engine.integrators import LINEAR, ON_PATHS, SLOPES, STAGED, SWEPT
 from conveyor_sim.engine.lists.riding import LEAST
 from conveyor_sim.engine.observers.ledger import BELTS
 from conveyor_sim.engine.threads.workers import UNIT
@@ -51,6 +60,7 @@ def empty_pairs(model: Model, entries: int) -> Pairs | None:
         touch=forces(model.has("implicit_friction")),
         spring=_pair_springs(entries) if _has_history(model, law) else None,
         tangent=_pair_tangent(entries) if model.integrator in LINEAR else None,
+        impulse=_pair_impulses(entries) if model.integrator in SWEPT else None,
         parts=PairParts(_triple(2 * entries + 1), _triple(2 * entries + 1)) if model.has("energy_ledger") else None,
     )
 
@@ -59,12 +69,13 @@ def empty_near(model: Model, slots: int, entries: int) -> Near:
     """Return an empty list for `entries` rail pieces near bottles."""
     law = model.rail_law
     springs = _near_springs(entries) if _has_history(model, law) else None
-    return Near(np.zeros(slots + 1, np.uint32), np.zeros(entries, np.uint32), springs)
+    impulses = _near_impulses(entries) if model.integrator in SWEPT else None
+    return Near(np.zeros(slots + 1, np.uint32), np.zeros(entries, np.uint32), springs, impulses)
 
 
 def near_bodies(slots: int, entries: int) -> Near:
     """Return an empty list for `entries` bodies near bottles. Their springs are not stored by entry."""
-    return Near(np.zeros(slots + 1, np.uint32), np.zeros(entries, np.uint32), None)
+    return Near(np.zeros(slots + 1, np.uint32), np.zeros(entries, np.uint32), None, None)
 
 
 def empty_world(model: Model, slots: int) -> World:
@@ -97,6 +108,7 @@ def empty_world(model: Model, slots: int) -> World:
         path=_triple(slots) if model.integrator in ON_PATHS and _has_springs(model) else None,
         slopes=_slopes(SLOPES[model.integrator], slots, peaks) if model.integrator in SLOPES else None,
         linear=_linear(slots) if model.integrator in LINEAR else None,
+        impulses=_impulses(model, slots) if model.integrator in SWEPT else None,
         implicit=_implicit(model, slots) if model.has("implicit_friction") else None,
         riding=_riding(model, slots) if model.has("riding") else None,
         neighbourhood=Neighbourhood(
@@ -232,6 +244,32 @@ def _linear(slots: int) -> Linear:
     )
 
 
+def _impulses(model: Model, slots: int) -> Impulses:
+    types, laws = len(model.bottle_types), model.rebounds
+    turning = model.type_radius**2 / model.type_inertia if model.has("rotation") else np.zeros(types)
+    return Impulses(
+        sweeps=model.sweeps,
+        types=types,
+        grip=model.largest_base_friction * model.gravity,
+        alike=1 if types == 1 else None,
+        pair_restitution=laws.pair_restitution,
+        pair_peak=laws.pair_peak,
+        rail_restitution=laws.rail_restitution,
+        rail_peak=laws.rail_peak,
+        inverse_mass=1.0 / model.type_mass,
+        turning=turning,
+        radius=model.type_radius.copy(),
+        pair_constants=np.zeros(CONSTANTS * types * types),
+        rail_constants=np.zeros(CONSTANTS * types * max(1, model.settings.rail_materials)),
+        body=np.zeros(BODY * slots),
+        free=np.zeros(4 * slots),
+        warm=_triple(slots),
+        step=np.zeros(1),
+        anew=np.ones(1, np.int64),
+        mask=np.zeros(slots, np.int64),
+    )
+
+
 def _riding(model: Model, slots: int) -> Riding:
     runs, units = slots // LEAST + 2, slots // UNIT + 1
     return Riding(
@@ -287,3 +325,25 @@ def _pair_springs(entries: int) -> PairSprings:
 def _near_springs(entries: int) -> NearSprings:
     bottle, piece = np.zeros((2, entries), np.uint32)
     return NearSprings(np.zeros(entries), bottle, piece, np.zeros(entries), np.full(1, -1, np.int64))
+
+
+def _pair_impulses(entries: int) -> PairImpulses:
+    i, j, kind, place, kept_i, kept_j = np.zeros((6, entries), np.uint32)
+    return PairImpulses(
+        i=i,
+        j=j,
+        kind=kind,
+        place=place,
+        start=np.zeros(COLOURS + 1, np.int64),
+        next=np.zeros(COLOURS, np.int64),
+        row=np.zeros(ROW * entries),
+        kept_i=kept_i,
+        kept_j=kept_j,
+        kept=np.zeros(ROW * entries),
+        kept_count=np.full(1, -1, np.int64),
+    )
+
+
+def _near_impulses(entries: int) -> NearImpulses:
+    bottle, piece = np.zeros((2, entries), np.uint32)
+    return NearImpulses(np.zeros(ROW * entries), bottle, piece, np.zeros(ROW * entries), np.full(1, -1, np.int64))

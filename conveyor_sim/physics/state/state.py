@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 
 from conveyor_sim.engine.arrays.contacts import PairSprings
 from conveyor_sim.engine.arrays.damage import lasting_columns, slot_columns
+from conveyor_sim.engine.arrays.impulses import ROW, NearImpulses, PairImpulses
 from conveyor_sim.engine.arrays.lists import Near, NearSprings
+from conveyor_sim.engine.impulses.carry import drop_near_impulses, drop_pair_impulses
 from conveyor_sim.engine.lists.near import drop_near_springs
 from conveyor_sim.engine.lists.neighbours import drop_springs, fill_column
 from conveyor_sim.engine.lists.rebuild import rebuild
@@ -131,7 +133,21 @@ class State:
                 drop_near_springs(near, near.springs, slot)
         if world.moving is not None and world.moving.springs is not None:
             world.moving.springs.elongation[slot] = 0.0
+        self._drop_impulses(slot)
         world.neighbourhood.stale[0] = 1
+
+    def _drop_impulses(self, slot: int) -> None:
+        """Clear the impulses that the contacts of a removed bottle hold."""
+        world = self.world
+        if world.impulses is None:
+            return
+        for column in world.impulses.warm:
+            column[slot] = 0.0
+        if world.pairs is not None:
+            drop_pair_impulses(world.pairs, world.pairs.impulse, slot)
+        for near in (world.near_segments, world.near_arcs):
+            if near is not None:
+                drop_near_impulses(near, near.impulse, slot)
 
     def take_removed(self) -> list[int]:
         """Return the ids of bottles removed since the last call, in order."""
@@ -198,7 +214,7 @@ class State:
             damage.impacts.vx[slots], damage.impacts.vy[slots] = bottles.vx[slots], bottles.vy[slots]
 
     def springs(self) -> bytes:
-        """Return the bytes of all tangential springs that are not slack, with their slots and rail pieces."""
+        """Return the bytes of tangential springs that are not slack, or of impulses, with slots and rail pieces."""
         world = self.world
         parts: list[NDArray[Any]] = []
         if world.pairs is not None and world.pairs.spring is not None:
@@ -216,13 +232,29 @@ class State:
         if world.moving is not None and world.moving.springs is not None:
             bottle, rail = np.nonzero(world.moving.springs.elongation)
             parts += [bottle, rail, world.moving.springs.elongation[bottle, rail]]
+        parts += self._impulses()
         return b"".join(part.tobytes() for part in parts)
+
+    def _impulses(self) -> Iterator[NDArray[Any]]:
+        """Yield the impulses that contacts hold, with their slots and rail pieces."""
+        world = self.world
+        if world.pairs is not None and world.pairs.impulse is not None:
+            rows = world.pairs.impulse.row.reshape(-1, ROW)[world.pairs.impulse.place[: world.pairs.used[0]]]
+            held = np.flatnonzero(rows.any(axis=1))
+            yield from (world.pairs.i[held], world.pairs.j[held], rows[held])
+        for near in (world.near_segments, world.near_arcs):
+            if near is not None and near.impulse is not None:
+                rows = near.impulse.row.reshape(-1, ROW)[: near.start[-1]]
+                held = np.flatnonzero(rows.any(axis=1))
+                bottle = np.searchsorted(near.start, held, side="right") - 1
+                yield from (bottle, near.piece[held], rows[held])
 
     def moving_rails(self) -> tuple[RailShape, ...]:
         """Return the bodies that are present, each as a rail, at their present positions."""
-        if self.world.moving is None:
+        moving = self.world.moving
+        if moving is None:
             return ()
-        return self.model.plant.moving_at(self.world.moving.position.tolist())
+        return self.model.plant.moving_at(moving.position.tolist(), moving.lag.tolist())
 
     def rails(self) -> tuple[RailShape, ...]:
         """Return all rails at their present positions: those at rest by number, then bodies."""
@@ -267,6 +299,7 @@ class State:
             longer = empty_pairs(self.model, 2 * pairs)
             if longer is not None:
                 _carry(world.pairs.spring, longer.spring)
+                _carry(world.pairs.impulse, longer.impulse)
             world = world._replace(pairs=longer)
         if world.slots is not None and more > world.slots.more_entry.size:
             world = world._replace(slots=empty_slots(slots, 2 * more))
@@ -281,8 +314,11 @@ class State:
         self.world = world
 
 
-def _carry(before: PairSprings | NearSprings | None, after: PairSprings | NearSprings | None) -> None:
-    """Copy the stored tangential springs of a list that is lengthened."""
+Stored = PairSprings | NearSprings | PairImpulses | NearImpulses | None
+
+
+def _carry(before: Stored, after: Stored) -> None:
+    """Copy the stored tangential springs or impulses of a list that is lengthened."""
     for name in before._fields if before is not None else ():
         if name.startswith("kept"):
             getattr(after, name)[: getattr(before, name).size] = getattr(before, name)
@@ -292,6 +328,7 @@ def _longer(model: Model, before: Near, slots: int, entries: int) -> Near:
     """Return a list with more entries, and the stored springs."""
     near = empty_near(model, slots, entries)
     _carry(before.springs, near.springs)
+    _carry(before.impulse, near.impulse)
     return near
 
 

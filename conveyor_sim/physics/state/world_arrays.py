@@ -22,9 +22,9 @@ FIXED = (
     *(f"belts.{name}" for name in ("x", "y", "ax", "ay", "length", "width", "sectors.")),
     *(f"moving.{name}" for name in ("axis", "pivot_", "along_", "turning", "account", "sweep", "home_")),
     *(f"moving.{name}" for name in ("first_cluster", "body")),
-    *(f"moving.clusters.{name}" for name in ("home_", "radius", "segment", "arc")),
+    "moving.clusters.",
+    "moving.arcs.",
     *(f"moving.segments.{name}" for name in ("length", "material", "rail", "surface", "ends.joint")),
-    *(f"moving.arcs.{name}" for name in ("radius", "reach", "material", "rail", "surface", "ends.joint")),
     *(f"moving.cams.{name}" for name in ("cam", "second", "across_", "period", "table.")),
     "moving.springs.column",
     "moving.springs.first",
@@ -34,6 +34,8 @@ FIXED = (
     "surface.friction",
     *(f"vibration.{name}" for name in ("swing_", "frequency")),
     *(f"static_friction.{name}" for name in ("stiffness", "damping", "friction")),
+    *(f"impulses.{name}" for name in ("pair_restitution", "pair_peak", "rail_restitution", "rail_peak")),
+    *(f"impulses.{name}" for name in ("inverse_mass", "turning", "radius")),
 )
 """Arrays in other groups that follow from the scene and never change."""
 
@@ -46,6 +48,9 @@ SCRATCH: Mapping[str, str] = {
     "slopes.": "of one step of a Runge-Kutta method",
     "linear.": "of one step of the linearly implicit method",
     "riding.": "of one call of an integrator",
+    **dict.fromkeys(("impulses.pair_constants", "impulses.rail_constants"), "of one call of an integrator"),
+    **dict.fromkeys(("impulses.body", "impulses.free"), "of one substep of the method of impulses"),
+    **dict.fromkeys(("impulses.mask", "pairs.impulse.next"), "of one rebuild of the lists"),
     **dict.fromkeys(("vibration.phase", "vibration.clock"), "of one tick"),
     "vibration.ahead": "of one step",
 }
@@ -73,19 +78,21 @@ REMADE = (
     ),
     "footing.",
     "probe.",
-    *(f"moving.{name}" for name in ("resting", "active", "loaded", "is_near", "near", "pose.", "clusters.", "cams.")),
+    *(f"moving.{name}" for name in ("resting", "active", "loaded", "is_near", "near", "pose.", "cams.")),
     "moving.segments.",
-    "moving.arcs.",
     "moving.actuators.push",
 )
 """Arrays that follow from the positions: rebuilt with the neighbour lists, or in the next evaluation of forces."""
 
 TIED: Mapping[str, tuple[str, ...]] = {
     "pairs.spring.": ("pairs.used", "pairs.i", "pairs.j"),
+    "pairs.impulse.": ("pairs.used", "pairs.i", "pairs.j"),
+    "near_segments.impulse.": ("near_segments.start", "near_segments.piece"),
+    "near_arcs.impulse.": ("near_arcs.start", "near_arcs.piece"),
     "near_segments.springs.": ("near_segments.start", "near_segments.piece"),
     "near_arcs.springs.": ("near_arcs.start", "near_arcs.piece"),
 }
-"""Arrays of tangential springs, which are state, and the lists whose entries they belong to."""
+"""Arrays of tangential springs and of impulses, which are state, and the lists whose entries they belong to."""
 
 BETWEEN_TICKS = (
     *(f"bottles.{name}" for name in ("id", "type", "radius", "inverse_mass", "weight")),

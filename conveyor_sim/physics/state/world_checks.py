@@ -39,7 +39,7 @@ def require_valid(world: World, model: Model, next_id: int) -> None:
         "slots.more_start",
     ):
         _require_starts(name, arrays)
-    for name in ("railed.first", "belts.uncertain.first", "neighbourhood.bucket"):
+    for name in ("railed.first", "belts.uncertain.first", "neighbourhood.bucket", "pairs.impulse.start"):
         _require_starts(name, arrays)
     _require_bottles(world, model)
 
@@ -100,6 +100,8 @@ def ranges(world: World, model: Model, next_id: int) -> dict[str, tuple[int, int
         "riding.end": (0, slots),
         "riding.runs": (0, slots),
         "riding.progress": (STEPPED, PLANNED),
+        "impulses.anew": (0, 1),
+        "impulses.mask": (0, 2**63 - 1),
     }
     if world.belts is not None:
         limits["belts.start"] = (0, world.belts.candidate.size)
@@ -113,6 +115,15 @@ def ranges(world: World, model: Model, next_id: int) -> dict[str, tuple[int, int
             "pairs.spring.kept_i": (0, slots - 1),
             "pairs.spring.kept_j": (0, slots - 1),
             "pairs.spring.kept_count": (-1, pairs),
+            "pairs.impulse.i": (0, slots - 1),
+            "pairs.impulse.j": (0, slots - 1),
+            "pairs.impulse.kind": (0, len(model.bottle_types) ** 2 - 1),
+            "pairs.impulse.place": (0, pairs - 1),
+            "pairs.impulse.start": (0, int(world.pairs.used[0])),
+            "pairs.impulse.next": (0, pairs),
+            "pairs.impulse.kept_i": (0, slots - 1),
+            "pairs.impulse.kept_j": (0, slots - 1),
+            "pairs.impulse.kept_count": (-1, pairs),
             "slots.entry": (0, 2 * pairs),
             "slots.more_bottle": (0, slots - 1),
             "slots.more_entry": (0, 2 * pairs),
@@ -132,6 +143,9 @@ def ranges(world: World, model: Model, next_id: int) -> dict[str, tuple[int, int
                 f"{name}.springs.kept_bottle": (0, slots - 1),
                 f"{name}.springs.kept_piece": (0, max(0, pieces - 1)),
                 f"{name}.springs.kept_count": (-1, near.piece.size),
+                f"{name}.impulse.kept_bottle": (0, slots - 1),
+                f"{name}.impulse.kept_piece": (0, max(0, pieces - 1)),
+                f"{name}.impulse.kept_count": (-1, near.piece.size),
             }
     return limits
 

@@ -5,6 +5,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+SKIN = 0.2
+"""Ratio of the neighbour lists' skin to the smallest radius, a compromise between rare rebuilds and short lists."""
+
 
 @dataclass(frozen=True)
 class Bound:

@@ -197,3 +197,16 @@ METHODS: Mapping[str, Method] = {
         explicit=False,
     ),
 }
+
+IMPULSES = Method(
+    peak=0.0,
+    jump=0.0,
+    touch=0.0,
+    tsuji=0.0,
+    viscoelastic=0.0,
+    onset=0.0,
+    slip=0.0,
+    second_order=True,
+    explicit=False,
+)
+"""The method of impulses has closed forms for impacts, so no error follows from steps per contact."""

@@ -34,7 +34,8 @@ def target(accuracy: Accuracy) -> Target:
     """Return the target of a scene; the default if it chooses none, or sets the time step."""
     if accuracy.tolerance is not None:
         return Target(accuracy.tolerance, f"tolerance {percent(accuracy.tolerance)} in contact force")
-    preset = accuracy.preset or DEFAULT
+    # `fast` is read as an integrator and its steps.
+    preset = DEFAULT if accuracy.preset is None or accuracy.preset == "fast" else accuracy.preset
     return Target(PRESETS[preset], f"{preset} ({percent(PRESETS[preset])} in contact force)")
 
 

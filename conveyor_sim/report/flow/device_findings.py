@@ -42,8 +42,9 @@ def devices_beside(scene: Scene, surfaces: SurfaceMap) -> Iterator[Finding]:
                 break
     reach = max(kind.radius for kind in scene.bottle_types.values())
     for place_of, mover in movers_of(scene):
-        body, axis = mover_shape(place_of, mover)
-        ends = [_line(*body.at(place)[0].ends) for place in (0.0, 0.5 * axis.stroke, axis.stroke)]
+        bodies, axis = mover_shape(place_of, mover)
+        places = (0.0, 0.5 * axis.stroke, axis.stroke)
+        ends = [_line(*piece.ends) for place in places for body in bodies for piece in body.at(place)]
         if not _near(surfaces, np.vstack(ends), reach):
             middle = ends[0].mean(axis=0)
             yield Finding(place_of, f"stands beside all belts: none is at {at((middle[0], middle[1]))}")

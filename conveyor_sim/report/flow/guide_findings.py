@@ -146,8 +146,9 @@ def _openings(scene: Scene) -> list[Array]:
     """Return places (m) at which bottles are meant to leave sideways."""
     places = [np.array(part.region).mean(axis=0) for part in scene.machines.values() if isinstance(part, Reject)]
     for path, mover in movers_of(scene):
-        body, axis = mover_shape(path, mover)
-        places += [np.mean(body.at(place)[0].ends, axis=0) for place in (0.0, axis.stroke)]
+        bodies, axis = mover_shape(path, mover)
+        pieces = (piece for place in (0.0, axis.stroke) for body in bodies for piece in body.at(place))
+        places += [np.mean(piece.ends, axis=0) for piece in pieces]
     return places
 
 

@@ -18,7 +18,7 @@ from conveyor_sim.scene.contacts import Base, Contact, Damping
 from conveyor_sim.scene.geometry import Piece, RailShape, rail_shapes, surface_shapes
 from conveyor_sim.scene.limits import Limits as DamageLimits
 from conveyor_sim.scene.moving import mover_shape, movers_of
-from conveyor_sim.scene.parts.movers import SlidingGate, SwingingGate
+from conveyor_sim.scene.parts.movers import LiftingGate, SlidingGate, SwingingGate
 from conveyor_sim.scene.rails import ArcRail, SegmentRail
 from conveyor_sim.scene.schema import Outputs, Scene, Single
 
@@ -38,11 +38,13 @@ def resting_movers(scene: Scene) -> list[RailShape]:
     A controller opens gates; a lone bottle would wait for it.
     """
     movers = ((mover, *mover_shape(path, mover)) for path, mover in movers_of(scene))
-    return [
+    shapes = (
         body.shape(axis.first)
-        for mover, body, axis in movers
-        if not isinstance(mover, (SlidingGate, SwingingGate)) or mover.open
-    ]
+        for mover, bodies, axis in movers
+        if not isinstance(mover, (SlidingGate, SwingingGate, LiftingGate)) or mover.open
+        for body in bodies
+    )
+    return [shape for shape in shapes if shape.pieces]
 
 
 def guide_pieces(scene: Scene) -> list[Piece]:
@@ -55,11 +57,11 @@ def trace_scene(scene: Scene, bottles: Sequence[Single], tick: float) -> Scene:
     """Return the scene in which lone bottles are traced. bottles: at their entries. tick: s."""
     spare = _beside(scene, bottles)
     rails = {
-        shape.name: SegmentRail.model_construct(
+        f"{shape.name} {number}": SegmentRail.model_construct(
             kind="segment", from_=piece.ends[0], to=piece.ends[1], material=shape.material
         )
         for shape in resting_movers(scene)
-        for piece in shape.pieces
+        for number, piece in enumerate(shape.pieces)
     }
     rails[_SPARE] = SegmentRail.model_construct(
         kind="segment", from_=(spare, 0.0), to=(spare + 1.0, 0.0), material=_SPARE

@@ -165,3 +165,18 @@ class AlongAdjustable(_Stretch):
     """
 
     side: Side = quantity("Side on which it is.")
+
+
+class AlongLift(_Across):
+    """A lifting gate across a conveyor."""
+
+
+class AlongClamp(_Stretch):
+    """A clamp whose jaws stand along a straight part of a conveyor, and close across."""
+
+    offset: Number = quantity(
+        "Distance of its middle from the middle of the path, positive to the left.", "m", default=0.0
+    )
+    opening: Positive | None = quantity(
+        "Distance of the jaws while they are open. Left out: the clear width between the guides.", "m", default=None
+    )

@@ -7,8 +7,10 @@ from typing import Any
 
 from conveyor_sim.scene.layout.along import (
     AlongAdjustable,
+    AlongClamp,
     AlongDiverter,
     AlongDivider,
+    AlongLift,
     AlongLine,
     AlongPusher,
     AlongRail,
@@ -27,7 +29,7 @@ from conveyor_sim.scene.words import shown
 _QUARTER = 0.5 * math.pi
 
 
-def line(site: Site[AlongLine]) -> list[Coordinate]:
+def line(site: Site[AlongLine] | Site[AlongLift]) -> list[Coordinate]:
     """Return a line across, from the right to the left. Raise LayoutFault."""
     s = site.station()
     right, left = site.across(s)
@@ -101,16 +103,27 @@ def adjustable(site: Site[AlongAdjustable]) -> list[Coordinate]:
     return _across_straight(site, site.place.side)
 
 
-def _across_straight(site: Site[Any], side: Side) -> list[Coordinate]:
-    """Return a rail along the middle of a straight part of the path that slides to a side. Raise LayoutFault."""
+def clamp(site: Site[AlongClamp]) -> list[Coordinate]:
+    """Return a clamp whose first jaw is on the right. Raise LayoutFault."""
+    begin, _, field = site.stretch()
+    right, left = site.clear(begin)
+    opening = left - right if site.place.opening is None else site.place.opening
+    return [
+        *_across_straight(site, "left", site.place.offset - 0.5 * opening),
+        Coordinate("opening", opening, field if site.place.opening is None else "opening"),
+    ]
+
+
+def _across_straight(site: Site[Any], side: Side, offset: float = 0.0) -> list[Coordinate]:
+    """Return a rail at an offset (m) along a straight part of the path that slides to a side. Raise LayoutFault."""
     begin, end, field = site.stretch()
     route = site.conveyor.route
     if any(isinstance(piece, Bend) for piece in route.between(begin, end).pieces):
         text = f"a bend lies between {begin:.6g} m and {end:.6g} m, expected a straight part of conveyor"
         raise LayoutFault((*site.path, field), f"{text} {site.conveyor.name}")
     return [
-        Coordinate("from", site.point(begin, 0.0), field),
-        Coordinate("to", site.point(end, 0.0), field),
+        Coordinate("from", site.point(begin, offset), field),
+        Coordinate("to", site.point(end, offset), field),
         Coordinate("direction", _sideways(site, begin, side), "side" if "side" in site.raw else field),
     ]
 

@@ -11,8 +11,10 @@ from conveyor_sim.scene.layout import barriers, entries
 from conveyor_sim.scene.layout.along import (
     Along,
     AlongAdjustable,
+    AlongClamp,
     AlongDiverter,
     AlongDivider,
+    AlongLift,
     AlongLine,
     AlongPoint,
     AlongPusher,
@@ -33,7 +35,9 @@ from conveyor_sim.scene.parts.infeed import Infeed
 from conveyor_sim.scene.parts.inspection import Inspection
 from conveyor_sim.scene.parts.movers import (
     AdjustableGuide,
+    Clamp,
     Diverter,
+    LiftingGate,
     Pusher,
     SlidingDivider,
     SlidingGate,
@@ -148,11 +152,13 @@ GRID = _device("bottles", GridOfBottles, AlongPoint, ("origin", "angle"), entrie
 DEVICES = (
     _device("gates", SlidingGate, AlongSlide, (*_ENDS, "direction"), barriers.sliding_gate, "slide"),
     _device("gates", SwingingGate, AlongSwing, _ENDS, barriers.swinging_gate, "swing"),
+    _device("gates", LiftingGate, AlongLift, _ENDS, barriers.line, "lift"),
     _device("pushers", Pusher, AlongPusher, ("direction",), barriers.pusher),
     _device("diverters", Diverter, AlongDiverter, _ENDS, barriers.diverter),
     _device("dividers", SwingingDivider, AlongDivider, _ENDS, barriers.swinging_divider, "swing"),
     _device("dividers", SlidingDivider, AlongSlidingDivider, ("direction",), barriers.sliding_divider, "slide"),
     _device("adjustable", AdjustableGuide, AlongAdjustable, ("direction",), barriers.adjustable),
+    _device("clamps", Clamp, AlongClamp, ("direction",), barriers.clamp),
     Placeable("stars", Star, AlongStar, ("centre", "turn", "entry"), coordinates=star),
     _device("screws", Screw, AlongScrew, (), line_along),
     _device("side_belts", SideBelt, AlongSideBelt, (), line_along),

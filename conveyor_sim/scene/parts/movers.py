@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rails of a scene file that move on command: gates, pushers, diverters, dividers, adjustable guides. All are straight.
+"""Rails of a scene file that move on command: gates, pushers, diverters, dividers, guides, clamps. All are straight.
 
 Their drives are treated as pneumatic cylinders at 6 bar, of the bores of ISO 6432: 20 mm at gates that slide, 25 mm at
 pushers, and 25 mm at a crank of 50 mm where rails swing. A bore of 20 mm is that of common stop cylinders for single
@@ -43,6 +43,9 @@ def cylinder_force(bore: float) -> float:
 
 GATE_FORCE, PUSHER_FORCE = cylinder_force(0.020), cylinder_force(0.025)
 """188.5 N, 294.5 N."""
+
+CLAMP_FORCE = cylinder_force(0.010)
+"""47.1 N."""
 
 MOST_POSITIONS = 50
 _POSITIONS = f"2 to {MOST_POSITIONS}"
@@ -96,10 +99,9 @@ class _Mover(DevicePart):
         )
 
 
-class _Sliding(_Mover):
+class _Linear(_Mover):
     DRIVE = ("force_limit", "N", "moving_mass", "kg", "m/s^2")
 
-    direction: Angle = quantity("Direction in which it slides, from the x-axis, counter-clockwise.", "rad")
     max_speed: Positive = quantity("Its greatest speed.", "m/s")
     acceleration: Positive = quantity("Acceleration at starts, reversals and stops.", "m/s^2")
     force_limit: Limit = quantity(
@@ -116,6 +118,10 @@ class _Sliding(_Mover):
     def drive_mass(self) -> float:
         """Moving mass, kg."""
         return self.moving_mass
+
+
+class _Sliding(_Linear):
+    direction: Angle = quantity("Direction in which it slides, from the x-axis, counter-clockwise.", "rad")
 
 
 class _SlidingStroke(_Sliding):
@@ -179,6 +185,47 @@ class SwingingGate(_SwingingStroke):
     from_: Point = quantity("The end about which it swings.", "m", alias="from")
     to: Point = quantity("The other end while it is closed.", "m")
     open: Flag = quantity("True: open at the start.", default=False)
+
+
+class LiftingGate(_Linear):
+    """A gate or a stop that lifts open. Bottles pass under it when it is above half of its stroke.
+
+    If a bottle is below when it lowers, it stays above the bottle, and is blocked.
+    """
+
+    KIND: ClassVar[str] = "gate"
+
+    kind: Literal["lift"] = quantity("The kind of gate.")
+    from_: Point = quantity("One end.", "m", alias="from")
+    to: Point = quantity("The other end.", "m")
+    stroke: Positive = quantity("Height through which it lifts.", "m", default=0.1)
+    open: Flag = quantity("True: open at the start.", default=False)
+
+
+class Clamp(_SlidingStroke):
+    """Two parallel jaws that close on bottles, as those of a gripper do. One drive moves both."""
+
+    KIND: ClassVar[str] = "clamp"
+
+    from_: Point = quantity("One end of the first jaw while it is open.", "m", alias="from")
+    to: Point = quantity("The other end of the first jaw while it is open.", "m")
+    stroke: Positive = quantity("Stroke length of each jaw along `direction`, which leads to the other jaw.", "m")
+    opening: Positive = quantity("Distance of the jaws along `direction` while they are open.", "m")
+    force_limit: Limit = quantity(
+        "Largest force of the drive. Each jaw presses with half of it. Default: a cylinder of 10 mm bore at 6 bar (ISO "
+        "6432).",
+        "N",
+        default=CLAMP_FORCE,
+    )
+
+    def shape_problems(self, path: Path) -> Iterator[Problem]:
+        """Yield problems of coinciding ends, and of jaws that meet."""
+        yield from super().shape_problems(path)
+        if 2.0 * self.stroke >= self.opening:
+            yield Problem(
+                (*path, "stroke"),
+                f"{shown(self.stroke)} given, expected less than half of opening, {self.opening:g} (m)",
+            )
 
 
 class Pusher(_SlidingStroke):
@@ -245,6 +292,12 @@ class _Divider(_Positioned):
     KIND: ClassVar[str] = "divider"
 
     lane: Index = quantity("Lane that it feeds at the start.", "1", default=0)
+    clearance: Positive | None = quantity(
+        "Clear width between two parallel rails, half of it on either side of the line from `from` to `to`, between "
+        "which bottles pass. Left out: one rail.",
+        "m",
+        default=None,
+    )
 
     @property
     def index(self) -> int:
@@ -315,12 +368,14 @@ Divider = Annotated[
 """Kinds of divider."""
 
 Gate = Annotated[
-    Annotated[SlidingGate, Tag("(slide)")] | Annotated[SwingingGate, Tag("(swing)")],
-    one_of({"slide": "(slide)", "swing": "(swing)"}),
+    Annotated[SlidingGate, Tag("(slide)")]
+    | Annotated[SwingingGate, Tag("(swing)")]
+    | Annotated[LiftingGate, Tag("(lift)")],
+    one_of({"slide": "(slide)", "swing": "(swing)", "lift": "(lift)"}),
 ]
 """Kinds of gate."""
 
 Positioned = SwingingDivider | SlidingDivider | AdjustableGuide
 """Movers with several positions."""
 
-Mover = SlidingGate | SwingingGate | Pusher | Diverter | Positioned
+Mover = SlidingGate | SwingingGate | LiftingGate | Clamp | Pusher | Diverter | Positioned

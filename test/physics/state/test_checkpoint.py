@@ -38,6 +38,7 @@ from scenes import (
     scene,
     with_bends,
 )
+from swept import QUEUE
 
 from conveyor_sim.accuracy.trajectory import displace
 from conveyor_sim.engine.arrays.world import World
@@ -483,7 +484,8 @@ def test_bottles_that_can_not_be_are_refused(saved: Path, tmp_path: Path) -> Non
 
 def test_every_index_is_known(saved: Path) -> None:
     """An array of whole numbers that is new must be given its range, or be named as one that indexes nothing."""
-    for sim in (Simulation.load(saved), Simulation(scene(**line())), Simulation(queue(**SPRINGS_AND_RINGS))):
+    others = (scene(**line()), queue(**SPRINGS_AND_RINGS), queue(**QUEUE))
+    for sim in (Simulation.load(saved), *(Simulation(other) for other in others)):
         arrays = changing_arrays(sim._state.world)
         assert indices(arrays) == ranges(sim._state.world, sim.model, 1).keys() & arrays.keys()
 

@@ -14,6 +14,7 @@ import pytest
 from line.machines.test_station import LOADED, stationed
 from physics.state.test_checkpoint import INTEGRATORS, queue, run
 from scenes import SPRINGS_AND_RINGS, line, scene
+from swept import QUEUE
 
 from conveyor_sim.physics.state.hashes import MEMORY, full_state_hash
 from conveyor_sim.physics.state.world_arrays import FIXED, LIMITED, OBSERVERS, SCRATCH, changing_arrays
@@ -26,6 +27,7 @@ SCENES: dict[str, Callable[[], Scene]] = {
     "springs": lambda: queue(**SPRINGS_AND_RINGS),
     "limits": lambda: queue(**SPRINGS_AND_RINGS, limits=LIMITS),
     "bends": lambda: scene(**line()),
+    "impulses": lambda: queue(**QUEUE),
     **{name: (lambda name=name: queue(accuracy={"integrator": name, **INTEGRATORS[name]})) for name in INTEGRATORS},
 }
 AHEAD = 12
@@ -156,7 +158,7 @@ def test_states_that_look_equal_and_have_other_futures_differ(station: Path) -> 
     assert other.full_state_hash() != sim.full_state_hash()
 
 
-@pytest.mark.parametrize("name", ["springs", "bends", "linearly_implicit"])
+@pytest.mark.parametrize("name", ["springs", "bends", "linearly_implicit", "impulses"])
 def test_threads_calls_and_lookers_on_change_nothing(name: str, tmp_path: Path) -> None:
     one, two = Simulation(SCENES[name](), threads=1), Simulation(SCENES[name](), threads=2)
     one.advance(50)

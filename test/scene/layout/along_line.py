@@ -37,6 +37,7 @@ def devices(side: str = "left") -> Data:
         },
         "gates": {
             "slide": {"kind": "slide", **along, "at": 2.9, "side": side, "open": True, **MOVES},
+            "lift": {"kind": "lift", **along, "at": 2.0, "open": True, **MOVES},
             "swing": {"kind": "swing", **along, "at": 1.5, "side": side, "angle": "80 deg", "open": True, **MOVES},
         },
         "pushers": {"pusher": {**along, "at": 2.6, "length": 0.12, "side": side, "stroke": 0.05, **MOVES}},
@@ -48,6 +49,7 @@ def devices(side: str = "left") -> Data:
                         "positions": [sign * 0.3, sign * 0.35]},
         },
         "adjustable": {"guide": {**along, "from": 2.2, "to": 2.4, "side": side, "positions": [0.05, 0.055], **MOVES}},
+        "clamps": {"clamp": {**along, "from": 2.9, "to": 3.0, "stroke": 0.005, **MOVES}},
         "infeeds": {"feed": {"bottle": "bottle", **along, "at": 0.1, "offset": sign * 0.001, "rate": 2.0, "count": 3}},
         "outfeeds": {"out": {**along, "at": "end", "length": 0.1}},
         "machines": {

@@ -13,8 +13,8 @@ from conveyor_sim.engine.arrays.bodies import Bottles, Spin
 from conveyor_sim.engine.arrays.rails import RailContacts
 from conveyor_sim.engine.compiler.numba_internals.machine_code import entry
 from conveyor_sim.engine.observers.guard_probe import look
-from conveyor_sim.engine.observers.stored_energy import stored_energy
-from conveyor_sim.physics.accounts.elastic import deepest_overlap
+from conveyor_sim.engine.observers.stored_energy import KINETIC, stored_energy
+from conveyor_sim.physics.accounts.elastic import deepest_overlap, impulse_energy
 from conveyor_sim.physics.state import State
 from conveyor_sim.physics.stepping.guard.squeeze import Squeeze, squeeze_of
 from conveyor_sim.physics.stepping.guard.violation import Violation, Words
@@ -173,7 +173,11 @@ class Guard:
         return deep > DEEPEST
 
     def _energy(self) -> float:
-        return float(stored_energy(self._state.world, self._found).sum())
+        stored = stored_energy(self._state.world, self._found)
+        if self._state.world.impulses is None:
+            return float(stored.sum())
+        # Overlaps of contacts that a substep does not resolve are errors: they store no energy.
+        return float(stored[KINETIC]) + impulse_energy(self._model, self._state.world)
 
     def _compile(self, bottles: Bottles, spin: Spin | None) -> Any:
         """Run the first check, which compiles it."""

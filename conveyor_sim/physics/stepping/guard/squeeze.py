@@ -18,6 +18,7 @@ ACTIONS = {
     "pushers": "pusher {} pushes",
     "diverters": "diverter {} swings against",
     "dividers": "divider {} moves against",
+    "clamps": "clamp {} closes on",
     "adjustable": "adjustable guide {} moves against",
 }
 """Verb phrases of movers, by kind."""

@@ -153,6 +153,9 @@ class Words:
         stopped = float(np.sqrt(2.0 * most / mass))
         if forced := self._forced(speed <= CAME_FAST * stopped):
             return forced
+        if self._model.sweeps:
+            sweeps = f"{self._model.steps_per_tick} steps a tick with {self._model.sweeps} sweeps"
+            return f"{sweeps} do not resolve the contact with {what}; choose more steps or sweeps"
         if speed > CAME_FAST * stopped:
             needed = mass * (speed / (REMEDY_DEPTH * radius)) ** 2
             return (

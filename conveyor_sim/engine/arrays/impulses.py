@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Arrays of the method of impulses (`engine/impulses/`); None with every other integrator.
+
+Shapes: S bottle slots, T bottle types, M rail materials, P pairs or E entries by capacity. SI units, float64.
+"""
+
+from typing import Any, NamedTuple
+
+from conveyor_sim.engine.arrays.integrators import Triple
+from conveyor_sim.engine.arrays.types import F8, I8, U4
+from conveyor_sim.engine.compiler.groups import group
+
+ROW = 4
+"""Numbers by contact: impulse as a vector (N s), turning impulse (N s), visits until the next impact may act."""
+
+BODY = 8
+"""Numbers by bottle, one cache line: x, y, vx, vy, R omega, 1/m, R^2/J, R."""
+
+CONSTANTS = 16
+"""Numbers by kind of contact (`impulses/constants.py`)."""
+
+COLOURS = 63
+"""Most colours of pairs. Pairs of one colour share no bottle, except in the last colour, which takes all others."""
+
+
+@group
+class PairImpulses(NamedTuple):
+    """Pairs in the order of their colours, and the impulses that they hold."""
+
+    i: U4
+    j: U4
+    kind: U4
+    """Type of i times T plus type of j, (P,)."""
+    place: U4
+    """Place of each pair of the sorted list in this order, (P,)."""
+    start: I8
+    """First pair of each colour, (COLOURS + 1,)."""
+    next: I8
+    """Scratch of a rebuild, (COLOURS,)."""
+    row: F8
+    """Impulse on j, (ROW * P,)."""
+    kept_i: U4
+    kept_j: U4
+    kept: F8
+    """Copy of the rows by pair, which survives a rebuild of the list, (ROW * P,)."""
+    kept_count: I8
+    """(1,)"""
+
+
+@group
+class NearImpulses(NamedTuple):
+    """Impulses by entry of a Near list, and a copy by bottle and piece that survives a rebuild."""
+
+    row: F8
+    """Impulse on the rail, (ROW * E,)."""
+    kept_bottle: U4
+    kept_piece: U4
+    kept: F8
+    kept_count: I8
+    """(1,)"""
+
+
+@group
+class Impulses(NamedTuple):
+    """Constants of the method, and its state by bottle."""
+
+    sweeps: int
+    types: int
+    grip: float
+    """Largest deceleration by the friction under a bottle, mu g, m/s^2."""
+    alike: Any
+    """1: all pairs have the same constants; None otherwise."""
+    pair_restitution: F8 | None
+    """(T * T,)"""
+    pair_peak: F8 | None
+    """Peak force of an impact over v sqrt(k m_r), (T * T,)."""
+    rail_restitution: F8 | None
+    """(T * M,)"""
+    rail_peak: F8 | None
+    inverse_mass: F8
+    """(T,)"""
+    turning: F8
+    """R^2/J, 0 if nothing turns, (T,)."""
+    radius: F8
+    """(T,)"""
+    pair_constants: F8
+    """Scratch of a call: constants at its substep, (CONSTANTS * T * T,)."""
+    rail_constants: F8
+    """Scratch of a call, (CONSTANTS * T * M,)."""
+    body: F8
+    """Scratch of a substep, (BODY * S,)."""
+    free: F8
+    """Scratch of a substep: velocities without the impulses of pressed contacts, (4 * S,)."""
+    warm: Triple
+    """Change of velocity by pressed contacts in the last substep, m/s; `turn`: of R omega; (S,)."""
+    step: F8
+    """Length of the last substep, s, to which the impulses belong; 0 before the first, (1,)."""
+    anew: I8
+    """1: lists were rebuilt, so `warm` must be summed anew, (1,)."""
+    mask: I8
+    """Scratch of a rebuild: colours of each bottle's pairs, one bit each, (S,)."""

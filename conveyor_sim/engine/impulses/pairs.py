@@ -1,0 +1,218 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A sweep over all pairs, colour by colour, in chunks: gather, law, scatter.
+
+No two pairs of a colour share a bottle, so its pairs can be divided among threads and taken in any order: the bits are
+the same. The columns of a chunk lie in one array at constant distances. LLVM vectorises the law only then.
+"""
+
+import math
+from typing import Any
+
+from numba import uint64
+
+from conveyor_sim.engine.arrays.impulses import BODY, COLOURS, CONSTANTS, ROW, PairImpulses
+from conveyor_sim.engine.arrays.types import F8
+from conveyor_sim.engine.arrays.world import Worker, World
+from conveyor_sim.engine.compiler.compile import part
+from conveyor_sim.engine.impulses.constants import (
+    APART,
+    CLOSED,
+    COMPLIANCE,
+    FASTEST,
+    FRICTION,
+    GAIN_CLOSED,
+    GAIN_OPEN,
+    MASS,
+    MASS_INVERSE,
+    OPEN,
+    PEAK,
+    REACH,
+    REBOUND,
+    TURN,
+    TURN_INVERSE,
+)
+from conveyor_sim.engine.impulses.law import visit
+from conveyor_sim.engine.threads.workers import CHUNK, share, wait_for_all
+
+_ROW, _BODY, _KINDS, _FREE = uint64(ROW), uint64(BODY), uint64(CONSTANTS), uint64(4)
+
+# Columns of a chunk: differences of positions and velocities, sum of R omega, row of the pair, then results.
+_X, _Y, _VX, _VY, _RIM = (uint64(CHUNK * column) for column in range(5))
+_HELD_X, _HELD_Y, _HELD_TURN, _WAIT = (uint64(CHUNK * column) for column in range(5, 9))
+_CHANGE_X, _CHANGE_Y, _CHANGE_TURN = (uint64(CHUNK * column) for column in range(9, 12))
+_NEW_X, _NEW_Y, _NEW_TURN, _NEW_WAIT = (uint64(CHUNK * column) for column in range(12, 16))
+_SHIFT_X, _SHIFT_Y, _ACT, _NORMAL, _SPEED = (uint64(CHUNK * column) for column in range(16, 21))
+_FIRST = 21
+"""First column of the constants of each pair, if these differ."""
+
+
+@part
+def sweep_pairs(world: World, worker: Worker, impulses: Any, h: float, threshold: float, last: bool) -> None:
+    """Visit every pair once. last: this is the last sweep of the substep of h (s). On return all pairs are done."""
+    if world.pairs is None:
+        return
+    _sweep(world, worker, impulses, world.pairs.impulse, h, threshold, last)
+
+
+@part
+def _sweep(
+    world: World, worker: Worker, impulses: Any, pairs: PairImpulses, h: float, threshold: float, last: bool
+) -> None:
+    for colour in range(COLOURS):
+        start, end = pairs.start[colour], pairs.start[colour + 1]
+        if start == end:
+            break
+        begin, stop = share(worker, end - start)
+        if colour == COLOURS - 1:
+            # These pairs may share bottles, so one thread takes them all.
+            begin, stop = 0, (end - start if worker.rank == 0 else 0)
+        for first in range(begin, stop, CHUNK):
+            count = min(CHUNK, stop - first)
+            _gather(impulses, impulses.alike, pairs, worker.chunk, start + first, count)
+            _solve(worker.chunk, impulses, impulses.alike, threshold, world.settings.slip_limit, h, count)
+            _scatter(impulses, pairs, worker.chunk, start + first, count)
+            _note(world.peaks, impulses, pairs, worker.chunk, h, last, start + first, count)
+        wait_for_all(worker)
+
+
+@part
+def _gather(impulses: Any, alike: Any, pairs: PairImpulses, chunk: F8, first: int, count: int) -> None:
+    body = impulses.body
+    for c in range(uint64(count)):
+        p = uint64(first) + c
+        a, b = uint64(pairs.i[p]) * _BODY, uint64(pairs.j[p]) * _BODY
+        chunk[_X + c] = body[b] - body[a]
+        chunk[_Y + c] = body[b + uint64(1)] - body[a + uint64(1)]
+        chunk[_VX + c] = body[b + uint64(2)] - body[a + uint64(2)]
+        chunk[_VY + c] = body[b + uint64(3)] - body[a + uint64(3)]
+        chunk[_RIM + c] = body[b + uint64(4)] + body[a + uint64(4)]
+        row = p * _ROW
+        chunk[_HELD_X + c] = pairs.row[row]
+        chunk[_HELD_Y + c] = pairs.row[row + uint64(1)]
+        chunk[_HELD_TURN + c] = pairs.row[row + uint64(2)]
+        chunk[_WAIT + c] = pairs.row[row + uint64(3)]
+        if alike is None:
+            kind = uint64(pairs.kind[p]) * _KINDS
+            for constant in range(uint64(PEAK)):
+                chunk[uint64(CHUNK) * (uint64(_FIRST) + constant) + c] = impulses.pair_constants[kind + constant]
+
+
+@part
+def _constant(chunk: F8, alike: Any, common: float, number: int, c: int) -> float:
+    if alike is None:
+        return chunk[uint64(CHUNK * (_FIRST + number)) + c]
+    return common
+
+
+@part
+def _solve(chunk: F8, impulses: Any, alike: Any, threshold: float, slip_limit: float, h: float, count: int) -> None:
+    table = impulses.pair_constants
+    reach, mass, mass_inverse = table[REACH], table[MASS], table[MASS_INVERSE]
+    turn, turn_inverse, open_rate, closed_rate = table[TURN], table[TURN_INVERSE], table[OPEN], table[CLOSED]
+    open_gain, closed_gain, compliance = table[GAIN_OPEN], table[GAIN_CLOSED], table[COMPLIANCE]
+    rebound, friction, apart, fastest = table[REBOUND], table[FRICTION], table[APART], table[FASTEST]
+    for c in range(uint64(count)):
+        x, y, vx, vy = chunk[_X + c], chunk[_Y + c], chunk[_VX + c], chunk[_VY + c]
+        distance = math.sqrt(x * x + y * y)
+        inverse = 1.0 / distance
+        nx, ny = x * inverse, y * inverse
+        change_x, change_y, change_turn, new_x, new_y, new_turn, wait, shift_x, shift_y, act, normal, speed = visit(
+            chunk[_HELD_X + c],
+            chunk[_HELD_Y + c],
+            chunk[_HELD_TURN + c],
+            chunk[_WAIT + c],
+            nx,
+            ny,
+            distance - _constant(chunk, alike, reach, REACH, c),
+            vx * nx + vy * ny,
+            vy * nx - vx * ny - chunk[_RIM + c],
+            _constant(chunk, alike, mass, MASS, c),
+            _constant(chunk, alike, mass_inverse, MASS_INVERSE, c),
+            _constant(chunk, alike, turn, TURN, c),
+            _constant(chunk, alike, turn_inverse, TURN_INVERSE, c),
+            _constant(chunk, alike, open_rate, OPEN, c),
+            _constant(chunk, alike, closed_rate, CLOSED, c),
+            _constant(chunk, alike, open_gain, GAIN_OPEN, c),
+            _constant(chunk, alike, closed_gain, GAIN_CLOSED, c),
+            _constant(chunk, alike, compliance, COMPLIANCE, c),
+            _constant(chunk, alike, rebound, REBOUND, c),
+            _constant(chunk, alike, friction, FRICTION, c),
+            _constant(chunk, alike, apart, APART, c),
+            _constant(chunk, alike, fastest, FASTEST, c),
+            threshold,
+            slip_limit,
+            h,
+        )
+        chunk[_CHANGE_X + c] = change_x
+        chunk[_CHANGE_Y + c] = change_y
+        chunk[_CHANGE_TURN + c] = change_turn
+        chunk[_NEW_X + c] = new_x
+        chunk[_NEW_Y + c] = new_y
+        chunk[_NEW_TURN + c] = new_turn
+        chunk[_NEW_WAIT + c] = wait
+        chunk[_SHIFT_X + c] = shift_x
+        chunk[_SHIFT_Y + c] = shift_y
+        chunk[_ACT + c] = act
+        chunk[_NORMAL + c] = normal
+        chunk[_SPEED + c] = speed
+
+
+@part
+def _scatter(impulses: Any, pairs: PairImpulses, chunk: F8, first: int, count: int) -> None:
+    body, free = impulses.body, impulses.free
+    for c in range(uint64(count)):
+        p, act = uint64(first) + c, chunk[_ACT + c]
+        row = p * _ROW
+        pairs.row[row + uint64(3)] = chunk[_NEW_WAIT + c]
+        if act == 0.0:
+            continue
+        a, b = uint64(pairs.i[p]) * _BODY, uint64(pairs.j[p]) * _BODY
+        mass_a, mass_b = body[a + uint64(5)], body[b + uint64(5)]
+        x, y, turn = chunk[_CHANGE_X + c], chunk[_CHANGE_Y + c], chunk[_CHANGE_TURN + c]
+        turn_a, turn_b = body[a + uint64(6)] * turn, body[b + uint64(6)] * turn
+        body[a] -= mass_a * chunk[_SHIFT_X + c]
+        body[a + uint64(1)] -= mass_a * chunk[_SHIFT_Y + c]
+        body[a + uint64(2)] -= mass_a * x
+        body[a + uint64(3)] -= mass_a * y
+        body[a + uint64(4)] += turn_a
+        body[b] += mass_b * chunk[_SHIFT_X + c]
+        body[b + uint64(1)] += mass_b * chunk[_SHIFT_Y + c]
+        body[b + uint64(2)] += mass_b * x
+        body[b + uint64(3)] += mass_b * y
+        body[b + uint64(4)] += turn_b
+        pairs.row[row] = chunk[_NEW_X + c]
+        pairs.row[row + uint64(1)] = chunk[_NEW_Y + c]
+        pairs.row[row + uint64(2)] = chunk[_NEW_TURN + c]
+        if act > 1.0:
+            a, b = uint64(pairs.i[p]) * _FREE, uint64(pairs.j[p]) * _FREE
+            free[a] -= mass_a * x
+            free[a + uint64(1)] -= mass_a * y
+            free[a + uint64(2)] += turn_a
+            free[b] += mass_b * x
+            free[b + uint64(1)] += mass_b * y
+            free[b + uint64(2)] += turn_b
+
+
+@part
+def _note(
+    peaks: Any, impulses: Any, pairs: PairImpulses, chunk: F8, h: float, last: bool, first: int, count: int
+) -> None:
+    """Update peaks by impacts and, in the last sweep, by the impulses of pressed contacts."""
+    if peaks is None:
+        return
+    for c in range(uint64(count)):
+        p, act, normal = uint64(first) + c, chunk[_ACT + c], chunk[_NORMAL + c]
+        if act > 1.0:
+            peak = impulses.pair_constants[uint64(pairs.kind[p]) * _KINDS + uint64(PEAK)]
+            note_peak(peaks, uint64(pairs.i[p]), -chunk[_SPEED + c] * peak, normal)
+            note_peak(peaks, uint64(pairs.j[p]), -chunk[_SPEED + c] * peak, normal)
+        elif last and normal > 0.0:
+            note_peak(peaks, uint64(pairs.i[p]), normal / h, normal)
+            note_peak(peaks, uint64(pairs.j[p]), normal / h, normal)
+
+
+@part
+def note_peak(peaks: Any, i: int, force: float, impulse: float) -> None:
+    """Update a bottle's largest normal force (N) and the sum of its normal impulses (N s)."""
+    peaks.force[i] = force if force > peaks.force[i] else peaks.force[i]
+    peaks.impulse[i] += impulse

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Impulses: implicit contacts in short substeps of h, solved by a few sweeps of Gauss-Seidel over the velocities.
+
+Contacts stiffer than a substep resolves stay stable and press with the right forces once the sweeps have passed the
+depth of the queue; fast impacts rebound in closed form. A substep is
+
+1. friction under each bottle, implicit, then the impulses that its contacts held in the last substep (warm start);
+2. `sweeps` times: all pairs, colour by colour, then all rails (`impulses/law.py`);
+3. r += h v.
+
+The step is that of Catto (GDC 2006) with the compliance of Bender et al. (2014) and short substeps as in Macklin et al.
+(2019). The positions of pressed contacts are corrected without a velocity, so no energy enters. Forces of single
+contacts in a crowd converge slowly, with the root of substeps times sweeps; docs/accuracy.md has the errors.
+"""
+
+from typing import Any
+
+from numba import uint64
+
+from conveyor_sim.engine.arrays.bodies import Bottles
+from conveyor_sim.engine.arrays.lists import Neighbourhood
+from conveyor_sim.engine.arrays.world import Worker, World
+from conveyor_sim.engine.compiler.compile import kernel, part
+from conveyor_sim.engine.impulses.bottles import begin_substep, end_substep, take_step, warm_anew
+from conveyor_sim.engine.impulses.constants import fill_constants
+from conveyor_sim.engine.impulses.pairs import sweep_pairs
+from conveyor_sim.engine.impulses.rails import sweep_rails
+from conveyor_sim.engine.integrators.motion import lists_hold, probe_rebuilt
+from conveyor_sim.engine.support.footing import check_footing
+from conveyor_sim.engine.threads.workers import BLOCK, MOVED, raise_flag, share, wait_for_all
+
+SLOWEST_IMPACT = 5e-3
+"""Closing speed below which a contact presses without an impact, m/s; and 4 times what friction changes in h."""
+
+
+@kernel
+def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> int:
+    """Take up to `steps` substeps of dt seconds; return how many were taken (see the package's docstring)."""
+    bottles = world.bottles
+    impulses: Any = world.impulses
+    begin, stop = share(worker, bottles.x.size)
+    if worker.rank == 0:
+        fill_constants(world, impulses, dt)
+        take_step(world, impulses, dt)
+    wait_for_all(worker)
+    threshold = max(SLOWEST_IMPACT, 4.0 * impulses.grip * dt)
+    for step in range(steps):
+        warm_anew(world, worker, impulses)
+        for first in range(begin, stop, BLOCK):
+            end = min(first + BLOCK, stop)
+            check_footing(bottles, world.belts, world.surface, world.footing, world.ring, first, end)
+            begin_substep(world, impulses, dt, first, end)
+        wait_for_all(worker)
+        for sweep in range(impulses.sweeps):
+            last = sweep + 1 == impulses.sweeps
+            sweep_pairs(world, worker, impulses, dt, threshold, last)
+            for first in range(begin, stop, BLOCK):
+                sweep_rails(world, impulses, dt, threshold, last, first, min(first + BLOCK, stop))
+            if not last:
+                wait_for_all(worker)
+        for first in range(begin, stop, BLOCK):
+            end = min(first + BLOCK, stop)
+            end_substep(world, impulses, dt, first, end)
+            if _leaves(bottles, world.neighbourhood, world.settings.skin, dt, first, end):
+                raise_flag(worker, MOVED)
+        if not lists_hold(world, worker):
+            return step + 1
+        probe_rebuilt(world, worker)
+    return steps
+
+
+@part
+def _leaves(bottles: Bottles, hood: Neighbourhood, skin: float, h: float, first: int, end: int) -> bool:
+    """Return True if a bottle of first to end may leave half of the skin in the next substep.
+
+    Contacts are solved before the bottles touch, so the lists must hold for the way of a substep more.
+    """
+    far = 0
+    for i in range(uint64(first), uint64(end)):
+        dx = abs(bottles.x[i] - hood.x[i]) + h * abs(bottles.vx[i])
+        dy = abs(bottles.y[i] - hood.y[i]) + h * abs(bottles.vy[i])
+        far |= dx * dx + dy * dy > 0.25 * skin * skin
+    return far != 0

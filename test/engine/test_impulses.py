@@ -1,0 +1,242 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The method of impulses: same bits for threads, calls, checkpoints and replays; colours; impulses that are state."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from bag.small_line import record
+from scenes import RADIUS, belt, bottle, kind, polyline, scene
+from swept import MU_BASE, crowd, fields, file_of, forces_on, glass, run, swept
+
+from conveyor_sim.bag.replay import replay
+from conveyor_sim.engine.arrays.impulses import COLOURS
+from conveyor_sim.engine.integrators import INTEGRATORS
+from conveyor_sim.engine.threads.workers import UNIT
+from conveyor_sim.physics.state.empty_world import empty_pairs
+from conveyor_sim.scene import parse_scene
+from conveyor_sim.scene.recorded import expanded_text
+from conveyor_sim.simulation import Simulation
+
+
+def pressed_crowd(threads: int = 1) -> Simulation:
+    """Return 240 bottles of two sizes, which a belt presses into a corner."""
+    return Simulation(scene(**crowd(16, 15)), threads=threads)
+
+
+def test_bits_depend_neither_on_threads_nor_on_calls_nor_on_checkpoints(tmp_path: Path) -> None:
+    one = pressed_crowd()
+    one.advance(150)
+    assert one._state.world.pairs is not None
+    assert one._state.world.pairs.impulse is not None
+    # Colours have several units, so each thread has a share.
+    assert np.diff(one._state.world.pairs.impulse.start).max() > UNIT
+    assert one.contacts().kind.size > 200
+    for threads, calls in ((2, (150,)), (3, (1, 60, 89))):
+        other = pressed_crowd(threads)
+        for ticks in calls:
+            other.advance(ticks)
+        assert other.full_state_hash() == one.full_state_hash()
+        np.testing.assert_array_equal(other.bottles().impulse, one.bottles().impulse)
+        np.testing.assert_array_equal(other.bottles().peak_force, one.bottles().peak_force)
+    saved = pressed_crowd()
+    saved.advance(97)
+    saved.save(tmp_path / "there")
+    loaded = Simulation.load(tmp_path / "there", threads=2)
+    loaded.advance(53)
+    assert loaded.full_state_hash() == one.full_state_hash()
+
+
+def test_peaks_change_no_bit() -> None:
+    """Nor do contacts that are read at every tick."""
+    shown, hidden = (
+        Simulation(scene(**crowd(6, 5, effects={"peaks": peaks, "rotation": "on", "unequal_radii": "on"})), threads=1)
+        for peaks in ("on", "off")
+    )
+    for _ in range(100):
+        shown.advance()
+        shown.contacts(), shown.bottles()
+    hidden.advance(100)
+    assert shown.state_hash() == hidden.state_hash()
+
+
+def test_one_kind_of_pairs_has_the_bits_of_several() -> None:
+    """A type without bottles changes how the constants of a pair are read, and no bit."""
+    given = file_of(30)
+    for n, one in enumerate(given["bottles"]):
+        one["position"][1] = 0.01 * math.sin(n)
+    alike = run(bottle_types={"bottle": kind()}, **given)
+    several = run(**given)
+    assert alike._state.world.impulses is not None
+    assert (alike._state.world.impulses.alike, several._state.world.impulses.alike) == (1, None)
+    for sim in (alike, several):
+        sim.advance(200)
+    for name in ("x", "y", "vx", "vy", "omega", "impulse"):
+        np.testing.assert_array_equal(getattr(alike.bottles(), name), getattr(several.bottles(), name))
+
+
+@pytest.mark.parametrize("accuracy", ["fast", swept(8, 3)])
+def test_a_recording_replays_bit_for_bit(accuracy: Any, tmp_path: Path) -> None:
+    given = crowd(6, 5, accuracy=accuracy, outputs={"bottles": 50, "contacts": 50})
+    recorded = scene(**given, duration=1.0)
+    record(recorded, tmp_path / "bag", 100)
+    report = replay(tmp_path / "bag")
+    assert report.difference is None
+    assert report.exact
+    assert report.compared["contacts"] == 51
+
+
+def test_the_explicit_form_of_a_scene_has_the_same_bits() -> None:
+    """`fast` alone, its fields, and the scene written with all values."""
+    word, written = (scene(**crowd(6, 5, accuracy=accuracy)) for accuracy in ("fast", swept(8, 2)))
+    expanded = parse_scene(expanded_text(word))
+    assert expanded.accuracy.sweeps == 2
+    hashes = []
+    for one in (word, written, expanded):
+        sim = Simulation(one)
+        sim.advance(60)
+        hashes.append(sim.state_hash())
+    assert hashes[0] == hashes[1] == hashes[2]
+
+
+def test_pairs_of_a_colour_share_no_bottle() -> None:
+    sim = pressed_crowd()
+    sim.advance(100)
+    pairs = sim._state.world.pairs
+    assert pairs is not None
+    assert pairs.impulse is not None
+    ordered = pairs.impulse
+    assert ordered.start[-1] == pairs.used[0] > 200
+    for first, end in zip(ordered.start[:-1], ordered.start[1:], strict=True):
+        bottles = np.concatenate([ordered.i[first:end], ordered.j[first:end]])
+        assert np.unique(bottles).size == bottles.size
+    place = ordered.place[: pairs.used[0]]
+    assert np.array_equal(ordered.i[place], pairs.i[: pairs.used[0]])
+    assert np.array_equal(np.sort(place), np.arange(pairs.used[0]))
+
+
+def test_more_neighbours_than_colours() -> None:
+    """A large disc pressed by 80 small ones: the last colour takes the rest, and the bits are those of one thread."""
+    count, large = 80, 1.0
+    radius = 0.9 * math.pi * large / count
+    ring = large + radius + 1e-4
+    angles = 2.0 * math.pi * np.arange(count) / count
+    given = fields(
+        bottle_types={"bottle": kind(radius, 0.05), "big": kind(large, 5.0)},
+        bottles=[
+            bottle(0.0, 0.0, type="big"),
+            *(bottle(ring * math.cos(a), ring * math.sin(a), -0.3 * math.cos(a), -0.3 * math.sin(a)) for a in angles),
+        ],
+    )
+    hashes = []
+    for threads in (1, 3):
+        sim = Simulation(scene(**given), threads=threads)
+        assert sim._state.world.pairs is not None
+        sim.advance(1)
+        assert sim._state.world.pairs.impulse is not None
+        start = sim._state.world.pairs.impulse.start
+        assert start[COLOURS] - start[COLOURS - 1] > 0
+        sim.advance(19)
+        hashes.append(sim.full_state_hash())
+        state = sim.bottles()
+        momentum = sim.model.type_mass[state.type] @ np.column_stack([state.vx, state.vy])
+        assert np.abs(momentum).max() < 1e-12
+    assert hashes[0] == hashes[1]
+
+
+def test_lists_that_are_too_short_leave_no_trace() -> None:
+    """A call returns where a rebuilt list does not fit; the rest of the tick follows with a longer one."""
+    one, other = pressed_crowd(), pressed_crowd()
+    state = other._state
+    assert state.world.pairs is not None
+    shortest = int(state.world.pairs.used[0])
+    state.world = state.world._replace(pairs=empty_pairs(state.model, shortest))
+    state.world.neighbourhood.stale[0] = 1
+    state.make_lists()
+    for sim in (one, other):
+        sim.advance(100)
+    assert state.world.pairs is not None
+    assert state.world.pairs.i.size > shortest
+    assert other.state_hash() == one.state_hash()
+    np.testing.assert_array_equal(other.bottles().impulse, one.bottles().impulse)
+
+
+def resting_file() -> Simulation:
+    """Return a file of ten that has come to rest on its stop."""
+    sim = run(16, 2, **file_of(10))
+    sim.advance(300)
+    return sim
+
+
+def test_forces_survive_a_rebuild_of_the_lists() -> None:
+    sim = resting_file()
+    before = forces_on(sim, "stop")
+    sim._state.world.neighbourhood.stale[0] = 1
+    sim._state.make_lists()
+    assert forces_on(sim, "stop") == before
+    sim.advance(1)
+    assert forces_on(sim, "stop") == pytest.approx(before, rel=1e-6)
+
+
+def test_forces_survive_shorter_steps() -> None:
+    """The guard repeats a tick in shorter steps: held impulses are scaled, so that nothing is kicked."""
+    sim = resting_file()
+    before, speed = forces_on(sim, "stop"), np.abs(sim.bottles().vx).max()
+    steps, dt = 4 * sim.model.steps_per_tick, sim.model.dt / 4.0
+    sim.integration._pool.advance(1, INTEGRATORS["impulses"], sim._state.world, steps, dt, 0)
+    assert forces_on(sim, "stop") == pytest.approx(before, rel=2e-3)
+    assert np.abs(sim.bottles().vx).max() < speed + 1e-4
+
+
+def test_a_bottle_that_is_removed_takes_its_impulses_along() -> None:
+    """The next one in its slot starts with none; the file closes the gap."""
+    sim = resting_file()
+    before = forces_on(sim, "stop")
+    sim._state.remove(0)
+    sim._state.make_lists()
+    assert forces_on(sim, "stop") == 0.0
+    warm = sim._state.world.impulses
+    assert warm is not None
+    assert warm.warm.x[0] == 0.0
+    sim.advance(300)
+    assert forces_on(sim, "stop") == pytest.approx(0.9 * before, rel=5e-3)
+
+
+def test_a_bottle_alone_keeps_its_spin_and_rides_the_belt() -> None:
+    sim = run(belts={"belt": belt(0.3)}, bottles=[bottle(0.0, 0.0, 0.3, spin=1.7), bottle(1.0, 1.0, type="big")])
+    sim.advance(100)
+    state = sim.bottles()
+    assert state.omega[0] == 1.7
+    assert state.vx[0] == pytest.approx(0.3, abs=1e-12)
+    assert state.x[0] == pytest.approx(0.3, rel=1e-9)
+
+
+def test_contacts_list_the_held_forces() -> None:
+    """On the second of two bottles: its stop bears both, the contact between them the drag of the one behind."""
+    sim = run(16, 2, **file_of(2))
+    sim.advance(200)
+    contacts = sim.contacts()
+    drag = MU_BASE * 0.2 * 9.81
+    pair, rail = contacts.kind == 0, contacts.kind == 1
+    assert contacts.normal_force[pair] == pytest.approx([drag], rel=1e-3)
+    assert contacts.normal_force[rail] == pytest.approx([2.0 * drag], rel=1e-3)
+    assert contacts.nx[rail] == pytest.approx([1.0])
+    assert contacts.x[rail] == pytest.approx([0.0], abs=1e-4)
+
+
+def test_a_fast_bottle_does_not_pass_a_rail() -> None:
+    """At 5 m/s it moves by a tenth of its radius in a substep; the contact acts before it touches."""
+    box = polyline([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)], closed=True)
+    sim = run(
+        contacts=[glass(restitution=0.99), glass("steel", restitution=0.99)],
+        rails={"box": box},
+        bottles=[bottle(0.0, 0.1, 4.0, 3.0)],
+    )
+    for _ in range(200):
+        sim.advance()
+        state = sim.bottles()
+        assert max(abs(state.x[0]), abs(state.y[0])) <= 0.5 - RADIUS + 1e-3
