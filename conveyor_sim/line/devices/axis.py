@@ -120,7 +120,7 @@ class AxisDevice(Device):
                 -most_rate,
                 most_rate,
                 part.rate or 0.0,
-                nominal=part.rate,
+                nominal=most_rate,
             )
         yield switch(f"{name}/jammed", "fault", "Stands still, against any torque of its drive.")
 
