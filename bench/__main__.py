@@ -16,6 +16,7 @@ with while_importing():
 
     from bench import (
         accuracy,
+        bodies,
         compiling,
         control,
         dense,
@@ -72,6 +73,7 @@ PARTS: dict[str, Part] = {
     "node": node,
     "control": control,
     "riding": riding,
+    "bodies": bodies,
     "lockstep": lockstep,
     "scada": scada,
     "isolation": isolation,

@@ -124,6 +124,9 @@ def _password(user: str, file: Path | None, user_certificate: Path | None) -> st
 
 
 def _require_opcua(url: str, option: str) -> None:
+    from conveyor_sim.protocols.attach.links import refuse_user
+
+    refuse_user(url)
     if not url.startswith("opc.tcp://"):
         raise ConveyorError(f"{option}: given with {printable(url)}, expected opc.tcp://host:port")
 

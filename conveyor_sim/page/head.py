@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -91,7 +92,7 @@ def plan_head(scene: Scene) -> dict[str, Any]:
             for body in bodies
             for piece in body.pieces
         ],
-        "bodies": [_body(body) for body in wheel_bodies(scene)],
+        "bodies": _bodies(wheel_bodies(scene)),
         "marks": [
             {
                 "look": mark.look,
@@ -105,19 +106,29 @@ def plan_head(scene: Scene) -> dict[str, Any]:
     }
 
 
-def _body(body: BodyShape) -> dict[str, Any]:
-    """Return a body of a star wheel, screw or side belt: its outline at displacement 0, and its motion.
+def _bodies(bodies: Sequence[BodyShape]) -> list[dict[str, Any]]:
+    """Return bodies of star wheels, screws and side belts, with lags from the first body of each machine.
+
+    The angle of a machine is that of its first body.
+    """
+    first: dict[str, float] = {}
+    for body in bodies:
+        first.setdefault(body.name, body.lag)
+    return [_body(body, body.lag - first[body.name]) for body in bodies]
+
+
+def _body(body: BodyShape, lag: float) -> dict[str, Any]:
+    """Return a body: its outline at displacement 0, and its motion. lag: behind the angle of its machine, rad.
 
     Parts of cams are [u, s, ds/du, d2s/du2]; null without a cam.
     """
     return {
         "name": body.name,
-        "axis": body.axis,
         "outline": _points(RailShape(body.name, body.material, body.pieces).outline(_POCKET_POINTS)),
         "pivot": body.pivot,
         "along": body.along,
         "turning": body.turning,
-        "lag": body.lag,
+        "lag": lag,
         "period": body.period,
         "cam": None if body.cam is None else {"parts": body.cam.parts, "end": body.cam.end},
         "slide": None if body.slide is None else {"direction": body.slide.direction, "parts": body.slide.cam.parts},

@@ -113,9 +113,16 @@ class Plant:
                 reach[axis] = max(reach[axis], shape.fastest_point)
         return reach
 
-    def moving_at(self, positions: Sequence[float]) -> tuple[RailShape, ...]:
-        """Return the bodies that are present, each as a rail, at positions (m or rad) of the axes."""
-        return bodies_at(self.moving, {axis.name: at for axis, at in zip(self.axes, positions, strict=True)})
+    def moving_at(self, positions: Sequence[float], lags: Sequence[float] = ()) -> tuple[RailShape, ...]:
+        """Return the bodies that are present, each as a rail, at positions (m or rad) of the axes.
+
+        lags: of the bodies where machines have slipped, m or rad; without any, those of the scene.
+        """
+        bodies = (
+            shape if shape.lag == lag else replace(shape, lag=lag)
+            for shape, lag in zip(self.moving, lags or [shape.lag for shape in self.moving], strict=True)
+        )
+        return bodies_at(bodies, {axis.name: at for axis, at in zip(self.axes, positions, strict=True)})
 
     @cached_property
     def rails(self) -> tuple[RailShape, ...]:

@@ -8,6 +8,7 @@ import math
 import numpy as np
 from fuzz.axis_invariants import AxisWatch
 from fuzz.crossing import crossed
+from fuzz.panel_invariants import ExpectedPanel
 from fuzz.violation import Violation
 from numpy.typing import NDArray
 
@@ -44,8 +45,8 @@ RISING = {
 class DeviceWatch:
     """Looks at the process image after every tick. Raises Violation."""
 
-    def __init__(self, simulation: Simulation) -> None:
-        self._sim = simulation
+    def __init__(self, simulation: Simulation, panel: ExpectedPanel) -> None:
+        self._sim, self._panel = simulation, panel
         self._signals = simulation.process_image.signals
         self._scene = simulation.scene
         self._injected: dict[str, float] = {}
@@ -160,12 +161,13 @@ class DeviceWatch:
             raise Violation("machine", f"{place} works on a bottle in state {state} at tick {self._sim.tick}")
 
     def _stopped(self) -> None:
-        """Check that an inspection or a reject runs unless the fault `stop` is injected."""
+        """Check that an inspection or a reject runs unless it has the fault `stop`; a reject needs power."""
         for name, machine in self._scene.machines.items():
             place = f"machines/{name}"
             if isinstance(machine, (Inspection, Reject)):
                 running, stop = self._now[f"{place}/running"], self._fault(f"{place}/stop")
-                if running == stop:
+                off = isinstance(machine, Reject) and self._panel.is_off("machines")
+                if running == (stop or off):
                     raise Violation("machine", f"{place}/running is {running} with {place}/stop at {stop}")
 
     def _lines(self, before: BottleColumns, now: BottleColumns) -> None:

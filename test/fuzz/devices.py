@@ -234,6 +234,32 @@ def _habits(draw: st.DrawFn, tick: float) -> Data:
 
 
 @st.composite
+def panel(draw: st.DrawFn, frame: Frame) -> Data:
+    """Push-buttons, selector switches, emergency stops, lamps, horns, stack lights and numeric fields; at least one."""
+    deceleration = frame.speed / (frame.tick * draw(st.sampled_from([0.5, 3.0, 17.0])))
+    cuts = st.sampled_from([[], ["drives"], ["machines"], ["drives", "machines"]])
+    found: dict[str, Data] = {}
+    for n in range(draw(st.integers(1, 5))):
+        kinds = ["emergency_stop", "button", "emergency_stop", "selector", "lamp", "horn", "stack_light", "numeric"]
+        part: Data = {"kind": draw(st.sampled_from(kinds))}
+        if part["kind"] == "button":
+            part |= {"contact": draw(st.sampled_from(["NO", "NC"]))}
+            part |= {"action": draw(st.sampled_from(["momentary", "maintained"]))}
+            part |= {"bounce": frame.tick * draw(st.sampled_from([0.0, 0.4, 5.0]))}
+        elif part["kind"] == "selector":
+            part |= {"positions": ["off", "hand", "auto"][: draw(st.integers(2, 3))]}
+            part |= draw(st.sampled_from([{}, {"initial": "hand"}]))
+        elif part["kind"] == "emergency_stop":
+            part |= {"cuts": draw(cuts)}
+            part |= {"deceleration": deceleration} if "drives" in part["cuts"] else {}
+        elif part["kind"] == "numeric":
+            part |= {"limits": [draw(between(-2.0, 0.0)), draw(between(0.1, 3.0))]}
+            part |= {"written_by": draw(st.sampled_from(["operator", "controller", "both"]))}
+        found[f"part_{n}"] = part
+    return {"panel": found}
+
+
+@st.composite
 def sensors(draw: st.DrawFn, frame: Frame, belts: list[str]) -> Data:
     """Photo-eyes, zones, counters, and an indicator where there is a belt for it."""
     delays = st.sampled_from([0.0, 0.0, 0.4 * frame.tick, 2.0 * frame.tick, 7.3 * frame.tick])

@@ -60,6 +60,7 @@ class Family:
     ledger: bool = False
     vibration: bool = False
     axes: bool = False
+    panel: bool = False
     effects: tuple[tuple[str, str], ...] = ()
 
     def __str__(self) -> str:
@@ -71,7 +72,7 @@ class Family:
         ]
         parts += [
             name
-            for name in ("drives", "movers", "lifts", "machines", "sensors", "ledger", "vibration", "axes")
+            for name in ("drives", "movers", "lifts", "machines", "sensors", "ledger", "vibration", "axes", "panel")
             if getattr(self, name)
         ]
         parts += [*(f"{kind} belts" for kind in self.belts), *(f"{kind}s" for kind in self.rails)]
@@ -114,7 +115,8 @@ def random_family(seed: int) -> Family:
         vibration=move and draw.random() < 0.3,
         axes=draw.random() < 0.3,
     )
-    return replace(family, lifts=family.movers and draw.random() < 0.3)
+    family = replace(family, lifts=family.movers and draw.random() < 0.3)
+    return replace(family, panel=draw.random() < 0.4)
 
 
 def _some(draw: random.Random, names: tuple[str, ...], least: int = 1) -> tuple[str, ...]:
@@ -135,7 +137,7 @@ _PLAIN = Family(
 
 CI_FAMILIES = (
     _PLAIN,
-    replace(_PLAIN, drives=True, machines=True, sensors=True, axes=True),
+    replace(_PLAIN, drives=True, machines=True, sensors=True, axes=True, panel=True),
     Family(types=2, drives=True, movers=True, lifts=True, machines=True, sensors=True, ledger=True, vibration=True),
 )
 """Two mixtures of effects, so that CI compiles few kernels: devices call for none but rails that move."""

@@ -12,6 +12,7 @@ from conveyor_sim.scene.drives import NamedDrive, SpeedSetpoint
 from conveyor_sim.scene.gearing import top_speed
 from conveyor_sim.scene.parts.axis import CYCLE
 from conveyor_sim.scene.parts.machine import PackmlPart
+from conveyor_sim.scene.parts.panel import Button, EmergencyStop, NumberField, Selector, StackLight
 from conveyor_sim.scene.parts.reject import Reject
 
 
@@ -59,6 +60,8 @@ def commands_of(scene: Scene) -> Table:
         for name, part in getattr(scene, field).items():
             table[f"{field}/{name}/{order}"] = Input("count", 0.0, len(part.positions) - 1.0)
     table |= {f"pushers/{name}/auto": Input() for name, part in scene.pushers.items() if part.zone is not None}
+    for name, part in scene.panel.items():
+        table |= {f"panel/{name}/{what}": given for what, given in _of_panel(part)}
     for name, axis in scene.axes.items():
         # Jogging is refused in gear, which the scene alone does not tell.
         table |= {f"axes/{name}/{what}": Input() for what in ("enable", "reset")}
@@ -75,6 +78,22 @@ def commands_of(scene: Scene) -> Table:
         elif isinstance(machine, Reject):
             table[f"machines/{name}/fire"] = Input()
     return table
+
+
+def _of_panel(part: object) -> list[tuple[str, Input]]:
+    """Commands of a part of the operator panel."""
+    if isinstance(part, Button):
+        return [("press" if part.action == "momentary" else "pressed", Input())]
+    if isinstance(part, Selector):
+        return [("turn", Input("count", 0.0, len(part.positions) - 1.0))]
+    if isinstance(part, EmergencyStop):
+        return [("press", Input()), ("reset", Input())]
+    if isinstance(part, StackLight):
+        return [(light, Input()) for light in part.lights]
+    if isinstance(part, NumberField):
+        writers = {"operator": ("set",), "controller": ("write",), "both": ("set", "write")}
+        return [(what, Input("number", *part.limits)) for what in writers[part.written_by]]
+    return [("on", Input())]
 
 
 def faults_of(scene: Scene) -> Table:

@@ -52,7 +52,7 @@ class Invariants:
             for one, other in carousel.changes.items()
         }
         self._belts = ExpectedBelts(simulation)
-        self._devices = DeviceWatch(simulation)
+        self._devices = DeviceWatch(simulation, self._belts.panel)
         self._stable = model.dt <= min((bound.dt for bound in model.bounds if bound.stability), default=math.inf)
         self._before = simulation.bottles()
         self._first = len(self._before.id) - simulation.counts.fed

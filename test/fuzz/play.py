@@ -230,7 +230,8 @@ def send(simulation: Simulation, inputs: Sent) -> None:
         if fault:
             simulation.inject(names[0], values[0])
         else:
-            simulation.command(names, values)
+            by_hand = any(name.startswith("panel/") for name in names)  # which a controller may not set
+            simulation.command(names, values, writer_kind="test" if by_hand else "controller")
 
 
 def _replayed(bag: Path) -> int:

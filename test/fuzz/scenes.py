@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from fuzz.checked import checked
-from fuzz.devices import axes, drives, machines, movers, row_pushers, sensors
+from fuzz.devices import axes, drives, machines, movers, panel, row_pushers, sensors
 from fuzz.draws import Data, between, fractions, scaled, signed
 from fuzz.families import Family
 from hypothesis import strategies as st
@@ -89,6 +89,8 @@ def scenes(draw: st.DrawFn, family: Family, beyond: bool = True) -> Data:
     if family.outfeeds:
         data["outfeeds"] = {f"out_{n}": {"region": region} for n, region in enumerate(draw(_regions(frame)))}
     data["bottles"] = draw(_bottles(frame, clear))
+    if family.panel:
+        data |= draw(panel(frame))
     return data
 
 

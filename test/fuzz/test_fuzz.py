@@ -181,6 +181,49 @@ def test_an_injected_fault_has_its_effect_and_no_other(
     assert violation_of(simulation, [((fault,), (value,), True)]) == kind
 
 
+PANEL = {
+    "panel": {
+        "e": {"kind": "emergency_stop", "cuts": ["drives", "machines"], "deceleration": 20.0},
+        "b": {"kind": "button", "contact": "NC"},
+        "s": {"kind": "selector", "positions": ["off", "on"]},
+        "n": {"kind": "numeric", "limits": [0.0, 1.0]},
+        "l": {"kind": "lamp"},
+    },
+    "base": [{"between": ["glass", "chain"], "friction": 0.1}],
+    "belts": {
+        "b": {"kind": "straight", "start": [0, 0], "angle": 0.0, "length": 1.0, "width": 1.0, "speed": 2.0,
+              "material": "chain", "speed_limits": [0.0, 2.0], "drive": {"acceleration": 1.0}}
+    },
+    "machines": {"r": {"kind": "reject", "region": [[0, 0], [0.1, 0], [0, 0.1]], "delay": 0.0, "window": 0.1}},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("command", "value", "signal", "by", "kind"),
+    [
+        ("panel/e/press", 1.0, "panel/e/contact", 0.0, ""),
+        ("panel/e/press", 1.0, "panel/e/contact", 1.0, "panel"),
+        ("panel/e/reset", 1.0, "panel/e/contact", -1.0, "panel"),
+        ("panel/e/press", 1.0, "belts/b/running", 1.0, "drives"),
+        ("panel/e/press", 1.0, "machines/r/running", 1.0, "works without power"),
+        ("panel/e/press", 1.0, "machines/r/rejected", 1.0, "works without power"),
+        ("panel/b/press", 1.0, "panel/b/contact", 0.0, ""),
+        ("panel/b/press", 1.0, "panel/b/contact", 1.0, "panel"),
+        ("panel/s/turn", 1.0, "panel/s/position", -1.0, "panel"),
+        ("panel/s/turn", 2.0, "panel/s/position", 0.0, ""),
+        ("panel/n/set", 0.5, "panel/n/value", 0.1, "panel"),
+        ("panel/n/set", math.nan, "panel/n/value", 0.0, ""),
+        ("panel/l/on", 1.0, "panel/n/value", 0.0, ""),
+    ],
+)
+def test_a_panel_that_does_not_follow_its_inputs_is_noticed(
+    command: str, value: float, signal: str, by: float, kind: str
+) -> None:
+    simulation = Misread(parse_scene(small(**PANEL).scene_text))
+    simulation.signal, simulation.by = signal, by
+    assert violation_of(simulation, [((command,), (value,), False)]) == kind
+
+
 def violation_of(simulation: Simulation, first: Sent) -> str:
     """Return the kind of the violation at tick 5, or "". first: inputs of the first tick."""
     invariants = Invariants(simulation)

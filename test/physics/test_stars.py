@@ -21,6 +21,7 @@ from wheel_lines import (
 )
 
 from conveyor_sim.scene import parse_scene
+from conveyor_sim.scene.geometry import ArcPiece
 from conveyor_sim.simulation import Simulation
 
 PAGE = Path(__file__).parents[2] / "docs" / "parts" / "stars.md"
@@ -91,6 +92,11 @@ def test_slip_makes_a_wrong_phase() -> None:
     now = dict(zip(names, sim.signals(), strict=True))
     turned = (now["axes/star/position"] - now["stars/in/angle"] - sim.scene.stars["in"].phase) % (2.0 * math.pi)
     assert turned == pytest.approx(0.002, abs=1e-9)
+    (wheel,) = [shape for shape in sim.moving_rails() if shape.name == "stars/in"]
+    pocket = wheel.pieces[0]
+    assert isinstance(pocket, ArcPiece)
+    angle = math.atan2(pocket.centre[0] - 1.0, PITCH_RADIUS - pocket.centre[1])
+    assert math.remainder(angle - now["stars/in/angle"], 2.0 * math.pi) == pytest.approx(0.0, abs=1e-9)
 
 
 def test_jammed_wheel_blocks_its_axis() -> None:

@@ -174,6 +174,7 @@ def test_attach_says_that_there_is_no_plc(tmp_path: Path, caplog: pytest.LogCapt
     [
         ("", "line 1: nothing given, expected tag,theirs"),
         ("ours,theirs\n", "line 1: ours,theirs given, expected tag,theirs"),
+        ("tag;theirs\n", "line 1: tag;theirs given, expected tag,theirs separated by commas"),
         ("tag,theirs\n", "has no tag, expected one or more"),
         ("tag,theirs\nbelts/zone9/speed,x\n", "line 2: belts/zone9/speed given, expected a signal or command"),
         ("tag,theirs\nbelts/zone1/trip,x\n", "line 2: belts/zone1/trip given, expected a signal or command"),
@@ -269,10 +270,19 @@ def test_a_part_of_a_url_without_effect_is_refused(url: str) -> None:
         plc_link(url, ())
 
 
-def test_a_url_with_a_password_is_refused_and_not_printed() -> None:
+@pytest.mark.parametrize(
+    "url", ["opc.tcp://jo:secret@127.0.0.1:1", "http://jo:secret@127.0.0.1", "jo:secret@127.0.0.1"]
+)
+def test_a_url_with_a_password_is_refused_and_not_printed(url: str) -> None:
     with pytest.raises(PlcLinkError, match=stating("127.0.0.1", "user in the URL", "--user")) as refused:
-        plc_link("opc.tcp://jo:secret@127.0.0.1:1", ())
+        plc_link(url, ())
     assert "secret" not in str(refused.value)
+
+
+@pytest.mark.parametrize("options", [["--browse"], ["--trust", "0" * 64]])
+def test_options_without_a_scene_do_not_print_a_password_either(options: list[str]) -> None:
+    answer = CliRunner().invoke(main, ["attach", "opc.tcp://jo:secret@127.0.0.1:1", *options])
+    assert answer.exit_code == 1 and "user in the URL" in answer.output and "secret" not in answer.output
 
 
 def test_a_variable_that_the_plc_lacks_is_named(plcs: Callable[[str], Plc], tmp_path: Path) -> None:

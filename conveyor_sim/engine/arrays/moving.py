@@ -133,13 +133,10 @@ class Pose(NamedTuple):
 class Clusters(NamedTuple):
     """Circles around neighbouring pieces of a body, (K,)."""
 
-    home_x: F8
-    """Centre relative to the pivot, at displacement 0, m."""
-    home_y: F8
-    radius: F8
     x: F8
-    """Present centre, m."""
+    """Centre relative to the pivot, at displacement 0, m."""
     y: F8
+    radius: F8
     segment: I4
     """First straight piece of each cluster, (K + 1,)."""
     arc: I4
@@ -200,8 +197,8 @@ class MovingBodies(NamedTuple):
     """Straight pieces at displacement 0, relative to the pivot; None without any."""
     segments: Segments | None
     """Straight pieces at present."""
-    home_arcs: Arcs | None
     arcs: Arcs | None
+    """Arcs at displacement 0, relative to the pivot; None without any. Contacts with them are found in this frame."""
     pose: Pose
     cams: CamMotion | None
     actuators: Actuators | None

@@ -95,16 +95,25 @@ def moving_contacts(i: int, bottles: Bottles, moving: Any, near: Any, contacts: 
     """Append the contacts of bottle i with bodies to the first `count`; return their new number."""
     if moving is None:
         return count
-    clusters, x, y, radius = moving.clusters, bottles.x[i], bottles.y[i], bottles.radius[i]
+    clusters, radius = moving.clusters, bottles.radius[i]
     for entry in range(near.start[i], near.start[i + 1]):
         b = near.piece[entry]
         if is_present(moving.cams, b):
+            x, y = _seen_from(moving, b, bottles.x[i], bottles.y[i])
             for k in range(moving.first_cluster[b], moving.first_cluster[b + 1]):
                 dx, dy, reach = clusters.x[k] - x, clusters.y[k] - y, clusters.radius[k] + radius
                 if dx * dx + dy * dy <= reach * reach:
-                    count = _segment_contacts(moving, moving.segments, k, x, y, radius, contacts, count)
-                    count = _arc_contacts(moving, moving.segments, moving.arcs, k, x, y, radius, contacts, count)
+                    count = _segment_contacts(moving, moving.segments, k, bottles, i, contacts, count)
+                    count = _arc_contacts(moving, moving.arcs, b, k, x, y, radius, contacts, count)
     return count
+
+
+@part
+def _seen_from(moving: MovingBodies, b: int, x: float, y: float) -> tuple[float, float]:
+    """Return a place (m) in the frame of body b."""
+    pose = moving.pose
+    dx, dy, cosine, sine = x - pose.x[b], y - pose.y[b], pose.cosine[b], pose.sine[b]
+    return dx * cosine + dy * sine, dy * cosine - dx * sine
 
 
 @part
@@ -112,17 +121,16 @@ def _segment_contacts(
     moving: MovingBodies,
     segments: Any,
     k: int,
-    x: float,
-    y: float,
-    radius: float,
+    bottles: Bottles,
+    i: int,
     contacts: RailContacts,
     count: int,
 ) -> int:
-    """Append the contacts with the straight pieces of cluster k."""
+    """Append the contacts of bottle i with the straight pieces of cluster k."""
     if segments is None:
         return count
     for g in range(moving.clusters.segment[k], moving.clusters.segment[k + 1]):
-        overlap, nx, ny = segment_contact(segments, g, x, y, radius)
+        overlap, nx, ny = segment_contact(segments, g, bottles.x[i], bottles.y[i], bottles.radius[i])
         if overlap > 0.0:
             material, rail, surface = segments.material[g], segments.rail[g], segments.surface[g]
             count = keep_deepest(contacts, count, overlap, nx, ny, material, rail, surface, MOVING + g)
@@ -132,8 +140,8 @@ def _segment_contacts(
 @part
 def _arc_contacts(
     moving: MovingBodies,
-    segments: Any,
     arcs: Any,
+    b: int,
     k: int,
     x: float,
     y: float,
@@ -141,13 +149,14 @@ def _arc_contacts(
     contacts: RailContacts,
     count: int,
 ) -> int:
-    """Append the contacts with the arcs of cluster k."""
+    """Append the contacts with the arcs of cluster k of a bottle at (x, y) in the frame of body b."""
     if arcs is None:
         return count
-    first = _count(segments)
+    first, cosine, sine = _count(moving.segments), moving.pose.cosine[b], moving.pose.sine[b]
     for g in range(moving.clusters.arc[k], moving.clusters.arc[k + 1]):
-        overlap, nx, ny = arc_contact(arcs, g, x, y, radius)
+        overlap, mx, my = arc_contact(arcs, g, x, y, radius)
         if overlap > 0.0:
+            nx, ny = mx * cosine - my * sine, mx * sine + my * cosine
             material, rail, surface = arcs.material[g], arcs.rail[g], arcs.surface[g]
             count = keep_deepest(contacts, count, overlap, nx, ny, material, rail, surface, MOVING + first + g)
     return count
@@ -215,20 +224,22 @@ def _with_surface(
         return x, y
     q = contacts.entry[c] - MOVING
     nx, ny = contacts.nx[c], contacts.ny[c]
-    tx, ty = _tangent(
-        moving.segments, moving.arcs, q, bottles.x[i] + bottles.radius[i] * nx, bottles.y[i] + bottles.radius[i] * ny
-    )
+    at_x, at_y = bottles.x[i] + bottles.radius[i] * nx, bottles.y[i] + bottles.radius[i] * ny
+    tx, ty = _tangent(moving, b, q, at_x, at_y)
     path = speeds[b] * time if ty * nx >= tx * ny else -speeds[b] * time
     return x - path * ny, y + path * nx
 
 
 @part
-def _tangent(segments: Any, arcs: Any, q: int, x: float, y: float) -> tuple[float, float]:
-    """Return a vector along piece q at a point (m), from its first to its last end."""
-    straight = _count(segments)
+def _tangent(moving: MovingBodies, b: int, q: int, x: float, y: float) -> tuple[float, float]:
+    """Return a vector along piece q of body b at a point (m), from its first to its last end."""
+    straight = _count(moving.segments)
     if q < straight:
-        return _along_segment(segments, q)
-    return _along_arc(arcs, q - straight, x, y)
+        return _along_segment(moving.segments, q)
+    x, y = _seen_from(moving, b, x, y)
+    tx, ty = _along_arc(moving.arcs, q - straight, x, y)
+    cosine, sine = moving.pose.cosine[b], moving.pose.sine[b]
+    return tx * cosine - ty * sine, tx * sine + ty * cosine
 
 
 @part

@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Positions of axes in time, and the poses of the bodies that they move, with their pieces.
 
-Only bodies near bottles have poses, and only those of axes that move are placed in each step.
+Only bodies near bottles have poses, and only those of axes that move are placed in each step. Straight pieces have
+places; arcs stay in the frame of their body.
 """
 
 import math
 from typing import Any
 
 from conveyor_sim.engine.arrays.moving import OFF_PROFILE, PHASES, MovingBodies
-from conveyor_sim.engine.arrays.rails import Arcs, Ends, Segments
+from conveyor_sim.engine.arrays.rails import Ends, Segments
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.engine.compiler.compile import kernel, part
 from conveyor_sim.engine.rails.actuators import is_off_profile
@@ -168,15 +169,11 @@ def _slide(moving: MovingBodies, cams: Any, b: int, speed: float) -> None:
 @part
 def _place_pieces(moving: MovingBodies, b: int) -> None:
     pose, clusters = moving.pose, moving.clusters
-    x, y, cosine, sine = pose.x[b], pose.y[b], pose.cosine[b], pose.sine[b]
-    first, last = moving.first_cluster[b], moving.first_cluster[b + 1]
-    for k in range(first, last):
-        clusters.x[k] = x + (clusters.home_x[k] * cosine - clusters.home_y[k] * sine)
-        clusters.y[k] = y + (clusters.home_x[k] * sine + clusters.home_y[k] * cosine)
-    begin, end = clusters.segment[first], clusters.segment[last]
-    _place_segments(moving.home_segments, moving.segments, x, y, cosine, sine, begin, end)
-    begin, end = clusters.arc[first], clusters.arc[last]
-    _place_arcs(moving.home_arcs, moving.arcs, x, y, cosine, sine, begin, end)
+    begin = clusters.segment[moving.first_cluster[b]]
+    end = clusters.segment[moving.first_cluster[b + 1]]
+    _place_segments(
+        moving.home_segments, moving.segments, pose.x[b], pose.y[b], pose.cosine[b], pose.sine[b], begin, end
+    )
 
 
 @part
@@ -200,28 +197,6 @@ def _place_segment(home: Segments, segments: Segments, x: float, y: float, cosin
     segments.ends.x[g, 1] = start_x + segments.length[g] * tx
     segments.ends.y[g, 1] = start_y + segments.length[g] * ty
     _turn_neighbours(home.ends, segments.ends, cosine, sine, g)
-
-
-@part
-def _place_arcs(home: Any, arcs: Any, x: float, y: float, cosine: float, sine: float, first: int, end: int) -> None:
-    if home is None:
-        return
-    for k in range(first, end):
-        _place_arc(home, arcs, x, y, cosine, sine, k)
-
-
-@part
-def _place_arc(home: Arcs, arcs: Arcs, x: float, y: float, cosine: float, sine: float, k: int) -> None:
-    arcs.x[k] = x + (home.x[k] * cosine - home.y[k] * sine)
-    arcs.y[k] = y + (home.x[k] * sine + home.y[k] * cosine)
-    arcs.start_x[k] = home.start_x[k] * cosine - home.start_y[k] * sine
-    arcs.start_y[k] = home.start_x[k] * sine + home.start_y[k] * cosine
-    arcs.end_x[k] = home.end_x[k] * cosine - home.end_y[k] * sine
-    arcs.end_y[k] = home.end_x[k] * sine + home.end_y[k] * cosine
-    for end in range(2):
-        arcs.ends.x[k, end] = x + (home.ends.x[k, end] * cosine - home.ends.y[k, end] * sine)
-        arcs.ends.y[k, end] = y + (home.ends.x[k, end] * sine + home.ends.y[k, end] * cosine)
-    _turn_neighbours(home.ends, arcs.ends, cosine, sine, k)
 
 
 @part

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Gates, pushers and diverters: rails that move to and fro on command, with end switches.
+"""Gates, pushers, diverters and clamps: rails that move to and fro on command, with end switches.
 
 A motion profile is an array (PHASES, 4): start time (s), position, speed and acceleration of each phase.
 """

@@ -165,9 +165,9 @@ function camAt(parts, at) {
   return s + (slope + 0.5 * curvature * (at - u)) * (at - u);
 }
 
-// Returns the outline of a star wheel, a pocket of a screw or a side belt at a position of its axis; null if it is absent.
-export function bodyPoints(body, position) {
-  let at = position - body.lag, aside = [0, 0];
+// Returns the outline of a star wheel, a pocket of a screw or a side belt at an angle of its machine; null if it is absent.
+export function bodyPoints(body, angle) {
+  let at = angle - body.lag, aside = [0, 0];
   if (body.period) at -= body.period * Math.floor(at / body.period);
   if (body.cam) {
     if (at < body.cam.parts[0][0] || at > body.cam.end) return null;
@@ -182,7 +182,7 @@ export function bodyPoints(body, position) {
 // Returns the bodies that are present, each with its name and its points.
 export function bodiesNow(view) {
   return view.recording.head.bodies
-    .map((body) => ({ device: body.name, points: bodyPoints(body, view.signal(`${body.axis}/position`) ?? 0) }))
+    .map((body) => ({ device: body.name, points: bodyPoints(body, view.signal(`${body.name}/angle`) ?? 0) }))
     .filter(({ points }) => points);
 }
 

@@ -18,7 +18,9 @@ from conveyor_sim.physics.effects.terms import (
 from conveyor_sim.physics.plant import Plant
 from conveyor_sim.physics.timestep.bounds import Bound, lattice_bound, mover_bound, wedge_bound
 from conveyor_sim.physics.timestep.methods import Share
+from conveyor_sim.scene.bodies import BodyShape
 from conveyor_sim.scene.contacts import Contact
+from conveyor_sim.scene.geometry import ArcPiece, SegmentPiece
 
 
 def contacts_in_use(plant: Plant, on: Collection[str]) -> Iterator[tuple[int, Contact]]:
@@ -90,13 +92,24 @@ def _mover_bounds(meeting: Meeting, stiffness: float, terms: Terms) -> list[tupl
         bodies = [shape for of, shape in zip(terms.plant.axis_of_body, terms.plant.moving, strict=True) if of == index]
         if axis.limit is None or materials[meeting.entry % len(materials)] not in {shape.material for shape in bodies}:
             continue
-        length = sum(piece.length for shape in bodies for piece in shape.pieces)
-        most = 2 * (1 + math.floor(length / (2.0 * meeting.first.radius)))
+        most = sum(_most_touching(shape, meeting.first.radius) for shape in bodies)
         # A force at the end of an arm accelerates it like a mass of J / L^2.
         mass = axis.inertia / reach**2
         reason = f"{most} bottles that stop {axis.name}, a body of {mass:.3g} kg, at k = {stiffness:.3g} N/m"
         bounds.append((mover_bound(stiffness, meeting.reduced_mass, mass, most), reason))
     return bounds
+
+
+def _most_touching(shape: BodyShape, radius: float) -> int:
+    """Return the largest number of bottles of a radius (m) that can press on a body.
+
+    They stand along both sides of a single piece, and along the outer side of several ones. A pocket holds one.
+    """
+    if len(shape.pieces) == 1 and isinstance(shape.pieces[0], SegmentPiece):
+        return 2 * (1 + math.floor(shape.pieces[0].length / (2.0 * radius)))
+    pockets = [isinstance(piece, ArcPiece) and piece.radius < 2.0 * radius for piece in shape.pieces]
+    lengths = [0.0 if pocket else piece.length for pocket, piece in zip(pockets, shape.pieces, strict=True)]
+    return sum(1 + math.floor(length / (2.0 * radius)) for length in lengths)
 
 
 def _linear(meeting: Meeting, terms: Terms) -> tuple[float, str]:

@@ -46,7 +46,7 @@ def moving_arrays(plant: Plant, surface: int, slots: int, ledger: bool, springs:
     pivot, along = np.array([shape.pivot for shape in shapes]), np.array([shape.along for shape in shapes])
     pieces = _ordered(shapes)
     segments, arcs = _pieces(plant, surface)
-    home_segments, home_arcs = _pieces(plant, surface)
+    home_segments, _ = _pieces(plant, surface)
     moves = any(shape.surface_speed is not None for shape in shapes)
     return MovingBodies(
         position=position,
@@ -75,7 +75,6 @@ def moving_arrays(plant: Plant, surface: int, slots: int, ledger: bool, springs:
         clusters=_clusters(shapes),
         home_segments=home_segments,
         segments=segments,
-        home_arcs=home_arcs,
         arcs=arcs,
         pose=_pose(len(shapes)),
         cams=_cams(shapes),
@@ -130,11 +129,9 @@ def _clusters(shapes: Sequence[BodyShape]) -> Clusters:
     )
     bent = [sum(isinstance(piece, ArcPiece) for piece in pieces) for _, pieces in groups]
     return Clusters(
-        home_x=centre[:, 0].copy(),
-        home_y=centre[:, 1].copy(),
+        x=centre[:, 0].copy(),
+        y=centre[:, 1].copy(),
         radius=np.array([radius for _, radius in circles]) + ROUNDING,
-        x=np.zeros(len(groups)),
-        y=np.zeros(len(groups)),
         segment=_starts([len(pieces) - arcs for (_, pieces), arcs in zip(groups, bent, strict=True)]),
         arc=_starts(bent),
     )

@@ -251,9 +251,10 @@ class State:
 
     def moving_rails(self) -> tuple[RailShape, ...]:
         """Return the bodies that are present, each as a rail, at their present positions."""
-        if self.world.moving is None:
+        moving = self.world.moving
+        if moving is None:
             return ()
-        return self.model.plant.moving_at(self.world.moving.position.tolist())
+        return self.model.plant.moving_at(moving.position.tolist(), moving.lag.tolist())
 
     def rails(self) -> tuple[RailShape, ...]:
         """Return all rails at their present positions: those at rest by number, then bodies."""

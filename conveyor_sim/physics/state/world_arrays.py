@@ -22,9 +22,9 @@ FIXED = (
     *(f"belts.{name}" for name in ("x", "y", "ax", "ay", "length", "width", "sectors.")),
     *(f"moving.{name}" for name in ("axis", "pivot_", "along_", "turning", "account", "sweep", "home_")),
     *(f"moving.{name}" for name in ("first_cluster", "body")),
-    *(f"moving.clusters.{name}" for name in ("home_", "radius", "segment", "arc")),
+    "moving.clusters.",
+    "moving.arcs.",
     *(f"moving.segments.{name}" for name in ("length", "material", "rail", "surface", "ends.joint")),
-    *(f"moving.arcs.{name}" for name in ("radius", "reach", "material", "rail", "surface", "ends.joint")),
     *(f"moving.cams.{name}" for name in ("cam", "second", "across_", "period", "table.")),
     "moving.springs.column",
     "moving.springs.first",
@@ -78,9 +78,8 @@ REMADE = (
     ),
     "footing.",
     "probe.",
-    *(f"moving.{name}" for name in ("resting", "active", "loaded", "is_near", "near", "pose.", "clusters.", "cams.")),
+    *(f"moving.{name}" for name in ("resting", "active", "loaded", "is_near", "near", "pose.", "cams.")),
     "moving.segments.",
-    "moving.arcs.",
     "moving.actuators.push",
 )
 """Arrays that follow from the positions: rebuilt with the neighbour lists, or in the next evaluation of forces."""

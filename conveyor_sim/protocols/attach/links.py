@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from importlib.util import find_spec
 from urllib.parse import urlsplit
@@ -38,6 +39,7 @@ def plc_link(
     Raises PlcLinkError for another URL, or an access that the protocol lacks; TagMapError for an invalid place;
     ImportError without the library.
     """
+    refuse_user(url)
     try:
         parts = urlsplit(url)
         host, port = parts.hostname, parts.port
@@ -48,8 +50,6 @@ def plc_link(
     if not host or port == 0 or parts.scheme not in LIBRARIES:
         expected = ", ".join(("opc.tcp://host:port", "modbus://host:port", *FORMS.values()))
         raise PlcLinkError(f"{printable(url)} given, expected one of {expected}")
-    if "@" in parts.netloc:  # recordings have the URL, and must have no password
-        raise PlcLinkError(f"{printable(host)}: given with a user in the URL, expected none (OPC UA: --user)")
     if access != ANONYMOUS and parts.scheme != "opc.tcp":
         raise PlcLinkError(f"{parts.scheme}://: given with a user or security, expected neither, or opc.tcp://")
     if parts.scheme in FORMS:
@@ -66,3 +66,11 @@ def plc_link(
     from conveyor_sim.protocols.attach.opcua_link import OpcUaLink
 
     return OpcUaLink(url, mapped, access, say)
+
+
+def refuse_user(url: str) -> None:
+    """Raise PlcLinkError if a URL names a user: messages and recordings have the URL, and must have no password."""
+    rest = url.partition("//")[2] or url
+    _, sign, place = re.split("[/?#]", rest, maxsplit=1)[0].rpartition("@")
+    if sign:
+        raise PlcLinkError(f"{printable(place)}: given with a user in the URL, expected none (OPC UA: --user)")

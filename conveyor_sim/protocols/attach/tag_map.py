@@ -92,7 +92,8 @@ def read_tag_map(path: Path, tags: Sequence[Tag]) -> TagMap:
     columns = tuple(rows[0][1]) if rows else ()
     if columns not in (COLUMNS, (*COLUMNS, NOTE)):
         header = printable(",".join(rows[0][1])) if rows else "nothing"
-        raise TagMapError(f"{path}: line 1: {header} given, expected {','.join(COLUMNS)}")
+        separated = " separated by commas, not semicolons" if ";" in header else ""
+        raise TagMapError(f"{path}: line 1: {header} given, expected {','.join(COLUMNS)}{separated}")
     known = mappable(tags)
     mapped: dict[str, MappedTag] = {}
     for number, cells in rows[1:]:

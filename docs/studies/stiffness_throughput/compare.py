@@ -198,7 +198,8 @@ def panel(ax: Axes, own: Sequence[Point], name: str) -> None:
         )  # fmt: skip
     ax.axvline(100.0 * DEEP, color=style.INK, linestyle=":", label="limit of the warning")
     ax.set_xscale("log")
-    ax.set_ylim(0.0, 1.05 if name == "jammed" else None)
+    # The limits leave a margin above the highest mark.
+    ax.set_ylim(0.0, 1.05 if name == "jammed" else 1.08 * ax.dataLim.ymax)
     ax.grid(True)
 
 

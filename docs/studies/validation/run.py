@@ -59,11 +59,15 @@ def measure(chosen: Mapping[str, Sequence[Case]], jobs: int) -> None:
         futures = {pool.submit(one, name, case): name for name, case in pending}
         bar.update(0)
         done = 0.0
-        for future in as_completed(futures):
-            source = known[futures[future]]
-            keep(source, future.result())
-            done += source.seconds
-            bar.update(done)
+        try:
+            for future in as_completed(futures):
+                source = known[futures[future]]
+                keep(source, future.result())
+                done += source.seconds
+                bar.update(done)
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)  # an error ends the study now, not after all other runs
+            raise
 
 
 def keep(source: Source, run: Run) -> None:

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 from fuzz.device_invariants import DeviceWatch
+from fuzz.panel_invariants import ExpectedPanel
 from fuzz.play import check_sentence
 from fuzz.violation import Violation
 
@@ -27,7 +28,7 @@ from conveyor_sim.columns.counters import CounterColumns
 from conveyor_sim.columns.read_back import ReadBackColumns
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.line.commands.authority import MAY, PEOPLE
-from conveyor_sim.line.commands.inputs import WRITER_KINDS, CommandOutcome, Input
+from conveyor_sim.line.commands.inputs import SET, WRITER_KINDS, CommandOutcome, Input
 from conveyor_sim.line.machines.efficiency import CATEGORIES
 from conveyor_sim.line.machines.packml import COMMAND_TEXTS, MODE_STATES, Command, PackMLState
 from conveyor_sim.line.machines.stop_reason import BY_HAND, COMMANDED, WORKING
@@ -114,6 +115,10 @@ def drawn(rng: random.Random) -> Scene:
     table = {"tag": "zones/before_capper/bottles", "high": 2, "deadband": 1, "on_delay": rng.choice([0.0, 0.05])}
     lost = {"tag": "machines/capper/holds", "low": 0.5, "latching": True, "suppressed_by": ["full"]}
     scene["alarms"] = {"full": table, "lost": lost} if rng.random() < 0.7 else {}
+    cuts = rng.choice([[], ["machines"], ["drives", "machines"]])
+    stop = {"kind": "emergency_stop", "cuts": cuts} | ({"deceleration": 1.0} if "drives" in cuts else {})
+    button = {"kind": "button", "bounce": rng.choice([0.0, 0.05])}
+    scene["panel"] = {"stop": stop, "start": button, "lamp": {"kind": "lamp"}} if rng.random() < 0.7 else {}
     return parse_scene(json.dumps(scene), "scene.yaml")
 
 
@@ -276,7 +281,8 @@ class Watch:
 
     def __init__(self, sim: Simulation) -> None:
         self._sim = sim
-        self._devices = DeviceWatch(sim)
+        self._panel = ExpectedPanel(sim)
+        self._devices = DeviceWatch(sim, self._panel)
         self._bottles = sim.bottles()
         self._machines = [
             name.removesuffix("/cntrl_cmd") for name in sim.process_image.command_names if name.endswith("/cntrl_cmd")
@@ -286,6 +292,7 @@ class Watch:
     def after_tick(self, given: list[Input], outcomes: list[CommandOutcome], expected: str | None) -> None:
         """expected: why the first input was to be refused, as it was told before it was given."""
         now = self._sim.bottles()
+        self._check_panel(outcomes)
         self._devices.check(self._bottles, now, outcomes)
         self._bottles = now
         self._answers(given, outcomes, expected)
@@ -293,6 +300,15 @@ class Watch:
         self._times()
         self._alarms()
         self._states, self._modes = self._state_of_machines(), dict(self._sim.line.modes.modes)
+
+    def _check_panel(self, outcomes: list[CommandOutcome]) -> None:
+        """The panel follows accepted inputs, also those beside refused commands for other devices."""
+        for outcome in outcomes:
+            if outcome.accepted and outcome.operation == SET:
+                for name, value in zip(outcome.names, outcome.values, strict=True):
+                    self._panel.take(name, value)
+        self._panel.begin()
+        self._panel.check(dict(zip(self._sim.process_image.signal_names, self._sim.signals().tolist(), strict=True)))
 
     def _answers(self, given: list[Input], outcomes: list[CommandOutcome], expected: str | None) -> None:
         """Each input has its outcome, or two where it was divided; who is refused is told why, in words."""
