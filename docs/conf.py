@@ -49,6 +49,7 @@ NAVIGATION = {
             "docs/tutorial_plc",
             "docs/tutorial_scada",
             "docs/tutorial_ros",
+            "docs/filler_block",
             "docs/troubleshooting",
             "docs/gallery",
         ],

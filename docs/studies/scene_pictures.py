@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pictures of docs/layout.md, docs/check.md and docs/build_a_line.md: python docs/studies/scene_pictures.py.
+"""Pictures of layout.md, filler_block.md, check.md and build_a_line.md in docs: python docs/studies/scene_pictures.py.
 
 Needs matplotlib and Pillow, as the tests do.
 """
@@ -13,7 +13,9 @@ from pathlib import Path
 from part_pictures import draw_state, save_image
 from PIL import Image
 
+from conveyor_sim.control.filler_block import filler_block
 from conveyor_sim.report.figures.draw import plot_scene
+from conveyor_sim.run.scan_loop import ScanLoop
 from conveyor_sim.scene import Scene, load_scene
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.resources import scene_path
@@ -24,6 +26,8 @@ CHECKED = {"check": "scenarios/two_stations", "build_a_line": DOCS.parent / "exa
 """Scenes that pages show as `check` draws them, by page."""
 MOMENT = 22.0
 """Simulated time of the picture of the layout, s."""
+RUNNING = 25.0
+"""Simulated time of the picture of the filler block, s."""
 
 
 def example(folder: Path) -> Scene:
@@ -34,12 +38,25 @@ def example(folder: Path) -> Scene:
     return load_scene(folder / "line.yaml")
 
 
+def filling() -> Simulation:
+    """Return the filler block after its start, with bottles in all its machines."""
+    simulation = Simulation(load_scene(scene_path("filler_block")), threads=1)
+    scans = ScanLoop(simulation, filler_block())
+    while simulation.time < RUNNING:
+        if simulation.tick == 1:
+            simulation.command(["panel/start/press"], [1.0], writer_kind="operator")
+        scans.before_tick(None)
+        simulation.advance()
+    return simulation
+
+
 def main() -> None:
     """Draw all pictures."""
     with tempfile.TemporaryDirectory() as folder:
         simulation = Simulation(example(Path(folder)), threads=1)
         simulation.advance(round(MOMENT / simulation.scene.tick))
         print(draw_state(simulation, DOCS / "images" / "layout.webp"))
+        print(draw_state(filling(), DOCS / "images" / "filler_block.webp"))
         for page, scene in CHECKED.items():
             drawn = plot_scene(load_scene(scene_path(scene)), Path(folder) / page)
             print(save_image(Image.open(drawn).convert("RGB"), DOCS / "images" / f"{page}.webp"))
