@@ -241,6 +241,7 @@ REFUSED = {
     "stars.in.pitch_radius: 0.32 given, expected the last pitch of screws.in, 157 mm: 2 pi pitch_radius / pockets is "
     "167.552 mm, 10.6 mm too long": {"in": {"pitch_radius": 0.32}},
     "stars.in.pockets: 40 given, expected pockets that do not overlap: at most": {"in": {"pockets": 40}},
+    "stars.in.worn: 0.5 given, expected a first pocket that does not reach into the next one": {"in": {"worn": 0.5}},
     'stars.in.axis: "block" given, expected an axis that brings as many pockets as screws.in brings bottles: '
     "12 pockets, 1 bottles per turn of the common master": {"in": {"axis": "block"}},
     'stars.in.axis: "other" given, expected a name from axes: block, star': {"in": {"axis": "other"}},
