@@ -268,6 +268,21 @@ def test_wheels_that_do_not_fit_are_refused(message: str) -> None:
     assert message in str(error.value)
 
 
+@pytest.mark.parametrize("turn", ["left", "right"])
+def test_guides_begin_at_angles_beyond_a_turn(turn: str) -> None:
+    """A wheel carries bottles through 300 degrees from an entry at -200 degrees, or after two such wheels."""
+    wheel = {**STAR, "carry": "300 deg", "guide": {"material": "steel"}}
+    first = {**wheel, "centre": [0.0, 0.0], "turn": turn, "entry": "-200 deg"}
+    scene = line(stars={"in": first, "next": {**wheel, "after": "in"}, "last": {**wheel, "after": "next"}})
+    guides = {shape.name: shape for shape in rail_shapes(scene)}
+    for name, wheel_there in wheels_of(scene.stars).items():
+        (guide,) = guides[f"{name}_guide"].pieces
+        reach = np.array([wheel_there.point(0.0), wheel_there.point(math.radians(300.0))]) - wheel_there.centre
+        ends = np.array(guide.ends) - wheel_there.centre
+        given, expected = (sorted((row / np.hypot(*row)).round(9).tolist() for row in rows) for rows in (ends, reach))
+        assert given == expected
+
+
 def test_pitch_within_the_play_of_a_pocket_is_accepted() -> None:
     """157.08 mm of a wheel fit a last pitch of 157 mm."""
     scene = line(stars={"in": {**STAR, "along": "infeed", "at": 2.0, "side": "left"}}, screws={"in": SCREW})
