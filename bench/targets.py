@@ -180,7 +180,7 @@ TARGETS = (
     Target("rise of the cost from 1 to 1 000 belts", "growth", MOST, 0.15, _rise(growth.BELTS, 1, 1_000)),
     Target("rise of the cost from 1 to 1 000 rails", "growth", MOST, 0.15, _rise(growth.RAILS, 1, 1_000)),
     Target("rise of the cost from 1 to 160 closed gates at a distance", "bodies", MOST, 0.05, bodies.rise),
-    Target("us a tick of a turning star wheel with 12 bottles", "bodies", MOST, 40.0, bodies.wheel_cost),
+    Target("us that a turning star wheel adds to a tick of 12 bottles", "bodies", MOST, 40.0, bodies.wheel_cost),
     Target("s to the first step, cached", "start", MOST, 1.0, _first_step),
     *(
         Target(f"first tick from an empty cache, {name}, of that before", "compile", MOST, v, _compile(name))

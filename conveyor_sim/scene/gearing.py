@@ -20,6 +20,14 @@ def first_speed(scene: Scene, name: str) -> float:
     return 0.0
 
 
+def rated_speed(scene: Scene, name: str) -> float:
+    """Return the largest speed of an axis in gear, rad/s, with the sign of its ratio."""
+    axis = scene.axes[name]
+    if axis.master is not None:
+        return axis.ratio * rated_speed(scene, axis.master)
+    return _own_top_speed(scene, axis)
+
+
 def first_position(scene: Scene, name: str) -> float:
     """Return the position of an axis at the start, rad: its phase, in gear with masters at theirs."""
     axis = scene.axes[name]
@@ -31,13 +39,16 @@ def top_speed(scene: Scene, name: str) -> float:
     axis = scene.axes[name]
     if axis.master is not None:
         return abs(axis.ratio) * top_speed(scene, axis.master) + axis.jog_speed
+    return max(_own_top_speed(scene, axis), axis.jog_speed)
+
+
+def _own_top_speed(scene: Scene, axis: Axis) -> float:
+    """Return the largest speed of an axis without a master by its rate, drive or machine, rad/s."""
     if axis.rate is not None:
-        own = CYCLE * axis.top_rate
-    elif axis.drive is not None and axis.travel is not None:
-        own = CYCLE * max(map(abs, scene.drives[axis.drive].speed_limits)) / axis.travel
-    else:
-        own = CYCLE * _machine_rate(scene, axis)
-    return max(own, axis.jog_speed)
+        return CYCLE * axis.top_rate
+    if axis.drive is not None and axis.travel is not None:
+        return CYCLE * max(map(abs, scene.drives[axis.drive].speed_limits)) / axis.travel
+    return CYCLE * _machine_rate(scene, axis)
 
 
 def _machine_rate(scene: Scene, axis: Axis) -> float:

@@ -13,7 +13,7 @@ from pydantic.fields import FieldInfo
 from conveyor_sim.scene import accuracy, belts, contacts, drives, failures, limits, schema, vibration
 from conveyor_sim.scene.layout import parts
 from conveyor_sim.scene.layout.devices import PLACEABLE
-from conveyor_sim.scene.parts import machine, star, work
+from conveyor_sim.scene.parts import machine, source, star, work
 from conveyor_sim.scene.units import UNITS
 from conveyor_sim.scene.words import expectation, field_names, in_yaml
 
@@ -30,7 +30,7 @@ PAGES: dict[str, tuple[str, ...]] = {
     "guides": ("`guides`", "`open`"),
     "indicators": ("`indicators`",),
     "infeeds": ("`infeeds`", "`outfeeds`", "`spills`"),
-    "machines": ("`machines`", "`acting_times`"),
+    "machines": ("`machines`", "`acting_times`", "`layer` of a source"),
     "materials": ("`contacts`", "of a contact", "`base`", "`floor`", "`bottle_types`"),
     "dividers": ("`dividers`", "`adjustable`"),
     "movers": ("`gates`", "`pushers`", "`diverters`", "`clamps`"),
@@ -83,6 +83,7 @@ BEHIND: dict[str, list[tuple[str, type[BaseModel]]]] = {
     "stars": [("`guide` of a star wheel", star.StarGuide)],
     "machines": [
         ("`acting_times` of a machine", machine.ActingTimes),
+        ("`layer` of a source", source.Layer),
         ("An entry of `failures` of a machine", failures.Failure),
         ("Times of a failure: `kind: exponential`", failures.Exponential),
         ("Times of a failure: `kind: weibull`", failures.Weibull),

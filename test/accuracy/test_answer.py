@@ -10,6 +10,7 @@ import pytest
 from facts import missing
 
 from conveyor_sim.accuracy.report.answer import eligible, find_answer, foretelling
+from conveyor_sim.accuracy.report.pareto import front
 from conveyor_sim.accuracy.results import Comparison, Cost, Errors, Point, Reference, Rest
 from conveyor_sim.accuracy.setting import Setting
 
@@ -138,3 +139,10 @@ def test_predictions_are_judged_beside_what_was_measured() -> None:
 def test_no_setting_keeps_the_tolerance() -> None:
     assert find_answer(ALL, SURE, [], 1e-5) is None
     assert eligible([failed(5)], math.inf) == []
+
+
+def test_impulses_are_measured_and_never_recommended() -> None:
+    """Their error in free impacts is that of rounding, and says nothing about forces in a crowd."""
+    swept = replace(VERLET, setting=replace(VERLET.setting, integrator="impulses", sweeps=2))
+    assert eligible([swept, FINE], 1.0) == [FINE]
+    assert front([swept, FINE]) == [FINE]

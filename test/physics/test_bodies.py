@@ -291,3 +291,13 @@ def test_bits_do_not_depend_on_threads_checkpoints_or_repeated_ticks(
     drive(two, OMEGA, 20, tried)
     assert one.state_hash() == two.state_hash() == again.state_hash()
     assert moving_of(one).springs is not None and moving_of(one).springs.elongation.any()  # type: ignore[union-attr]
+
+
+def test_the_step_of_a_limited_wheel_counts_a_bottle_in_each_pocket(build: Build) -> None:
+    """1 / sqrt(k (2 / m + n / M)), with M = J / r^2 at the tips of the wheel."""
+    inertia = 0.01
+    sim = build((WHEEL,), axes=(axis(limit=1.0, inertia=inertia),), integrator="velocity_verlet")
+    (bound,) = (bound for bound in sim.model.bounds if bound.name == "mover stability")
+    mass = inertia / WHEEL.fastest_point**2
+    assert bound.dt == pytest.approx(1.0 / math.sqrt(STIFFNESS * (2.0 / MASS + POCKETS / mass)))
+    assert f"{POCKETS} bottles that stop axes/a" in bound.reason

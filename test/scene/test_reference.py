@@ -34,7 +34,7 @@ def test_every_field_says_what_it_is_what_it_takes_and_in_which_unit(model: type
         assert field.description.endswith("."), name
         takes = expectation(field)
         assert takes, name
-        words = ("number", "an angle", "points [", "a point [", "a velocity [", "ranges [", "corners [")
+        words = ("number", "an angle", "angles", "points [", "a point [", "a velocity [", "ranges [", "corners [")
         numeric = any(word in takes for word in words)
         assert bool(unit_of(field)) == numeric, name
 

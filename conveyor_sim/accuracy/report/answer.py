@@ -31,9 +31,11 @@ def eligible(points: Sequence[Point], tolerance: float) -> list[Point]:
     """Return the eligible settings for forces, cheapest first.
 
     They have the scene's stiffness, did not fail, meet the tolerance in impacts and in resting load (as predicted where
-    it could not be measured), and are within every stability bound.
+    it could not be measured), and are within every stability bound. Impulses are not: their error in free impacts says
+    nothing about forces in a crowd.
     """
-    kept = [point for point in points if point.setting.stiffness == 1.0 and _trusted(point, tolerance)]
+    own = [point for point in points if point.setting.stiffness == 1.0 and point.setting.sweeps is None]
+    kept = [point for point in own if _trusted(point, tolerance)]
     return sorted(kept, key=lambda point: (_cost(point), point.setting.key))
 
 

@@ -16,7 +16,8 @@ def front(points: Iterable[Point], softened: bool = True) -> list[Point]:
     beyond a bound of stability are left out, and so are settings of another stiffness than the scene's if `softened` is
     false.
     """
-    allowed = [p for p in points if p.stable and (softened or p.setting.stiffness == 1.0)]
+    of_forces = [p for p in points if p.setting.sweeps is None]
+    allowed = [p for p in of_forces if p.stable and (softened or p.setting.stiffness == 1.0)]
     placed = [(place, p) for p in allowed if (place := place_of(p))]
     chosen: list[tuple[tuple[float, float], Point]] = []
     for place, point in sorted(placed, key=lambda pair: pair[0]):

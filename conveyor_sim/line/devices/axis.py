@@ -120,7 +120,7 @@ class AxisDevice(Device):
                 -most_rate,
                 most_rate,
                 part.rate or 0.0,
-                nominal=part.rate,
+                nominal=most_rate,
             )
         yield switch(f"{name}/jammed", "fault", "Stands still, against any torque of its drive.")
 
@@ -230,11 +230,16 @@ class AxisDevice(Device):
         """Return the speed that it is commanded to have out of gear, or that of its gear, rad/s."""
         if self.master is not None and self.mode != FREE:
             return self._part.ratio * self.master.wanted(now)
-        if not self.runs or any(axis.tripped for axis in self._train()):
+        if not self._may_run:
             return 0.0
         if self.jog_forward != self.jog_backward:
             return self._part.jog_speed if self.jog_forward else -self._part.jog_speed
         return self._source_speed(now)
+
+    @property
+    def _may_run(self) -> bool:
+        """True if it runs, and no axis that is in gear with it has failed."""
+        return self.runs and not any(axis.tripped for axis in self._train())
 
     def _source_speed(self, now: ScanContext) -> float:
         part = self._part
@@ -274,10 +279,12 @@ class AxisDevice(Device):
             target = part.ratio * master.speed
         else:
             target = self.wanted(now)
-        if target == self.speed == 0.0:
+        if target == self.speed == 0.0 and self.mode == FREE:
             return Motion(self.position, 0.0)
         # A drive has a ramp itself. Once an axis has its speed, it keeps up.
         limit = math.inf if self.follows and self.runs else part.acceleration
+        if self.mode == FREE and not self._may_run and part.stop_deceleration is not None:
+            limit = part.stop_deceleration
         acceleration = acceleration_toward(self.speed, target, limit, tick)
         motion = Motion(self.position, self.speed, acceleration)
         reached = abs(target - self.speed) <= limit * tick
@@ -351,7 +358,7 @@ class AxisDevice(Device):
         if self.following_error == 0.0:
             return motion
         if self.catch_up.distance == 0.0:
-            if self.limited or self.tripped:
+            if self.limited or not self.runs:
                 return motion.plus(Motion(-self.following_error, 0.0))
             self.catch_up.start(now.tick, self.following_error, part.jog_speed, part.acceleration, tick)
         gain = self.catch_up.during(now.tick, tick)

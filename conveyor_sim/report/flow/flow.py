@@ -20,7 +20,7 @@ from conveyor_sim.report.flow.surfaces import SurfaceMap, surfaces_of
 from conveyor_sim.report.flow.trace import trace, traced_scene
 from conveyor_sim.report.flow.trace_scene import guide_pieces
 from conveyor_sim.report.flow.wheel_findings import wrong_phases
-from conveyor_sim.report.flow.wheels_as_belts import with_wheels_as_belts
+from conveyor_sim.report.flow.wheels_as_belts import pitches_of, with_wheels_as_belts
 from conveyor_sim.run.compilation import Compilation
 from conveyor_sim.scene.schema import Scene
 
@@ -57,14 +57,14 @@ def compile_traces(scene: Scene, say: Callable[[str], object]) -> None:
 
 def flow_of(scene: Scene) -> LineFlow:
     """Trace a lone bottle from every entry of a scene, and return routes, capacities and findings."""
-    wheels = list(wrong_phases(scene))
+    wheels, pitches = list(wrong_phases(scene)), pitches_of(scene)
     scene = with_wheels_as_belts(scene)
     surfaces = surfaces_of(scene)
     guides = Guides(guide_pieces(scene))
     legs = trace(scene, surfaces, guides)
     clearances = [clearance(leg, surfaces, guides) for leg in legs]
     routes = routes_of(scene, legs)
-    stretches = stretches_of(legs, clearances, surfaces)
+    stretches = stretches_of(legs, clearances, surfaces, pitches)
     findings = [
         *unreached_exits(scene, surfaces, routes),
         *opposed_belts(surfaces),

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -60,11 +60,15 @@ def stretches_of(
     legs: Sequence[Leg],
     clearances: Sequence[Clearance | None],
     surfaces: SurfaceMap,
+    pitches: Mapping[str, float],
 ) -> tuple[Stretch, ...]:
-    """Return the stretches of all legs in order. Legs from entries share stretches: the longest stands for all."""
+    """Return the stretches of all legs in order. Legs from entries share stretches: the longest stands for all.
+
+    pitches: distance (m) of bottles on surfaces where pockets space them, by name.
+    """
     longest: dict[tuple[str, bool], Stretch] = {}
     for leg, samples in zip(legs, clearances, strict=True):
-        for stretch in _along(leg, samples, surfaces) if samples is not None else ():
+        for stretch in _along(leg, samples, surfaces, pitches) if samples is not None else ():
             key = (stretch.name, stretch.single)
             if key not in longest or stretch.length > longest[key].length:
                 longest[key] = stretch
@@ -96,7 +100,7 @@ def feed_rate(scene: Scene, path: Path) -> float:
     return 0.0
 
 
-def _along(leg: Leg, samples: Clearance, surfaces: SurfaceMap) -> Iterator[Stretch]:
+def _along(leg: Leg, samples: Clearance, surfaces: SurfaceMap, pitches: Mapping[str, float]) -> Iterator[Stretch]:
     spacing = SPACING * leg.radius
     wide = _steady(samples)
     for first, last in _equal(np.column_stack([samples.carriers, wide])):
@@ -107,7 +111,8 @@ def _along(leg: Leg, samples: Clearance, surfaces: SurfaceMap) -> Iterator[Stret
         length, width = (last - first) * spacing, samples.width[first:last]
         speed = abs(surface.running)
         if single:
-            capacity, rate = length / (2.0 * leg.radius), speed / (2.0 * leg.radius)
+            pitch = pitches.get(surface.name, 2.0 * leg.radius)
+            capacity, rate = length / pitch, speed / pitch
         else:
             density = PACKING / (2.0 * math.sqrt(3.0) * leg.radius**2)
             capacity, rate = density * length * float(width.mean()), density * speed * float(width.min())

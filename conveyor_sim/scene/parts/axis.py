@@ -80,6 +80,12 @@ class Axis(DevicePart):
         "rad/s^2",
         default=10.0,
     )
+    stop_deceleration: Positive | None = quantity(
+        "Deceleration out of gear when it is disabled or without power, and when an axis in gear with it has failed. "
+        "Left out: `acceleration`.",
+        "rad/s^2",
+        default=None,
+    )
     jog_speed: Positive = quantity(
         "Speed of jogging, and largest additional speed of a phase shift.", "rad/s", default=1.0
     )
@@ -133,11 +139,14 @@ class Axis(DevicePart):
                     if getattr(part, "axis", None) == path[-1]:
                         text = f"given, expected none: {field}.{name} needs an axis without a cam"
                         yield Problem((*path, "cam"), text)
-        if self.torque_limit != "none" and self.acceleration * self.inertia > self.torque_limit:
+        for field in ("acceleration", "stop_deceleration"):
+            value = getattr(self, field)
+            if value is None or self.torque_limit == "none" or value * self.inertia <= self.torque_limit:
+                continue
             most = self.torque_limit / self.inertia
             yield Problem(
-                (*path, "acceleration"),
-                f"{shown(self.acceleration)} given, expected at most {most:.4g} (rad/s^2), what a torque_limit of "
+                (*path, field),
+                f"{shown(value)} given, expected at most {most:.4g} (rad/s^2), what a torque_limit of "
                 f"{self.torque_limit:g} N m gives to its inertia of {self.inertia:g} kg m^2, or torque_limit: none",
             )
 

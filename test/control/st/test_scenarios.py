@@ -53,6 +53,10 @@ def emergency_stop(controller: StructuredText) -> None:
     scenario("emergency_stop").check_emergency_stop(Scenario("scenarios/panel_line"), controller)
 
 
+def filler_block(controller: StructuredText) -> None:
+    scenario("filler_block").check_start_without_bottles(Scenario("filler_block"), controller)
+
+
 @pytest.mark.parametrize(
     ("program", "check", "right", "wrong"),
     [
@@ -61,6 +65,7 @@ def emergency_stop(controller: StructuredText) -> None:
         ("jam", jam, "BACK_TIME : TIME := T#1.3s", "BACK_TIME : TIME := T#0.5s"),
         ("reject", reject, "LREAL := 1.2", "LREAL := 1.1"),
         ("panel", emergency_stop, "powered AND (ready OR resets)", "powered"),
+        ("filler_block", filler_block, "NOT backed_up AND queued", "NOT backed_up"),
     ],
 )
 def test_a_program_passes_the_scenario_of_its_twin(

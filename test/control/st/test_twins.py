@@ -12,6 +12,7 @@ import pytest
 from control.test_gap_on_a_line import DIAMETER, GAP, metered
 
 from conveyor_sim.control.cascade import Cascade, CascadeZone
+from conveyor_sim.control.filler_block import filler_block
 from conveyor_sim.control.gap import GapControl
 from conveyor_sim.control.jam import JamAlarm, JamClearing
 from conveyor_sim.control.level import Count, table_level
@@ -138,6 +139,14 @@ TWINS = {
     "reject": Twins(lambda: Scenario("scenarios/reject_line"), reject, nothing, 40, "LREAL := 1.2", "LREAL := 1.1"),
     "panel": Twins(
         lambda: Scenario("scenarios/panel_line"), panel_line, restart, 6, "powered AND (ready OR resets)", "powered"
+    ),
+    "filler_block": Twins(
+        lambda: Scenario("filler_block"),
+        filler_block,
+        restart,
+        2,
+        "NOT failed AND (ready OR reset_button)",
+        "NOT failed",
     ),
 }
 

@@ -142,6 +142,15 @@ def test_gearing_out_goes_on_at_the_own_rate() -> None:
     assert deviation(sim) == pytest.approx(0.0, abs=1e-12)
 
 
+def test_an_axis_gears_in_with_a_master_at_rest() -> None:
+    sim = axes(block={"rate": 0.0, "rate_limit": RATE}, star={"in_gear": False})
+    commanded(sim, gear_in=1)
+    in_gear(sim)
+    commanded(sim, block_rate=RATE)
+    sim.advance(300)
+    assert signal(sim, "star/speed") == OMEGA / 12 and deviation(sim) == pytest.approx(0.0, abs=1e-12)
+
+
 def test_a_phase_shift_moves_to_the_new_phase_and_back() -> None:
     sim = axes()
     sim.advance(10)
@@ -408,3 +417,50 @@ def test_jammed_is_a_fault_and_no_command() -> None:
     sim = axes()
     assert sim.line.refusal(Input("test", "test", "test", INJECT, ("axes/star/jammed",), (1.0,))) == ""
     assert "axes/star/jammed" not in sim.process_image.command_names
+
+
+def loaded(**star: Any) -> Simulation:
+    """Return a star wheel that drags a bottle of 2 kg over the floor, at 0.3 m from its centre, mu = 0.3."""
+    wheel = {"centre": [0.0, 0.0], "turn": "left", "entry": 0.0, "carry": "180 deg", "pockets": 12, "pitch_radius": 0.3,
+             "pocket_radius": 0.034, "axis": "star", "material": "steel",
+             "guide": {"material": "steel", "to": "360 deg"}}  # fmt: skip
+    damping = {"law": "normal", "restitution": 0.2}
+    return simulation(
+        bottle_types={"bottle": {"radius": 0.033, "mass": 2.0, "material": "glass"}},
+        contacts=[{"between": ["glass", "steel"], "stiffness": 20000.0, "damping": damping}],
+        floor={"friction": 0.3}, stars={"wheel": wheel}, bottles=[bottle(0.3, 0.0)],
+        axes={"block": {"rate": 1.0, **LIMITS}, "star": {"master": "block", "ratio": "1/12", "inertia": 0.05, **star}},
+    )  # fmt: skip
+
+
+DRAG = 0.3 * 2.0 * 9.81 * 0.3
+"""Torque of friction on the floor, N m."""
+
+
+def test_the_torque_of_a_wheel_is_that_of_the_friction_of_its_bottle() -> None:
+    sim = loaded()
+    sim.advance(200)
+    torques = []
+    for _ in range(100):
+        sim.advance()
+        torques.append(signal(sim, "star/torque"))
+    assert np.mean(torques) == pytest.approx(DRAG, rel=0.02)
+    assert signal(sim, "star/in_gear") == 1.0 and signal(sim, "star/torque_limited") == 0.0
+
+
+def test_an_overloaded_drive_pushes_with_its_limit_and_its_failure_stops_the_train() -> None:
+    sim = loaded(torque_limit=0.5 * DRAG, following_limit=0.3)
+    torques = []
+    while not signal(sim, "star/fault"):
+        sim.advance()
+        torques.append(signal(sim, "star/torque"))
+    assert np.mean(torques[-20:]) == pytest.approx(0.5 * DRAG, rel=0.02)
+    assert signal(sim, "star/torque_limited") == 1.0 and signal(sim, "star/following_error") > 0.3
+    assert {"axes/star/torque", "axes/star/fault"} <= sim.alarms
+    sim.advance(100)
+    assert signal(sim, "block/speed") == 0.0
+    sim.delete(int(sim.bottles().id[0]))
+    commanded(sim, reset=1)
+    sim.advance(300)
+    assert signal(sim, "star/in_gear") == 1.0 and signal(sim, "block/speed") == TURN
+    assert not {"axes/star/torque", "axes/star/fault"} & sim.alarms

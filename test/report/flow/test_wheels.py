@@ -70,3 +70,14 @@ def test_wrong_phase_is_found_with_its_distance() -> None:
     (finding,) = wrong_phases(line(phase=fitting + 0.1))
     assert finding.path == ("stars", "out", "phase")
     assert finding.text == "its pockets are 30 mm too late for the bottles of stars.in: a phase of 0 rad fits"
+
+
+@pytest.mark.parametrize("rate", [0.0, 0.5])
+def test_a_wheel_passes_one_bottle_per_pocket(rate: float) -> None:
+    """A wheel that stands at the start is estimated at its largest rate."""
+    turning = line()
+    axis = turning.axes["star"].model_copy(update={"rate": rate, "rate_limit": 0.5})
+    flow = flow_of(turning.model_copy(update={"axes": {"star": axis}}))
+    (wheel,) = [stretch for stretch in flow.stretches if stretch.name == "in (star)"]
+    assert wheel.rate == pytest.approx(0.5 * POCKETS)
+    assert wheel.capacity == pytest.approx(POCKETS / 4, rel=0.15)

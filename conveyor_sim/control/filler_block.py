@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`FillerBlock`: start, run, stop and restart of a block of machines on axes in gear, fed through a stop gate."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import IntEnum
+
+from conveyor_sim.control.scan import Inputs
+
+
+class Step(IntEnum):
+    """Step of the sequence."""
+
+    STOPPED = 0
+    ENABLING = 1
+    """The axes are disabled for one scan, because a rising edge of `enable` starts them."""
+    GEARING = 2
+    """The slaves gear in, while the master stands."""
+    RUNNING = 3
+    FAILED = 4
+    """An axis has failed. The axes in gear brake in phase."""
+
+
+@dataclass
+class FillerBlock:
+    """Control of `config/filler_block.yaml`.
+
+    The start button enables all axes, gears the slaves in, and starts the master. The block runs without bottles until
+    enough wait at the gate. The gate closes when too few wait, when the discharge is full, and when the block stops.
+    After the failure of an axis or an emergency stop, the reset button precedes the next start.
+    """
+
+    slaves: Sequence[str]
+    """Names of the axes with a master."""
+    master: str = "block"
+    slow: float = 0.6
+    """Rate over the commanded one while few bottles come."""
+    _step: Step = Step.STOPPED
+    _ready: bool = True
+    _start: bool = field(default=True)
+    _pulse: bool = False
+
+    def scan(self, inputs: Inputs) -> Mapping[str, float]:
+        """Return the commands of one scan."""
+        axes = (self.master, *self.slaves)
+        powered = inputs["panel/estop/contact"] != 0.0
+        failed = any(inputs[f"axes/{axis}/fault"] for axis in axes)
+        start, reset = inputs["panel/start/contact"] != 0.0, inputs["panel/reset/contact"] != 0.0
+        starts = start and not self._start
+        self._start = start
+        # An axis reports the end of its failure one scan after the reset.
+        self._ready = powered and not failed and (self._ready or reset)
+        geared = all(inputs[f"axes/{axis}/in_gear"] for axis in self.slaves)
+        self._pulse = self._step == Step.GEARING and not self._pulse
+        self._step = self._next(failed, starts, geared, inputs["panel/stop/contact"] != 0.0)
+        runs = self._step == Step.RUNNING
+        full = inputs["photo_eyes/backed_up/blocked"] != 0.0
+        wanted = inputs["panel/rate/value"] / 3600.0
+        share = 1.0 if inputs["photo_eyes/supplied/blocked"] else self.slow
+        commands = {
+            f"axes/{self.master}/rate": wanted * share if runs and not full else 0.0,
+            "gates/stop/open": float(runs and not full and inputs["photo_eyes/queued/blocked"] != 0.0),
+            "belts/infeed/run": float(powered and self._step != Step.FAILED),
+            "belts/discharge/run": float(powered and self._step != Step.FAILED),
+            "panel/stack/red": float(failed or not powered),
+            "panel/stack/yellow": float(powered and not failed and not self._ready),
+            "panel/stack/green": float(runs),
+            "panel/filled/write": inputs["carousels/valves/good"],
+        }
+        for axis in axes:
+            commands[f"axes/{axis}/enable"] = float(self._step != Step.ENABLING)
+            commands[f"axes/{axis}/reset"] = float(reset)
+        for axis in self.slaves:
+            commands[f"axes/{axis}/gear_in"] = float(self._step == Step.GEARING and self._pulse)
+        return commands
+
+    def _next(self, failed: bool, starts: bool, geared: bool, stop_closed: bool) -> Step:
+        """Return the next step. A stop button opens its contact."""
+        if failed:
+            return Step.FAILED
+        if not self._ready or not stop_closed:
+            return Step.STOPPED
+        if self._step in (Step.STOPPED, Step.FAILED):
+            return Step.ENABLING if starts else Step.STOPPED
+        if self._step == Step.ENABLING or (self._step == Step.GEARING and not geared):
+            return Step.GEARING
+        return Step.RUNNING
+
+
+def filler_block() -> FillerBlock:
+    """Return the controller of `config/filler_block.yaml`."""
+    return FillerBlock(("inlet", "filler", "outlet", "capper"))
