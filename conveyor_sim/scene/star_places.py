@@ -94,6 +94,6 @@ def _guide(wheel: Wheel) -> ArcRail | None:
         material=guide.material,
         centre=wheel.centre,
         radius=wheel.part.pitch_radius + wheel.part.pocket_radius + guide.clearance,
-        start_angle=wheel.entry + (guide.from_ if wheel.sign > 0.0 else -to),
+        start_angle=math.fmod(wheel.entry + (guide.from_ if wheel.sign > 0.0 else -to), 2.0 * math.pi),
         span=span,
     )

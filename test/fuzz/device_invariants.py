@@ -10,6 +10,7 @@ from fuzz.axis_invariants import AxisWatch
 from fuzz.crossing import crossed
 from fuzz.panel_invariants import ExpectedPanel
 from fuzz.violation import Violation
+from fuzz.wheel_invariants import WheelWatch
 from numpy.typing import NDArray
 
 from conveyor_sim.columns.bottles import BottleColumns
@@ -37,7 +38,7 @@ RUNNING = (PackMLState.EXECUTE, PackMLState.SUSPENDED, PackMLState.COMPLETING)
 RISING = {
     "fed", "removed", "produced", "taken", "taken_bad", "count", "bad", "rejected", "rejected_bad", "rejected_good",
     "processed", "good", "defective", "false_accepts", "false_rejects", "failures", "missed", "dropped", "edges",
-    "forward", "backward", "starved_time", "blocked_time", "time", "bad_time",
+    "forward", "backward", "starved_time", "blocked_time", "time", "bad_time", "missing", "skipped", "lost",
 }  # fmt: skip
 """Signals that never fall."""
 
@@ -53,7 +54,7 @@ class DeviceWatch:
         """The last accepted value of each injected fault."""
         self._movers = [mover_shape(*mover) for mover in movers_of(simulation.scene)]
         self._now = self._before = self._values()
-        self._axes = AxisWatch(simulation)
+        self._axes, self._wheels = AxisWatch(simulation), WheelWatch(simulation)
         self._still = dict.fromkeys((axis.name for _, axis in self._movers), 0)
         """Ticks for which each moving rail has stood."""
         ledger = simulation.ledger()
@@ -75,6 +76,7 @@ class DeviceWatch:
         self._eyes(before, now)
         self._check_movers()
         self._axes.check(self._before, self._now, outcomes)
+        self._wheels.check(self._before, self._now, outcomes)
         self._ledger()
 
     def in_frames(self, before: F8, after: F8) -> list[tuple[str, SegmentPiece, F8, F8]]:

@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from typing import Any, Protocol
 
-from fuzz.draws import Data, between, fractions, scaled
+from fuzz.draws import Data, between, fractions, scaled, signed
 from hypothesis import strategies as st
 
 WORK: Data = {
@@ -82,6 +82,58 @@ def axes(draw: st.DrawFn, frame: Frame, belts: Data, drives: Data) -> Data:
             rest = {field: value for field, value in belt.items() if field not in OF_DRIVE}
             moved[name] = {**rest, "axis": draw(st.sampled_from(sorted(found))), "travel": 6.3 * frame.unit}
     return {"axes": found, "belts": moved}
+
+
+@st.composite
+def wheels(draw: st.DrawFn, frame: Frame, material: str, found: Data) -> Data:
+    """Star wheels with carousels, screws and side belts; the fields of these, and `axes` with at least one.
+
+    found: axes of the scene. Their limits of torque suffice for their accelerations.
+    """
+    machines: dict[str, dict[str, Data]] = {"axes": dict(found), "stars": {}, "carousels": {}, "screws": {}}
+    machines["side_belts"] = {}
+    reach, heaviest = 8.0 * frame.unit, max(kind["mass"] for kind in frame.types.values())
+    top = frame.speed / reach
+    if not found:
+        rate = top / 6.3
+        machines["axes"]["axis_0"] = {"rate": rate * draw(signed), "rate_limit": rate, "jog_speed": 0.3 * top}
+        machines["axes"]["axis_0"]["acceleration"] = top / (frame.tick * draw(st.sampled_from([0.5, 4.0, 30.0])))
+        machines["axes"]["axis_1"] = {**machines["axes"]["axis_0"], "master": "axis_0"}
+        for field in ("rate", "rate_limit"):
+            del machines["axes"]["axis_1"][field]
+        machines["axes"]["axis_1"]["ratio"] = draw(st.sampled_from([1.0, -0.5, "1/12"]))
+    for axis in machines["axes"].values():
+        if spare := draw(st.sampled_from([0.0, 1.01, 10.0])):
+            axis["inertia"] = heaviest * reach**2 * draw(scaled(0.3, 30.0))
+            axis["torque_limit"] = axis["inertia"] * axis["acceleration"] * spare
+    names = sorted(machines["axes"])
+    for n in range(draw(st.integers(1, 3))):
+        axis, pocket = draw(st.sampled_from(names)), frame.unit * draw(st.sampled_from([1.02, 1.2, 2.0]))
+        on_axis = {"axis": axis, "material": material, "pocket_radius": pocket}
+        what = draw(st.sampled_from(["star", "star", "screw", "side belt"])) if n else "star"
+        start, angle = draw(frame.points), draw(between(-math.pi, math.pi))
+        length = frame.unit * draw(st.integers(2, 8))
+        end = [start[0] + length * math.cos(angle), start[1] + length * math.sin(angle)]
+        if what == "side belt":
+            belt = {"from": start, "to": end, "material": material, "speed": frame.speed * draw(signed)}
+            belt["speed_limits"] = [-frame.speed, frame.speed]
+            machines["side_belts"]["side"] = belt
+        elif what == "screw":
+            pitch = 2.0 * pocket * draw(between(1.0, 1.5))
+            points = draw(st.sampled_from([[[0.0, pitch]], [[0.0, pitch], [0.5 * length, 1.4 * pitch]]]))
+            side = draw(st.sampled_from(["left", "right"]))
+            machines["screws"]["screw"] = {**on_axis, "from": start, "to": end, "side": side, "pitch": points}
+        else:
+            pockets = draw(st.sampled_from([1, 2, 3, 8]))
+            radius = max(1.3 * pocket * pockets / math.pi, 1.5 * pocket)
+            star = {**on_axis, "centre": start, "entry": angle, "turn": draw(st.sampled_from(["left", "right"]))}
+            star |= {"pockets": pockets, "pitch_radius": radius, "carry": draw(between(0.5, 6.28))}
+            star |= draw(st.sampled_from([{}, {"guide": {"material": material, "clearance": 0.1 * pocket}}]))
+            machines["stars"][f"star_{n}"] = star
+            if draw(st.booleans()):
+                work = {"star": f"star_{n}", "from": 0.0, "to": star["carry"], "sets": {"cap": {"to": 1.0}}}
+                machines["carousels"][f"carousel_{n}"] = work
+    return {field: parts for field, parts in machines.items() if parts}
 
 
 @st.composite

@@ -60,6 +60,8 @@ class Family:
     ledger: bool = False
     vibration: bool = False
     axes: bool = False
+    wheels: bool = False
+    """Star wheels with carousels, screws, side belts, and the axes that turn them."""
     panel: bool = False
     effects: tuple[tuple[str, str], ...] = ()
 
@@ -72,7 +74,18 @@ class Family:
         ]
         parts += [
             name
-            for name in ("drives", "movers", "lifts", "machines", "sensors", "ledger", "vibration", "axes", "panel")
+            for name in (
+                "drives",
+                "movers",
+                "lifts",
+                "machines",
+                "sensors",
+                "ledger",
+                "vibration",
+                "axes",
+                "wheels",
+                "panel",
+            )
             if getattr(self, name)
         ]
         parts += [*(f"{kind} belts" for kind in self.belts), *(f"{kind}s" for kind in self.rails)]
@@ -116,7 +129,8 @@ def random_family(seed: int) -> Family:
         axes=draw.random() < 0.3,
     )
     family = replace(family, lifts=family.movers and draw.random() < 0.3)
-    return replace(family, panel=draw.random() < 0.4)
+    family = replace(family, panel=draw.random() < 0.4)
+    return replace(family, wheels=move and draw.random() < 0.3)
 
 
 def _some(draw: random.Random, names: tuple[str, ...], least: int = 1) -> tuple[str, ...]:
@@ -139,5 +153,6 @@ CI_FAMILIES = (
     _PLAIN,
     replace(_PLAIN, drives=True, machines=True, sensors=True, axes=True, panel=True),
     Family(types=2, drives=True, movers=True, lifts=True, machines=True, sensors=True, ledger=True, vibration=True),
+    Family(rails=("segment", "arc"), wheels=True, panel=True, infeeds=True, ledger=True),
 )
-"""Two mixtures of effects, so that CI compiles few kernels: devices call for none but rails that move."""
+"""Few mixtures of effects, so that CI compiles few kernels: devices call for none but rails that move."""

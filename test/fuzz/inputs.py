@@ -33,6 +33,8 @@ class Input:
 Table = Mapping[str, Input]
 
 MOVERS = (("gates", "open"), ("pushers", "push"), ("diverters", "divert"), ("clamps", "close"))
+GEARED = ("stars", "screws")
+"""Fields of machines on the shaft of an axis."""
 POSITIONED = (("dividers", "cmd_lane"), ("adjustable", "cmd_setting"))
 
 
@@ -71,6 +73,12 @@ def commands_of(scene: Scene) -> Table:
         if axis.master is not None:
             table |= {f"axes/{name}/{what}": Input() for what in ("gear_in", "gear_out")}
             table[f"axes/{name}/phase_shift"] = Input("number", -CYCLE, CYCLE)
+    for name, belt in scene.side_belts.items():
+        table |= {
+            f"side_belts/{name}/cmd_speed": Input("number", *belt.speed_limits),
+            f"side_belts/{name}/run": Input(),
+        }
+    table |= {f"carousels/{name}/on": Input() for name in scene.carousels}
     for name, machine in scene.machines.items():
         if isinstance(machine, PackmlPart):
             most = machine.rate if machine.rate_limit is None else machine.rate_limit
@@ -101,7 +109,17 @@ def faults_of(scene: Scene) -> Table:
     table = {f"{place}/trip": Input() for place, part in speed_parts(scene) if has_drive(part)}
     for field, _ in (*MOVERS, *POSITIONED):
         table |= {f"{field}/{name}/jammed": Input() for name in getattr(scene, field)}
-    table |= {f"axes/{name}/jammed": Input() for name in scene.axes}
+    table |= {
+        f"{field}/{name}/jammed": Input() for field in ("axes", *GEARED, "side_belts") for name in getattr(scene, field)
+    }
+    table |= {
+        f"{field}/{name}/slip": Input("number", -math.pi, math.pi) for field in GEARED for name in getattr(scene, field)
+    }
+    table |= {f"side_belts/{name}/slip": Input("number") for name in scene.side_belts}
+    table |= {
+        f"carousels/{name}/dead_tool": Input("count", 0.0, scene.stars[carousel.star].pockets)
+        for name, carousel in scene.carousels.items()
+    }
     table |= {f"machines/{name}/stop": Input() for name in scene.machines}
     table |= {f"spills/{name}/drop": Input() for name in scene.spills}
     for name in scene.photo_eyes:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from fuzz.checked import checked
-from fuzz.devices import axes, drives, machines, movers, panel, row_pushers, sensors
+from fuzz.devices import axes, drives, machines, movers, panel, row_pushers, sensors, wheels
 from fuzz.draws import Data, between, fractions, scaled, signed
 from fuzz.families import Family
 from hypothesis import strategies as st
@@ -73,6 +73,8 @@ def scenes(draw: st.DrawFn, family: Family, beyond: bool = True) -> Data:
         data |= draw(drives(frame, data["belts"]))
     if family.axes:
         data |= draw(axes(frame, data["belts"], data.get("drives", {})))
+    if family.wheels:
+        data |= draw(wheels(frame, STEEL, data.get("axes", {})))
     if family.movers:
         data |= draw(movers(frame, STEEL, family.lifts))
     clear = _Clear(data, frame)

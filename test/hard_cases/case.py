@@ -27,6 +27,9 @@ SPRING, SPRING_DAMPING = 0.5, 1.0
 RING = 0.85
 """Base radius over the radius, in the variant `ring`."""
 
+RAILS = ("rails", "stars", "screws")
+"""Fields of parts that touch bottles, with a material."""
+
 UNMEASURED = ("chatter", "residual")
 """What can't be measured on every run (`measures.py`)."""
 
@@ -196,7 +199,7 @@ def with_annex(fields: dict[str, Any]) -> dict[str, Any]:
     kind = {"radius": radius, "mass": mass, "material": "annex"}
     x, y = fields.pop("annex", [3.0, -3.0])
     materials = dict.fromkeys([*(kind["material"] for kind in types), "annex"])
-    rails = {rail["material"] for rail in fields.get("rails", {}).values()}
+    rails = {rail["material"] for field in RAILS for rail in fields.get(field, {}).values()}
     carriers = {belt["material"] for belt in fields.get("belts", {}).values()}
     law: dict[str, Any] = {"stiffness": 1e-3, "damping": {"law": "normal", "coefficient": 1e-6}, "friction": 1e-6}
     if any("tangential" in contact for contact in fields["contacts"]):

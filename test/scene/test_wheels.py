@@ -241,6 +241,7 @@ REFUSED = {
     "stars.in.pitch_radius: 0.32 given, expected the last pitch of screws.in, 157 mm: 2 pi pitch_radius / pockets is "
     "167.552 mm, 10.6 mm too long": {"in": {"pitch_radius": 0.32}},
     "stars.in.pockets: 40 given, expected pockets that do not overlap: at most": {"in": {"pockets": 40}},
+    "stars.in.worn: 0.5 given, expected a first pocket that does not reach into the next one": {"in": {"worn": 0.5}},
     'stars.in.axis: "block" given, expected an axis that brings as many pockets as screws.in brings bottles: '
     "12 pockets, 1 bottles per turn of the common master": {"in": {"axis": "block"}},
     'stars.in.axis: "other" given, expected a name from axes: block, star': {"in": {"axis": "other"}},
@@ -265,6 +266,21 @@ def test_wheels_that_do_not_fit_are_refused(message: str) -> None:
     with pytest.raises(SceneError) as error:
         line(stars=stars, screws={"in": SCREW})
     assert message in str(error.value)
+
+
+@pytest.mark.parametrize("turn", ["left", "right"])
+def test_guides_begin_at_angles_beyond_a_turn(turn: str) -> None:
+    """A wheel carries bottles through 300 degrees from an entry at -200 degrees, or after two such wheels."""
+    wheel = {**STAR, "carry": "300 deg", "guide": {"material": "steel"}}
+    first = {**wheel, "centre": [0.0, 0.0], "turn": turn, "entry": "-200 deg"}
+    scene = line(stars={"in": first, "next": {**wheel, "after": "in"}, "last": {**wheel, "after": "next"}})
+    guides = {shape.name: shape for shape in rail_shapes(scene)}
+    for name, wheel_there in wheels_of(scene.stars).items():
+        (guide,) = guides[f"{name}_guide"].pieces
+        reach = np.array([wheel_there.point(0.0), wheel_there.point(math.radians(300.0))]) - wheel_there.centre
+        ends = np.array(guide.ends) - wheel_there.centre
+        given, expected = (sorted((row / np.hypot(*row)).round(9).tolist() for row in rows) for rows in (ends, reach))
+        assert given == expected
 
 
 def test_pitch_within_the_play_of_a_pocket_is_accepted() -> None:

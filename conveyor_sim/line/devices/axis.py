@@ -218,7 +218,8 @@ class AxisDevice(Device):
 
     def _start(self) -> None:
         if self._power is not None:
-            self._power.start(self.name)
+            for axis in (self, *self._train()):
+                self._power.start(axis.name)
 
     def _leave_gear(self) -> None:
         self.mode = FREE

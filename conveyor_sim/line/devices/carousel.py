@@ -66,15 +66,17 @@ class CarouselDevice(BottleWork, Device):
         self.on = True
         self.dead_tool = 0
         self.bottles, self.done = [NONE] * star.pockets, [NONE] * star.pockets
-        self.passed = [self._pocket_at(angle, self._star.angle) for angle in self._ends]
-        """Pocket that was the last to pass each of the two angles."""
+        self.turned = self._star.angle
+        """Angle by which the wheel has turned, rad, with all of its turns."""
+        self.passed = [self._passed(angle) for angle in self._ends]
+        """Number of pockets that have passed each of the two angles, less those that have passed it backward."""
 
-    def _pocket_at(self, angle: float, turned: float) -> int:
-        """Return the number (from 0) of the last pocket that passed an angle, at an angle of the wheel (rad).
+    def _passed(self, angle: float) -> int:
+        """Return the number of pockets that have passed an angle (rad).
 
         Pocket k passes it when the wheel has turned by `angle` + k pitches.
         """
-        return math.floor((turned - angle) / self._pitch) % self._pockets
+        return math.floor((self.turned - angle) / self._pitch)
 
     def command(self, name: str, value: float, now: ScanContext) -> None:
         """Take `on` or the fault `dead_tool`."""
@@ -86,16 +88,11 @@ class CarouselDevice(BottleWork, Device):
     def feed(self, now: ScanContext) -> None:
         """Begin and end the work on bottles in the pockets that have passed an angle. The ledger books it as fed."""
         turned = self._star.angle
+        self.turned += math.remainder(turned - self.turned, 2.0 * math.pi)
         for end, angle in enumerate(self._ends):
-            pocket, before = self._pocket_at(angle, turned), self.passed[end]
-            if pocket == before:
-                continue
-            self.passed[end] = pocket
-            steps = (pocket - before) % self._pockets
-            if 2 * steps >= self._pockets > 1:  # it turns backward
-                continue
-            for step in range(1, steps + 1):
-                (self._begin if end == 0 else self._end)((before + step) % self._pockets, turned, now)
+            before, self.passed[end] = self.passed[end], self._passed(angle)
+            for passed in range(before + 1, self.passed[end] + 1):
+                (self._begin if end == 0 else self._end)(passed % self._pockets, turned, now)
 
     def _begin(self, pocket: int, turned: float, now: ScanContext) -> None:
         bottle = self._bottle(self._slot(pocket, turned, now), now)

@@ -85,6 +85,9 @@ class Star(DevicePart):
         elif not self.land > 0.0:
             text = f"{shown(self.pockets)} given, expected pockets that do not overlap: at most {self._most_pockets}"
             yield Problem((*path, "pockets"), text)
+        elif not self._worn_land > 0.0:
+            text = f"{shown(self.worn)} given, expected a first pocket that does not reach into the next one"
+            yield Problem((*path, "worn"), f"{text} (m)")
 
     @property
     def tip_radius(self) -> float:
@@ -101,6 +104,12 @@ class Star(DevicePart):
     def land(self) -> float:
         """Angle of the rim between two pockets, rad; negative if pockets overlap."""
         return 2.0 * math.pi / self.pockets - 2.0 * self.tip_angle(self.pocket_radius)
+
+    @property
+    def _worn_land(self) -> float:
+        """Angle of the rim between the worn pocket and the next one, rad; negative if they overlap."""
+        worn = self.tip_angle(self.pocket_radius + self.worn)
+        return 2.0 * math.pi / self.pockets - worn - (worn if self.pockets == 1 else self.tip_angle(self.pocket_radius))
 
     @property
     def _most_pockets(self) -> int:

@@ -254,8 +254,19 @@ def test_an_emergency_stop_brakes_the_train_in_gear() -> None:
     sim.command(["panel/stop/press"], [1.0], writer_kind="operator")
     sim.advance(300)
     assert signal(sim, "block/speed") == signal(sim, "star/speed") == 0.0
-    assert signal(sim, "block/running") == 0.0
+    assert signal(sim, "block/running") == signal(sim, "star/running") == 0.0
     assert deviation(sim, 0.0) == pytest.approx(0.0, abs=1e-12)
+    # A start command of the master starts the axes in gear with it.
+    sim.command(["panel/stop/press"], [0.0], writer_kind="operator")
+    sim.command(["panel/stop/reset"], [1.0], writer_kind="operator")
+    sim.advance()
+    sim.command(["axes/block/enable"], [0.0])
+    sim.advance()
+    assert signal(sim, "star/running") == 0.0
+    sim.command(["axes/block/enable"], [1.0])
+    sim.advance(300)
+    assert signal(sim, "block/running") == signal(sim, "star/running") == signal(sim, "star/in_gear") == 1.0
+    assert signal(sim, "star/speed") == signal(sim, "block/speed") / 12.0 > 0.0
 
 
 def test_an_axis_follows_a_named_drive_by_its_travel() -> None:

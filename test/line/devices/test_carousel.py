@@ -154,6 +154,19 @@ def test_a_wheel_that_stands_or_turns_backward_does_no_work_twice() -> None:
     assert sim._line.now.bad == set()
 
 
+@pytest.mark.parametrize("pockets", [1, 2, 3])
+def test_wheels_of_few_pockets_work_on_their_bottles(pockets: int) -> None:
+    """The work of 160 degrees is done once per turn in each pocket; without bottles, pockets are missing."""
+    given = fields(filled=(0,))
+    given["stars"]["wheel"]["pockets"] = pockets
+    sim = simulation(**given)
+    sim.advance(math.ceil(200.0 / (360.0 * RATE) * 100.0))
+    assert (of(sim, "processed"), sim.bottles().type.tolist()) == (1.0, [1])
+    empty = simulation(**{**given, "bottles": []})
+    empty.advance(round(2.0 / RATE * 100.0))
+    assert of(empty, "missing") == 2.0 * pockets
+
+
 @pytest.mark.parametrize("threads", [1, 2])
 def test_a_run_goes_on_from_a_checkpoint_with_the_same_bits(threads: int, tmp_path: Path) -> None:
     sim = simulation(**fields())
