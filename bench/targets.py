@@ -12,6 +12,7 @@ from bench import (
     compiling,
     control,
     dense,
+    filler_block,
     growth,
     isolation,
     lockstep,
@@ -181,6 +182,13 @@ TARGETS = (
     Target("rise of the cost from 1 to 1 000 rails", "growth", MOST, 0.15, _rise(growth.RAILS, 1, 1_000)),
     Target("rise of the cost from 1 to 160 closed gates at a distance", "bodies", MOST, 0.05, bodies.rise),
     Target("us that a turning star wheel adds to a tick of 12 bottles", "bodies", MOST, 40.0, bodies.wheel_cost),
+    Target(
+        "filler block at 24 000 bottles an hour, slowest period, times real time",
+        "filler_block",
+        LEAST,
+        1.0,
+        filler_block.slowest,
+    ),
     Target("s to the first step, cached", "start", MOST, 1.0, _first_step),
     *(
         Target(f"first tick from an empty cache, {name}, of that before", "compile", MOST, v, _compile(name))
