@@ -12,6 +12,7 @@ from bag.small_line import SMALL_LINE, record
 from physics.test_force_limits import press
 from rosbags.rosbag2 import StoragePlugin, Writer
 from scenes import NO_OUTPUTS
+from wheel_lines import POCKETS, RATE, star_line
 
 from conveyor_sim.bag.messages.encode import Header
 from conveyor_sim.bag.messages.topics import TOPICS
@@ -344,6 +345,47 @@ def test_a_pusher_that_is_held_up_replays_bit_for_bit(tmp_path: Path) -> None:
     )
     with pytest.raises(BagError, match=expected):
         replay(edited(bag, tmp_path / "before", before))
+
+
+AXIS_COMMANDS = {
+    5: ("star/phase_shift", 0.02), 40: ("star/phase_shift", 0.0), 60: ("star/gear_out", 1.0),
+    80: ("block/rate", 0.5 * RATE), 90: ("star/jog_forward", 1.0), 120: ("star/jog_forward", 0.0),
+    121: ("star/jog_backward", 1.0), 150: ("star/jog_backward", 0.0), 170: ("star/gear_in", 1.0),
+    230: ("star/jammed", 1.0), 234: ("star/jammed", 0.0),
+}  # fmt: skip
+"""Inputs of the axes of a star wheel by tick."""
+
+
+def test_commands_of_axes_replay_bit_for_bit(tmp_path: Path) -> None:
+    """A wheel that carries a bottle is shifted, geared out, jogged both ways, geared in, and jammed for a moment."""
+    limits = {"acceleration": 20.0, "jog_speed": 1.0, "following_limit": "none"}
+    star = {"master": "block", "ratio": f"1/{POCKETS}", **limits}
+    sim = star_line(
+        axes={"block": {"rate": RATE, **limits}, "star": star},
+        outputs={**NO_OUTPUTS, "signals": 100, "bottles": 100, "ledger": 100},
+    )
+    with Recorder(tmp_path / "wheel") as recorder:
+        outputs = OutputWriter(sim, [recorder], run_id="run", frame_id="hall")
+        outputs.start()
+        while sim.tick < 300:
+            name, value = AXIS_COMMANDS.get(sim.tick, ("", 0.0))
+            if name.endswith("jammed"):
+                sim.inject(f"axes/{name}", value)
+            elif name:
+                sim.command([f"axes/{name}"], [value])
+            sim.advance()
+            outputs.after_tick()
+    with open_bag(tmp_path / "wheel") as opened:
+        names = opened.line.signal_names
+        places = [names.index(f"axes/star/{name}") for name in ("speed", "in_gear", "following_error")]
+        speed, in_gear, error = np.array([[frame.data[place] for place in places] for frame in opened.signals()]).T
+        outcomes = [frame.data.accepted for frame in opened.outcomes()]
+    assert speed.min() == -1.0 and speed.max() > 1.0 and error.max() > 0.05
+    assert in_gear[0] == in_gear[-1] == 1.0 and in_gear[180] == 0.0
+    assert outcomes == [True] * len(AXIS_COMMANDS)
+    report = replay(tmp_path / "wheel")
+    assert (report.difference, report.exact) == (None, True)
+    assert report.compared["signals"] == report.compared["bottles"] == report.compared["ledger"] == 301
 
 
 OLD = Path(__file__).parent / "old"

@@ -17,9 +17,11 @@ from wheel_lines import (
     RATE,
     SPEED,
     STIFFNESS,
+    line,
     star_line,
 )
 
+from conveyor_sim.engine.threads.workers import UNIT
 from conveyor_sim.scene import parse_scene
 from conveyor_sim.scene.geometry import ArcPiece
 from conveyor_sim.simulation import Simulation
@@ -138,6 +140,43 @@ def test_results_have_equal_bits_with_threads_and_after_checkpoints(tmp_path: Pa
         sim.advance(60)
     assert len({sim.state_hash() for sim in runs}) == 1
     assert np.hypot(*(getattr(runs[0].bottles(), name)[0] for name in ("vx", "vy"))) > 0.5 * SPEED
+
+
+def large_wheel(threads: int) -> Simulation:
+    """Return a wheel with a bottle in each of 96 pockets, whose drive is too weak for their friction on the floor."""
+    pockets, radius = 96, 8.0 * PITCH_RADIUS
+    angles = 2.0 * math.pi / pockets * np.arange(pockets)
+    drag = MU * MASS * 9.81 * radius * pockets
+    wheel = {
+        "centre": [0.0, 0.0], "turn": "left", "entry": 0.0, "phase": 0.0, "pockets": pockets, "pitch_radius": radius,
+        "pocket_radius": POCKET_RADIUS, "axis": "star", "material": "steel",
+        "guide": {"material": "steel", "to": "360 deg"},
+    }  # fmt: skip
+    return line(
+        threads=threads,
+        base=[],
+        floor={"friction": MU},
+        stars={"in": wheel},
+        axes={"star": {"rate": RATE / pockets, "torque_limit": 0.5 * drag, "inertia": 5.0, "following_limit": "none"}},
+        bottles=[
+            {"type": "bottle", "position": [radius * math.cos(angle), radius * math.sin(angle)],
+             "velocity": [-SPEED * math.sin(angle), SPEED * math.cos(angle)]}
+            for angle in angles
+        ],
+    )  # fmt: skip
+
+
+def test_bottles_of_several_threads_load_one_axis_with_equal_bits() -> None:
+    """More bottles than a thread takes at a time press on the wheel, and their forces slow it down."""
+    one, two = (large_wheel(threads) for threads in (1, 2))
+    assert one.bottles().x.size > UNIT
+    for sim in (one, two):
+        sim.advance(50)
+    signals = dict(zip(one.process_image.signal_names, one.signals().tolist(), strict=True))
+    assert signals["axes/star/torque_limited"] == 1.0 and signals["axes/star/following_error"] > 1e-3
+    assert 0.0 < signals["axes/star/speed"] < 0.9 * SPEED / (8.0 * PITCH_RADIUS)
+    assert two.signals().tolist() == one.signals().tolist()
+    assert two.full_state_hash() == one.full_state_hash()
 
 
 def test_queue_is_handed_over_without_knocks() -> None:
