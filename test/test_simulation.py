@@ -126,7 +126,7 @@ def test_rebuilds_of_the_lists_leave_no_trace(reference: Simulation) -> None:
 
 def lengthen_lists(sim: Simulation, needed: int) -> None:
     """Lengthen each list as if it had `needed` entries."""
-    sim._state._lengthen_lists(needed, needed, needed, needed, needed)
+    sim._state._lengthen_lists(needed, needed, needed, needed, needed, needed)
     sim._state.world.neighbourhood.stale[0] = 1
     sim._state.make_lists()
 
