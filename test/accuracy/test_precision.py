@@ -249,7 +249,7 @@ def test_softer_contacts_rebound_as_before(e: float) -> None:
 def test_integrators_that_effects_forbid_are_left_out_and_named() -> None:
     sprung = head_on(contacts=[contact(K, friction=0.1, tangential={"stiffness": K})])
     reasons = forbidden(sprung)
-    assert reasons.keys() == {"dormand_prince", "linearly_implicit"}
+    assert reasons.keys() == {"dormand_prince", "linearly_implicit", "impulses"}
     assert "tangential" in reasons["dormand_prince"]
     assert {setting.integrator for setting in candidates(sprung)} == {"leapfrog", "velocity_verlet", "rk4"}
     assert reference_setting(sprung).integrator == "velocity_verlet"

@@ -327,6 +327,10 @@ def models(annotation: Any) -> Iterator[type[BaseModel]]:
             yield from models(part)
 
 
+RELATIVE_ANGLES = ("from", "phase", "positions", "to")
+"""Fields with angles from an axis, a wheel's entry or a divider's line, which turn with their cell."""
+
+
 def test_the_tables_of_fields_cover_the_schema() -> None:
     """Fields that hold names or coordinates are known, so that a cell with them is renamed and placed."""
     known_names = {*naming.REFERENCES, naming.TAG, *naming.OTHER_NAMES}
@@ -338,7 +342,7 @@ def test_the_tables_of_fields_cover_the_schema() -> None:
                 assert name in known_names, (model, name)
             if "a point [x, y]" in words:
                 assert name in points, (model, name)
-            if "an angle, a number" in words and name != "positions":  # those of a divider count from its line
+            if "an angle, a number" in words and name not in RELATIVE_ANGLES:
                 assert name in cell_coordinates.DIRECTIONS, (model, name)
             if "a velocity" in words:
                 assert name in cell_coordinates.VECTORS, (model, name)

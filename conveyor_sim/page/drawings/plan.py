@@ -43,6 +43,7 @@ LAYERS: dict[str, tuple[str, int]] = {
     "SINKS": ("#a3447f", 6),
     "STATIONS": ("#a3447f", 6),
     "REJECTS": ("#a3447f", 6),
+    "CAROUSELS": ("#a3447f", 6),
     "INFEEDS": ("#00735c", 94),
     "SOURCES": ("#00735c", 94),
     "SPILLS": ("#00735c", 94),

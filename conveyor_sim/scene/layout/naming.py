@@ -20,6 +20,7 @@ REFERENCES: Mapping[str, tuple[str, ...]] = {
     "pusher": ("pushers",),
     "machine": ("machines",),
     "master": ("axes",),
+    "star": ("stars",),
     "start_zone": ("zones",),
     "zone": ("zones",),
 }

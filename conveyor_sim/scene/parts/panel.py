@@ -17,7 +17,7 @@ Colour = Literal["black", "white", "red", "yellow", "green", "blue"]
 Load = Literal["drives", "machines"]
 """Consumers whose power an emergency stop takes."""
 
-PanelUnit = Literal["1", "m", "m/s", "s", "Hz", "1/s", "1/min", "1/h", "1/m^2", "N", "J", "%"]
+PanelUnit = Literal["1", "m", "m/s", "s", "Hz", "1/s", "1/min", "1/h", "1/m^2", "N", "N m", "J", "rad", "rad/s", "%"]
 """Units of a number: those of tags."""
 
 MOST_POSITIONS = 20

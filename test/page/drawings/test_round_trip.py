@@ -38,6 +38,13 @@ INFEEDS: {as: infeed, block: INFEED, bottle: $BOTTLE, speed: 0.3, gap: 0.01}
 GATES: {as: ignore}
 PUSHERS: {as: ignore}
 DIVERTERS: {as: ignore}
+DIVIDERS: {as: ignore}
+ADJUSTABLE: {as: ignore}
+CLAMPS: {as: ignore}
+STARS: {as: ignore}
+SCREWS: {as: ignore}
+SIDE_BELTS: {as: ignore}
+CAROUSELS: {as: ignore}
 INSPECTIONS: {as: ignore}
 SINKS: {as: ignore}
 STATIONS: {as: ignore}
@@ -63,6 +70,8 @@ def imported_again(scene: Scene, folder: Path) -> Scene:
     base: dict[str, Any] = json.loads(scene.model_dump_json(by_alias=True, exclude_unset=True))
     for section in DRAWN:
         base.pop(section, None)
+    for star in base.get("stars", {}).values():
+        star.pop("guide", None)  # drawn as a rail
     (folder / "base.yaml").write_text(json.dumps(base))
     return parse_scene(scene_text(result.sections, "test", folder / "base.yaml"))
 
