@@ -306,7 +306,7 @@ def test_integrators_differ_in_marker_and_line_too(figures: dict[str, Figure]) -
 def test_a_difference_far_outside_stands_at_the_end_with_its_number(figures: dict[str, Figure]) -> None:
     ax = panel(figures["ensembles"], "peak force")
     (text,) = [text.get_text() for text in ax.texts]
-    assert text == "-48 %"
+    assert text == "-47.4 %"
     (drawn,) = [drawn for drawn in ax.lines if drawn.get_gid() == "different"]
     assert ax.get_xlim()[0] < points_of(drawn)[0][0] < -6.0
 

@@ -37,7 +37,7 @@ def test_codes_of_units_are_those_of_unece_recommendation_20() -> None:
     """The list is that of the OPC Foundation (UNECE_to_OPCUA.csv)."""
     assert {unit: entry.code for unit, entry in UNITS.items()} == {
         "1": "C62", "m": "MTR", "m/s": "MTS", "s": "SEC", "Hz": "HTZ", "1/s": "C97", "1/min": "C94", "1/h": "H10",
-        "1/m^2": "C93", "N": "NEW", "J": "JOU", "%": "P1",
+        "1/m^2": "C93", "N": "NEW", "N m": "NU", "J": "JOU", "rad": "C81", "rad/s": "2A", "%": "P1",
     }  # fmt: skip
     assert switch("a/b", "status", "On.").unece == ("C62", "one")
 

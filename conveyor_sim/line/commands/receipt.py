@@ -33,7 +33,7 @@ name: unknown. value: out of range, or of a wrong kind. form: any other defect o
 
 RESET_COUNTERS = "reset_counters"
 
-COUNTING = ("infeed", "inspection", "outfeed", "reject", "sink", "source", "station")
+COUNTING = ("carousel", "infeed", "inspection", "outfeed", "reject", "sink", "source", "station")
 """Classes of devices that have counters which can be reset."""
 
 
