@@ -70,11 +70,15 @@ class Session:
             # Where compiling is broken off, the compiler may make another error of it.
             if not (self._struck or isinstance(error, KeyboardInterrupt)):
                 raise
-            self._show(f"Interrupted; the best answer so far. {self._best.title}", self._best.lines)
+            self.show_best()
             raise KeyboardInterrupt from None
         self.setting = None if study.answer is None else study.answer.setting
         self._show(ANSWER, summary(study))
         return study
+
+    def show_best(self) -> None:
+        """Show the best answer so far, for an interrupted study."""
+        self._show(f"Interrupted; the best answer so far. {self._best.title}", self._best.lines)
 
     def _report(self, interim: Interim) -> None:
         self._best = interim

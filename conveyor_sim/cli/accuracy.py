@@ -53,7 +53,12 @@ def accuracy(
         loaded = options.load(scene)
         folder = out or study_folder(loaded)
         session = Session(loaded, tolerance, click.echo, say)
-        session.predict(folder, effort := THOROUGH if thorough else DEFAULT)
+    try:
+        with held_back():
+            session.predict(folder, effort := THOROUGH if thorough else DEFAULT)
+    except KeyboardInterrupt:
+        session.show_best()
+        raise
     study = session.run(folder, effort, lambda what, counted: ProgressBar(what, 0.0, counted=counted))
     if study is not None:
         if details:
