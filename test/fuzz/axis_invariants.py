@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What holds of axes at every tick: phase in gear, limits of speed and acceleration, jams, and belts on axes."""
+"""Invariants of axes at every tick: phase in gear, limits of speed and acceleration, jams, and belts on axes."""
 
 from __future__ import annotations
 

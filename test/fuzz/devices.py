@@ -258,7 +258,7 @@ def machines(draw: st.DrawFn, frame: Frame, clear: Clear) -> Data:
 
 @st.composite
 def _insides(draw: st.DrawFn, rate: float, types: list[str]) -> Data:
-    """How many bottles a station holds and for how long, and what becomes of their types."""
+    """Return random fields of a station: the bottles that it holds, their time there, and changes of their types."""
     capacity = draw(st.integers(1, 5))
     found = draw(st.sampled_from([{}, {"capacity": capacity}, {"capacity": capacity, "hold": 0.6 * capacity / rate}]))
     changes = {before: after for before in types if (after := draw(st.sampled_from(types))) != before}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What holds of star wheels, screws, carousels and side belts at every tick: they turn with their axes, or stand."""
+"""Invariants of star wheels, screws, carousels and side belts at every tick: they turn with their axes, or stand."""
 
 from __future__ import annotations
 
