@@ -40,7 +40,8 @@ def url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     home = {**os.environ, "HOME": folder, "XDG_CONFIG_HOME": folder}
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=home) as process:
         assert process.stdout is not None
-        yield process.stdout.readline().strip()
+        # The library may print a warning about Node.js first.
+        yield next(row.strip() for row in process.stdout if row.startswith("opc.tcp://"))
         process.kill()
 
 
