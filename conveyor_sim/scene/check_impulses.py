@@ -38,8 +38,6 @@ def impulse_problems(scene: Scene) -> Iterator[Problem]:
             return
     if accuracy.per_tick is None and accuracy.dt is None:
         yield Problem(("accuracy",), f"neither per_tick nor dt given, expected per_tick, such as 8, {_WITH}")
-    for name in scene.axes:
-        yield Problem(("axes", name), f"given, expected no axis {_WITH}")
     yield from _laws(scene)
     yield from _observers(scene)
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from numba import uint64
 
-from conveyor_sim.engine.arrays.impulses import BODY, ROW
+from conveyor_sim.engine.arrays.impulses import BODY, CONTACTS, ROW
 from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.contact.friction import implicit_slip
@@ -120,6 +120,7 @@ def take_step(world: World, impulses: Any, h: float) -> None:
         _scale_pairs(world.pairs, ratio)
         _scale_near(world.near_segments, ratio)
         _scale_near(world.near_arcs, ratio)
+        _scale_bodies(impulses.bodies, ratio)
         impulses.anew[0] = 1
     impulses.step[0] = h
 
@@ -139,6 +140,13 @@ def _scale_near(near: Any, ratio: float) -> None:
 
 
 @part
+def _scale_bodies(bodies: Any, ratio: float) -> None:
+    if bodies is None:
+        return
+    _scale(bodies.row, bodies.piece.size, ratio)
+
+
+@part
 def _scale(rows: Any, count: int, ratio: float) -> None:
     for entry in range(count):
         rows[ROW * entry] *= ratio
@@ -154,6 +162,7 @@ def _sum(world: World, impulses: Any) -> None:
     _sum_pairs(world, world.pairs, impulses)
     _sum_near(world, world.near_segments, impulses)
     _sum_near(world, world.near_arcs, impulses)
+    _sum_bodies(world, impulses, impulses.bodies)
 
 
 @part
@@ -173,6 +182,15 @@ def _sum_near(world: World, near: Any, impulses: Any) -> None:
     for i in range(world.bottles.x.size):
         for entry in range(near.start[i], near.start[i + 1]):
             _add(world, impulses, i, near.impulse.row, ROW * entry, -1.0)
+
+
+@part
+def _sum_bodies(world: World, impulses: Any, bodies: Any) -> None:
+    if bodies is None:
+        return
+    for place in range(bodies.piece.size):
+        if bodies.piece[place] >= 0:
+            _add(world, impulses, place // CONTACTS, bodies.row, ROW * place, -1.0)
 
 
 @part

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conveyor_sim.engine.arrays.contacts import ContactLaw
-from conveyor_sim.engine.arrays.impulses import ROW
+from conveyor_sim.engine.arrays.impulses import CONTACTS, ROW
 from conveyor_sim.engine.arrays.rails import RailContacts
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.engine.arrays.world import World
@@ -56,6 +56,13 @@ def impulse_energy(model: Model, world: World) -> float:
             piece = near.piece[: bottle.size]
             kind = world.bottles.type[bottle].astype(np.int64) * materials + pieces.material[piece]
             stored += _stored(near.impulse.row, step, model.rail_law, kind)
+    if (bodies := world.impulses.bodies) is not None and world.moving is not None and model.rail_law is not None:
+        place = np.flatnonzero(bodies.piece >= 0)
+        material = np.concatenate(
+            [group.material for group in (world.moving.segments, world.moving.arcs) if group is not None]
+        )
+        kind = world.bottles.type[place // CONTACTS].astype(np.int64) * materials + material[bodies.piece[place]]
+        stored += _stored(bodies.row.reshape(-1, ROW)[place], step, model.rail_law, kind)
     return stored
 
 

@@ -11,7 +11,10 @@ from conveyor_sim.engine.arrays.impulses import (
     BODY,
     COLOURS,
     CONSTANTS,
+    CONTACTS,
+    GEOMETRY,
     ROW,
+    BodyImpulses,
     Impulses,
     NearImpulses,
     PairImpulses,
@@ -267,6 +270,21 @@ def _impulses(model: Model, slots: int) -> Impulses:
         step=np.zeros(1),
         anew=np.ones(1, np.int64),
         mask=np.zeros(slots, np.int64),
+        bodies=_body_impulses(len(model.plant.axes), slots) if model.has("moving_rails") else None,
+    )
+
+
+def _body_impulses(axes: int, slots: int) -> BodyImpulses:
+    contacts = CONTACTS * slots
+    return BodyImpulses(
+        piece=np.full(contacts, -1, np.int32),
+        row=np.zeros(ROW * contacts),
+        geometry=np.zeros(GEOMETRY * contacts),
+        axis=np.zeros(contacts, np.int32),
+        kind=np.zeros(contacts, np.int32),
+        speed=np.zeros(axes),
+        drive=np.zeros(axes),
+        struck=np.zeros(-(-slots // UNIT) * axes),
     )
 
 

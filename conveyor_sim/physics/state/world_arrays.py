@@ -50,6 +50,10 @@ SCRATCH: Mapping[str, str] = {
     "riding.": "of one call of an integrator",
     **dict.fromkeys(("impulses.pair_constants", "impulses.rail_constants"), "of one call of an integrator"),
     **dict.fromkeys(("impulses.body", "impulses.free"), "of one substep of the method of impulses"),
+    **dict.fromkeys(
+        tuple(f"impulses.bodies.{name}" for name in ("geometry", "axis", "kind", "speed", "drive", "struck")),
+        "of one substep of the method of impulses",
+    ),
     **dict.fromkeys(("impulses.mask", "pairs.impulse.next"), "of one rebuild of the lists"),
     **dict.fromkeys(("vibration.phase", "vibration.clock"), "of one tick"),
     "vibration.ahead": "of one step",

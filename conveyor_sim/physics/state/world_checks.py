@@ -103,6 +103,12 @@ def ranges(world: World, model: Model, next_id: int) -> dict[str, tuple[int, int
         "impulses.anew": (0, 1),
         "impulses.mask": (0, 2**63 - 1),
     }
+    if world.impulses is not None and world.impulses.bodies is not None and world.moving is not None:
+        limits |= {
+            "impulses.bodies.piece": (-1, world.moving.body.size - 1),
+            "impulses.bodies.axis": (-1, max(0, axes - 1)),
+            "impulses.bodies.kind": (0, world.impulses.rail_constants.size - 1),
+        }
     if world.belts is not None:
         limits["belts.start"] = (0, world.belts.candidate.size)
     if world.pairs is not None:
