@@ -87,6 +87,8 @@ class BodyImpulses(NamedTuple):
     """Scratch of a substep: speed of an axis off its profile, m/s or rad/s, (A,)."""
     drive: F8
     """Scratch of a substep: impulse of its drive, N s or N m s, (A,)."""
+    leaves: I4
+    """Scratch of a substep: 1 if the axis leaves its profile, (A,)."""
     struck: F8
     """Scratch of a substep: force over h of impacts that drives withstand, by unit of bottles and axis, N or N m,
     (units * A,)."""

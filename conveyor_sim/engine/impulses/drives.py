@@ -8,14 +8,18 @@ At the end of the substep the forces of the last sweep move the axis, as with ex
 
 from typing import Any
 
-from conveyor_sim.engine.arrays.impulses import CONTACTS, BodyImpulses
-from conveyor_sim.engine.arrays.moving import OFF_PROFILE, Actuators, MovingBodies
+from conveyor_sim.engine.arrays.impulses import CONTACTS, GEOMETRY, BodyImpulses
+from conveyor_sim.engine.arrays.moving import OFF_PROFILE, ON_PROFILE, Actuators, MovingBodies
 from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import part
-from conveyor_sim.engine.impulses.bodies import held_work, visit_body
-from conveyor_sim.engine.rails.actuators import wanted_speed
+from conveyor_sim.engine.impulses.bodies import ACROSS, ASIDE, NORMAL, held_work, visit_body
+from conveyor_sim.engine.rails.actuators import leave_profile, wanted_speed
 from conveyor_sim.engine.rails.moving import pass_step
+from conveyor_sim.engine.rails.poses import mean_speed
 from conveyor_sim.engine.threads.workers import units, wait_for_all
+
+SETTLING = 8
+"""Sweeps over the contacts of axes that leave their profiles in a substep."""
 
 
 @part
@@ -74,20 +78,98 @@ def _sweep_drives(
 ) -> None:
     if actuators is None:
         return
-    if not _any_off(moving, actuators):
+    off = _any_off(moving, actuators)
+    if not (off or last):
         return
     wait_for_all(worker)
     if worker.rank == 0:
-        railed = world.railed
-        first, end = units(0, world.bottles.x.size)
-        for entry in range(railed.first[first], railed.first[end]):
-            i = railed.bottle[entry]
-            for place in range(CONTACTS * i, CONTACTS * i + CONTACTS):
-                if bodies.piece[place] >= 0 and bodies.axis[place] >= 0:
-                    if actuators.mode[bodies.axis[place]] == OFF_PROFILE:
-                        visit_body(i, place, world, moving, impulses, bodies, h, threshold, last, True)
-        _drive(moving, actuators, bodies, h)
+        if off:
+            _sweep_off(world, moving, actuators, impulses, bodies, h, threshold, last)
+        if last and _leave_profiles(world, moving, actuators, bodies, h):
+            for _ in range(SETTLING):
+                _sweep_off(world, moving, actuators, impulses, bodies, h, threshold, False)
     wait_for_all(worker)
+
+
+@part
+def _sweep_off(
+    world: World,
+    moving: MovingBodies,
+    actuators: Actuators,
+    impulses: Any,
+    bodies: BodyImpulses,
+    h: float,
+    threshold: float,
+    last: bool,
+) -> None:
+    railed = world.railed
+    first, end = units(0, world.bottles.x.size)
+    for entry in range(railed.first[first], railed.first[end]):
+        i = railed.bottle[entry]
+        for place in range(CONTACTS * i, CONTACTS * i + CONTACTS):
+            if bodies.piece[place] >= 0 and bodies.axis[place] >= 0:
+                if actuators.mode[bodies.axis[place]] == OFF_PROFILE:
+                    visit_body(i, place, world, moving, impulses, bodies, h, threshold, last, True)
+    _drive(moving, actuators, bodies, h)
+
+
+@part
+def _leave_profiles(
+    world: World, moving: MovingBodies, actuators: Actuators, bodies: BodyImpulses, h: float
+) -> bool:
+    """Take axes off profiles that their drives can't follow against the forces of the last sweep; return True if any.
+
+    Their bodies had no mass in this substep, so it must still be solved for them.
+    """
+    for entry in range(moving.actives[0]):
+        a = moving.active[entry]
+        bodies.leaves[a] = 0
+        if actuators.mode[a] == ON_PROFILE:
+            bodies.speed[a] = 0.0
+    railed = world.railed
+    first, end = units(0, world.bottles.x.size)
+    for entry in range(railed.first[first], railed.first[end]):
+        i = railed.bottle[entry]
+        for place in range(CONTACTS * i, CONTACTS * i + CONTACTS):
+            if bodies.piece[place] >= 0 and bodies.axis[place] >= 0:
+                if actuators.mode[bodies.axis[place]] == ON_PROFILE:
+                    bodies.speed[bodies.axis[place]] += held_work(bodies, place)
+    leaves = False
+    for entry in range(moving.actives[0]):
+        a = moving.active[entry]
+        if actuators.mode[a] == ON_PROFILE:
+            push = bodies.speed[a] / h
+            for unit in range(actuators.push.shape[0]):
+                push += actuators.push[unit, a, 0]
+            mean = mean_speed(moving, a, h)
+            leave_profile(actuators, moving, a, push, moving.clock[0] * h)
+            if actuators.mode[a] == OFF_PROFILE:
+                leaves = True
+                bodies.leaves[a], bodies.drive[a] = 1, mean
+                bodies.speed[a] = moving.speed[a] + h * push / actuators.mass[a]
+    if leaves:
+        _use_speeds(world, moving, bodies)
+        for entry in range(moving.actives[0]):
+            a = moving.active[entry]
+            if bodies.leaves[a] != 0:
+                bodies.drive[a] = 0.0
+        _drive(moving, actuators, bodies, h)
+    return leaves
+
+
+@part
+def _use_speeds(world: World, moving: MovingBodies, bodies: BodyImpulses) -> None:
+    """Take the speeds of the profiles, in `drive`, out of the contacts of axes that leave them."""
+    railed, geometry = world.railed, bodies.geometry
+    first, end = units(0, world.bottles.x.size)
+    for entry in range(railed.first[first], railed.first[end]):
+        i = railed.bottle[entry]
+        for place in range(CONTACTS * i, CONTACTS * i + CONTACTS):
+            a = bodies.axis[place]
+            if bodies.piece[place] >= 0 and a >= 0:
+                if bodies.leaves[a] != 0:
+                    geometry[GEOMETRY * place + NORMAL] = 0.0
+                    geometry[GEOMETRY * place + ACROSS] -= bodies.drive[a] * geometry[GEOMETRY * place + ASIDE]
 
 
 @part

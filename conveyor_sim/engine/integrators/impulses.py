@@ -21,8 +21,8 @@ from conveyor_sim.engine.arrays.bodies import Bottles
 from conveyor_sim.engine.arrays.lists import Neighbourhood
 from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import kernel, part
-from conveyor_sim.engine.impulses.bottles import begin_substep, end_substep, take_step, warm_anew
 from conveyor_sim.engine.impulses.bodies import add_pushes, find_bodies, sweep_bodies
+from conveyor_sim.engine.impulses.bottles import begin_substep, end_substep, take_step, warm_anew
 from conveyor_sim.engine.impulses.constants import fill_constants
 from conveyor_sim.engine.impulses.drives import begin_drives, pass_bodies, sweep_drives
 from conveyor_sim.engine.impulses.pairs import sweep_pairs

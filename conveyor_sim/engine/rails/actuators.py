@@ -130,7 +130,7 @@ def drive_axes(actuators: Any, moving: MovingBodies, ledger: Any, time: float, d
         actuators.load[a] += push
         if actuators.mode[a] != HELD:
             if actuators.mode[a] == ON_PROFILE:
-                acceleration = _leave_profile(actuators, moving, a, push, time)
+                acceleration = leave_profile(actuators, moving, a, push, time)
             elif _is_endless(actuators, a):
                 acceleration = _rejoin_speed(actuators, moving, ledger, a, push, time, dt)
             else:
@@ -145,7 +145,7 @@ def _is_endless(actuators: Actuators, a: int) -> bool:
 
 
 @part
-def _leave_profile(actuators: Actuators, moving: MovingBodies, a: int, push: float, time: float) -> float:
+def leave_profile(actuators: Actuators, moving: MovingBodies, a: int, push: float, time: float) -> float:
     """Leave the profile if the drive can't follow it; return the possible acceleration."""
     wanted = moving.course[a, phase_at(moving.course, a, time), 3]
     acceleration = _possible(actuators, moving, a, wanted, push)

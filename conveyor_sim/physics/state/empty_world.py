@@ -284,6 +284,7 @@ def _body_impulses(axes: int, slots: int) -> BodyImpulses:
         kind=np.zeros(contacts, np.int32),
         speed=np.zeros(axes),
         drive=np.zeros(axes),
+        leaves=np.zeros(axes, np.int32),
         struck=np.zeros(-(-slots // UNIT) * axes),
     )
 

@@ -51,7 +51,7 @@ SCRATCH: Mapping[str, str] = {
     **dict.fromkeys(("impulses.pair_constants", "impulses.rail_constants"), "of one call of an integrator"),
     **dict.fromkeys(("impulses.body", "impulses.free"), "of one substep of the method of impulses"),
     **dict.fromkeys(
-        tuple(f"impulses.bodies.{name}" for name in ("geometry", "axis", "kind", "speed", "drive", "struck")),
+        tuple(f"impulses.bodies.{name}" for name in ("geometry", "axis", "kind", "speed", "drive", "leaves", "struck")),
         "of one substep of the method of impulses",
     ),
     **dict.fromkeys(("impulses.mask", "pairs.impulse.next"), "of one rebuild of the lists"),

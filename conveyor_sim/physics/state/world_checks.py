@@ -107,6 +107,7 @@ def ranges(world: World, model: Model, next_id: int) -> dict[str, tuple[int, int
         limits |= {
             "impulses.bodies.piece": (-1, world.moving.body.size - 1),
             "impulses.bodies.axis": (-1, max(0, axes - 1)),
+            "impulses.bodies.leaves": (0, 1),
             "impulses.bodies.kind": (0, world.impulses.rail_constants.size - 1),
         }
     if world.belts is not None:
