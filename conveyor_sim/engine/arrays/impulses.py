@@ -71,7 +71,7 @@ GEOMETRY = 7
 
 @group
 class BodyImpulses(NamedTuple):
-    """Contacts with bodies (`engine/impulses/bodies.py`), and the drives of their axes (`engine/impulses/drives.py`)."""
+    """Contacts with bodies (`engine/impulses/bodies.py`) and drives of their axes (`engine/impulses/drives.py`)."""
 
     piece: I4
     """Piece of a body, (C,); -1: no contact."""
@@ -88,7 +88,7 @@ class BodyImpulses(NamedTuple):
     drive: F8
     """Scratch of a substep: impulse of its drive, N s or N m s, (A,)."""
     leaves: I4
-    """Scratch of a substep: 1 if the axis leaves its profile, (A,)."""
+    """Scratch of a substep: marks of axes that leave their profiles (`drives.py`), (A,)."""
     struck: F8
     """Scratch of a substep: force over h of impacts that drives withstand, by unit of bottles and axis, N or N m,
     (units * A,)."""

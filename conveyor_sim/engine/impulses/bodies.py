@@ -5,9 +5,9 @@ At the beginning of a substep each bottle finds its contacts: normal, gap and ve
 the coming motion of the body. They hold for all sweeps. An impulse belongs to a bottle and a piece; it is released when
 the piece is out of reach or its body absent.
 
-A body on its profile moves the same whatever strikes it. If the peak force of an impact exceeds the limit of its drive,
-the axis is struck as a mass: the bottle rebounds from it with e, and the axis recoils at the end of the substep. The
-contacts of axes off their profiles are visited one by one (`drives.py`).
+A body on its profile moves the same whatever presses on it. If the peak force of an impact would exceed the limit of
+its drive, the impact waits for the axis to leave its profile. The contacts of axes off their profiles are visited one
+by one (`drives.py`).
 """
 
 from typing import Any
@@ -38,6 +38,9 @@ from conveyor_sim.engine.rails.moving import MOVING, belt_speed, clear_rail_push
 from conveyor_sim.engine.rails.poses import mean_speed
 from conveyor_sim.engine.threads.workers import UNIT, units
 
+MARKED, LEFT = 1, 2
+"""Marks of axes that leave their profiles in a substep: still to be done, and done."""
+
 NX, NY, GAP, NORMAL, ACROSS, AHEAD, ASIDE = range(GEOMETRY)
 
 
@@ -51,8 +54,12 @@ def find_bodies(world: World, worker: Worker, impulses: Any, bodies: Any, h: flo
     near, piece = world.near_bodies, bodies.piece
     for i in range(first, end):
         c = CONTACTS * i
-        if near.start[i] < near.start[i + 1] or piece[c] >= 0 or piece[c + 1] >= 0 or piece[c + 2] >= 0 or (
-            piece[c + 3] >= 0
+        if (
+            near.start[i] < near.start[i + 1]
+            or piece[c] >= 0
+            or piece[c + 1] >= 0
+            or piece[c + 2] >= 0
+            or (piece[c + 3] >= 0)
         ):
             _find(i, world, world.moving, near, worker.rail_contacts, impulses, bodies, h)
 
@@ -108,10 +115,10 @@ def _deepest(contacts: RailContacts, count: int) -> int:
 
 @part
 def _touches(contacts: RailContacts, count: int, q: int) -> bool:
+    touches = False
     for c in range(count):
-        if contacts.entry[c] - MOVING == q:
-            return True
-    return False
+        touches = touches or contacts.entry[c] - MOVING == q
+    return touches
 
 
 @part
@@ -180,7 +187,7 @@ def sweep_bodies(
         i = railed.bottle[entry]
         for place in range(CONTACTS * i, CONTACTS * i + CONTACTS):
             if bodies.piece[place] >= 0 and not _is_off(world.moving, bodies.axis[place]):
-                visit_body(i, place, world, world.moving, impulses, bodies, h, threshold, last, False)
+                _visit_on_profile(i, place, world, world.moving, impulses, bodies, h, threshold, last)
 
 
 @part
@@ -188,6 +195,56 @@ def _is_off(moving: MovingBodies, a: int) -> bool:
     if a < 0:
         return False
     return is_off_profile(moving.actuators, a)
+
+
+@part
+def _visit_on_profile(
+    i: int,
+    place: int,
+    world: World,
+    moving: MovingBodies,
+    impulses: Any,
+    bodies: BodyImpulses,
+    h: float,
+    threshold: float,
+    last: bool,
+) -> None:
+    if _overpowers(i, place, world, moving.actuators, impulses, bodies, h, threshold):
+        bodies.leaves[bodies.axis[place]] = MARKED
+    else:
+        visit_body(i, place, world, moving, impulses, bodies, h, threshold, last, False)
+
+
+@part
+def _overpowers(
+    i: int, place: int, world: World, actuators: Any, impulses: Any, bodies: BodyImpulses, h: float, threshold: float
+) -> bool:
+    """Return True if a contact is an impact whose peak force exceeds the limit of the drive."""
+    if actuators is None:
+        return False
+    a, g, row = bodies.axis[place], GEOMETRY * place, ROW * place
+    if a < 0 or bodies.row[row] != 0.0 or bodies.row[row + 1] != 0.0 or bodies.row[row + 3] != 0.0:
+        return False
+    gap, separating = _gap(i, g, world, impulses, bodies), _separating(i, g, impulses, bodies, 0.0)
+    if separating >= -threshold or gap + h * separating > 0.0 or actuators.mode[a] == HELD:
+        return False
+    peak = -separating * impulses.rail_constants[bodies.kind[place] + PEAK]
+    return peak * abs(bodies.geometry[g + AHEAD]) > actuators.limit[a]
+
+
+@part
+def _gap(i: int, g: int, world: World, impulses: Any, bodies: BodyImpulses) -> float:
+    body, bottles, geometry, b = impulses.body, world.bottles, bodies.geometry, BODY * i
+    x, y = body[b] - bottles.x[i], body[b + 1] - bottles.y[i]
+    return geometry[g + GAP] - (x * geometry[g + NX] + y * geometry[g + NY])
+
+
+@part
+def _separating(i: int, g: int, impulses: Any, bodies: BodyImpulses, speed: float) -> float:
+    """Return the speed at which a contact opens, m/s. speed: of an axis off its profile."""
+    body, geometry, b = impulses.body, bodies.geometry, BODY * i
+    along = body[b + 2] * geometry[g + NX] + body[b + 3] * geometry[g + NY]
+    return geometry[g + NORMAL] + speed * geometry[g + AHEAD] - along
 
 
 @part
@@ -204,18 +261,15 @@ def visit_body(
     off: bool,
 ) -> None:
     """Visit a contact of bottle i. off: its axis is off its profile, so its mass and its speed take part."""
-    body, bottles, geometry = impulses.body, world.bottles, bodies.geometry
+    body, geometry = impulses.body, bodies.geometry
     b, row, g, a = BODY * i, ROW * place, GEOMETRY * place, bodies.axis[place]
     nx, ny, ahead, aside = geometry[g + NX], geometry[g + NY], geometry[g + AHEAD], geometry[g + ASIDE]
-    gap = geometry[g + GAP] - ((body[b] - bottles.x[i]) * nx + (body[b + 1] - bottles.y[i]) * ny)
     speed = bodies.speed[a] if off else 0.0
-    vx, vy = body[b + 2], body[b + 3]
-    separating = geometry[g + NORMAL] + speed * ahead - (vx * nx + vy * ny)
+    gap, separating = _gap(i, g, world, impulses, bodies), _separating(i, g, impulses, bodies, speed)
+    passing = body[b + 3] * nx - body[b + 2] * ny
     table, kind = impulses.rail_constants, bodies.kind[place]
     mobility = _mobility(moving.actuators, a) if off else 0.0
     more, across = mobility * ahead * ahead, mobility * aside * aside
-    peak = -separating * table[kind + PEAK]
-    gives = mobility if off else _gives(moving.actuators, a, peak * abs(ahead))
     mass, turn = table[kind + MASS] + more, table[kind + TURN] + across
     x, y, spun, new_x, new_y, new_turn, wait, shift_x, shift_y, act, normal, _ = visit(
         bodies.row[row],
@@ -226,7 +280,7 @@ def visit_body(
         ny,
         gap,
         separating,
-        geometry[g + ACROSS] + speed * aside - (vy * nx - vx * ny) - body[b + 4],
+        geometry[g + ACROSS] + speed * aside - passing - body[b + 4],
         mass,
         1.0 / mass,
         turn,
@@ -236,7 +290,7 @@ def visit_body(
         table[kind + GAIN_OPEN] / (1.0 + more * table[kind + GAIN_OPEN]),
         table[kind + GAIN_CLOSED] / (1.0 + more * table[kind + GAIN_CLOSED]),
         table[kind + COMPLIANCE],
-        table[kind + REBOUND] * (table[kind + MASS] / (table[kind + MASS] + gives * ahead * ahead)),
+        table[kind + REBOUND] * (table[kind + MASS] / mass),
         table[kind + FRICTION] * (turn / table[kind + TURN]),
         table[kind + APART],
         table[kind + FASTEST],
@@ -263,8 +317,8 @@ def visit_body(
         free[f] -= body[b + 5] * x
         free[f + 1] -= body[b + 5] * y
         free[f + 2] += body[b + 6] * spun
-        _note_impact(moving.actuators, bodies, i, a, work / h, gives > 0.0)
-    _note(world.peaks, i, act, peak, normal, h, last)
+        _note_impact(moving.actuators, bodies, i, a, work / h, off)
+    _note(world.peaks, i, act, -separating * table[kind + PEAK], normal, h, last)
 
 
 @part
@@ -275,25 +329,13 @@ def _mobility(actuators: Any, a: int) -> float:
 
 
 @part
-def _gives(actuators: Any, a: int, force: float) -> float:
-    """Return 1/M of an axis whose drive is too weak for a force (N or N m); 0 if it withstands it."""
-    if actuators is None:
-        return 0.0
-    if a < 0:
-        return 0.0
-    if actuators.mode[a] == HELD or force <= actuators.limit[a]:
-        return 0.0
-    return 1.0 / actuators.mass[a]
-
-
-@part
-def _note_impact(actuators: Any, bodies: BodyImpulses, i: int, a: int, force: float, gives: bool) -> None:
-    """Note the mean force (N or N m) of an impact over a substep. gives: the axis recoils from it."""
+def _note_impact(actuators: Any, bodies: BodyImpulses, i: int, a: int, force: float, off: bool) -> None:
+    """Note the mean force (N or N m) of an impact over a substep. off: the axis recoils from it."""
     if actuators is None:
         return
     if a < 0:
         return
-    if gives:
+    if off:
         actuators.push[i // UNIT, a, 0] += force
     else:
         bodies.struck[i // UNIT * actuators.mode.size + a] += force

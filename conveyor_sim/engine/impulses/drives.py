@@ -12,8 +12,8 @@ from conveyor_sim.engine.arrays.impulses import CONTACTS, GEOMETRY, BodyImpulses
 from conveyor_sim.engine.arrays.moving import OFF_PROFILE, ON_PROFILE, Actuators, MovingBodies
 from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import part
-from conveyor_sim.engine.impulses.bodies import ACROSS, ASIDE, NORMAL, held_work, visit_body
-from conveyor_sim.engine.rails.actuators import leave_profile, wanted_speed
+from conveyor_sim.engine.impulses.bodies import ACROSS, ASIDE, LEFT, MARKED, NORMAL, held_work, visit_body
+from conveyor_sim.engine.rails.actuators import leave_profile, overloads, wanted_speed
 from conveyor_sim.engine.rails.moving import pass_step
 from conveyor_sim.engine.rails.poses import mean_speed
 from conveyor_sim.engine.threads.workers import units, wait_for_all
@@ -78,16 +78,16 @@ def _sweep_drives(
 ) -> None:
     if actuators is None:
         return
-    off = _any_off(moving, actuators)
-    if not (off or last):
-        return
     wait_for_all(worker)
     if worker.rank == 0:
-        if off:
+        _leave_profiles(world, moving, actuators, bodies, h)
+        if _any_off(moving, actuators):
             _sweep_off(world, moving, actuators, impulses, bodies, h, threshold, last)
-        if last and _leave_profiles(world, moving, actuators, bodies, h):
-            for _ in range(SETTLING):
-                _sweep_off(world, moving, actuators, impulses, bodies, h, threshold, False)
+        if last:
+            _mark_overloaded(world, moving, actuators, bodies, h)
+            if _leave_profiles(world, moving, actuators, bodies, h):
+                for _ in range(SETTLING):
+                    _sweep_off(world, moving, actuators, impulses, bodies, h, threshold, False)
     wait_for_all(worker)
 
 
@@ -114,18 +114,11 @@ def _sweep_off(
 
 
 @part
-def _leave_profiles(
-    world: World, moving: MovingBodies, actuators: Actuators, bodies: BodyImpulses, h: float
-) -> bool:
-    """Take axes off profiles that their drives can't follow against the forces of the last sweep; return True if any.
-
-    Their bodies had no mass in this substep, so it must still be solved for them.
-    """
+def _mark_overloaded(world: World, moving: MovingBodies, actuators: Actuators, bodies: BodyImpulses, h: float) -> None:
+    """Mark axes that can't follow their profiles against the forces of the last sweep."""
     for entry in range(moving.actives[0]):
-        a = moving.active[entry]
-        bodies.leaves[a] = 0
-        if actuators.mode[a] == ON_PROFILE:
-            bodies.speed[a] = 0.0
+        if actuators.mode[moving.active[entry]] == ON_PROFILE:
+            bodies.speed[moving.active[entry]] = 0.0
     railed = world.railed
     first, end = units(0, world.bottles.x.size)
     for entry in range(railed.first[first], railed.first[end]):
@@ -134,50 +127,59 @@ def _leave_profiles(
             if bodies.piece[place] >= 0 and bodies.axis[place] >= 0:
                 if actuators.mode[bodies.axis[place]] == ON_PROFILE:
                     bodies.speed[bodies.axis[place]] += held_work(bodies, place)
-    leaves = False
     for entry in range(moving.actives[0]):
         a = moving.active[entry]
         if actuators.mode[a] == ON_PROFILE:
-            push = bodies.speed[a] / h
-            for unit in range(actuators.push.shape[0]):
-                push += actuators.push[unit, a, 0]
-            mean = mean_speed(moving, a, h)
-            leave_profile(actuators, moving, a, push, moving.clock[0] * h)
-            if actuators.mode[a] == OFF_PROFILE:
-                leaves = True
-                bodies.leaves[a], bodies.drive[a] = 1, mean
-                bodies.speed[a] = moving.speed[a] + h * push / actuators.mass[a]
-    if leaves:
-        _use_speeds(world, moving, bodies)
-        for entry in range(moving.actives[0]):
-            a = moving.active[entry]
-            if bodies.leaves[a] != 0:
-                bodies.drive[a] = 0.0
-        _drive(moving, actuators, bodies, h)
-    return leaves
+            if overloads(actuators, moving, a, bodies.speed[a] / h, moving.clock[0] * h):
+                bodies.leaves[a] = MARKED
 
 
 @part
-def _use_speeds(world: World, moving: MovingBodies, bodies: BodyImpulses) -> None:
-    """Take the speeds of the profiles, in `drive`, out of the contacts of axes that leave them."""
-    railed, geometry = world.railed, bodies.geometry
-    first, end = units(0, world.bottles.x.size)
-    for entry in range(railed.first[first], railed.first[end]):
-        i = railed.bottle[entry]
-        for place in range(CONTACTS * i, CONTACTS * i + CONTACTS):
-            a = bodies.axis[place]
-            if bodies.piece[place] >= 0 and a >= 0:
-                if bodies.leaves[a] != 0:
-                    geometry[GEOMETRY * place + NORMAL] = 0.0
-                    geometry[GEOMETRY * place + ACROSS] -= bodies.drive[a] * geometry[GEOMETRY * place + ASIDE]
+def _leave_profiles(world: World, moving: MovingBodies, actuators: Actuators, bodies: BodyImpulses, h: float) -> bool:
+    """Take marked axes off their profiles within the substep of h (s); return True if there are any.
+
+    Their bodies had no mass in this substep until now, so their contacts must still be solved.
+    """
+    leave = False
+    for entry in range(moving.actives[0]):
+        a = moving.active[entry]
+        if bodies.leaves[a] == MARKED:
+            leave = True
+            # `drive` holds the speed of the profile until it is taken out of the contacts.
+            bodies.drive[a], bodies.speed[a] = mean_speed(moving, a, h), moving.speed[a]
+            leave_profile(actuators, moving, a)
+    if leave:
+        railed = world.railed
+        first, end = units(0, world.bottles.x.size)
+        for entry in range(railed.first[first], railed.first[end]):
+            i = railed.bottle[entry]
+            for place in range(CONTACTS * i, CONTACTS * i + CONTACTS):
+                if bodies.piece[place] >= 0 and bodies.axis[place] >= 0:
+                    if bodies.leaves[bodies.axis[place]] == MARKED:
+                        _use_speed(bodies, place, bodies.axis[place], actuators.mass[bodies.axis[place]])
+        for entry in range(moving.actives[0]):
+            a = moving.active[entry]
+            if bodies.leaves[a] == MARKED:
+                bodies.leaves[a], bodies.drive[a] = LEFT, 0.0
+        _drive(moving, actuators, bodies, h)
+    return leave
+
+
+@part
+def _use_speed(bodies: BodyImpulses, place: int, a: int, mass: float) -> None:
+    """Take the speed of the profile, in `drive`, out of a contact, and let the contact act on the axis."""
+    g, geometry = GEOMETRY * place, bodies.geometry
+    geometry[g + NORMAL] = 0.0
+    geometry[g + ACROSS] -= bodies.drive[a] * geometry[g + ASIDE]
+    bodies.speed[a] += held_work(bodies, place) / mass
 
 
 @part
 def _any_off(moving: MovingBodies, actuators: Actuators) -> bool:
+    off = False
     for entry in range(moving.actives[0]):
-        if actuators.mode[moving.active[entry]] == OFF_PROFILE:
-            return True
-    return False
+        off = off or actuators.mode[moving.active[entry]] == OFF_PROFILE
+    return off
 
 
 @part
@@ -202,7 +204,17 @@ def pass_bodies(world: World, worker: Worker, bodies: Any, h: float) -> None:
         return
     if worker.rank == 0:
         _add_struck(world.moving, world.moving.actuators, bodies)
+        clear_marks(bodies)
     pass_step(world.moving, None, worker, h, False)
+
+
+@part
+def clear_marks(bodies: Any) -> None:
+    """Forget which axes left their profiles."""
+    if bodies is None:
+        return
+    for a in range(bodies.leaves.size):
+        bodies.leaves[a] = 0
 
 
 @part

@@ -24,7 +24,7 @@ from conveyor_sim.engine.compiler.compile import kernel, part
 from conveyor_sim.engine.impulses.bodies import add_pushes, find_bodies, sweep_bodies
 from conveyor_sim.engine.impulses.bottles import begin_substep, end_substep, take_step, warm_anew
 from conveyor_sim.engine.impulses.constants import fill_constants
-from conveyor_sim.engine.impulses.drives import begin_drives, pass_bodies, sweep_drives
+from conveyor_sim.engine.impulses.drives import begin_drives, clear_marks, pass_bodies, sweep_drives
 from conveyor_sim.engine.impulses.pairs import sweep_pairs
 from conveyor_sim.engine.impulses.rails import sweep_rails
 from conveyor_sim.engine.integrators.motion import lists_hold, probe_rebuilt
@@ -46,6 +46,7 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
     if worker.rank == 0:
         fill_constants(world, impulses, dt)
         take_step(world, impulses, dt)
+        clear_marks(impulses.bodies)
     wait_for_all(worker)
     threshold = max(SLOWEST_IMPACT, 4.0 * impulses.grip * dt)
     for step in range(steps):

@@ -130,7 +130,7 @@ def drive_axes(actuators: Any, moving: MovingBodies, ledger: Any, time: float, d
         actuators.load[a] += push
         if actuators.mode[a] != HELD:
             if actuators.mode[a] == ON_PROFILE:
-                acceleration = leave_profile(actuators, moving, a, push, time)
+                acceleration = _leave_profile(actuators, moving, a, push, time)
             elif _is_endless(actuators, a):
                 acceleration = _rejoin_speed(actuators, moving, ledger, a, push, time, dt)
             else:
@@ -145,15 +145,28 @@ def _is_endless(actuators: Actuators, a: int) -> bool:
 
 
 @part
-def leave_profile(actuators: Actuators, moving: MovingBodies, a: int, push: float, time: float) -> float:
+def _leave_profile(actuators: Actuators, moving: MovingBodies, a: int, push: float, time: float) -> float:
     """Leave the profile if the drive can't follow it; return the possible acceleration."""
     wanted = moving.course[a, phase_at(moving.course, a, time), 3]
     acceleration = _possible(actuators, moving, a, wanted, push)
     if acceleration != wanted:
-        actuators.mode[a], actuators.left[a] = OFF_PROFILE, 1
+        leave_profile(actuators, moving, a)
         actuators.acceleration[a] = acceleration
-        moving.resting[a] = 0
     return acceleration
+
+
+@part
+def overloads(actuators: Actuators, moving: MovingBodies, a: int, push: float, time: float) -> bool:
+    """Return True if an axis on its profile can't follow it at a time (s) against a push."""
+    wanted = moving.course[a, phase_at(moving.course, a, time), 3]
+    return _possible(actuators, moving, a, wanted, push) != wanted
+
+
+@part
+def leave_profile(actuators: Actuators, moving: MovingBodies, a: int) -> None:
+    """Take an axis off its profile."""
+    actuators.mode[a], actuators.left[a] = OFF_PROFILE, 1
+    moving.resting[a] = 0
 
 
 @part
