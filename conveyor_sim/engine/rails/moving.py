@@ -93,7 +93,7 @@ def _note_slide(springs: Any, cams: Any, b: int, sign: float) -> None:
 @part
 def moving_contacts(i: int, bottles: Bottles, moving: Any, near: Any, contacts: RailContacts, count: int) -> int:
     """Append the contacts of bottle i with bodies to the first `count`; return their new number."""
-    if moving is None:
+    if near is None:
         return count
     clusters, radius = moving.clusters, bottles.radius[i]
     for entry in range(near.start[i], near.start[i + 1]):
@@ -321,7 +321,7 @@ def set_moving_spring(moving: Any, i: int, entry: int, elongation: float) -> Non
 @part
 def reset_moving_springs(moving: Any, near: Any, i: int) -> None:
     """Reset the springs of bottle i at all bodies near it."""
-    if moving is not None:
+    if near is not None:
         for entry in range(near.start[i], near.start[i + 1]):
             b = near.piece[entry]
             for column in range(moving.springs.first[b], moving.springs.first[b + 1]):
