@@ -199,13 +199,21 @@ def _drive(moving: MovingBodies, actuators: Actuators, bodies: BodyImpulses, h: 
 
 @part
 def pass_bodies(world: World, worker: Worker, bodies: Any, h: float) -> None:
-    """Move axes and bodies by a substep of h (s), right after a `wait_for_all`; on return all workers see it."""
+    """Move axes and bodies by a substep of h (s), right after a `wait_for_all`; on return all workers see it.
+
+    bodies: None if bottles pass through bodies.
+    """
+    if worker.rank == 0:
+        _end_sweeps(world, bodies)
+    pass_step(world.moving, None, worker, h, False)
+
+
+@part
+def _end_sweeps(world: World, bodies: Any) -> None:
     if bodies is None:
         return
-    if worker.rank == 0:
-        _add_struck(world.moving, world.moving.actuators, bodies)
-        clear_marks(bodies)
-    pass_step(world.moving, None, worker, h, False)
+    _add_struck(world.moving, world.moving.actuators, bodies)
+    clear_marks(bodies)
 
 
 @part
