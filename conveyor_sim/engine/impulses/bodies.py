@@ -5,7 +5,7 @@ At the beginning of a substep each bottle finds its contacts: normal, gap and ve
 the coming motion of the body. They hold for all sweeps. An impulse belongs to a bottle and a piece; it is released when
 the piece is out of reach or its body absent.
 
-A body on its profile moves the same whatever presses on it. If the peak force of an impact would exceed the limit of
+A body on its profile has infinite mass. If the peak force of an impact would exceed the limit of
 its drive, the impact waits for the axis to leave its profile. The contacts of axes off their profiles are visited one
 by one (`drives.py`).
 """
