@@ -19,6 +19,9 @@ BODY = 8
 CONSTANTS = 16
 """Numbers by kind of contact (`impulses/constants.py`)."""
 
+MOST_PRESSED = 16
+"""Pressed contacts of one bottle that are compared for the largest squeeze. Further ones count in sums only."""
+
 COLOURS = 63
 """Most colours of pairs. Pairs of one colour share no bottle, except in the last colour, which takes all others."""
 
@@ -61,6 +64,39 @@ class NearImpulses(NamedTuple):
 
 
 @group
+class WorkScratch(NamedTuple):
+    """Scratch of a substep for the energy ledger (`impulses/work.py`), (S,)."""
+
+    start_x: F8
+    """Velocity after base friction, before contacts, m/s."""
+    start_y: F8
+    mean: Triple
+    """Velocity with which the friction under a bottle and its pressed contacts do work, m/s; `turn`: R omega."""
+    impact: F8
+    """Kinetic energy that impacts gave the bottle, J."""
+
+
+@group
+class LoadScratch(NamedTuple):
+    """Scratch of a substep for loads on bottles (`impulses/loads.py`), (S,)."""
+
+    normal: F8
+    """Sum of the normal impulses of pressed contacts, N s."""
+    blow: F8
+    """Largest peak force of an impact, N."""
+    x: F8
+    """Impulse of all contacts on the bottle, N s."""
+    y: F8
+    count: I8
+    """Pressed contacts in the columns below."""
+    pressed_x: F8
+    """Outward normal, (MOST_PRESSED * S,)."""
+    pressed_y: F8
+    pressed_normal: F8
+    """Normal impulse, N s."""
+
+
+@group
 class Impulses(NamedTuple):
     """Constants of the method, and its state by bottle."""
 
@@ -99,3 +135,5 @@ class Impulses(NamedTuple):
     """1: lists were rebuilt, so `warm` must be summed anew, (1,)."""
     mask: I8
     """Scratch of a rebuild: colours of each bottle's pairs, one bit each, (S,)."""
+    work: WorkScratch | None
+    loads: LoadScratch | None

@@ -23,8 +23,10 @@ from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import kernel, part
 from conveyor_sim.engine.impulses.bottles import begin_substep, end_substep, take_step, warm_anew
 from conveyor_sim.engine.impulses.constants import fill_constants
+from conveyor_sim.engine.impulses.loads import begin_loads, end_loads
 from conveyor_sim.engine.impulses.pairs import sweep_pairs
 from conveyor_sim.engine.impulses.rails import sweep_rails
+from conveyor_sim.engine.impulses.work import begin_work, book_pressed, mean_velocities
 from conveyor_sim.engine.integrators.motion import lists_hold, probe_rebuilt
 from conveyor_sim.engine.support.footing import check_footing
 from conveyor_sim.engine.threads.workers import BLOCK, MOVED, raise_flag, share, wait_for_all
@@ -50,6 +52,8 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
             end = min(first + BLOCK, stop)
             check_footing(bottles, world.belts, world.surface, world.footing, world.ring, first, end)
             begin_substep(world, impulses, dt, first, end)
+            begin_work(world, impulses, dt, first, end)
+            begin_loads(world, impulses, dt, first, end)
         wait_for_all(worker)
         for sweep in range(impulses.sweeps):
             last = sweep + 1 == impulses.sweeps
@@ -60,9 +64,12 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
                 wait_for_all(worker)
         for first in range(begin, stop, BLOCK):
             end = min(first + BLOCK, stop)
+            mean_velocities(world, impulses, first, end)
             end_substep(world, impulses, dt, first, end)
+            end_loads(world, impulses, dt, first, end)
             if _leaves(bottles, world.neighbourhood, world.settings.skin, dt, first, end):
                 raise_flag(worker, MOVED)
+        book_pressed(world, worker, impulses)
         if not lists_hold(world, worker):
             return step + 1
         probe_rebuilt(world, worker)

@@ -27,6 +27,10 @@ BIN = 0.05
 """Largest length of a bin of rail, m."""
 
 
+LOADS = ("scuffing", "crushing", "impacts", "tipping")
+"""Effects with loads on bottles."""
+
+
 @dataclass(frozen=True)
 class RailPlaces:
     """Places of the rails' bins, (B,), in the order of the engine: straight pieces, then arcs."""
