@@ -27,8 +27,8 @@ def outline(summary: Summary) -> list[str]:
         forces = f"peak {summary.peak_force:.3g} N, 99 % of peaks at most {summary.peak_force_99:.3g} N"
         predicted = f"; predicted error {summary.predicted}" if summary.predicted else ""
         lines.append(labelled("forces", f"{forces}{predicted}"))
-    if summary.borne is not None and (loads := summary.borne.sentence):
-        lines.append(labelled("damage", loads))
+    if summary.load_sentence:
+        lines.append(labelled("damage", summary.load_sentence))
     if summary.alarms is not None and summary.alarms.any:
         lines += [labelled("" if index else "alarms", line) for index, line in enumerate(summary.alarms.lines)]
     if summary.commands > summary.refused:

@@ -87,8 +87,8 @@ class LoadScratch(NamedTuple):
     x: F8
     """Impulse of all contacts on the bottle, N s."""
     y: F8
-    count: I8
-    """Pressed contacts in the columns below."""
+    pressed: I8
+    """Number of pressed contacts in the columns below."""
     pressed_x: F8
     """Outward normal, (MOST_PRESSED * S,)."""
     pressed_y: F8

@@ -28,7 +28,7 @@ def _clear(world: World, damage: Any, loads: Any, free: F8, h: float, first: int
         return
     for i in range(first, end):
         loads.normal[i] = loads.blow[i] = loads.x[i] = loads.y[i] = 0.0
-        loads.count[i] = 0
+        loads.pressed[i] = 0
     _note_base(world.bottles, damage.tipping, free, h, first, end)
 
 
@@ -62,13 +62,13 @@ def note_pressed(
     """
     _push(loads, i, sign * x, sign * y)
     loads.normal[i] += normal
-    count = loads.count[i]
+    count = loads.pressed[i]
     if count < MOST_PRESSED:
         place = MOST_PRESSED * i + count
         loads.pressed_x[place] = sign * nx
         loads.pressed_y[place] = sign * ny
         loads.pressed_normal[place] = normal
-        loads.count[i] = count + 1
+        loads.pressed[i] = count + 1
     _scuff(damage.scuffing, i, work)
     _raise_force(damage.impacts, i, normal / h)
 
@@ -138,7 +138,7 @@ def _crush(crushing: Any, loads: LoadScratch, i: int, h: float) -> None:
         return
     raise_to(crushing.total, i, loads.normal[i] / h + loads.blow[i])
     opposed, begin = 0.0, MOST_PRESSED * i
-    for a in range(begin, begin + loads.count[i]):
+    for a in range(begin, begin + loads.pressed[i]):
         for b in range(begin, a):
             cosine = loads.pressed_x[a] * loads.pressed_x[b] + loads.pressed_y[a] * loads.pressed_y[b]
             opposed = max(opposed, -cosine * min(loads.pressed_normal[a], loads.pressed_normal[b]))

@@ -244,9 +244,7 @@ def _load_blow(
 
 
 @part
-def _wear(
-    world: World, scuffing: Any, i: int, key: int, nx: float, ny: float, work: float, normal: float
-) -> None:
+def _wear(world: World, scuffing: Any, i: int, key: int, nx: float, ny: float, work: float, normal: float) -> None:
     if scuffing is None:
         return
     body = world.impulses.body

@@ -103,7 +103,7 @@ def ranges(world: World, model: Model, next_id: int) -> dict[str, tuple[int, int
         "riding.progress": (STEPPED, PLANNED),
         "impulses.anew": (0, 1),
         "impulses.mask": (0, 2**63 - 1),
-        "impulses.loads.count": (0, MOST_PRESSED),
+        "impulses.loads.pressed": (0, MOST_PRESSED),
     }
     if world.belts is not None:
         limits["belts.start"] = (0, world.belts.candidate.size)
