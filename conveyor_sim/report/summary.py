@@ -16,6 +16,7 @@ from conveyor_sim.physics.timestep.prediction import percent
 from conveyor_sim.report.alarm_figures import AlarmFigures
 from conveyor_sim.report.bottle_counts import BottleCounts
 from conveyor_sim.run.force_check import ForceCheck, Pressed
+from conveyor_sim.run.queue_check import QueueCheck
 from conveyor_sim.run.speed import TopicCount
 
 LOAD_WORDS = {
@@ -158,6 +159,8 @@ class Summary:
     """Check of the peak force; None if it or its prediction is unknown."""
     pressed: Pressed | None
     """Largest sustained force; None if unknown, or if no bound on the time step depends on it."""
+    queue: QueueCheck | None
+    """Longest queue with integrator impulses; None with others, and if bottles were not recorded."""
     warnings: list[str]
     """Sentences on settings of the scene that make results wrong; empty if this version refuses the scene."""
     guard: dict[str, int]

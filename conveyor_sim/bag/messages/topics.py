@@ -289,7 +289,8 @@ _ROWS = (
     Topic(
         "rail_wear",
         "conveyor_msgs/msg/RailWear",
-        "sliding work and impulse in each bin of the rails, of at most 5 cm, since the start",
+        "sliding work and impulse in each bin of the rails, of at most 5 cm, since the start; bins of machines have "
+        "their places at displacement 0",
         "as `damage`",
         rate="damage",
         state=lambda now: now.sim.rail_wear(),

@@ -14,12 +14,13 @@ from typing import Any
 
 from conveyor_sim.engine.arrays.bodies import Bottles, ForceSums, Spin
 from conveyor_sim.engine.arrays.damage import MOST_BORNE, MOST_TOUCHES, ContactLoads, Maximum, RailBins
+from conveyor_sim.engine.arrays.rails import Arcs, Segments
 from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.contact.pairs import normal_and_overlap
 from conveyor_sim.engine.contact.slots import WIDTH
 from conveyor_sim.engine.observers.contact_list import pair_contact
-from conveyor_sim.engine.rails.moving import moves, surface_velocity
+from conveyor_sim.engine.rails.moving import MOVING, moves, seen_from, surface_velocity
 from conveyor_sim.engine.rails.rails import find_rail_contacts, rail_contact, rail_elongation
 from conveyor_sim.engine.support.base import add_base_friction, add_straddling_friction
 from conveyor_sim.engine.support.footing import check_footing
@@ -107,8 +108,7 @@ def _list_rails(i: int, world: World, damage: Any, worker: Worker, count: int) -
             arm = bottles.radius[i] - contacts.overlap[c]
             x, y = bottles.x[i] + arm * nx, bottles.y[i] + arm * ny
             if moves(world.moving, entry):
-                # Work on a moving rail belongs to no place of the line.
-                key, place = -entry, -1
+                key, place = -entry, _body_bin(damage.scuffing, world.moving, entry - MOVING, x, y)
             else:
                 key = _rail_key(world.near_segments, world.near_arcs, entry)
                 place = rail_bin(damage.scuffing, world.segments, world.arcs, key, x, y)
@@ -175,22 +175,74 @@ def rail_bin(scuffing: Any, segments: Any, arcs: Any, key: int, x: float, y: flo
 def _segment_bin(bins: RailBins, segments: Any, g: int, x: float, y: float) -> int:
     if segments is None:
         return -1
+    return _bin_at(int(bins.segment_first[g]), int(bins.segment_first[g + 1]), _along_segment(segments, g, x, y))
+
+
+@part
+def _along_segment(segments: Segments, g: int, x: float, y: float) -> float:
+    """Return the place of a point (m) along a segment, as a share of its length."""
     along = (x - segments.x[g]) * segments.tx[g] + (y - segments.y[g]) * segments.ty[g]
-    return _bin_at(int(bins.segment_first[g]), int(bins.segment_first[g + 1]), along / segments.length[g])
+    return along / segments.length[g]
 
 
 @part
 def _arc_bin(bins: RailBins, arcs: Any, k: int, x: float, y: float) -> int:
     if arcs is None:
         return -1
+    return _bin_at(int(bins.arc_first[k]), int(bins.arc_first[k + 1]), _along_arc(arcs, k, bins.arc_span[k], x, y))
+
+
+@part
+def _along_arc(arcs: Arcs, k: int, span: float, x: float, y: float) -> float:
+    """Return the place of a point (m) along an arc, as a share of its span (rad)."""
     dx, dy = x - arcs.x[k], y - arcs.y[k]
     start_x, start_y = arcs.start_x[k], arcs.start_y[k]
     angle = math.atan2(start_x * dy - start_y * dx, start_x * dx + start_y * dy)
     # The range of angles starts at half the gap before the start.
-    span = bins.arc_span[k]
     if angle < 0.5 * span - math.pi:
         angle += 2.0 * math.pi
-    return _bin_at(int(bins.arc_first[k]), int(bins.arc_first[k + 1]), angle / span)
+    return angle / span
+
+
+@part
+def _body_bin(scuffing: Any, moving: Any, q: int, x: float, y: float) -> int:
+    """Return the bin of piece q of a body at a point (m) of its present place; -1 if bins are not requested."""
+    if scuffing is None:
+        return -1
+    return _bin_of_piece(scuffing.bins.bodies, moving, q, x, y)
+
+
+@part
+def _bin_of_piece(bins: Any, moving: Any, q: int, x: float, y: float) -> int:
+    if bins is None:
+        return -1
+    first, end = int(bins.first[q]), int(bins.end[q])
+    straight = _count(moving.segments)
+    if q < straight:
+        return _bin_at(first, end, _along_body_segment(moving.segments, q, x, y))
+    across, ahead = seen_from(moving, moving.body[q], x, y)
+    return _bin_at(first, end, _along_body_arc(moving.arcs, q - straight, bins.span[q], across, ahead))
+
+
+@part
+def _count(segments: Any) -> int:
+    if segments is None:
+        return 0
+    return segments.x.size
+
+
+@part
+def _along_body_segment(segments: Any, g: int, x: float, y: float) -> float:
+    if segments is None:
+        return 0.0
+    return _along_segment(segments, g, x, y)
+
+
+@part
+def _along_body_arc(arcs: Any, k: int, span: float, x: float, y: float) -> float:
+    if arcs is None:
+        return 0.0
+    return _along_arc(arcs, k, span, x, y)
 
 
 @part

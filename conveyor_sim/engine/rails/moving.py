@@ -93,13 +93,13 @@ def _note_slide(springs: Any, cams: Any, b: int, sign: float) -> None:
 @part
 def moving_contacts(i: int, bottles: Bottles, moving: Any, near: Any, contacts: RailContacts, count: int) -> int:
     """Append the contacts of bottle i with bodies to the first `count`; return their new number."""
-    if moving is None:
+    if near is None:
         return count
     clusters, radius = moving.clusters, bottles.radius[i]
     for entry in range(near.start[i], near.start[i + 1]):
         b = near.piece[entry]
         if is_present(moving.cams, b):
-            x, y = _seen_from(moving, b, bottles.x[i], bottles.y[i])
+            x, y = seen_from(moving, b, bottles.x[i], bottles.y[i])
             for k in range(moving.first_cluster[b], moving.first_cluster[b + 1]):
                 dx, dy, reach = clusters.x[k] - x, clusters.y[k] - y, clusters.radius[k] + radius
                 if dx * dx + dy * dy <= reach * reach:
@@ -109,7 +109,7 @@ def moving_contacts(i: int, bottles: Bottles, moving: Any, near: Any, contacts: 
 
 
 @part
-def _seen_from(moving: MovingBodies, b: int, x: float, y: float) -> tuple[float, float]:
+def seen_from(moving: MovingBodies, b: int, x: float, y: float) -> tuple[float, float]:
     """Return a place (m) in the frame of body b."""
     pose = moving.pose
     dx, dy, cosine, sine = x - pose.x[b], y - pose.y[b], pose.cosine[b], pose.sine[b]
@@ -236,7 +236,7 @@ def _tangent(moving: MovingBodies, b: int, q: int, x: float, y: float) -> tuple[
     straight = _count(moving.segments)
     if q < straight:
         return _along_segment(moving.segments, q)
-    x, y = _seen_from(moving, b, x, y)
+    x, y = seen_from(moving, b, x, y)
     tx, ty = _along_arc(moving.arcs, q - straight, x, y)
     cosine, sine = moving.pose.cosine[b], moving.pose.sine[b]
     return tx * cosine - ty * sine, tx * sine + ty * cosine
@@ -321,7 +321,7 @@ def set_moving_spring(moving: Any, i: int, entry: int, elongation: float) -> Non
 @part
 def reset_moving_springs(moving: Any, near: Any, i: int) -> None:
     """Reset the springs of bottle i at all bodies near it."""
-    if moving is not None:
+    if near is not None:
         for entry in range(near.start[i], near.start[i + 1]):
             b = near.piece[entry]
             for column in range(moving.springs.first[b], moving.springs.first[b + 1]):

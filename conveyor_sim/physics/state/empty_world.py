@@ -152,7 +152,8 @@ def empty_world(model: Model, slots: int) -> World:
 
 
 def _moving(model: Model, slots: int) -> MovingBodies | None:
-    if not model.has("moving_rails"):
+    # Devices read the axes of a scene whose bodies touch nothing because the effect is forced off.
+    if not model.plant.moving:
         return None
     surface = sum(len(rail.pieces) for rail in model.plant.rails_at_rest)
     springs = _has_history(model, model.rail_law)

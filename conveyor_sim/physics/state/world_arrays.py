@@ -29,7 +29,7 @@ FIXED = (
     "moving.springs.column",
     "moving.springs.first",
     *(f"moving.actuators.{name}" for name in ("limit", "mass", "max_", "low", "stroke", "account")),
-    *(f"damage.scuffing.bins.{name}" for name in ("segment_first", "arc_first", "arc_span")),
+    *(f"damage.scuffing.bins.{name}" for name in ("segment_first", "arc_first", "arc_span", "bodies.")),
     *(f"damage.tipping.{name}" for name in ("contact_lever", "base_lever", "delay")),
     "surface.friction",
     *(f"vibration.{name}" for name in ("swing_", "frequency")),
