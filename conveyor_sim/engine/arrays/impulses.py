@@ -20,6 +20,9 @@ BODY = 8
 CONSTANTS = 16
 """Numbers by kind of contact (`impulses/constants.py`)."""
 
+MOST_PRESSED = 16
+"""Pressed contacts of one bottle that are compared for the largest squeeze. Further ones count in sums only."""
+
 COLOURS = 63
 """Most colours of pairs. Pairs of one colour share no bottle, except in the last colour, which takes all others."""
 
@@ -68,6 +71,8 @@ GEOMETRY = 7
 """Numbers by contact with a body: normal x and y, gap (m), velocity of its surface along the normal and across it
 (m/s), the same by the speed of an axis that is off its profile (1, or m)."""
 
+NX, NY, GAP, NORMAL, ACROSS, AHEAD, ASIDE = range(GEOMETRY)
+
 
 @group
 class BodyImpulses(NamedTuple):
@@ -92,6 +97,39 @@ class BodyImpulses(NamedTuple):
     struck: F8
     """Scratch of a substep: force over h of impacts that drives withstand, by unit of bottles and axis, N or N m,
     (units * A,)."""
+
+
+@group
+class WorkScratch(NamedTuple):
+    """Scratch of a substep for the energy ledger (`impulses/work.py`), (S,)."""
+
+    start_x: F8
+    """Velocity after base friction, before contacts, m/s."""
+    start_y: F8
+    mean: Triple
+    """Velocity with which the friction under a bottle and its pressed contacts do work, m/s; `turn`: R omega."""
+    impact: F8
+    """Kinetic energy that impacts gave the bottle, J."""
+
+
+@group
+class LoadScratch(NamedTuple):
+    """Scratch of a substep for loads on bottles (`impulses/loads.py`), (S,)."""
+
+    normal: F8
+    """Sum of the normal impulses of pressed contacts, N s."""
+    blow: F8
+    """Largest peak force of an impact, N."""
+    x: F8
+    """Impulse of all contacts on the bottle, N s."""
+    y: F8
+    pressed: I8
+    """Number of pressed contacts in the columns below."""
+    pressed_x: F8
+    """Outward normal, (MOST_PRESSED * S,)."""
+    pressed_y: F8
+    pressed_normal: F8
+    """Normal impulse, N s."""
 
 
 @group
@@ -134,3 +172,5 @@ class Impulses(NamedTuple):
     mask: I8
     """Scratch of a rebuild: colours of each bottle's pairs, one bit each, (S,)."""
     bodies: BodyImpulses | None
+    work: WorkScratch | None
+    loads: LoadScratch | None

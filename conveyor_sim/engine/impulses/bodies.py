@@ -12,9 +12,24 @@ by one (`drives.py`).
 
 from typing import Any
 
-from conveyor_sim.engine.arrays.impulses import BODY, CONSTANTS, CONTACTS, GEOMETRY, ROW, BodyImpulses
+from conveyor_sim.engine.arrays.impulses import (
+    ACROSS,
+    AHEAD,
+    ASIDE,
+    BODY,
+    CONSTANTS,
+    CONTACTS,
+    GAP,
+    GEOMETRY,
+    NORMAL,
+    NX,
+    NY,
+    ROW,
+    BodyImpulses,
+)
 from conveyor_sim.engine.arrays.moving import HELD, MovingBodies
 from conveyor_sim.engine.arrays.rails import RailContacts
+from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.impulses.constants import (
@@ -32,7 +47,10 @@ from conveyor_sim.engine.impulses.constants import (
     TURN,
 )
 from conveyor_sim.engine.impulses.law import visit
+from conveyor_sim.engine.impulses.loads import note_blow, note_pressed
 from conveyor_sim.engine.impulses.pairs import note_peak
+from conveyor_sim.engine.impulses.work import book_body, book_impact, note_impact
+from conveyor_sim.engine.observers.damage import body_bin, wear
 from conveyor_sim.engine.rails.actuators import is_off_profile
 from conveyor_sim.engine.rails.moving import MOVING, belt_speed, clear_rail_push, mean_motion, moving_contacts
 from conveyor_sim.engine.rails.poses import mean_speed
@@ -40,8 +58,6 @@ from conveyor_sim.engine.threads.workers import UNIT, units
 
 MARKED, LEFT = 1, 2
 """Marks of axes that leave their profiles in a substep: still to be done, and done."""
-
-NX, NY, GAP, NORMAL, ACROSS, AHEAD, ASIDE = range(GEOMETRY)
 
 
 @part
@@ -175,9 +191,7 @@ def _describe(
 
 
 @part
-def sweep_bodies(
-    world: World, impulses: Any, bodies: Any, h: float, threshold: float, last: bool, first: int, end: int
-) -> None:
+def sweep_bodies(world: World, impulses: Any, bodies: Any, h: float, threshold: float, first: int, end: int) -> None:
     """Visit every contact of bottles first to end with bodies once, except those of axes off their profiles."""
     if bodies is None:
         return
@@ -187,7 +201,7 @@ def sweep_bodies(
         i = railed.bottle[entry]
         for place in range(CONTACTS * i, CONTACTS * i + CONTACTS):
             if bodies.piece[place] >= 0 and not _is_off(world.moving, bodies.axis[place]):
-                _visit_on_profile(i, place, world, world.moving, impulses, bodies, h, threshold, last)
+                _visit_on_profile(i, place, world, world.moving, impulses, bodies, h, threshold)
 
 
 @part
@@ -207,12 +221,11 @@ def _visit_on_profile(
     bodies: BodyImpulses,
     h: float,
     threshold: float,
-    last: bool,
 ) -> None:
     if _overpowers(i, place, world, moving.actuators, impulses, bodies, h, threshold):
         bodies.leaves[bodies.axis[place]] = MARKED
     else:
-        visit_body(i, place, world, moving, impulses, bodies, h, threshold, last, False)
+        visit_body(i, place, world, moving, impulses, bodies, h, threshold, False)
 
 
 @part
@@ -257,7 +270,6 @@ def visit_body(
     bodies: BodyImpulses,
     h: float,
     threshold: float,
-    last: bool,
     off: bool,
 ) -> None:
     """Visit a contact of bottle i. off: its axis is off its profile, so its mass and its speed take part."""
@@ -266,7 +278,7 @@ def visit_body(
     nx, ny, ahead, aside = geometry[g + NX], geometry[g + NY], geometry[g + AHEAD], geometry[g + ASIDE]
     speed = bodies.speed[a] if off else 0.0
     gap, separating = _gap(i, g, world, impulses, bodies), _separating(i, g, impulses, bodies, speed)
-    passing = body[b + 3] * nx - body[b + 2] * ny
+    slip = geometry[g + ACROSS] + speed * aside - (body[b + 3] * nx - body[b + 2] * ny) - body[b + 4]
     table, kind = impulses.rail_constants, bodies.kind[place]
     mobility = _mobility(moving.actuators, a) if off else 0.0
     more, across = mobility * ahead * ahead, mobility * aside * aside
@@ -280,7 +292,7 @@ def visit_body(
         ny,
         gap,
         separating,
-        geometry[g + ACROSS] + speed * aside - passing - body[b + 4],
+        slip,
         mass,
         1.0 / mass,
         turn,
@@ -317,8 +329,81 @@ def visit_body(
         free[f] -= body[b + 5] * x
         free[f + 1] -= body[b + 5] * y
         free[f + 2] += body[b + 6] * spun
+        mean = 0.5 * (speed + bodies.speed[a]) if off else 0.0
+        after = slip + turn * -spun
+        peak = -separating * table[kind + PEAK]
         _note_impact(moving.actuators, bodies, i, a, work / h, off)
-    _note(world.peaks, i, act, -separating * table[kind + PEAK], normal, h, last)
+        _note_peak(world.peaks, i, peak, normal)
+        _book(world, impulses.work, body, bodies, i, place, normal, x, y, spun, separating, slip, mass, turn, mean)
+        _load_blow(
+            world, world.damage, impulses.loads, bodies, i, place, normal, x, y, spun, slip + after, -separating, peak
+        )
+
+
+@part
+def _note_peak(peaks: Any, i: int, force: float, normal: float) -> None:
+    if peaks is not None:
+        note_peak(peaks, i, force, normal)
+
+
+@part
+def _book(
+    world: World,
+    work: Any,
+    body: F8,
+    bodies: BodyImpulses,
+    i: int,
+    place: int,
+    normal: float,
+    x: float,
+    y: float,
+    along: float,
+    separating: float,
+    slip: float,
+    mass: float,
+    turn: float,
+    speed: float,
+) -> None:
+    """Book an impact of bottle i on a body in the energy ledger. speed: mean, of an axis off its profile."""
+    if work is None:
+        return
+    book_impact(world.ledger, i // UNIT, normal, along, separating, slip, mass, turn)
+    note_impact(work, body, i, -1.0, x, y, along)
+    book_body(world.ledger, world.moving, bodies, i, place, x, y, speed)
+
+
+@part
+def _load_blow(
+    world: World,
+    damage: Any,
+    loads: Any,
+    bodies: BodyImpulses,
+    i: int,
+    place: int,
+    normal: float,
+    x: float,
+    y: float,
+    along: float,
+    slips: float,
+    closing: float,
+    peak: float,
+) -> None:
+    """Note an impact of bottle i on a body. slips: sum of the slips before and after it, m/s."""
+    if loads is None:
+        return
+    work = abs(0.5 * along * slips)
+    note_blow(damage, loads, i, -x, -y, closing, peak, work)
+    _wear(world, damage.scuffing, bodies, i, place, work, normal)
+
+
+@part
+def _wear(world: World, scuffing: Any, bodies: BodyImpulses, i: int, place: int, work: float, normal: float) -> None:
+    if scuffing is None:
+        return
+    body, g = world.impulses.body, GEOMETRY * place
+    x = body[BODY * i] + body[BODY * i + 7] * bodies.geometry[g + NX]
+    y = body[BODY * i + 1] + body[BODY * i + 7] * bodies.geometry[g + NY]
+    wear(scuffing.bins, i // UNIT, body_bin(scuffing, world.moving, bodies.piece[place], x, y), work, normal)
 
 
 @part
@@ -342,34 +427,65 @@ def _note_impact(actuators: Any, bodies: BodyImpulses, i: int, a: int, force: fl
 
 
 @part
-def _note(peaks: Any, i: int, act: float, impact: float, normal: float, h: float, last: bool) -> None:
-    if peaks is None:
-        return
-    if act > 1.0:
-        note_peak(peaks, i, impact, normal)
-    elif last and normal > 0.0:
-        note_peak(peaks, i, normal / h, normal)
+def end_bodies(world: World, impulses: Any, bodies: Any, h: float, first: int, end: int) -> None:
+    """Note the pressed contacts of bottles first to end with bodies after the last sweep: on axes, in peaks and loads.
 
-
-@part
-def add_pushes(world: World, bodies: Any, h: float, first: int, end: int) -> None:
-    """Add the forces with which bottles first to end press on axes: held impulses over h (s), by virtual work."""
+    Forces are held impulses over h (s).
+    """
     if bodies is None:
-        return
-    _add_pushes(world, world.moving.actuators, bodies, h, first, end)
-
-
-@part
-def _add_pushes(world: World, actuators: Any, bodies: BodyImpulses, h: float, first: int, end: int) -> None:
-    if actuators is None:
         return
     railed = world.railed
     begin, stop = units(first, end)
     for entry in range(railed.first[begin], railed.first[stop]):
         i = railed.bottle[entry]
         for place in range(CONTACTS * i, CONTACTS * i + CONTACTS):
-            if bodies.piece[place] >= 0 and bodies.axis[place] >= 0:
-                actuators.push[i // UNIT, bodies.axis[place], 0] += held_work(bodies, place) / h
+            if bodies.piece[place] >= 0:
+                _add_push(world.moving.actuators, bodies, i, place, h)
+                _note_pressed(world, world.moving, impulses, bodies, i, place, h)
+
+
+@part
+def _add_push(actuators: Any, bodies: BodyImpulses, i: int, place: int, h: float) -> None:
+    if actuators is None:
+        return
+    if bodies.axis[place] >= 0:
+        actuators.push[i // UNIT, bodies.axis[place], 0] += held_work(bodies, place) / h
+
+
+@part
+def _note_pressed(
+    world: World, moving: MovingBodies, impulses: Any, bodies: BodyImpulses, i: int, place: int, h: float
+) -> None:
+    row, g, geometry = ROW * place, GEOMETRY * place, bodies.geometry
+    normal = bodies.row[row] * geometry[g + NX] + bodies.row[row + 1] * geometry[g + NY]
+    if normal > 0.0:
+        _note_peak(world.peaks, i, normal / h, normal)
+        _load(world, world.damage, impulses.loads, moving, impulses.body, bodies, i, place, normal, h)
+
+
+@part
+def _load(
+    world: World,
+    damage: Any,
+    loads: Any,
+    moving: MovingBodies,
+    body: F8,
+    bodies: BodyImpulses,
+    i: int,
+    place: int,
+    normal: float,
+    h: float,
+) -> None:
+    """Note a pressed contact of bottle i with a body, as a load on both."""
+    if loads is None:
+        return
+    row, g, b, geometry, a = ROW * place, GEOMETRY * place, BODY * i, bodies.geometry, bodies.axis[place]
+    nx, ny = geometry[g + NX], geometry[g + NY]
+    speed = bodies.speed[a] if _is_off(moving, a) else 0.0
+    slip = geometry[g + ACROSS] + speed * geometry[g + ASIDE] - (body[b + 3] * nx - body[b + 2] * ny) - body[b + 4]
+    work = abs(bodies.row[row + 2] * slip)
+    note_pressed(damage, loads, i, -1.0, bodies.row[row], bodies.row[row + 1], nx, ny, normal, work, h)
+    _wear(world, damage.scuffing, bodies, i, place, work, normal)
 
 
 @part

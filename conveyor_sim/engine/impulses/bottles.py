@@ -6,6 +6,7 @@ from typing import Any
 
 from numba import uint64
 
+from conveyor_sim.engine.arrays.bodies import Bottles
 from conveyor_sim.engine.arrays.impulses import BODY, CONTACTS, ROW
 from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import part
@@ -56,15 +57,22 @@ def _on_base(world: World, footing: Any, h: float, i: int) -> tuple[float, float
     bottles, limit = world.bottles, world.settings.slip_limit
     if footing is None:
         return bottles.vx[i], bottles.vy[i]
-    ux, uy = footing.ux[i], footing.uy[i]
-    if footing.turn is not None:
-        ux -= footing.turn[i] * (bottles.y[i] + 0.5 * h * bottles.vy[i])
-        uy += footing.turn[i] * (bottles.x[i] + 0.5 * h * bottles.vx[i])
+    ux, uy = belt_velocity(bottles, footing, h, i)
     vx, vy = bottles.vx[i] - ux, bottles.vy[i] - uy
     slip = math.sqrt(vx * vx + vy * vy)
     rest = implicit_slip(slip, h * footing.friction_limit[i] * bottles.inverse_mass[i] / limit, limit, None)
     share = rest / slip if slip > 0.0 else 0.0
     return ux + share * vx, uy + share * vy
+
+
+@part
+def belt_velocity(bottles: Bottles, footing: Any, h: float, i: int) -> tuple[float, float]:
+    """Return the velocity (m/s) of the belt under bottle i at the middle of its way in a substep of h (s)."""
+    ux, uy = footing.ux[i], footing.uy[i]
+    if footing.turn is not None:
+        ux -= footing.turn[i] * (bottles.y[i] + 0.5 * h * bottles.vy[i])
+        uy += footing.turn[i] * (bottles.x[i] + 0.5 * h * bottles.vx[i])
+    return ux, uy
 
 
 @part

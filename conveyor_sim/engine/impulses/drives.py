@@ -8,11 +8,11 @@ At the end of the substep the forces of the last sweep move the axis, as with ex
 
 from typing import Any
 
-from conveyor_sim.engine.arrays.impulses import CONTACTS, GEOMETRY, BodyImpulses
+from conveyor_sim.engine.arrays.impulses import ACROSS, ASIDE, CONTACTS, GEOMETRY, NORMAL, BodyImpulses
 from conveyor_sim.engine.arrays.moving import OFF_PROFILE, ON_PROFILE, Actuators, MovingBodies
 from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import part
-from conveyor_sim.engine.impulses.bodies import ACROSS, ASIDE, LEFT, MARKED, NORMAL, held_work, visit_body
+from conveyor_sim.engine.impulses.bodies import LEFT, MARKED, held_work, visit_body
 from conveyor_sim.engine.rails.actuators import leave_profile, overloads, wanted_speed
 from conveyor_sim.engine.rails.moving import pass_step
 from conveyor_sim.engine.rails.poses import mean_speed
@@ -82,12 +82,12 @@ def _sweep_drives(
     if worker.rank == 0:
         _leave_profiles(world, moving, actuators, bodies, h)
         if _any_off(moving, actuators):
-            _sweep_off(world, moving, actuators, impulses, bodies, h, threshold, last)
+            _sweep_off(world, moving, actuators, impulses, bodies, h, threshold)
         if last:
             _mark_overloaded(world, moving, actuators, bodies, h)
             if _leave_profiles(world, moving, actuators, bodies, h):
                 for _ in range(SETTLING):
-                    _sweep_off(world, moving, actuators, impulses, bodies, h, threshold, False)
+                    _sweep_off(world, moving, actuators, impulses, bodies, h, threshold)
     wait_for_all(worker)
 
 
@@ -100,7 +100,6 @@ def _sweep_off(
     bodies: BodyImpulses,
     h: float,
     threshold: float,
-    last: bool,
 ) -> None:
     railed = world.railed
     first, end = units(0, world.bottles.x.size)
@@ -109,7 +108,7 @@ def _sweep_off(
         for place in range(CONTACTS * i, CONTACTS * i + CONTACTS):
             if bodies.piece[place] >= 0 and bodies.axis[place] >= 0:
                 if actuators.mode[bodies.axis[place]] == OFF_PROFILE:
-                    visit_body(i, place, world, moving, impulses, bodies, h, threshold, last, True)
+                    visit_body(i, place, world, moving, impulses, bodies, h, threshold, True)
     _drive(moving, actuators, bodies, h)
 
 

@@ -21,12 +21,14 @@ from conveyor_sim.engine.arrays.bodies import Bottles
 from conveyor_sim.engine.arrays.lists import Neighbourhood
 from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import kernel, part
-from conveyor_sim.engine.impulses.bodies import add_pushes, find_bodies, sweep_bodies
+from conveyor_sim.engine.impulses.bodies import end_bodies, find_bodies, sweep_bodies
 from conveyor_sim.engine.impulses.bottles import begin_substep, end_substep, take_step, warm_anew
 from conveyor_sim.engine.impulses.constants import fill_constants
 from conveyor_sim.engine.impulses.drives import begin_drives, clear_marks, pass_bodies, sweep_drives
+from conveyor_sim.engine.impulses.loads import begin_loads, end_loads
 from conveyor_sim.engine.impulses.pairs import sweep_pairs
 from conveyor_sim.engine.impulses.rails import sweep_rails
+from conveyor_sim.engine.impulses.work import begin_work, book_pressed, mean_velocities
 from conveyor_sim.engine.integrators.motion import lists_hold, probe_rebuilt
 from conveyor_sim.engine.rails.moving import place_rails
 from conveyor_sim.engine.support.footing import check_footing
@@ -56,6 +58,8 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
             check_footing(bottles, world.belts, world.surface, world.footing, world.ring, first, end)
             begin_substep(world, impulses, dt, first, end)
             find_bodies(world, worker, impulses, impulses.bodies, dt, first, end)
+            begin_work(world, impulses, dt, first, end)
+            begin_loads(world, impulses, dt, first, end)
         wait_for_all(worker)
         begin_drives(world, worker, impulses.bodies, dt)
         for sweep in range(impulses.sweeps):
@@ -64,16 +68,19 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
             for first in range(begin, stop, BLOCK):
                 end = min(first + BLOCK, stop)
                 sweep_rails(world, impulses, dt, threshold, last, first, end)
-                sweep_bodies(world, impulses, impulses.bodies, dt, threshold, last, first, end)
+                sweep_bodies(world, impulses, impulses.bodies, dt, threshold, first, end)
             sweep_drives(world, worker, impulses, impulses.bodies, dt, threshold, last)
             if not last:
                 wait_for_all(worker)
         for first in range(begin, stop, BLOCK):
             end = min(first + BLOCK, stop)
-            add_pushes(world, impulses.bodies, dt, first, end)
+            end_bodies(world, impulses, impulses.bodies, dt, first, end)
+            mean_velocities(world, impulses, first, end)
             end_substep(world, impulses, dt, first, end)
+            end_loads(world, impulses, dt, first, end)
             if _leaves(bottles, world.neighbourhood, world.settings.skin, dt, first, end):
                 raise_flag(worker, MOVED)
+        book_pressed(world, worker, impulses)
         hold = lists_hold(world, worker)
         pass_bodies(world, worker, impulses.bodies, dt)
         if not hold:

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from conveyor_sim.engine.arrays.impulses import MOST_PRESSED
 from conveyor_sim.engine.arrays.moving import HELD, ON_PROFILE
 from conveyor_sim.engine.arrays.world import World
 from conveyor_sim.engine.contact.slots import WIDTH
@@ -103,6 +104,7 @@ def ranges(world: World, model: Model, next_id: int) -> dict[str, tuple[int, int
         "riding.progress": (STEPPED, PLANNED),
         "impulses.anew": (0, 1),
         "impulses.mask": (0, 2**63 - 1),
+        "impulses.loads.pressed": (0, MOST_PRESSED),
     }
     if world.impulses is not None and world.impulses.bodies is not None and world.moving is not None:
         limits |= {
