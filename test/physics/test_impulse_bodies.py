@@ -12,6 +12,7 @@ import pytest
 from scenes import MASS, RADIUS, belt, bottle, scene, segment
 from swept import G, fields, glass, kinetic
 
+from conveyor_sim.columns.ledger import Ledger
 from conveyor_sim.engine.arrays.impulses import CONTACTS
 from conveyor_sim.engine.arrays.moving import OFF_PROFILE, Actuators, MovingBodies
 from conveyor_sim.engine.threads.workers import UNIT
@@ -20,6 +21,7 @@ from conveyor_sim.simulation import Simulation
 
 SPEED, AT_ONCE = 0.5, 1e9
 """m/s; m/s^2 or rad/s^2: at full speed after a nanosecond."""
+LOADS = ("scuffing", "crushing", "impacts")
 PARKED = bottle(20.0, 20.0, type="big")
 POCKETS, PITCH_RADIUS, PLAY, OMEGA = 6, 0.4, 0.002, 3.0
 """Star wheel about (30, 0), m, rad/s."""
@@ -67,6 +69,7 @@ def plant(*bottles: dict[str, Any], steps: int = 8, sweeps: int = 2, threads: in
             name: {**segment((37.0, y), (42.0, y)), "material": "ice"}
             for name, y in (("beside", RADIUS + 1e-4), ("opposite", -RADIUS - 1e-4))
         },
+        "effects": dict.fromkeys(["peaks", "rotation", "unequal_radii", "energy_ledger", *LOADS], "on"),
         "belts": {"belt": belt(1.3, (37.0, -0.2), 7.0, 0.4)},
     }
     rails = {**given["rails"], **more.pop("rails", {})}
@@ -298,6 +301,42 @@ def test_a_plate_with_a_weak_drive_is_struck_as_a_mass(mass: float) -> None:
     speed, vx = axis_of(sim, "gates/g")[1], float(sim.bottles().vx[0])
     assert mass * speed + MASS * vx == pytest.approx(-0.8 * MASS, rel=1e-2)
     assert vx - speed == pytest.approx(0.4, rel=1e-2)
+
+
+def ledger_of(sim: Simulation) -> Ledger:
+    """Return the energy ledger."""
+    ledger = sim.ledger()
+    assert ledger is not None
+    return ledger
+
+
+def test_the_ledger_closes_with_movers_off_and_on_their_profiles() -> None:
+    """A pusher that strikes gives the momentum times its speed; a stalled crowd and a weak wheel leave no residual."""
+    sim = plant(bottle(RADIUS + 0.03, 0.05))
+    sim.command(["pushers/p/push"], [1])
+    sim.advance(8)
+    ledger = ledger_of(sim)
+    assert ledger.rail_work.sum() == pytest.approx(SPEED * MASS * sim.bottles().vx[0], rel=1e-9)
+    assert abs(ledger.residual) < 1e-12
+    sim = busy()
+    sim.advance(100)
+    ledger = ledger_of(sim)
+    assert ledger.rail_work.sum() > 0.1
+    assert abs(ledger.residual) < 1e-6 * ledger.turnover
+
+
+def test_a_bottle_between_pusher_and_wall_bears_the_limit() -> None:
+    """No peak exceeds the limit if nothing strikes, although the plate had no mass in the sweeps before it stalls."""
+    limit = 20.0
+    sim = plant(
+        bottle(RADIUS + 1e-7, 0.0),
+        pushers={"p": pusher("steel", acceleration=20.0, force_limit=limit, moving_mass=1.0)},
+        rails={"wall": segment((2.0 * RADIUS + 2e-7, -0.2), (2.0 * RADIUS + 2e-7, 0.2))},
+    )
+    sim.command(["pushers/p/push"], [1])
+    sim.advance(50)
+    assert mean_load(sim, "pushers/p") == pytest.approx(-limit, rel=1e-3)
+    assert limit * (1.0 - 1e-3) <= sim.bottles().peak_force[0] < 1.2 * limit
 
 
 def busy(threads: int = 1, **more: Any) -> Simulation:
