@@ -27,7 +27,7 @@ def outline(summary: Summary) -> list[str]:
     if summary.peak_force:
         forces = f"peak {summary.peak_force:.3g} N, 99 % of peaks at most {summary.peak_force_99:.3g} N"
         predicted = f"; predicted error {summary.predicted}" if summary.predicted else ""
-        lines.append(labelled("forces", f"{forces}{_peak_note(summary.queue)}{predicted}"))
+        lines.append(labelled("forces", f"{forces}{summary.origin}{_peak_note(summary.queue)}{predicted}"))
     if summary.load_sentence:
         lines.append(labelled("damage", summary.load_sentence))
     if summary.alarms is not None and summary.alarms.any:

@@ -191,17 +191,18 @@ class Summary:
     @property
     def energy_sentence(self) -> str:
         """Return one sentence on the energy ledger; empty without one."""
-        return "" if self.energy is None else self.energy.sentence + self._origin
+        return "" if self.energy is None else self.energy.sentence + self.origin
 
     @property
     def load_sentence(self) -> str:
         """Return one sentence on the loads on bottles; empty without any."""
         loads = "" if self.borne is None else self.borne.sentence
-        return loads + self._origin if loads else ""
+        return loads + self.origin if loads else ""
 
     @property
-    def _origin(self) -> str:
-        return "; from impulses" if self.from_impulses else ""
+    def origin(self) -> str:
+        """Return a clause that marks figures from impulses, with the comma before it; empty with forces."""
+        return ", from impulses" if self.from_impulses else ""
 
     @property
     def real_time_factor(self) -> float | None:
