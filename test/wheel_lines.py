@@ -39,7 +39,7 @@ def line(damped: bool = True, friction: float = MU, threads: int = 1, **fields: 
     return Simulation(scene(**{**given, **fields}), threads)
 
 
-def screw_line(speed: float, threads: int = 1, play: float = 1e-3) -> Simulation:
+def screw_line(speed: float, threads: int = 1, play: float = 1e-3, **fields: Any) -> Simulation:
     """Return a conveyor with a queue of bottles in front of a screw. play: of bottles to each side, m."""
     guides = {**_STEEL, "clearance": 2.0 * (RADIUS + play)}
     return line(
@@ -55,6 +55,7 @@ def screw_line(speed: float, threads: int = 1, play: float = 1e-3) -> Simulation
         },
         infeeds={"filler": {"along": "infeed", "at": 0.05, "bottle": "bottle", "rate": 8.0}},
         outfeeds={"packer": {"along": "infeed", "at": "end", "length": 0.1}},
+        **fields,
     )  # fmt: skip
 
 

@@ -44,7 +44,7 @@ class RailWearColumns:
     rail: NDArray[np.uint32]
     """Index of the rail."""
     x: F8
-    """Middle of the bin, m."""
+    """Middle of the bin, m; on machines that move, their place at displacement 0."""
     y: F8
     """m"""
     length: F8

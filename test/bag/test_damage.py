@@ -94,7 +94,7 @@ def test_rails_are_as_hot_as_what_they_bore(borne: tuple[Recording, Damage], rec
         hot = values > 0.0
         np.testing.assert_allclose(np.sort(drawn.get_array()), np.sort((values / wear.length)[hot]))
         # Each bin lies where it is.
-        middles = np.array([line[2] for line in drawn.get_segments()])
+        middles = np.array([line[1] for line in drawn.get_segments()])
         there = np.column_stack([wear.x, wear.y])[hot]
         distance = np.hypot(*(middles[:, None] - there).transpose(2, 0, 1))
         assert distance.min(axis=1).max() < 1e-3

@@ -73,6 +73,21 @@ def signal(sim: Simulation, name: str) -> float:
     return float(sim.signals()[sim.process_image.signal_names.index(name)])
 
 
+def test_bottles_pass_through_bodies_whose_effect_is_off() -> None:
+    """The pusher moves to its end, as its device reports, and the bottle in its way rests, near it as far from it."""
+    sim = plant(bottle(RADIUS + 0.02, 0.05), effects={**COMMON, "moving_rails": "off"})
+    before = sim.bottles()
+    sim.command(["pushers/p/push"], [1])
+    sim.advance(30)
+    assert signal(sim, "pushers/p/position") == pytest.approx(0.5, rel=1e-6)
+    sim.advance(40)
+    assert signal(sim, "pushers/p/extended") == 1.0
+    after = sim.bottles()
+    assert np.array_equal(after.x, before.x)
+    assert not after.vx.any()
+    assert not ledger_of(sim).rail_work.any()
+
+
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_a_pusher_leaves_a_bottle_at_rest_with_twice_its_speed(integrator: str) -> None:
     """An elastic impact on a wall that moves; its work is its speed times the momentum it gave."""

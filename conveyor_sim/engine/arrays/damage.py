@@ -31,6 +31,17 @@ class Maximum(NamedTuple):
 
 
 @group
+class BodyBins(NamedTuple):
+    """Pieces of bodies cut into bins, in the order of `MovingBodies.body`, (Q,). Equal bodies of a train share bins."""
+
+    first: U4
+    """First bin of each piece."""
+    end: U4
+    span: F8
+    """rad; 0 for a straight piece."""
+
+
+@group
 class RailBins(NamedTuple):
     """Rails cut into bins: segment g has bins segment_first[g]:segment_first[g + 1]; arcs likewise."""
 
@@ -40,6 +51,8 @@ class RailBins(NamedTuple):
     """(A + 1,)"""
     arc_span: F8
     """(A,), rad"""
+    bodies: BodyBins | None
+    """None without bodies that bottles touch."""
     work: F8
     """Work in J by unit of bottles (`workers.py`), so that sums don't depend on the threads, (units, B)."""
     impulse: F8

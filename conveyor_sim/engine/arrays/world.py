@@ -77,6 +77,7 @@ class World(NamedTuple):
     near_arcs: Near | None
     moving: MovingBodies | None
     near_bodies: Near | None
+    """None without bodies, and where bottles pass through them because the effect `moving_rails` is off."""
     railed: BottleList | None
     """Bottles near a rail, or near the sweep of a body."""
     rail_law: ContactLaw | None

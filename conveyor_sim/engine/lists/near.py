@@ -84,12 +84,21 @@ def list_near_arcs(bottles: Bottles, grid: Any, arcs: Any, near: Any, margin: fl
 def list_near_bodies(bottles: Bottles, grid: Any, moving: Any, near: Any, margin: float) -> int:
     """List the bodies whose sweep is within radius + margin of each bottle, and the axes of these bodies.
 
-    Return the number of entries needed.
+    Return the number of entries needed. near: None if bottles pass through bodies; no body is near a bottle then.
     """
     if moving is None:
         return 0
     for b in range(moving.is_near.size):
         moving.is_near[b] = 0
+    count = _list_bodies(bottles, grid, moving, near, margin)
+    list_near_axes(moving)
+    return count
+
+
+@part
+def _list_bodies(bottles: Bottles, grid: Any, moving: Any, near: Any, margin: float) -> int:
+    if near is None:
+        return 0
     count = 0
     for i in range(bottles.x.size):
         near.start[i] = min(count, near.piece.size)
@@ -106,7 +115,6 @@ def list_near_bodies(bottles: Bottles, grid: Any, moving: Any, near: Any, margin
                     near.piece[count] = b
                 count += 1
     near.start[bottles.x.size] = min(count, near.piece.size)
-    list_near_axes(moving)
     return count
 
 

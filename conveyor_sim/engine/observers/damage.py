@@ -14,12 +14,13 @@ from typing import Any
 
 from conveyor_sim.engine.arrays.bodies import Bottles, ForceSums, Spin
 from conveyor_sim.engine.arrays.damage import MOST_BORNE, MOST_TOUCHES, ContactLoads, Maximum, RailBins
+from conveyor_sim.engine.arrays.rails import Arcs, Segments
 from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.contact.pairs import normal_and_overlap
 from conveyor_sim.engine.contact.slots import WIDTH
 from conveyor_sim.engine.observers.contact_list import pair_contact
-from conveyor_sim.engine.rails.moving import moves, surface_velocity
+from conveyor_sim.engine.rails.moving import MOVING, moves, seen_from, surface_velocity
 from conveyor_sim.engine.rails.rails import find_rail_contacts, rail_contact, rail_elongation
 from conveyor_sim.engine.support.base import add_base_friction, add_straddling_friction
 from conveyor_sim.engine.support.footing import check_footing
@@ -107,11 +108,10 @@ def _list_rails(i: int, world: World, damage: Any, worker: Worker, count: int) -
             arm = bottles.radius[i] - contacts.overlap[c]
             x, y = bottles.x[i] + arm * nx, bottles.y[i] + arm * ny
             if moves(world.moving, entry):
-                # Work on a moving rail belongs to no place of the line.
-                key, place = -entry, -1
+                key, place = -entry, body_bin(damage.scuffing, world.moving, entry - MOVING, x, y)
             else:
                 key = _rail_key(world.near_segments, world.near_arcs, entry)
-                place = _bin(damage.scuffing, world.segments, world.arcs, key, x, y)
+                place = rail_bin(damage.scuffing, world.segments, world.arcs, key, x, y)
             ux, uy = surface_velocity(world.moving, contacts, c, bottles, i)
             approach = _approach(damage.impacts, i, nx, ny) - (ux * nx + uy * ny)
             _write_force(worker.history, count, nx, ny, normal, tangential, slip)
@@ -162,8 +162,8 @@ def _piece(near: Any, entry: int) -> int:
 
 
 @part
-def _bin(scuffing: Any, segments: Any, arcs: Any, key: int, x: float, y: float) -> int:
-    """Return the bin of a rail piece, by its key, at a point (m); -1 if bins are not requested."""
+def rail_bin(scuffing: Any, segments: Any, arcs: Any, key: int, x: float, y: float) -> int:
+    """Return the bin of a rail piece, by its key, at a point (m); -1 without the effect `scuffing`."""
     if scuffing is None:
         return -1
     if key % 2 != 0:
@@ -175,22 +175,74 @@ def _bin(scuffing: Any, segments: Any, arcs: Any, key: int, x: float, y: float) 
 def _segment_bin(bins: RailBins, segments: Any, g: int, x: float, y: float) -> int:
     if segments is None:
         return -1
+    return _bin_at(int(bins.segment_first[g]), int(bins.segment_first[g + 1]), _along_segment(segments, g, x, y))
+
+
+@part
+def _along_segment(segments: Segments, g: int, x: float, y: float) -> float:
+    """Return the place of a point (m) along a segment, as a share of its length."""
     along = (x - segments.x[g]) * segments.tx[g] + (y - segments.y[g]) * segments.ty[g]
-    return _bin_at(int(bins.segment_first[g]), int(bins.segment_first[g + 1]), along / segments.length[g])
+    return along / segments.length[g]
 
 
 @part
 def _arc_bin(bins: RailBins, arcs: Any, k: int, x: float, y: float) -> int:
     if arcs is None:
         return -1
+    return _bin_at(int(bins.arc_first[k]), int(bins.arc_first[k + 1]), _along_arc(arcs, k, bins.arc_span[k], x, y))
+
+
+@part
+def _along_arc(arcs: Arcs, k: int, span: float, x: float, y: float) -> float:
+    """Return the place of a point (m) along an arc, as a share of its span (rad)."""
     dx, dy = x - arcs.x[k], y - arcs.y[k]
     start_x, start_y = arcs.start_x[k], arcs.start_y[k]
     angle = math.atan2(start_x * dy - start_y * dx, start_x * dx + start_y * dy)
     # The range of angles starts at half the gap before the start.
-    span = bins.arc_span[k]
     if angle < 0.5 * span - math.pi:
         angle += 2.0 * math.pi
-    return _bin_at(int(bins.arc_first[k]), int(bins.arc_first[k + 1]), angle / span)
+    return angle / span
+
+
+@part
+def body_bin(scuffing: Any, moving: Any, q: int, x: float, y: float) -> int:
+    """Return the bin of piece q of a body at a point (m) of its present place; -1 if bins are not requested."""
+    if scuffing is None:
+        return -1
+    return _bin_of_piece(scuffing.bins.bodies, moving, q, x, y)
+
+
+@part
+def _bin_of_piece(bins: Any, moving: Any, q: int, x: float, y: float) -> int:
+    if bins is None:
+        return -1
+    first, end = int(bins.first[q]), int(bins.end[q])
+    straight = _count(moving.segments)
+    if q < straight:
+        return _bin_at(first, end, _along_body_segment(moving.segments, q, x, y))
+    across, ahead = seen_from(moving, moving.body[q], x, y)
+    return _bin_at(first, end, _along_body_arc(moving.arcs, q - straight, bins.span[q], across, ahead))
+
+
+@part
+def _count(segments: Any) -> int:
+    if segments is None:
+        return 0
+    return segments.x.size
+
+
+@part
+def _along_body_segment(segments: Any, g: int, x: float, y: float) -> float:
+    if segments is None:
+        return 0.0
+    return _along_segment(segments, g, x, y)
+
+
+@part
+def _along_body_arc(arcs: Any, k: int, span: float, x: float, y: float) -> float:
+    if arcs is None:
+        return 0.0
+    return _along_arc(arcs, k, span, x, y)
 
 
 @part
@@ -207,11 +259,12 @@ def _scuff(i: int, scuffing: Any, history: ContactLoads, count: int, dt: float) 
     for c in range(count):
         work = dt * abs(history.tangential[c] * history.slip[c])
         scuffing.work[i] += work
-        _wear(scuffing.bins, i // UNIT, history.place[c], work, dt * history.normal[c])
+        wear(scuffing.bins, i // UNIT, history.place[c], work, dt * history.normal[c])
 
 
 @part
-def _wear(bins: Any, unit: int, place: int, work: float, impulse: float) -> None:
+def wear(bins: Any, unit: int, place: int, work: float, impulse: float) -> None:
+    """Add sliding work (J) and normal impulse (N s) to a bin of a rail; place -1: none."""
     if bins is None:
         return
     if place >= 0:
@@ -230,8 +283,8 @@ def _crush(i: int, crushing: Any, history: ContactLoads, count: int) -> None:
         for b in range(a):
             cosine = history.nx[a] * history.nx[b] + history.ny[a] * history.ny[b]
             opposed = max(opposed, -cosine * min(history.normal[a], history.normal[b]))
-    _raise(crushing.total, i, total)
-    _raise(crushing.opposed, i, opposed)
+    raise_to(crushing.total, i, total)
+    raise_to(crushing.opposed, i, opposed)
 
 
 @part
@@ -244,12 +297,12 @@ def _hit(i: int, impacts: Any, history: ContactLoads, count: int) -> None:
         impacts.touched[i, before] = impacts.touching[i, before]
         before += 1
     for c in range(count):
-        _raise(impacts.force, i, history.normal[c])
+        raise_to(impacts.force, i, history.normal[c])
         known = before == MOST_TOUCHES
         for place in range(before):
             known = known or impacts.touched[i, place] == history.key[c]
         if not known:
-            _raise(impacts.speed, i, history.approach[c])
+            raise_to(impacts.speed, i, history.approach[c])
         if c < MOST_TOUCHES:
             impacts.touching[i, c] = history.key[c]
     if count < MOST_TOUCHES:
@@ -257,7 +310,8 @@ def _hit(i: int, impacts: Any, history: ContactLoads, count: int) -> None:
 
 
 @part
-def _raise(worst: Maximum, i: int, value: float) -> None:
+def raise_to(worst: Maximum, i: int, value: float) -> None:
+    """Raise the maximum of bottle i in the present tick to a value."""
     if value > worst.tick[i]:
         worst.tick[i] = value
 
@@ -296,18 +350,26 @@ def _apart(spin: Any, moment: Any) -> Any:
 
 @part
 def _tip(i: int, bottles: Bottles, tipping: Any, history: ContactLoads, count: int, dt: float) -> None:
-    """Update |F_c (h_c - h_cg) - F_b h_cg| / (m g R_b), smoothed because a blow is over before a bottle can tip."""
     if tipping is None:
         return
-    if bottles.weight[i] <= 0.0:
-        return
-    kind = bottles.type[i]
     fx = fy = 0.0
     for c in range(count):
         fx -= history.normal[c] * history.nx[c] + history.tangential[c] * history.ny[c]
         fy += history.tangential[c] * history.nx[c] - history.normal[c] * history.ny[c]
+    tip(i, bottles, tipping, fx, fy, dt)
+
+
+@part
+def tip(i: int, bottles: Bottles, tipping: Any, fx: float, fy: float, dt: float) -> None:
+    """Update |F_c (h_c - h_cg) - F_b h_cg| / (m g R_b), smoothed because a blow is over before a bottle can tip.
+
+    fx, fy: sum of the contact forces on bottle i, N.
+    """
+    if bottles.weight[i] <= 0.0:
+        return
+    kind = bottles.type[i]
     along, under = tipping.contact_lever[kind] / bottles.weight[i], tipping.base_lever[kind] / bottles.weight[i]
     weight = dt / (dt + tipping.delay[kind])
     tipping.mean_x[i] += weight * (along * fx - under * tipping.fx[i] - tipping.mean_x[i])
     tipping.mean_y[i] += weight * (along * fy - under * tipping.fy[i] - tipping.mean_y[i])
-    _raise(tipping.ratio, i, math.sqrt(tipping.mean_x[i] ** 2 + tipping.mean_y[i] ** 2))
+    raise_to(tipping.ratio, i, math.sqrt(tipping.mean_x[i] ** 2 + tipping.mean_y[i] ** 2))

@@ -12,6 +12,13 @@ export const WEARS = {
 
 export const NO_WEAR = 1e-9; // values up to this are treated as none
 
+// Unit vector from the middle of a bin to its neighbour on a side; null if no entry beside it is near enough.
+function towards(bins, i, side) {
+  const there = i + side, dx = bins.x[there] - bins.x[i], dy = bins.y[there] - bins.y[i], distance = Math.hypot(dx, dy);
+  if (bins.rail[there] !== bins.rail[i] || !(distance > 0) || distance > 0.75 * (bins.length[i] + bins.length[there])) return null;
+  return [dx / distance, dy / distance];
+}
+
 export class Wear {
   constructor(view) {
     this.view = view;
@@ -33,18 +40,15 @@ export class Wear {
     const wanted = WEARS[this.shown], row = wear[lastUpTo(wear.map(([time]) => time), clock.time + 1e-6)];
     if (!wanted.of || !row) return;
     this.most = Math.max(this.scale(), rival ? rival.wear.scale() : 0);
-    context.lineCap = "butt";
+    context.lineCap = "round";
     context.lineWidth = Math.max(6, 0.02 * camera.scale);
     bins.x.forEach((x, i) => {
       const share = wanted.of(row, i, bins, recording.began) / this.most;
       if (share <= 0.01) return;
       context.beginPath();
-      for (const side of [-1, 0, 1]) {
-        // Halfway to the next bin; at the end of a rail symmetric to the other side.
-        const there = bins.rail[i + side] === bins.rail[i], near = there ? i + side : i - side, half = there ? 0.5 : -0.5;
-        const known = bins.rail[near] === bins.rail[i] ? half : 0;
-        context[side < 0 ? "moveTo" : "lineTo"](camera.toX(x + known * ((bins.x[near] ?? x) - x)), camera.toY(bins.y[i] + known * ((bins.y[near] ?? 0) - bins.y[i])));
-      }
+      const sides = [-1, 1].map((side) => towards(bins, i, side)), half = 0.5 * bins.length[i];
+      const [back, ahead] = [sides[0] ?? sides[1]?.map((part) => -part) ?? [0, 0], sides[1] ?? sides[0]?.map((part) => -part) ?? [0, 0]];
+      for (const [dx, dy] of [back, [0, 0], ahead]) context.lineTo(camera.toX(x + half * dx), camera.toY(bins.y[i] + half * dy));
       context.strokeStyle = SCALES.force[Math.min(STEPS - 1, Math.floor(share * STEPS))];
       context.stroke();
     });

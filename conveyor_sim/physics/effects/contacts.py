@@ -86,7 +86,9 @@ def _mover_bounds(meeting: Meeting, stiffness: float, terms: Terms) -> list[tupl
     The bound assumes that bottles stop the axis: as many as fit along the pieces of its bodies. stiffness: N/m.
     """
     materials = terms.plant.rail_materials
-    bounds = []
+    bounds: list[tuple[float, str]] = []
+    if "moving_rails" not in terms.on:
+        return bounds
     reaches = terms.plant.reach_of_axes.tolist()
     for index, (axis, reach) in enumerate(zip(terms.plant.axes, reaches, strict=True)):
         bodies = [shape for of, shape in zip(terms.plant.axis_of_body, terms.plant.moving, strict=True) if of == index]

@@ -44,7 +44,7 @@ def moving_arrays(plant: Plant, surface: int, slots: int, ledger: bool, springs:
     course = np.zeros((len(axes), PHASES, 4))
     course[:, :, 1] = position[:, None]
     pivot, along = np.array([shape.pivot for shape in shapes]), np.array([shape.along for shape in shapes])
-    pieces = _ordered(shapes)
+    pieces = ordered_pieces(shapes)
     segments, arcs = _pieces(plant, surface)
     home_segments, _ = _pieces(plant, surface)
     moves = any(shape.surface_speed is not None for shape in shapes)
@@ -83,7 +83,7 @@ def moving_arrays(plant: Plant, surface: int, slots: int, ledger: bool, springs:
     )
 
 
-def _ordered(shapes: Sequence[BodyShape]) -> list[tuple[int, int]]:
+def ordered_pieces(shapes: Sequence[BodyShape]) -> list[tuple[int, int]]:
     """Return body and index of all pieces, cluster by cluster; straight pieces come first."""
     pieces = [(b, index) for b, shape in enumerate(shapes) for group in shape.groups for index in group]
     return sorted(pieces, key=lambda entry: isinstance(shapes[entry[0]].pieces[entry[1]], ArcPiece))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from conveyor_sim.engine.arrays.damage import (
     MOST_TOUCHES,
+    BodyBins,
     Crushing,
     DamageArrays,
     Impacts,
@@ -21,15 +22,21 @@ from conveyor_sim.engine.arrays.damage import (
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.engine.threads.workers import UNIT
 from conveyor_sim.physics.model import Model
+from conveyor_sim.physics.model.moving_rails import ordered_pieces
+from conveyor_sim.scene.effect_names import EffectName
 from conveyor_sim.scene.geometry import ArcPiece, Piece
 
 BIN = 0.05
 """Largest length of a bin of rail, m."""
 
 
+LOADS: tuple[EffectName, ...] = ("scuffing", "crushing", "impacts", "tipping")
+"""Effects with loads on bottles."""
+
+
 @dataclass(frozen=True)
 class RailPlaces:
-    """Places of the rails' bins, (B,), in the order of the engine: straight pieces, then arcs."""
+    """Places of the rails' bins, (B,), in the order of `_pieces`."""
 
     rail: NDArray[np.uint32]
     x: F8
@@ -61,7 +68,7 @@ def empty_damage(model: Model, slots: int) -> DamageArrays | None:
 
 
 def rail_places(model: Model) -> RailPlaces:
-    """Return the places of the bins of all rails."""
+    """Return the places of the bins of all rails. Bins of bodies are placed as the body is at displacement 0."""
     rail, x, y, length = [], [], [], []
     for index, piece in _pieces(model):
         bins = _bins(piece)
@@ -79,28 +86,63 @@ def rail_places(model: Model) -> RailPlaces:
 
 
 def _pieces(model: Model) -> Iterator[tuple[int, Piece]]:
-    """Yield rail numbers and pieces in the order of `plant_arrays.rail_arrays`."""
-    pieces = [(index, piece) for index, rail in enumerate(model.plant.rails) for piece in rail.pieces]
+    """Yield rail numbers and pieces: straight ones at rest and on bodies, then arcs at rest and on bodies.
+
+    Pieces at rest have the order of `plant_arrays.rail_arrays`. Equal pieces of a machine, as in a train, come once.
+    """
+    at_rest = [(index, piece) for index, rail in enumerate(model.plant.rails_at_rest) for piece in rail.pieces]
+    on_bodies = [*dict.fromkeys(_body_pieces(model))]
     for arc, arrays in ((False, model.segments), (True, model.arcs)):
-        if arrays is not None:
+        for pieces in (at_rest if arrays is not None else [], on_bodies):
             yield from (entry for entry in pieces if isinstance(entry[1], ArcPiece) is arc)
+
+
+def _body_pieces(model: Model) -> Iterator[tuple[int, Piece]]:
+    """Yield rail number and piece for each piece of a body in the order of the engine."""
+    plant = model.plant
+    if model.has("moving_rails"):
+        for body, index in ordered_pieces(plant.moving):
+            yield len(plant.rails_at_rest) + plant.machine_of_body[body], plant.moving[body].pieces[index]
 
 
 def _rail_bins(model: Model, slots: int) -> RailBins | None:
     if model.rail_law is None:
         return None
-    pieces = [piece for _, piece in _pieces(model)]
-    first = np.concatenate([[0], np.cumsum([_bins(piece) for piece in pieces])]).astype(np.uint32)
-    arcs = [piece for piece in pieces if isinstance(piece, ArcPiece)]
-    straight = len(pieces) - len(arcs)
+    pieces = [*_pieces(model)]
+    ends = np.cumsum([0, *(_bins(piece) for _, piece in pieces)])
+    places = {piece: place for place, piece in enumerate(pieces)}
+    fixed = len(model.plant.rails_at_rest)
+    straight, bent = (
+        [place for place, (rail, piece) in enumerate(pieces) if rail < fixed and isinstance(piece, ArcPiece) is arc]
+        for arc in (False, True)
+    )
+    moving = [places[piece] for piece in _body_pieces(model)]
     units = slots // UNIT + 1
     return RailBins(
-        segment_first=first[: straight + 1].copy(),
-        arc_first=first[straight:].copy(),
-        arc_span=np.array([arc.span for arc in arcs]),
-        work=np.zeros((units, int(first[-1]))),
-        impulse=np.zeros((units, int(first[-1]))),
+        segment_first=_firsts(ends, straight),
+        arc_first=_firsts(ends, bent),
+        arc_span=_spans(pieces, bent),
+        bodies=BodyBins(
+            first=ends[moving].astype(np.uint32),
+            end=ends[np.array(moving) + 1].astype(np.uint32),
+            span=_spans(pieces, moving),
+        )
+        if moving
+        else None,
+        work=np.zeros((units, int(ends[-1]))),
+        impulse=np.zeros((units, int(ends[-1]))),
     )
+
+
+def _firsts(ends: NDArray[np.int64], places: list[int]) -> NDArray[np.uint32]:
+    """Return the first bins of pieces that follow each other, and the end of the last one."""
+    start = places[0] if places else 0
+    return ends[start : start + len(places) + 1].astype(np.uint32)
+
+
+def _spans(pieces: list[tuple[int, Piece]], places: list[int]) -> F8:
+    chosen = (pieces[place][1] for place in places)
+    return np.array([piece.span if isinstance(piece, ArcPiece) else 0.0 for piece in chosen])
 
 
 def _bins(piece: Piece) -> int:

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
 from typing import Final
 
 import matplotlib
@@ -33,7 +32,6 @@ QUANTITIES: Final = {
     "tipping": ("Index of tipping", "1 would tip"),
 }
 _WIDTH: Final = 13.0  # inches
-_POINTS_A_BIN: Final = 5
 _BARS: Final = 30
 
 
@@ -48,7 +46,7 @@ def rails_figure(plant: StaticGeometry, damage: Damage, title: str) -> Figure:
     figure = style.new_figure(_WIDTH, 0.7 + (2.0 if stacked else 1.0) * (tall + 0.6))
     axes = figure.subplots(2, 1) if stacked else figure.subplots(1, 2)
     wear, time = damage.wear, max(damage.time, 1e-9)
-    lines = bin_lines(plant, wear)
+    lines = bin_lines(wear)
     maps = (
         ("pressure", "Mean pressure on the rails", "N/m", wear.impulse / wear.length / time),
         ("scuffing", "Sliding work on the rails", "J/m", wear.scuffing_work / wear.length),
@@ -85,18 +83,23 @@ def bottles_figure(damage: Damage, title: str) -> Figure:
     return figure
 
 
-def bin_lines(plant: StaticGeometry, wear: RailWearColumns) -> list[Floats]:
-    """Return the polyline (k, 2) of each bin, m, in the order of the columns."""
-    lines = []
-    for rail in dict.fromkeys(wear.rail.tolist()):
-        course = plant.rail_line(rail)
-        way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(course, axis=0).T))])
-        ends = np.concatenate([[0.0], np.cumsum(wear.length[wear.rail == rail])])
-        ends *= way[-1] / ends[-1]
-        for start, end in pairwise(ends.tolist()):
-            at = np.linspace(start, end, _POINTS_A_BIN)
-            lines.append(np.column_stack([np.interp(at, way, course[:, 0]), np.interp(at, way, course[:, 1])]))
-    return lines
+def bin_lines(wear: RailWearColumns) -> list[Floats]:
+    """Return the polyline (3, 2) of each bin, m: its middle, and half its length towards its neighbours on both sides.
+
+    Neighbours are entries beside it of one rail, near enough. Without one a bin has the direction of the other side,
+    and without both it is a point.
+    """
+    middle = np.column_stack([wear.x, wear.y])
+    step, near = np.diff(middle, axis=0), np.diff(wear.rail.astype(np.int64)) == 0
+    distance = np.hypot(*step.T)
+    near &= (distance > 0.0) & (distance < 0.75 * (wear.length[1:] + wear.length[:-1]))
+    unit = np.where(near[:, None], step / np.where(near, distance, 1.0)[:, None], 0.0)
+    none = np.zeros((1, 2))
+    ahead, behind = np.concatenate([unit, none]), np.concatenate([none, unit])
+    to_next = np.where(ahead.any(axis=1)[:, None], ahead, behind)
+    to_last = np.where(behind.any(axis=1)[:, None], behind, ahead)
+    half = 0.5 * wear.length[:, None]
+    return [*np.stack([middle - half * to_last, middle, middle + half * to_next], axis=1)]
 
 
 def _draw_heat(ax: Axes, lines: list[Floats], values: Floats, gid: str, unit: str) -> None:
@@ -105,7 +108,13 @@ def _draw_heat(ax: Axes, lines: list[Floats], values: Floats, gid: str, unit: st
     order = order[values[order] > 0.0]
     norm = PowerNorm(0.5, 0.0, float(values.max(initial=0.0)) or 1.0)
     collection = LineCollection(
-        [lines[index] for index in order], cmap=HEAT, norm=norm, linewidths=5.0, zorder=Z_RAIL + 0.1, gid=gid
+        [lines[index] for index in order],
+        cmap=HEAT,
+        norm=norm,
+        linewidths=5.0,
+        zorder=Z_RAIL + 0.1,
+        gid=gid,
+        capstyle="round",
     )
     collection.set_array(values[order])
     ax.add_collection(collection)
@@ -118,7 +127,7 @@ def _most(plant: StaticGeometry, wear: RailWearColumns, values: Floats, unit: st
     if not values.any():
         return "none"
     index = int(np.argmax(values))
-    name = plant.rails[int(wear.rail[index])].name
+    name = plant.rail_names[int(wear.rail[index])]
     return f"most {values[index]:.3g} {unit} on {name} at ({wear.x[index]:.2f}, {wear.y[index]:.2f}) m"
 
 

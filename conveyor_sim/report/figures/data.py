@@ -38,16 +38,19 @@ class StaticGeometry:
     underlay: ShownUnderlay | None = None
     resting: int = 0
     """Number of rails at rest."""
+    rail_names: tuple[str, ...] = ()
+    """Names by rail number: rails at rest, then machines."""
 
     @classmethod
     def of(cls, scene: Scene) -> StaticGeometry:
         """Return the static geometry of `scene`."""
-        underlay, resting = shown_underlay(scene), rail_shapes(scene)
+        underlay, resting, bodies = shown_underlay(scene), rail_shapes(scene), bodies_of(scene)
         return cls(
             surfaces=tuple(surface_shapes(scene)),
             speeds=np.array([*belt_speeds(scene).values()], dtype=np.float64),
-            rails=(*resting, *bodies_at(bodies_of(scene), {axis.name: axis.first for axis in axes_of(scene)})),
+            rails=(*resting, *bodies_at(bodies, {axis.name: axis.first for axis in axes_of(scene)})),
             resting=len(resting),
+            rail_names=(*(rail.name for rail in resting), *dict.fromkeys(body.name for body in bodies)),
             marks=tuple(marks_of(scene)),
             underlay=underlay if isinstance(underlay, ShownUnderlay) else None,
         )

@@ -40,6 +40,19 @@ def test_every_effect_that_can_be_off_is_priced() -> None:
         assert price.low <= price.cost <= price.high
 
 
+def test_moving_rails_are_priced_with_their_devices() -> None:
+    """A gate beside a bottle: without the effect the gate still has its position, and its device a state."""
+    gate = {"from": [0.21, -0.1], "to": [0.21, 0.1], "material": "glass", "direction": "90 deg", "stroke": 0.2}
+    moved = {"kind": "slide", **gate, "max_speed": 0.8, "acceleration": 8.0}
+    pricing = Pricing(scene(**{**FIELDS, "gates": {"g": moved}}), at=0.02)
+    pricing.warm_up(lambda done, whole: None)
+    pricing.prepare(lambda done, whole: None)
+    prices = pricing.measure(lambda done, whole: None, rounds=1)
+    assert {price.effect for price in prices.prices} == {"bottle_contact", "normal_damping", "moving_rails"}
+    assert prices.fixed == ("linear",)
+    assert prices.failed == {}
+
+
 def test_variants_take_the_steps_of_the_scene() -> None:
     """Damping that bounds the time step does not buy longer steps where it is off."""
     pricing = Pricing(

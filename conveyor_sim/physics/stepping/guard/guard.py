@@ -18,8 +18,9 @@ from conveyor_sim.engine.observers.stored_energy import KINETIC, stored_energy
 from conveyor_sim.physics.accounts.elastic import deepest_overlap, impulse_energy
 from conveyor_sim.physics.state import State
 from conveyor_sim.physics.stepping.guard.squeeze import Squeeze, squeeze_of
-from conveyor_sim.physics.stepping.guard.violation import Violation, Words
+from conveyor_sim.physics.stepping.guard.violation import Violation, Words, unresolved
 from conveyor_sim.physics.stepping.guard.world_snapshot import WorldSnapshot
+from conveyor_sim.physics.timestep.prediction import DEEP
 from conveyor_sim.scene.types import Unchecked
 
 DEEPEST = 0.75
@@ -32,7 +33,19 @@ SOFT = 0.2
 """Overlap, in radii, from which a contact is reported as soft. Positions are wrong by the overlap."""
 
 CLOSELY = 128
-"""Largest number of steps between checks of overlaps. A check costs about half a step."""
+"""Largest number of steps between checks of overlaps, sweeps counted as steps. A check costs about half a step."""
+
+HALF_WAY = 0.5
+"""Largest way of a bottle in a step of integrator impulses over the skin of the lists.
+
+A contact acts before bottles touch, so the lists of both must hold for the next step.
+"""
+
+OVERLAP = 2.0 * DEEP
+"""Overlap, in radii, from which integrator impulses is reported as too coarse for contacts that it does not resolve.
+
+An overlap is an error there. Up to DEEP of the diameter the flow was that of stiff contacts.
+"""
 
 
 @dataclass
@@ -66,7 +79,9 @@ class Guard:
         self._model = state.model
         self._found = found
         self._memory = WorldSnapshot()
-        self._every = max(1, math.ceil(CLOSELY / self._model.steps_per_tick))
+        self._every = max(1, math.ceil(CLOSELY / (self._model.steps_per_tick * max(1, self._model.sweeps))))
+        self._longest_way = self._model.settings.skin * (HALF_WAY if self._model.sweeps else 1.0)
+        self._soft_from = OVERLAP if unresolved(self._model) else SOFT
         tick, slip = self._model.tick_ns * 1e-9, self._model.settings.slip_limit
         self._friction = tick * self._model.largest_base_friction
         # The energy of bottles within the slip limit is negligible.
@@ -102,8 +117,8 @@ class Guard:
         if fastest < 0:
             return None
         speed = math.sqrt(square)
-        if self._something_there and speed * dt > model.settings.skin:
-            return self._words_before(fastest).far(fastest, speed, dt)
+        if self._something_there and speed * dt > self._longest_way:
+            return self._words_before(fastest).far(fastest, speed, dt, self._longest_way)
         if kinetic > GROWTH * self._kinetic + self._work and (energies := self._grown()):
             return self._words_before(fastest).energy(fastest, *energies, self._work)
         depth = max(deep)
@@ -111,7 +126,7 @@ class Guard:
             return None
         # `put_in` stays True until a check finds no deep overlap.
         self.memory.put_in = self.memory.put_in and depth == 0.0
-        if depth > SOFT >= self.memory.deepest or depth > DEEPEST:
+        if depth > self._soft_from >= self.memory.deepest or depth > DEEPEST:
             worst = deep.index(depth)
             bottle, other = int(world.probe.bottle[worst]), int(world.probe.other[worst])
             words = self._words_before(bottle) if depth > DEEPEST else Words(model, world, self._squeeze(bottle))
