@@ -27,9 +27,9 @@ def outline(summary: Summary) -> list[str]:
     if summary.peak_force:
         forces = f"peak {summary.peak_force:.3g} N, 99 % of peaks at most {summary.peak_force_99:.3g} N"
         predicted = f"; predicted error {summary.predicted}" if summary.predicted else ""
-        lines.append(labelled("forces", f"{forces}{_peak_note(summary.queue)}{predicted}"))
-    if summary.borne is not None and (loads := summary.borne.sentence):
-        lines.append(labelled("damage", loads))
+        lines.append(labelled("forces", f"{forces}{summary.origin}{_peak_note(summary.queue)}{predicted}"))
+    if summary.load_sentence:
+        lines.append(labelled("damage", summary.load_sentence))
     if summary.alarms is not None and summary.alarms.any:
         lines += [labelled("" if index else "alarms", line) for index, line in enumerate(summary.alarms.lines)]
     if summary.commands > summary.refused:

@@ -56,7 +56,7 @@ def _account(summary: Summary) -> list[tuple[str, str]]:
         ("queues", None if summary.queue is None else summary.queue.sentence),
         ("guard", _listed(summary.guard, summary.guard_texts)),
         ("limits passed", _listed(summary.damage_events, summary.damage_texts)),
-        ("energy", None if summary.energy is None else summary.energy.sentence),
+        ("energy", summary.energy_sentence),
         ("commands", _commands(summary)),
     ]
     return [(name, text) for name, text in rows if text]

@@ -135,6 +135,7 @@ class _Tally:
             guard_texts=[text for _, text in self._guard[:GUARD_TEXTS]],
             energy=None if self._ledger is None else _energy(self._ledger, line.belts, line.rails),
             borne=self._borne,
+            from_impulses=line.integrator == "impulses",
             damage_events=dict(Counter(kind for kind, _ in self._passed)),
             damage_texts=[text for _, text in self._passed[:GUARD_TEXTS]],
             alarms=self._alarms.figures(seconds, int(line.tick_ns) * 1e-9) if "events" in self._bag.counts else None,
