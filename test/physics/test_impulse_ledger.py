@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scenes import MASS, NO_OUTPUTS, RADIUS, base, belt, bottle, kind, scene, segment
+from scenes import MASS, NO_OUTPUTS, RADIUS, arc, base, belt, bottle, kind, scene, segment
 from swept import MU_BASE, G, crowd, fields, file_of, forces_on, glass, run
 
 from conveyor_sim.columns.damage import DamageColumns, RailWearColumns
@@ -85,6 +85,25 @@ def test_an_oblique_impact_loses_friction_times_the_mean_slip() -> None:
     assert wear.scuffing_work[struck] == pytest.approx(lost, rel=1e-12)
     assert wear.impulse[struck] == pytest.approx(MASS * 1.5 * v_n, rel=1e-12)
     assert wear.x[struck] == pytest.approx(v_t * 0.01 / v_n, abs=0.05)
+
+
+def test_an_arc_bears_an_impact_where_it_was_struck() -> None:
+    sim = watched(
+        rails={"bowl": arc((0.0, 0.0), 0.5, -math.pi, math.pi)},
+        bottles=[bottle(0.3, 0.0, 0.0, -1.0)],
+    )
+    sim.advance(35)
+    state, wear = sim.bottles(), wear_of(sim)
+    bowl = wear.rail == sim.model.rails.index("bowl")
+    (struck,) = np.flatnonzero(bowl & (wear.impulse > 0.0))
+    # The axis is 0.5 m - R from the centre then.
+    angle = -math.acos(0.3 / (0.5 - RADIUS))
+    place = (0.5 * math.cos(angle), 0.5 * math.sin(angle))
+    assert math.hypot(wear.x[struck] - place[0], wear.y[struck] - place[1]) < 0.03
+    gained = MASS * math.hypot(state.vx[0], state.vy[0] + 1.0)
+    assert wear.impulse[struck] == pytest.approx(MASS * 1.5 * -math.sin(angle), rel=5e-3)
+    assert wear.impulse[struck] < gained
+    assert wear.scuffing_work[struck] == pytest.approx(ledger_of(sim).contact_friction, rel=1e-12)
 
 
 def test_a_bottle_set_down_takes_twice_what_it_gets() -> None:

@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 from conveyor_sim.columns.events import GuardEvent
 from conveyor_sim.engine.arrays.bodies import Bottles, Spin
+from conveyor_sim.engine.arrays.observers import GuardProbe
 from conveyor_sim.engine.arrays.rails import RailContacts
 from conveyor_sim.engine.compiler.numba_internals.machine_code import entry
 from conveyor_sim.engine.observers.guard_probe import look
@@ -99,20 +100,18 @@ class Guard:
         """
         model, world = self._model, self._state.world
         self._memory.take(world)
+        bad, _, _, mass, self._kinetic, _, _ = self._look(world.bottles, world.spin, world.probe)
         if tick % self._every == 0:
             world.probe.due[0] = 1
-        bad, _, _, weight, self._kinetic = self._look(world.bottles, world.spin)
         # A rail of speed u does work against friction; its impact can raise a bottle's speed to v + 2 u.
-        hits = 4.0 * rail_speed**2 * self._mass() if rail_speed > 0.0 else 0.0
-        self._work = weight * (self._friction * (surface_speed + rail_speed) + self._noise) + hits
+        hits = 4.0 * rail_speed**2 * mass
+        self._work = mass * model.gravity * (self._friction * (surface_speed + rail_speed) + self._noise) + hits
         return Words(model, world).put_in(bad) if bad >= 0 else None
 
     def end(self, dt: float) -> Violation | None:
         """Return a violation at the end of a tick with steps of dt (s), and put the state back; None without one."""
         world, model = self._state.world, self._model
-        bad, fastest, square, _, kinetic = self._look(world.bottles, world.spin)
-        deep = float(world.probe.depth[0]), float(world.probe.depth[1])
-        self.forget()
+        bad, fastest, square, _, kinetic, *deep = self._look(world.bottles, world.spin, world.probe)
         if bad >= 0:
             return self._words_before().not_finite(bad)
         if fastest < 0:
@@ -161,11 +160,6 @@ class Guard:
         )
         return GuardEvent(tick, "chatter", bottle, x, y, text)
 
-    def _mass(self) -> float:
-        """Return the mass of all bottles, kg."""
-        bottles = self._state.world.bottles
-        return float(self._model.type_mass[bottles.type[bottles.id >= 0]].sum())
-
     def _grown(self) -> tuple[float, float] | None:
         """Return the energy (J) before and after the tick if it grew too much; else None."""
         after = WorldSnapshot()
@@ -189,15 +183,15 @@ class Guard:
 
     def _energy(self) -> float:
         stored = stored_energy(self._state.world, self._found)
-        if self._state.world.impulses is None:
+        if not unresolved(self._model):
             return float(stored.sum())
         # Overlaps of contacts that a substep does not resolve are errors: they store no energy.
         return float(stored[KINETIC]) + impulse_energy(self._model, self._state.world)
 
-    def _compile(self, bottles: Bottles, spin: Spin | None) -> Any:
+    def _compile(self, bottles: Bottles, spin: Spin | None, probe: GuardProbe) -> Any:
         """Run the first check, which compiles it."""
-        self._look = entry(look, bottles, spin)
-        return self._look(bottles, spin)
+        self._look = entry(look, bottles, spin, probe)
+        return self._look(bottles, spin, probe)
 
     def _squeeze(self, slot: int) -> Squeeze | None:
         return squeeze_of(self._model, self._state.world, self._found, slot)
