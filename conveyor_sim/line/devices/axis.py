@@ -21,7 +21,7 @@ from conveyor_sim.line.devices.edge import RisingEdge
 from conveyor_sim.line.devices.setup import DeviceSetup
 from conveyor_sim.line.tag import Tag, number, switch
 from conveyor_sim.scene.driven import moved_by_axis
-from conveyor_sim.scene.gearing import first_position, first_speed, top_speed, travel_per_radian
+from conveyor_sim.scene.gearing import first_position, first_speed, slaves_of, top_speed, travel_per_radian
 from conveyor_sim.scene.parts.axis import CYCLE, Axis
 
 FREE, SYNCHRONISING, GEARED = range(3)
@@ -53,7 +53,7 @@ class AxisDevice(Device):
         scene, short_name = setup.scene, name.rpartition("/")[2]
         top, first = top_speed(scene, short_name), first_position(scene, short_name)
         start = first_speed(scene, short_name)
-        self._part, self._setup, self._tick = part, setup, scene.tick
+        self._part, self._setup, self._tick, self._short_name = part, setup, scene.tick, short_name
         self._top, self._spacing = top, part.gear_spacing
         self._has_own_rate = part.drive is None and part.machine is None
         self._modulus = CYCLE if part.cam is None else part.cam[-1][0]
@@ -134,10 +134,14 @@ class AxisDevice(Device):
 
     @property
     def alarms(self) -> Sequence[Declared]:
-        """Alarms of the torque limit and of the following error."""
-        name = self.name
-        torque = error(self._torque_alarm, f"{name} has reached its torque limit", f"{name}/torque_limited")
-        fault = error(self._fault_alarm, f"{name} has failed: its following error is too large", f"{name}/fault")
+        """Alarms of the torque limit and of the following error.
+
+        The failure of an axis stops its masters, whose alarms it suppresses as consequences.
+        """
+        name, causes = self.name, [f"axes/{slave}/fault" for slave in slaves_of(self._setup.scene, self._short_name)]
+        torque = error(self._torque_alarm, f"{name} has reached its torque limit", f"{name}/torque_limited", causes)
+        text = f"{name} has failed: its following error is too large"
+        fault = error(self._fault_alarm, text, f"{name}/fault", causes)
         return (torque, fault) if self._part.torque_limit != "none" else (fault,)
 
     @property
