@@ -94,15 +94,14 @@ class AxisDevice(Device):
         self.restored(0)
 
     def _drive_tags(self, name: str, first: float, start: float) -> Iterator[Tag]:
-        part, top = self._part, self._top
-        most = LARGEST_TORQUE if part.torque_limit == "none" else part.torque_limit
+        part, top, most = self._part, self._top, self._most_torque
         place = "Position." if part.cam is None else "Position, the input of its cam."
         yield number(f"{name}/position", "actual", place, "rad", 0.0, self._modulus, first % self._modulus)
         yield number(f"{name}/speed", "actual", "Speed.", "rad/s", -top, top, start)
-        yield number(
-            f"{name}/torque", "actual", "Torque that it exerts on bottles, forward positive.", "N m", -most, most
-        )
-        yield number(f"{name}/following_error", "actual", "Commanded minus actual position.", "rad", -CYCLE, CYCLE)
+        text = "Torque that it exerts on bottles, forward positive, up to its limit."
+        yield number(f"{name}/torque", "actual", text, "N m", -most, most)
+        text = "Commanded minus actual position, up to a cycle."
+        yield number(f"{name}/following_error", "actual", text, "rad", -CYCLE, CYCLE)
         yield switch(f"{name}/running", "status", "Enabled, with power, and not failed.", 1.0, "state")
         yield switch(f"{name}/torque_limited", "status", "Its load exceeds its torque limit.", adds_to="state")
         yield switch(f"{name}/fault", "status", "Failed by its following error.", adds_to="state")
@@ -143,6 +142,10 @@ class AxisDevice(Device):
         text = f"{name} has failed: its following error is too large"
         fault = error(self._fault_alarm, text, f"{name}/fault", causes)
         return (torque, fault) if self._part.torque_limit != "none" else (fault,)
+
+    @property
+    def _most_torque(self) -> float:
+        return LARGEST_TORQUE if self._part.torque_limit == "none" else self._part.torque_limit
 
     @property
     def speed_range(self) -> tuple[float, float, float]:
@@ -374,7 +377,7 @@ class AxisDevice(Device):
         """Take over position and torque of a limited drive, and fail if the following error is too large."""
         moving, number = now.state.world.moving, self._number
         if now.tick and moving is not None and (actuators := moving.actuators) is not None:
-            self.torque = -float(actuators.load[number] / moving.clock[0])
+            self.torque = 0.0 - float(actuators.load[number] / moving.clock[0])  # not -0
             limited = bool(actuators.left[number]) and not self._is_jammed
             if limited:
                 self.catch_up.stop()
@@ -394,8 +397,8 @@ class AxisDevice(Device):
         values = (
             self.actual_position % self._modulus,
             self.actual_speed,
-            self.torque,
-            self.following_error,
+            _within(self.torque, self._most_torque),
+            _within(self.following_error, CYCLE),
             self.runs,
             self.limited,
             self.tripped,
@@ -406,3 +409,8 @@ class AxisDevice(Device):
         """Return running, torque_limited, fault, and in_gear of an axis with a master."""
         geared = () if self._part.master is None else (self.is_geared,)
         return [self.runs, self.limited, self.tripped, *geared]
+
+
+def _within(value: float, most: float) -> float:
+    """Return a value limited to the range of its signal, from -most to most."""
+    return min(max(value, -most), most)
