@@ -162,7 +162,8 @@ class Simulation:
             if peaks is not None and self.due("bottles"):
                 peaks.force[:] = 0.0
                 peaks.impulse[:] = 0.0
-            self._accounts.begin(self.due("damage"))
+            if self._accounts.damage is not None:
+                self._accounts.damage.begin(self.due("damage"))
             self.integration.take_tick(self.tick, self._line.fastest_surface)
             self.tick += 1
             passed = self._accounts.end(self.tick, self._line.removed_by)
@@ -277,23 +278,29 @@ class Simulation:
 
     def bottles(self) -> BottleColumns:
         """Return every bottle present, ordered by ID. Peaks are NaN without the effect `peaks`."""
-        world = self._state.world
-        slots = self._slots()
-        rest, unknown = np.zeros(slots.size), np.full(slots.size, math.nan)
-        spin = world.spin
+        slots, peaks = self._slots(), self._state.world.peaks
+        unknown = np.full(slots.size, math.nan)
         return BottleColumns(
-            id=world.bottles.id[slots].astype(np.uint64),
-            type=world.bottles.type[slots].astype(np.uint16),
-            x=world.bottles.x[slots],
-            y=world.bottles.y[slots],
-            theta=spin.theta[slots] if spin is not None else rest,
-            vx=world.bottles.vx[slots],
-            vy=world.bottles.vy[slots],
-            omega=spin.omega[slots] if spin is not None else rest,
+            **self._motion(slots),
             belt=self._line.carriers()[slots],
-            peak_force=world.peaks.force[slots] if world.peaks is not None else unknown,
-            impulse=world.peaks.impulse[slots] if world.peaks is not None else unknown,
+            peak_force=peaks.force[slots] if peaks is not None else unknown,
+            impulse=peaks.impulse[slots] if peaks is not None else unknown,
         )
+
+    def _motion(self, slots: np.ndarray) -> dict[str, np.ndarray]:
+        """Return the columns of `COLUMNS` for the bottles in some slots."""
+        bottles, spin = self._state.world.bottles, self._state.world.spin
+        rest = np.zeros(slots.size)
+        return {
+            "id": bottles.id[slots].astype(np.uint64),
+            "type": bottles.type[slots].astype(np.uint16),
+            "x": bottles.x[slots],
+            "y": bottles.y[slots],
+            "theta": spin.theta[slots] if spin is not None else rest,
+            "vx": bottles.vx[slots],
+            "vy": bottles.vy[slots],
+            "omega": spin.omega[slots] if spin is not None else rest,
+        }
 
     @property
     def peak_force(self) -> float | None:
@@ -334,8 +341,8 @@ class Simulation:
 
     def state_hash(self) -> int:
         """Return a 64-bit hash of tick, bottles, stretched springs, belts and moving rails."""
-        bottles, now = self.bottles(), self._line.now
-        columns = [*(getattr(bottles, name) for name in COLUMNS), now.setpoints, now.speeds]
+        motion, now = self._motion(self._slots()), self._line.now
+        columns = [*(motion[name] for name in COLUMNS), now.setpoints, now.speeds]
         return state_hash(self.tick, columns, self._state)
 
     def full_state_hash(self) -> int:

@@ -39,6 +39,7 @@ autodoc_typehints = "signature"
 autodoc_default_options = {"members": True, "undoc-members": True}
 default_role = "code"  # docstrings are Markdown in this
 
+RECIPES = sorted(page.stem for page in ROOT.glob("docs/cookbook/*.md") if page.stem != "index")
 PARTS = sorted(page.stem for page in ROOT.glob("docs/parts/*.md"))
 MEASURED = sorted(page.stem for page in ROOT.glob("docs/performance/*.md"))
 STUDIES = sorted(ROOT.glob("docs/accuracy/*/tables.md"))
@@ -50,6 +51,7 @@ NAVIGATION = {
             "docs/tutorial_scada",
             "docs/tutorial_ros",
             "docs/filler_block",
+            "docs/cookbook/index",
             "docs/troubleshooting",
             "docs/gallery",
         ],
@@ -82,6 +84,7 @@ NAVIGATION = {
         "Inside": ["docs/architecture", "docs/extending", "docs/api/index", "CONTRIBUTING", "CHANGELOG"],
     },
     "docs/plc": {"PLCs": [f"plc/{page.stem}" for page in sorted(ROOT.glob("docs/plc/*.md"))]},
+    "docs/cookbook/index": {"Recipes": RECIPES},
     "docs/structured_text": {"Studies": ["studies/structured_text"]},
     "docs/ros": {"Pages": [f"ros/{page.stem}" for page in sorted(ROOT.glob("docs/ros/*.md"))]},
     "docs/scene": {"Parts": [f"parts/{page}" for page in PARTS]},

@@ -19,8 +19,12 @@ def swept(steps: int = 8, sweeps: int = 2) -> dict[str, Any]:
     return {"integrator": "impulses", "per_tick": steps, "sweeps": sweeps}
 
 
-QUEUE: dict[str, Any] = {"accuracy": swept(), "effects": dict.fromkeys(["peaks", "rotation", "unequal_radii"], "on")}
-"""Fields with which the scenes of other tests have the integrator; it has no energy ledger."""
+OBSERVERS = ("peaks", "energy_ledger", "scuffing", "crushing", "impacts")
+QUEUE: dict[str, Any] = {
+    "accuracy": swept(),
+    "effects": dict.fromkeys([*OBSERVERS, "rotation", "unequal_radii"], "on"),
+}
+"""Fields with which the scenes of other tests have the integrator."""
 
 
 def glass(other: str = "glass", stiffness: float = 1e8, restitution: float = 0.5, friction: float = 0.1) -> Any:

@@ -53,6 +53,8 @@ def pages() -> Iterator[tuple[Path, str]]:
     text = stability.PAGE.read_text(encoding="utf-8")
     yield stability.PAGE, stability.page(text, stability.FOLDER)
     yield stability.CASES, stability.cases(stability.FOLDER)
+    settings = importlib.import_module("cookbook_settings")
+    yield settings.INDEX, settings.page()
     validation = importlib.import_module("validation.page")
     yield validation.PAGE, validation.page()
 

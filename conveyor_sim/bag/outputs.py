@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 
 _EVENTS = [(name, topic, topic.events) for name, topic in OUTPUTS.items() if topic.events is not None]
+_STATES = [(topic, topic.state) for topic in OUTPUTS.values() if topic.state is not None and not topic.once]
 
 
 class MessageSink(Protocol):
@@ -100,11 +101,9 @@ class OutputWriter:
             return
         self._write_eyes()
         header, now = self._header(self._sim.tick), Snapshot(self._sim, self._run_id)
-        for topic in OUTPUTS.values():
-            if topic.state is None or topic.once:
-                continue
+        for topic, state in _STATES:
             if topic.rate is None or self._sim.due(topic.rate):
-                self._hand_out(topic.name, topic, header, topic.state, now)
+                self._hand_out(topic.name, topic, header, state, now)
 
     def _hand_out(self, name: str, topic: Topic, header: Header, observe: Callable[[Any], Any], source: Any) -> None:
         """Write the observation of a source, if any sink wants the topic and there is an observation."""

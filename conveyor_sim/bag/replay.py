@@ -90,7 +90,7 @@ def replay(path: str | Path, progress: Callable[[float, float], None] | None = N
     machine are those of the recording. Otherwise topics with tolerances are compared within these, and others not.
     A run that began at a checkpoint is replayed from it, if it is in the bag's folder as `start.npz`.
     The replay stops at the first difference. progress(done, total) is called with simulated times, s.
-    Raise BagError, also for a recording from a version in which moving rails pushed with unlimited force. Raise
+    Raise BagError, also for a recording that this version can't simulate again (`_simulation`). Raise
     SceneError if the recorded scene is refused, CheckpointError if a checkpoint is damaged or of another version.
     """
     with open_bag(path) as bag, bag.sense():
@@ -206,6 +206,11 @@ def _simulation(bag: Bag) -> Simulation:
         raise BagError(
             f"{bag.path}: format 4 with implicit friction and {model.integrator}, expected another format, solver or "
             "integrator: this version evaluates the friction under bottles at another time of the step"
+        )
+    if bag.format < 6 and model.sweeps:
+        raise BagError(
+            f"{bag.path}: format {bag.format} with integrator {model.integrator}, expected format 6 or another "
+            "integrator: this version solves the contacts of a step in another way"
         )
     for axis in model.plant.axes:
         if axis.kind == "position" and f"{axis.name}/blocked" not in bag.line.signal_names:

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Devices that rest: they are not called in ticks until a command, a restore, or a bottle near them wakes them."""
+"""Devices that rest: they are not called in ticks until something wakes them.
+
+Commands, a loss of power, a restore, and bottles near a moving rail wake them.
+"""
 
 from collections.abc import Callable, Sequence
 
@@ -19,6 +22,8 @@ class CalledDevices:
         # Only overridden methods are called.
         self._beginning = [device for device in devices if type(device).begin is not Device.begin]
         self._ending = [device for device in devices if type(device).end is not Device.end]
+        self.beginning: list[Device] = []
+        self.ending: list[Device] = []
         self._changed = changed
         self._resting: dict[Device, None] = {}
         self._sleepers = [device for device in devices if type(device).rests is not Device.rests]
@@ -31,13 +36,20 @@ class CalledDevices:
         self._resting.clear()
         self._divide()
 
-    def wake_loaded(self, now: ScanContext) -> None:
-        """Wake devices with an axis near which a bottle has come."""
+    def begin(self, now: ScanContext) -> None:
+        """Let devices act before the steps of a tick. One that wakes a later device acts before it."""
+        for device in self.beginning:
+            device.begin(now)
+
+    def end(self, now: ScanContext) -> None:
+        """Let devices evaluate the steps of a tick. Before, wake those with an axis near which a bottle has come."""
         moving = now.state.world.moving
         if self._axes.size and moving is not None and moving.loaded[self._axes].any():
-            for device in [one for one in self._resting if moving.loaded[one.axis]]:
+            for device in [one for one in self._resting if one.axis >= 0 and moving.loaded[one.axis]]:
                 self._resting.pop(device)
             self._divide()
+        for device in self.ending:
+            device.end(now)
 
     def review(self, now: ScanContext) -> None:
         """Let devices rest from now on that have nothing to do."""
@@ -51,9 +63,9 @@ class CalledDevices:
             self._divide()
 
     def _divide(self) -> None:
-        """Make the lists of devices to call, in order."""
-        self.beginning = [device for device in self._beginning if device not in self._resting]
-        self.ending = [device for device in self._ending if device not in self._resting]
+        """Make the lists of devices to call, in order. They change in place, because `begin` may be using them."""
+        self.beginning[:] = [device for device in self._beginning if device not in self._resting]
+        self.ending[:] = [device for device in self._ending if device not in self._resting]
         self._awake = [device for device in self._sleepers if device not in self._resting]
-        self._axes = np.array([device.axis for device in self._resting], np.int64)
+        self._axes = np.array([device.axis for device in self._resting if device.axis >= 0], np.int64)
         self._changed(frozenset(device.name for device in self._resting))

@@ -58,7 +58,7 @@ class EventLog:
         now: at the start, with the initial states of machines.
         """
         self._machines = [
-            (device.name, device, states)
+            (device.name, device.states, states)
             for device in devices
             if (states := [signal for signal in device.signals if signal.adds_to == "state"])
         ]
@@ -67,7 +67,7 @@ class EventLog:
         self.total = 0
         """Number of events so far."""
         self.bottles = {device.name: 0 for device in devices}
-        self.states = {name: [float(value) for value in device.states(now)] for name, device, _ in self._machines}
+        self.states = {name: [float(value) for value in read(now)] for name, read, _ in self._machines}
 
     def begin(self) -> None:
         """Start a tick without events."""
@@ -112,8 +112,8 @@ class EventLog:
     def note_states(self, now: ScanContext) -> None:
         """Add events of changed states at the end of a tick."""
         stored = self.states
-        for name, device, states in self._watched:
-            before, present = stored[name], device.states(now)
+        for name, read, states in self._watched:
+            before, present = stored[name], read(now)
             if before != present:
                 stored[name] = [float(value) for value in present]
                 for state, old, value in zip(states, before, present, strict=True):
@@ -335,8 +335,7 @@ class Line:
                 self.read_back.note(stopped, tick)
                 self._log.note(tick, "machine_state", name, 0.0, text="stopped: its watchdog received no command")
         before = self.now.speeds.tolist()
-        for device in self._called.beginning:
-            device.begin(self.now)
+        self._called.begin(self.now)
         self._alarms.take(self.now)
         if before != self.now.speeds.tolist():
             self.move_belts()
@@ -344,9 +343,7 @@ class Line:
     def end(self, tick: int) -> None:
         """Let the devices evaluate the steps up to a tick."""
         self._at(tick)
-        self._called.wake_loaded(self.now)
-        for device in self._called.ending:
-            device.end(self.now)
+        self._called.end(self.now)
         if tick == 0:
             self._alarms.take(self.now)
 
@@ -370,7 +367,8 @@ class Line:
         for device in self._feeding:
             first = self.now.state.next_id
             device.feed(self.now)
-            self._log.note_fed(device, first, self.now)
+            if self.now.state.next_id > first:
+                self._log.note_fed(device, first, self.now)
         self.now.begin_scan()
 
     def close(self, passed: Sequence[DamageEvent], clogged: Mapping[str, bool]) -> None:

@@ -10,6 +10,7 @@ from shlex import quote
 from conveyor_sim.report.labelled import MOST_LINES, labelled
 from conveyor_sim.report.summary import Summary
 from conveyor_sim.run.force_check import ForceCheck, Pressed
+from conveyor_sim.run.queue_check import QueueCheck
 from conveyor_sim.run.runner import Run
 from conveyor_sim.support.printable import SENTENCE, printable
 
@@ -26,9 +27,9 @@ def outline(summary: Summary) -> list[str]:
     if summary.peak_force:
         forces = f"peak {summary.peak_force:.3g} N, 99 % of peaks at most {summary.peak_force_99:.3g} N"
         predicted = f"; predicted error {summary.predicted}" if summary.predicted else ""
-        lines.append(labelled("forces", f"{forces}{predicted}"))
-    if summary.borne is not None and (loads := summary.borne.sentence):
-        lines.append(labelled("damage", loads))
+        lines.append(labelled("forces", f"{forces}{summary.origin}{_peak_note(summary.queue)}{predicted}"))
+    if summary.load_sentence:
+        lines.append(labelled("damage", summary.load_sentence))
     if summary.alarms is not None and summary.alarms.any:
         lines += [labelled("" if index else "alarms", line) for index, line in enumerate(summary.alarms.lines)]
     if summary.commands > summary.refused:
@@ -42,8 +43,8 @@ def outline_unrecorded(
     """Return the lines of a run that was not recorded. name: scene. scene_warnings: about its settings."""
     lines = [headline(name, run.simulated, run.wall)]
     if run.peak_force:
-        lines.append(labelled("forces", f"peak {run.peak_force:.3g} N"))
-    warnings = _check_warnings(checks)
+        lines.append(labelled("forces", f"peak {run.peak_force:.3g} N{_peak_note(run.queue)}"))
+    warnings = [*_queue_warnings(run.queue), *_check_warnings(checks)]
     guard = (f"guard: {text}" for text in run.guard)
     return _with_warnings(lines, [*warnings, *scene_warnings, *guard])
 
@@ -88,11 +89,21 @@ def _warnings(summary: Summary) -> list[str]:
     refused = f"{summary.refused} command{'s' * (summary.refused != 1)} refused{on_occasions(summary)}"
     return [
         *_events("guard", summary.guard, summary.guard_texts),
+        *_queue_warnings(summary.queue),
         *_check_warnings((summary.achieved, summary.pressed)),
         *summary.warnings,
         *_events("limits passed", summary.damage_events, summary.damage_texts),
         *([f"{refused}; `conveyor-sim events BAG --kind command_refused` lists them"] if summary.refused else []),
     ]
+
+
+def _peak_note(queue: QueueCheck | None) -> str:
+    """Return a clause on what the peak force leaves out, with the comma before it; empty with other integrators."""
+    return "" if queue is None or not queue.peak_note else f" ({queue.peak_note})"
+
+
+def _queue_warnings(queue: QueueCheck | None) -> list[str]:
+    return [] if queue is None or not queue.warning else [queue.warning]
 
 
 def _check_warnings(checks: Sequence[ForceCheck | Pressed | None]) -> list[str]:

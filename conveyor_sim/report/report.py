@@ -53,9 +53,10 @@ def _account(summary: Summary) -> list[tuple[str, str]]:
         ("predicted error", summary.predicted),
         ("achieved", None if summary.achieved is None else summary.achieved.sentence),
         ("load", None if summary.pressed is None else summary.pressed.sentence),
+        ("queues", None if summary.queue is None else summary.queue.sentence),
         ("guard", _listed(summary.guard, summary.guard_texts)),
         ("limits passed", _listed(summary.damage_events, summary.damage_texts)),
-        ("energy", None if summary.energy is None else summary.energy.sentence),
+        ("energy", summary.energy_sentence),
         ("commands", _commands(summary)),
     ]
     return [(name, text) for name, text in rows if text]
@@ -123,7 +124,7 @@ def report_unrecorded(scene: Scene, model: Model, run: Run, details: bool = Fals
         return
     for line in (
         setting_line(model),
-        *(check.sentence for check in checks if check is not None),
+        *(check.sentence for check in (*checks, run.queue) if check is not None),
         *measured(run.simulated, run.wall, run.spent, 0.0, step_limit(scene), {}),
     ):
         click.echo(line)

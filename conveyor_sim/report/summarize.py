@@ -26,6 +26,7 @@ from conveyor_sim.report.bottle_counts import BottleCounter, BottleCounts
 from conveyor_sim.report.explain.choices import scene_warnings
 from conveyor_sim.report.summary import BeltFlow, Energy, LoadHistory, Loop, Summary
 from conveyor_sim.run.force_check import PressWatch, achieved, pressed
+from conveyor_sim.run.queue_check import QueueWatch
 from conveyor_sim.run.speed import TopicCount
 from conveyor_sim.scene import parse_again, parse_overrides
 from conveyor_sim.support.printable import SENTENCE, printable
@@ -68,6 +69,7 @@ class _Tally:
         self._passed: list[tuple[str, str]] = []
         self._alarms = AlarmTally()
         self._pressing = PressWatch()
+        self._queues = QueueWatch(self._model)
         for topic, _, data in bag.raw():
             self._topics[topic][0] += 1
             self._topics[topic][1] += len(data)
@@ -83,6 +85,7 @@ class _Tally:
             time = self._bag.time(message.tick)
             self._itinerary.take(time, read)
             self._pressing.take(time, read.id, read.impulse)
+            self._queues.take(time, read)
             self._forces.append(read.peak_force[read.peak_force > 0.0])
             self._unknown = self._unknown or bool(np.isnan(read.peak_force).any())
         elif topic == "guard":
@@ -126,11 +129,13 @@ class _Tally:
             limit=_step_limit(line, len(belt)),
             achieved=None if model is None else achieved(model, peak),
             pressed=None if model is None else pressed(model, self._pressing.load),
+            queue=self._queues.check,
             warnings=[] if model is None else [printable(text, SENTENCE) for text in scene_warnings(model)],
             guard=dict(Counter(kind for kind, _ in self._guard)),
             guard_texts=[text for _, text in self._guard[:GUARD_TEXTS]],
             energy=None if self._ledger is None else _energy(self._ledger, line.belts, line.rails),
             borne=self._borne,
+            from_impulses=line.integrator == "impulses",
             damage_events=dict(Counter(kind for kind, _ in self._passed)),
             damage_texts=[text for _, text in self._passed[:GUARD_TEXTS]],
             alarms=self._alarms.figures(seconds, int(line.tick_ns) * 1e-9) if "events" in self._bag.counts else None,
@@ -198,5 +203,6 @@ def _step_limit(line: Any, bottles: int) -> StepLimit | None:
         choice = choose_steps(Plant.of(scene))
     except SceneError:
         return None
-    same = (scene.accuracy.integrator, choice.steps) == (line.integrator, line.steps_per_tick)
+    chosen = scene.accuracy.integrator, choice.steps, scene.accuracy.sweeps or 0
+    same = chosen == (line.integrator, line.steps_per_tick, line.sweeps)
     return step_limit(scene, choice, bottles) if same else None

@@ -16,6 +16,7 @@ from conveyor_sim.physics.timestep.prediction import percent
 from conveyor_sim.report.alarm_figures import AlarmFigures
 from conveyor_sim.report.bottle_counts import BottleCounts
 from conveyor_sim.run.force_check import ForceCheck, Pressed
+from conveyor_sim.run.queue_check import QueueCheck
 from conveyor_sim.run.speed import TopicCount
 
 LOAD_WORDS = {
@@ -158,6 +159,8 @@ class Summary:
     """Check of the peak force; None if it or its prediction is unknown."""
     pressed: Pressed | None
     """Largest sustained force; None if unknown, or if no bound on the time step depends on it."""
+    queue: QueueCheck | None
+    """Longest queue with integrator impulses; None with others, and if bottles were not recorded."""
     warnings: list[str]
     """Sentences on settings of the scene that make results wrong; empty if this version refuses the scene."""
     guard: dict[str, int]
@@ -168,6 +171,8 @@ class Summary:
     """None if no energy ledger was recorded."""
     borne: LoadHistory | None
     """Loads on the bottles; None if it was not recorded."""
+    from_impulses: bool
+    """True if energy, loads and peaks come from impulses, with integrator impulses, and not from forces."""
     damage_events: dict[str, int]
     """Number of passed limits, by limit."""
     damage_texts: list[str]
@@ -182,6 +187,22 @@ class Summary:
     on commanding it; None if events were not recorded.
     """
     topics: dict[str, TopicCount]
+
+    @property
+    def energy_sentence(self) -> str:
+        """Return one sentence on the energy ledger; empty without one."""
+        return "" if self.energy is None else self.energy.sentence + self.origin
+
+    @property
+    def load_sentence(self) -> str:
+        """Return one sentence on the loads on bottles; empty without any."""
+        loads = "" if self.borne is None else self.borne.sentence
+        return loads + self.origin if loads else ""
+
+    @property
+    def origin(self) -> str:
+        """Return a clause that marks figures from impulses, with the comma before it; empty with forces."""
+        return ", from impulses" if self.from_impulses else ""
 
     @property
     def real_time_factor(self) -> float | None:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from conveyor_sim.physics.model import Model
 from conveyor_sim.physics.timestep.prediction import deep_warning, deepest, percent
+from conveyor_sim.run.queue_check import QueueCheck, QueueWatch
 from conveyor_sim.simulation import Simulation
 
 WINDOW = 1.0
@@ -138,6 +139,12 @@ class PeakWatch:
         self.force = simulation.peak_force
         """Largest force so far, N; None without the effect `peaks`."""
         self._pressing = PressWatch()
+        self._queues = QueueWatch(simulation.model)
+
+    @property
+    def queue(self) -> QueueCheck | None:
+        """Longest queue with integrator impulses; None with others."""
+        return self._queues.check
 
     @property
     def load(self) -> float | None:
@@ -153,6 +160,7 @@ class PeakWatch:
             if simulation.due("bottles"):
                 bottles = simulation.bottles()
                 self._pressing.take(simulation.time, bottles.id, bottles.impulse)
+                self._queues.take(simulation.time, bottles)
 
 
 def achieved(model: Model, peak_force: float | None) -> ForceCheck | None:

@@ -18,6 +18,7 @@ from conveyor_sim.control.scan import Controller
 from conveyor_sim.errors import ConveyorError, SimulationError
 from conveyor_sim.line.run_state import ENDED, RUNNING, STOPPED, RunState
 from conveyor_sim.run.force_check import PeakWatch
+from conveyor_sim.run.queue_check import QueueCheck
 from conveyor_sim.run.scan_loop import ScanLoop
 from conveyor_sim.run.session import keep_stopped
 from conveyor_sim.run.speed import Spent
@@ -44,6 +45,8 @@ class Run:
     """Largest normal contact force, N; None without the effect `peaks`."""
     load: float | None
     """Largest lasting load on a bottle (`force_check.Pressed`), N; None if it is unknown."""
+    queue: QueueCheck | None
+    """Longest queue with integrator impulses; None with others."""
     guard: tuple[str, ...]
     """Reports of the guard."""
     spent: Spent
@@ -113,7 +116,8 @@ def run_scene(
         guard = tuple(event.text for event in outputs.take_noticed())
         kernels = simulation.integration.kernel_seconds
         spent = Spent(kernels, stepping - kernels, 0.0 if recorder is None else wall - stepping)
-        return Run(bag, simulation.tick * scene.tick, wall, stop.is_set(), peaks.force, peaks.load, guard, spent)
+        simulated, reached = simulation.tick * scene.tick, (peaks.force, peaks.load, peaks.queue)
+        return Run(bag, simulated, wall, stop.is_set(), *reached, guard, spent)
 
 
 @contextmanager

@@ -194,8 +194,9 @@ class ScanLoop:
     def before_tick(self, outputs: OutputWriter | None) -> None:
         """Scan, write the recorded variables to the outputs, and queue the commands. Raise as `scan_tick`."""
         self.scan_tick()
-        if outputs is not None:
-            outputs.show_variables(self.recorded.names, self.recorded.values())
+        if outputs is not None and self._attached is not None:
+            recorded = self._attached.recorded
+            outputs.show_variables(recorded.names, recorded.values())
         self.give()
 
     def after_tick(self, outcomes: Sequence[CommandOutcome]) -> None:

@@ -47,7 +47,7 @@ def contact_problems(scene: Scene) -> Iterator[Problem]:
                 ("bottle_types", name, "base_radius"),
                 f"{shown(kind.base_radius)} given, expected at most the radius, {kind.radius:g} (m)",
             )
-    if scene.friction_solver == "implicit" and scene.accuracy.integrator not in STEPPED:
+    if scene.friction_solver == "implicit" and scene.accuracy.integrator not in (*STEPPED, "impulses"):
         yield Problem(
             ("friction_solver",), f'"implicit" given, expected "explicit" with integrator {scene.accuracy.integrator}'
         )

@@ -1,18 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks of a scene with integrator impulses: laws that it does not have, and outputs that it can't give."""
+"""Checks of a scene with integrator impulses: laws that it does not have."""
 
 from collections.abc import Iterator
 
-from conveyor_sim.scene.effect_names import EffectName
 from conveyor_sim.scene.problems import Path, Problem
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.scene.words import shown
-
-OBSERVERS: tuple[EffectName, ...] = ("energy_ledger", "scuffing", "crushing", "impacts", "tipping")
-"""Effects that evaluate forces in every step; an impact has none."""
-
-LOADS = ("scuffing_work", "crushing_force", "opposed_force", "impact_speed", "impact_force", "tipping")
-"""Limits that need these effects."""
 
 _WITH = "with integrator impulses, or another integrator"
 
@@ -38,10 +31,7 @@ def impulse_problems(scene: Scene) -> Iterator[Problem]:
             return
     if accuracy.per_tick is None and accuracy.dt is None:
         yield Problem(("accuracy",), f"neither per_tick nor dt given, expected per_tick, such as 8, {_WITH}")
-    for name in scene.axes:
-        yield Problem(("axes", name), f"given, expected no axis {_WITH}")
     yield from _laws(scene)
-    yield from _observers(scene)
 
 
 def _laws(scene: Scene) -> Iterator[Problem]:
@@ -61,15 +51,3 @@ def _laws(scene: Scene) -> Iterator[Problem]:
             yield Problem(
                 ("bottle_types", name, "base_radius"), f"{shown(kind.base_radius)} given, expected none {_WITH}"
             )
-
-
-def _observers(scene: Scene) -> Iterator[Problem]:
-    for topic in ("ledger", "damage"):
-        if (rate := getattr(scene.outputs, topic)) > 0.0:
-            yield Problem(("outputs", topic), f"{shown(rate)} given, expected 0 {_WITH}")
-    for field in LOADS:
-        if (limit := getattr(scene.limits, field)) is not None:
-            yield Problem(("limits", field), f"{shown(limit)} given, expected none {_WITH}")
-    for name in OBSERVERS:
-        if scene.effects.get(name) == "on":
-            yield Problem(("effects", name), f'"on" given, expected "off" {_WITH}')

@@ -55,8 +55,11 @@ def limit_problems(scene: Scene) -> Iterator[Problem]:
         yield Problem(("limits", "clogging_time"), text)
 
 
-MOVE_RAILS = ("leapfrog", "semi_implicit_euler", "velocity_verlet")
+MOVE_RAILS = ("leapfrog", "semi_implicit_euler", "velocity_verlet", "impulses")
 """Integrators with moving rails. The others evaluate forces within a step, or solve for forces of rails at rest."""
+
+VIBRATE = ("leapfrog", "semi_implicit_euler", "velocity_verlet")
+"""Integrators with vibrating belts."""
 
 
 WHEEL_FIELDS = ("stars", "screws", "side_belts")
@@ -232,11 +235,11 @@ def _vibrations(scene: Scene) -> Iterator[Problem]:
         if belt.vibration is None:
             continue
         path: Path = ("belts", name, "vibration")
-        if scene.accuracy.integrator not in MOVE_RAILS:
+        if scene.accuracy.integrator not in VIBRATE:
             yield Problem(
                 path,
                 f"given, expected none with integrator {scene.accuracy.integrator}, or integrator "
-                f"{listed(list(MOVE_RAILS))}",
+                f"{listed(list(VIBRATE))}",
             )
         turns = isinstance(belt, CurvedBelt) or (
             isinstance(belt, PathBelt) and any(isinstance(surface, CurvedSurface) for surface in belt.surfaces)

@@ -45,6 +45,10 @@ FRICTION = OLD / "before_warm_friction.mcap"
 """Format 3, recorded with commit cab9d27: a zigzag queue of four bottles with implicit friction in few steps."""
 VERLET = OLD / "before_warm_friction_verlet.mcap"
 """Likewise, with velocity Verlet."""
+EXPLICIT = OLD / "before_sweeps.mcap"
+"""Format 5, recorded with commit 04b1e30: six bottles that a belt pushes into a corner, with leapfrog."""
+IMPULSES = OLD / "before_sweeps_impulses.mcap"
+"""Likewise, with impulses and three sweeps per step."""
 EYE = "photo_eyes/eye/blocked"
 
 
@@ -209,6 +213,22 @@ def _of_format_4(folder: Path, integrator: str, solver: str) -> Path:
 
     record(parse_scene(json.dumps(scene)), folder / "bag", 2)
     return edited(folder / "bag", folder / "fourth", fourth)
+
+
+def test_the_fifth_format_replays_with_integrators_of_forces() -> None:
+    report = replay(EXPLICIT)
+    assert (report.difference, report.last_tick, report.compared["contacts"]) == (None, 20, 11)
+    with open_bag(EXPLICIT) as bag:
+        assert (bag.format, bag.line.sweeps, bag.line.integrator) == (5, 0, "leapfrog")
+        assert bag.line.tags
+
+
+def test_impulses_of_the_fifth_format_are_refused_and_reported() -> None:
+    with pytest.raises(BagError, match=stating("format 5", "integrator impulses", "expected format 6")):
+        replay(IMPULSES)
+    assert summarize(IMPULSES).simulated == pytest.approx(0.2)
+    with open_bag(IMPULSES) as bag:
+        assert recorded_scene(bag.line, "bag").accuracy.sweeps == 3
 
 
 def test_a_format_of_the_future_is_refused(tmp_path: Path) -> None:

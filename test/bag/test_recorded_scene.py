@@ -37,7 +37,7 @@ def test_streams_are_those_of_when_it_was_recorded(format: int) -> None:
     """By the place of a device in its list, with a branch for each purpose; and by names since."""
     made = scene(**LINE)
     line = SimpleNamespace(
-        scene_text=made.source_text, overrides="", integrator="leapfrog", steps_per_tick=10, format=format
+        scene_text=made.source_text, overrides="", integrator="leapfrog", steps_per_tick=10, sweeps=0, format=format
     )
     by_name = format > 1
     simulation = Simulation(recorded_scene(line, "bag"))

@@ -5,19 +5,27 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from bag.small_line import record
+from facts import stating
 from scenes import RADIUS, belt, bottle, kind, polyline, scene
 from swept import MU_BASE, crowd, fields, file_of, forces_on, glass, run, swept
 
+from conveyor_sim.bag.messages.encode import FORMAT
+from conveyor_sim.bag.reader import open_bag
+from conveyor_sim.bag.recorded_scene import recorded_scene
 from conveyor_sim.bag.replay import replay
 from conveyor_sim.engine.arrays.impulses import COLOURS
 from conveyor_sim.engine.integrators import INTEGRATORS
 from conveyor_sim.engine.threads.workers import UNIT
+from conveyor_sim.errors import CheckpointError
 from conveyor_sim.physics.state.empty_world import empty_pairs
+from conveyor_sim.physics.stepping.guard.guard import OVERLAP
+from conveyor_sim.physics.stepping.guard.violation import unresolved
 from conveyor_sim.scene import parse_scene
 from conveyor_sim.scene.recorded import expanded_text
 from conveyor_sim.simulation import Simulation
@@ -84,10 +92,32 @@ def test_a_recording_replays_bit_for_bit(accuracy: Any, tmp_path: Path) -> None:
     given = crowd(6, 5, accuracy=accuracy, outputs={"bottles": 50, "contacts": 50})
     recorded = scene(**given, duration=1.0)
     record(recorded, tmp_path / "bag", 100)
+    with open_bag(tmp_path / "bag") as bag:
+        assert bag.line.sweeps == recorded.accuracy.sweeps
     report = replay(tmp_path / "bag")
     assert report.difference is None
     assert report.exact
     assert report.compared["contacts"] == 51
+
+
+def test_a_recording_keeps_its_sweeps_whatever_the_default() -> None:
+    """The sweeps of the recorded run replace those that this version would choose for the same text."""
+    given = crowd(2, 2, accuracy={"integrator": "impulses", "per_tick": 8})
+    text = scene(**given).source_text
+    line = SimpleNamespace(
+        scene_text=text, overrides="", integrator="impulses", steps_per_tick=8, sweeps=5, format=FORMAT
+    )
+    assert parse_scene(text).accuracy.sweeps == 2
+    assert recorded_scene(line, "bag").accuracy.sweeps == 5
+
+
+def test_a_checkpoint_does_not_go_on_with_other_sweeps(tmp_path: Path) -> None:
+    one, other = (scene(**crowd(6, 5, accuracy=swept(8, sweeps))) for sweeps in (2, 3))
+    sim = Simulation(one)
+    sim.advance(2)
+    sim.save(tmp_path / "there")
+    with pytest.raises(CheckpointError, match=stating("accuracy.sweeps", "2", "3")):
+        Simulation.load(tmp_path / "there", scene=other)
 
 
 def test_the_explicit_form_of_a_scene_has_the_same_bits() -> None:
@@ -240,3 +270,38 @@ def test_a_fast_bottle_does_not_pass_a_rail() -> None:
         sim.advance()
         state = sim.bottles()
         assert max(abs(state.x[0]), abs(state.y[0])) <= 0.5 - RADIUS + 1e-3
+
+
+def test_overlaps_of_too_few_sweeps_are_reported_once() -> None:
+    """From 0.4 % of the diameter on; with the default steps the crowd stays far below it."""
+    found = {}
+    for steps, sweeps in ((1, 1), (8, 2)):
+        given = crowd(6, 5)
+        sim = run(steps, sweeps, **{name: given[name] for name in ("belts", "rails", "bottles")})
+        sim.advance(200)
+        found[steps] = sim.integration.deepest_overlap, [event.text for event in sim.integration.take_events()]
+    coarse, default = found[1], found[8]
+    assert coarse[0] > OVERLAP > 4.0 * default[0]
+    assert default[1] == [] and len(coarse[1]) == 1
+    assert "1 steps a tick with 1 sweep do not resolve" in coarse[1][0]
+    assert "overlaps" in coarse[1][0] or "sinks" in coarse[1][0]
+
+
+def test_a_contact_that_steps_resolve_may_overlap() -> None:
+    """A soft spring overlaps by its load: that is no error of the sweeps."""
+    soft = [glass(stiffness=2e3), glass("steel", stiffness=2e3)]
+    for stiffness, expected in ((soft, False), (fields()["contacts"], True)):
+        sim = run(8, 2, **file_of(3) | {"contacts": stiffness})
+        assert unresolved(sim.model) is expected
+
+
+def test_a_step_may_go_half_the_skin() -> None:
+    """Contacts act before bottles touch, so the lists of both bottles must hold for the next step."""
+    allowed, reported = [], []
+    for share in (0.99, 1.01):
+        sim = run(1, 1, bottles=[bottle(0.0, 0.0, share * 0.5 * 0.2 * RADIUS / 0.01), bottle(9.0, 0.0)])
+        sim.advance(3)
+        allowed.append(sim.integration.shortened_ticks == 0)
+        reported.append([event.kind for event in sim.integration.take_events()])
+    assert allowed == [True, False]
+    assert reported[0] == [] and reported[1][0] == "shorter_steps"

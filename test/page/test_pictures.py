@@ -21,8 +21,8 @@ from conveyor_sim.scene import load_scene
 from conveyor_sim.support.resources import scene_path
 
 IMAGES = Path(__file__).resolve().parents[2] / "docs" / "images" / "page"
-MOST_BYTES = 5_000_000
-"""Bytes of all pictures of docs/, at most."""
+MOST_BYTES = 7_000_000
+"""Bytes of all pictures of docs/, at most: those of the cookbook took them above 5 MB."""
 BLOCK = 20
 """Size of a block that is reduced to one colour, px: about a word."""
 OFF = 30.0

@@ -12,6 +12,8 @@ from bag.editing import edited
 from bag.small_line import SMALL_LINE, record
 from facts import missing
 from rich.console import Console
+from scenes import NO_OUTPUTS, bottle, scene
+from swept import fields
 
 from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.reader import open_bag
@@ -254,6 +256,15 @@ def test_the_energy_ledger_is_told_with_the_work_of_each_belt(tmp_path: Path) ->
     assert f"% of a turnover of {ledger.turnover:.4g} J" in text
     assert f"{ledger.belt_work[0]:.4g}" in text
     assert json.loads(write_summary(summary, tmp_path).read_text())["energy"]["residual"] == ledger.residual
+
+
+def test_figures_from_impulses_are_marked(bag: Path, tmp_path: Path) -> None:
+    rates = {"bottles": 100, "ledger": 100, "damage": 100}
+    bottles = [bottle(0.0, 0.0, 0.5), bottle(0.132, 0.0)]
+    record(scene(**fields(bottles=bottles, outputs={**NO_OUTPUTS, **rates})), tmp_path / "bag", 2)
+    lines = shown(summarize(tmp_path / "bag")).splitlines()
+    assert [line.split()[0] for line in lines if ", from impulses" in line] == ["forces", "damage", "energy"]
+    assert "from impulses" not in shown(summarize(bag))
 
 
 def test_summary_is_written_as_json(bag: Path, tmp_path: Path) -> None:

@@ -23,7 +23,7 @@ from conveyor_sim.scene.recorded import recorded_source
 if TYPE_CHECKING:
     from conveyor_sim.simulation import Simulation
 
-FORMAT = 5
+FORMAT = 6
 """Version of the messages and of the meaning of the recorded scene text (Line.format). It is raised by one at each
 change that a reader must know; `older.py` reads the earlier ones.
 """
@@ -240,5 +240,6 @@ def line_message(sim: Simulation, run_id: str, header: Header) -> bytes:
         "where": scene.where,
         "start_time": scene.start_time,
         "tags": [TagFields.of(tag) for tag in image.tags],
+        "sweeps": model.sweeps,
     }
     return _pack(LINE, header, values)

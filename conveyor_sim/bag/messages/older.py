@@ -2,7 +2,7 @@
 """Messages of recordings in earlier formats, converted to the present definitions.
 
 Format 1: Line has no tags. Format 2: Line has tags as columns, in place of messages (`Line.tags`). In both, Line has no
-field `format`; the hash of its definition identifies them.
+field `format`; the hash of its definition identifies them. Up to format 5, Line has no sweeps.
 """
 
 from __future__ import annotations
@@ -50,6 +50,8 @@ def _zero(kind: int, details: Any) -> Any:
 
 
 def _line(message: Any, format: int) -> dict[str, Any]:
+    if format > 2:
+        return {}
     return {"format": format, "tags": _signals_as_tags(message) if format == 1 else _columns_as_tags(message)}
 
 

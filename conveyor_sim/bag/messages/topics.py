@@ -269,7 +269,8 @@ _ROWS = (
     Topic(
         "ledger",
         "conveyor_msgs/msg/Ledger",
-        "the energy ledger: work of each belt, dissipated and stored energy, and the residual",
+        "the energy ledger: work of each belt, dissipated and stored energy, and the residual; "
+        "[from impulses](../energy_and_damage.md#from-impulses) if `line.integrator` is impulses",
         rate="ledger",
         state=lambda now: now.sim.ledger(),
         columns=Ledger,
@@ -279,7 +280,7 @@ _ROWS = (
         "damage",
         "conveyor_msgs/msg/Damage",
         "loads on every bottle: sliding work so far; largest forces, impacts and index of tipping since the last "
-        "message",
+        "message; [from impulses](../energy_and_damage.md#from-impulses) if `line.integrator` is impulses",
         rate="damage",
         state=lambda now: now.sim.damage(),
         columns=DamageColumns,

@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Arrays of the method of impulses (`engine/impulses/`); None with every other integrator.
 
-Shapes: S bottle slots, T bottle types, M rail materials, P pairs or E entries by capacity. SI units, float64.
+Shapes: S bottle slots, T bottle types, M rail materials, P pairs or E entries by capacity, A axes, C contacts with
+bodies: CONTACTS by slot. SI units, float64.
 """
 
 from typing import Any, NamedTuple
 
 from conveyor_sim.engine.arrays.integrators import Triple
-from conveyor_sim.engine.arrays.types import F8, I8, U4
+from conveyor_sim.engine.arrays.types import F8, I4, I8, U4
 from conveyor_sim.engine.compiler.groups import group
 
 ROW = 4
@@ -18,6 +19,9 @@ BODY = 8
 
 CONSTANTS = 16
 """Numbers by kind of contact (`impulses/constants.py`)."""
+
+MOST_PRESSED = 16
+"""Pressed contacts of one bottle that are compared for the largest squeeze. Further ones count in sums only."""
 
 COLOURS = 63
 """Most colours of pairs. Pairs of one colour share no bottle, except in the last colour, which takes all others."""
@@ -60,6 +64,74 @@ class NearImpulses(NamedTuple):
     """(1,)"""
 
 
+CONTACTS = 4
+"""Most contacts of a bottle with bodies; only the deepest act."""
+
+GEOMETRY = 7
+"""Numbers by contact with a body: normal x and y, gap (m), velocity of its surface along the normal and across it
+(m/s), the same by the speed of an axis that is off its profile (1, or m)."""
+
+NX, NY, GAP, NORMAL, ACROSS, AHEAD, ASIDE = range(GEOMETRY)
+
+
+@group
+class BodyImpulses(NamedTuple):
+    """Contacts with bodies (`engine/impulses/bodies.py`) and drives of their axes (`engine/impulses/drives.py`)."""
+
+    piece: I4
+    """Piece of a body, (C,); -1: no contact."""
+    row: F8
+    """Impulse on the body, (ROW * C,)."""
+    geometry: F8
+    """Scratch of a substep, (GEOMETRY * C,)."""
+    axis: I4
+    """Scratch of a substep: axis of the body, (C,); -1: the body rests."""
+    kind: I4
+    """Scratch of a substep: row of `rail_constants`, (C,)."""
+    speed: F8
+    """Scratch of a substep: speed of an axis off its profile, m/s or rad/s, (A,)."""
+    drive: F8
+    """Scratch of a substep: impulse of its drive, N s or N m s, (A,)."""
+    leaves: I4
+    """Scratch of a substep: marks of axes that leave their profiles (`drives.py`), (A,)."""
+    struck: F8
+    """Scratch of a substep: force over h of impacts that drives withstand, by unit of bottles and axis, N or N m,
+    (units * A,)."""
+
+
+@group
+class WorkScratch(NamedTuple):
+    """Scratch of a substep for the energy ledger (`impulses/work.py`), (S,)."""
+
+    start_x: F8
+    """Velocity after base friction, before contacts, m/s."""
+    start_y: F8
+    mean: Triple
+    """Velocity with which the friction under a bottle and its pressed contacts do work, m/s; `turn`: R omega."""
+    impact: F8
+    """Kinetic energy that impacts gave the bottle, J."""
+
+
+@group
+class LoadScratch(NamedTuple):
+    """Scratch of a substep for loads on bottles (`impulses/loads.py`), (S,)."""
+
+    normal: F8
+    """Sum of the normal impulses of pressed contacts, N s."""
+    blow: F8
+    """Largest peak force of an impact, N."""
+    x: F8
+    """Impulse of all contacts on the bottle, N s."""
+    y: F8
+    pressed: I8
+    """Number of pressed contacts in the columns below."""
+    pressed_x: F8
+    """Outward normal, (MOST_PRESSED * S,)."""
+    pressed_y: F8
+    pressed_normal: F8
+    """Normal impulse, N s."""
+
+
 @group
 class Impulses(NamedTuple):
     """Constants of the method, and its state by bottle."""
@@ -99,3 +171,6 @@ class Impulses(NamedTuple):
     """1: lists were rebuilt, so `warm` must be summed anew, (1,)."""
     mask: I8
     """Scratch of a rebuild: colours of each bottle's pairs, one bit each, (S,)."""
+    bodies: BodyImpulses | None
+    work: WorkScratch | None
+    loads: LoadScratch | None

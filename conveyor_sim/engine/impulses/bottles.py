@@ -6,7 +6,8 @@ from typing import Any
 
 from numba import uint64
 
-from conveyor_sim.engine.arrays.impulses import BODY, ROW
+from conveyor_sim.engine.arrays.bodies import Bottles
+from conveyor_sim.engine.arrays.impulses import BODY, CONTACTS, ROW
 from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.contact.friction import implicit_slip
@@ -56,15 +57,22 @@ def _on_base(world: World, footing: Any, h: float, i: int) -> tuple[float, float
     bottles, limit = world.bottles, world.settings.slip_limit
     if footing is None:
         return bottles.vx[i], bottles.vy[i]
-    ux, uy = footing.ux[i], footing.uy[i]
-    if footing.turn is not None:
-        ux -= footing.turn[i] * (bottles.y[i] + 0.5 * h * bottles.vy[i])
-        uy += footing.turn[i] * (bottles.x[i] + 0.5 * h * bottles.vx[i])
+    ux, uy = belt_velocity(bottles, footing, h, i)
     vx, vy = bottles.vx[i] - ux, bottles.vy[i] - uy
     slip = math.sqrt(vx * vx + vy * vy)
     rest = implicit_slip(slip, h * footing.friction_limit[i] * bottles.inverse_mass[i] / limit, limit, None)
     share = rest / slip if slip > 0.0 else 0.0
     return ux + share * vx, uy + share * vy
+
+
+@part
+def belt_velocity(bottles: Bottles, footing: Any, h: float, i: int) -> tuple[float, float]:
+    """Return the velocity (m/s) of the belt under bottle i at the middle of its way in a substep of h (s)."""
+    ux, uy = footing.ux[i], footing.uy[i]
+    if footing.turn is not None:
+        ux -= footing.turn[i] * (bottles.y[i] + 0.5 * h * bottles.vy[i])
+        uy += footing.turn[i] * (bottles.x[i] + 0.5 * h * bottles.vx[i])
+    return ux, uy
 
 
 @part
@@ -120,6 +128,7 @@ def take_step(world: World, impulses: Any, h: float) -> None:
         _scale_pairs(world.pairs, ratio)
         _scale_near(world.near_segments, ratio)
         _scale_near(world.near_arcs, ratio)
+        _scale_bodies(impulses.bodies, ratio)
         impulses.anew[0] = 1
     impulses.step[0] = h
 
@@ -139,6 +148,13 @@ def _scale_near(near: Any, ratio: float) -> None:
 
 
 @part
+def _scale_bodies(bodies: Any, ratio: float) -> None:
+    if bodies is None:
+        return
+    _scale(bodies.row, bodies.piece.size, ratio)
+
+
+@part
 def _scale(rows: Any, count: int, ratio: float) -> None:
     for entry in range(count):
         rows[ROW * entry] *= ratio
@@ -154,6 +170,7 @@ def _sum(world: World, impulses: Any) -> None:
     _sum_pairs(world, world.pairs, impulses)
     _sum_near(world, world.near_segments, impulses)
     _sum_near(world, world.near_arcs, impulses)
+    _sum_bodies(world, impulses, impulses.bodies)
 
 
 @part
@@ -173,6 +190,15 @@ def _sum_near(world: World, near: Any, impulses: Any) -> None:
     for i in range(world.bottles.x.size):
         for entry in range(near.start[i], near.start[i + 1]):
             _add(world, impulses, i, near.impulse.row, ROW * entry, -1.0)
+
+
+@part
+def _sum_bodies(world: World, impulses: Any, bodies: Any) -> None:
+    if bodies is None:
+        return
+    for place in range(bodies.piece.size):
+        if bodies.piece[place] >= 0:
+            _add(world, impulses, place // CONTACTS, bodies.row, ROW * place, -1.0)
 
 
 @part

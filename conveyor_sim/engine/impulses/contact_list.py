@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.engine.arrays.impulses import ROW
+from conveyor_sim.engine.arrays.impulses import CONTACTS, ROW
 from conveyor_sim.engine.arrays.types import F8, I8
 from conveyor_sim.engine.arrays.world import World
 from conveyor_sim.engine.compiler.compile import kernel, part
 from conveyor_sim.engine.rails.arc import arc_contact
+from conveyor_sim.engine.rails.moving import piece_contact
 from conveyor_sim.engine.rails.segment import segment_contact
 
 
@@ -23,7 +24,8 @@ def list_impulses(world: World, kind: NDArray[np.uint8], a: I8, b: I8, values: F
     """
     count = _pairs(world, kind, a, b, values)
     count = _segments(world, world.segments, world.near_segments, kind, a, b, values, count)
-    return _arcs(world, world.arcs, world.near_arcs, kind, a, b, values, count)
+    count = _arcs(world, world.arcs, world.near_arcs, kind, a, b, values, count)
+    return _bodies(world, world.moving, world.impulses.bodies, kind, a, b, values, count)
 
 
 @part
@@ -79,6 +81,24 @@ def _arcs(world: World, arcs: Any, near: Any, kind: Any, a: I8, b: I8, values: F
             if overlap > margin or (overlap > 0.0 and _holds(row)):
                 if count < kind.size:
                     _write_rail(world, kind, a, b, values, count, i, arcs.rail[k], nx, ny, overlap - margin, row)
+                count += 1
+    return count
+
+
+@part
+def _bodies(world: World, moving: Any, bodies: Any, kind: Any, a: I8, b: I8, values: F8, count: int) -> int:
+    if bodies is None:
+        return count
+    bottles, margin = world.bottles, 0.5 * world.settings.skin
+    for place in range(bodies.piece.size):
+        if bodies.piece[place] >= 0:
+            i = place // CONTACTS
+            x, y, radius = bottles.x[i], bottles.y[i], bottles.radius[i]
+            overlap, nx, ny, rail = piece_contact(moving, bodies.piece[place], x, y, radius + margin)
+            row = bodies.row, ROW * place
+            if overlap > margin or (overlap > 0.0 and _holds(row)):
+                if count < kind.size:
+                    _write_rail(world, kind, a, b, values, count, i, rail, nx, ny, overlap - margin, row)
                 count += 1
     return count
 

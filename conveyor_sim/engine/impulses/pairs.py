@@ -32,6 +32,8 @@ from conveyor_sim.engine.impulses.constants import (
     TURN_INVERSE,
 )
 from conveyor_sim.engine.impulses.law import visit
+from conveyor_sim.engine.impulses.loads import note_blow, note_pressed
+from conveyor_sim.engine.impulses.work import book_impact, note_impact, pair_unit
 from conveyor_sim.engine.threads.workers import CHUNK, share, wait_for_all
 
 _ROW, _BODY, _KINDS, _FREE = uint64(ROW), uint64(BODY), uint64(CONSTANTS), uint64(4)
@@ -72,6 +74,8 @@ def _sweep(
             _solve(worker.chunk, impulses, impulses.alike, threshold, world.settings.slip_limit, h, count)
             _scatter(impulses, pairs, worker.chunk, start + first, count)
             _note(world.peaks, impulses, pairs, worker.chunk, h, last, start + first, count)
+            _book(world.ledger, impulses.work, impulses, pairs, worker.chunk, start, first, count)
+            _load(world.damage, impulses.loads, impulses, pairs, worker.chunk, h, last, start + first, count)
         wait_for_all(worker)
 
 
@@ -216,3 +220,82 @@ def note_peak(peaks: Any, i: int, force: float, impulse: float) -> None:
     """Update a bottle's largest normal force (N) and the sum of its normal impulses (N s)."""
     peaks.force[i] = force if force > peaks.force[i] else peaks.force[i]
     peaks.impulse[i] += impulse
+
+
+@part
+def _book(
+    ledger: Any, work: Any, impulses: Any, pairs: PairImpulses, chunk: F8, start: int, first: int, count: int
+) -> None:
+    """Book the impacts of a chunk in the energy ledger. start: first pair of the colour."""
+    if work is None:
+        return
+    for c in range(count):
+        if chunk[_ACT + c] > 1.0:
+            p = start + first + c
+            kind = int(pairs.kind[p]) * CONSTANTS
+            mass, turn = impulses.pair_constants[kind + MASS], impulses.pair_constants[kind + TURN]
+            slip, along = _slip(chunk, c), chunk[_CHANGE_TURN + c]
+            unit = pair_unit(ledger, first + c)
+            book_impact(ledger, unit, chunk[_NORMAL + c], along, chunk[_SPEED + c], slip, mass, turn)
+            x, y = chunk[_CHANGE_X + c], chunk[_CHANGE_Y + c]
+            note_impact(work, impulses.body, int(pairs.i[p]), -1.0, x, y, along)
+            note_impact(work, impulses.body, int(pairs.j[p]), 1.0, x, y, along)
+
+
+@part
+def _slip(chunk: F8, c: int) -> float:
+    """Return the slip of a pair before its visit, m/s."""
+    x, y = chunk[_X + c], chunk[_Y + c]
+    inverse = 1.0 / math.sqrt(x * x + y * y)
+    return (chunk[_VY + c] * x - chunk[_VX + c] * y) * inverse - chunk[_RIM + c]
+
+
+@part
+def _load(
+    damage: Any,
+    loads: Any,
+    impulses: Any,
+    pairs: PairImpulses,
+    chunk: F8,
+    h: float,
+    last: bool,
+    first: int,
+    count: int,
+) -> None:
+    """Note loads by impacts and, in the last sweep, by pressed contacts."""
+    if loads is None:
+        return
+    for c in range(count):
+        act, normal = chunk[_ACT + c], chunk[_NORMAL + c]
+        if act > 1.0 or (last and normal > 0.0):
+            p = first + c
+            i, j, kind = int(pairs.i[p]), int(pairs.j[p]), int(pairs.kind[p]) * CONSTANTS
+            along, x, y = _total(chunk, c)
+            before = _slip(chunk, c)
+            after = before + _change_of_slip(impulses.pair_constants, kind, chunk, c)
+            if act > 1.0:
+                speed = -chunk[_SPEED + c]
+                peak, work = speed * impulses.pair_constants[kind + PEAK], abs(along * 0.5 * (before + after))
+                note_blow(damage, loads, i, -x, -y, speed, peak, work)
+                note_blow(damage, loads, j, x, y, speed, peak, work)
+            else:
+                px, py, work = chunk[_X + c], chunk[_Y + c], abs(along * after)
+                inverse = 1.0 / math.sqrt(px * px + py * py)
+                nx, ny = px * inverse, py * inverse
+                note_pressed(damage, loads, i, -1.0, x, y, nx, ny, normal, work, h)
+                note_pressed(damage, loads, j, 1.0, x, y, nx, ny, normal, work, h)
+
+
+@part
+def _total(chunk: F8, c: int) -> tuple[float, float, float]:
+    """Return the impulse of a pair after its visit: of friction, and as a vector on the second bottle, N s."""
+    along = chunk[_HELD_TURN + c] + chunk[_CHANGE_TURN + c]
+    return along, chunk[_HELD_X + c] + chunk[_CHANGE_X + c], chunk[_HELD_Y + c] + chunk[_CHANGE_Y + c]
+
+
+@part
+def _change_of_slip(table: F8, kind: int, chunk: F8, c: int) -> float:
+    x, y = chunk[_X + c], chunk[_Y + c]
+    inverse = 1.0 / math.sqrt(x * x + y * y)
+    moved = (chunk[_CHANGE_Y + c] * x - chunk[_CHANGE_X + c] * y) * inverse * table[kind + MASS]
+    return moved - chunk[_CHANGE_TURN + c] * (table[kind + TURN] - table[kind + MASS])

@@ -108,10 +108,10 @@ def _list_rails(i: int, world: World, damage: Any, worker: Worker, count: int) -
             arm = bottles.radius[i] - contacts.overlap[c]
             x, y = bottles.x[i] + arm * nx, bottles.y[i] + arm * ny
             if moves(world.moving, entry):
-                key, place = -entry, _body_bin(damage.scuffing, world.moving, entry - MOVING, x, y)
+                key, place = -entry, body_bin(damage.scuffing, world.moving, entry - MOVING, x, y)
             else:
                 key = _rail_key(world.near_segments, world.near_arcs, entry)
-                place = _bin(damage.scuffing, world.segments, world.arcs, key, x, y)
+                place = rail_bin(damage.scuffing, world.segments, world.arcs, key, x, y)
             ux, uy = surface_velocity(world.moving, contacts, c, bottles, i)
             approach = _approach(damage.impacts, i, nx, ny) - (ux * nx + uy * ny)
             _write_force(worker.history, count, nx, ny, normal, tangential, slip)
@@ -162,8 +162,8 @@ def _piece(near: Any, entry: int) -> int:
 
 
 @part
-def _bin(scuffing: Any, segments: Any, arcs: Any, key: int, x: float, y: float) -> int:
-    """Return the bin of a rail piece, by its key, at a point (m); -1 if bins are not requested."""
+def rail_bin(scuffing: Any, segments: Any, arcs: Any, key: int, x: float, y: float) -> int:
+    """Return the bin of a rail piece, by its key, at a point (m); -1 without the effect `scuffing`."""
     if scuffing is None:
         return -1
     if key % 2 != 0:
@@ -205,7 +205,7 @@ def _along_arc(arcs: Arcs, k: int, span: float, x: float, y: float) -> float:
 
 
 @part
-def _body_bin(scuffing: Any, moving: Any, q: int, x: float, y: float) -> int:
+def body_bin(scuffing: Any, moving: Any, q: int, x: float, y: float) -> int:
     """Return the bin of piece q of a body at a point (m) of its present place; -1 if bins are not requested."""
     if scuffing is None:
         return -1
@@ -259,11 +259,12 @@ def _scuff(i: int, scuffing: Any, history: ContactLoads, count: int, dt: float) 
     for c in range(count):
         work = dt * abs(history.tangential[c] * history.slip[c])
         scuffing.work[i] += work
-        _wear(scuffing.bins, i // UNIT, history.place[c], work, dt * history.normal[c])
+        wear(scuffing.bins, i // UNIT, history.place[c], work, dt * history.normal[c])
 
 
 @part
-def _wear(bins: Any, unit: int, place: int, work: float, impulse: float) -> None:
+def wear(bins: Any, unit: int, place: int, work: float, impulse: float) -> None:
+    """Add sliding work (J) and normal impulse (N s) to a bin of a rail; place -1: none."""
     if bins is None:
         return
     if place >= 0:
@@ -282,8 +283,8 @@ def _crush(i: int, crushing: Any, history: ContactLoads, count: int) -> None:
         for b in range(a):
             cosine = history.nx[a] * history.nx[b] + history.ny[a] * history.ny[b]
             opposed = max(opposed, -cosine * min(history.normal[a], history.normal[b]))
-    _raise(crushing.total, i, total)
-    _raise(crushing.opposed, i, opposed)
+    raise_to(crushing.total, i, total)
+    raise_to(crushing.opposed, i, opposed)
 
 
 @part
@@ -296,12 +297,12 @@ def _hit(i: int, impacts: Any, history: ContactLoads, count: int) -> None:
         impacts.touched[i, before] = impacts.touching[i, before]
         before += 1
     for c in range(count):
-        _raise(impacts.force, i, history.normal[c])
+        raise_to(impacts.force, i, history.normal[c])
         known = before == MOST_TOUCHES
         for place in range(before):
             known = known or impacts.touched[i, place] == history.key[c]
         if not known:
-            _raise(impacts.speed, i, history.approach[c])
+            raise_to(impacts.speed, i, history.approach[c])
         if c < MOST_TOUCHES:
             impacts.touching[i, c] = history.key[c]
     if count < MOST_TOUCHES:
@@ -309,7 +310,8 @@ def _hit(i: int, impacts: Any, history: ContactLoads, count: int) -> None:
 
 
 @part
-def _raise(worst: Maximum, i: int, value: float) -> None:
+def raise_to(worst: Maximum, i: int, value: float) -> None:
+    """Raise the maximum of bottle i in the present tick to a value."""
     if value > worst.tick[i]:
         worst.tick[i] = value
 
@@ -348,18 +350,26 @@ def _apart(spin: Any, moment: Any) -> Any:
 
 @part
 def _tip(i: int, bottles: Bottles, tipping: Any, history: ContactLoads, count: int, dt: float) -> None:
-    """Update |F_c (h_c - h_cg) - F_b h_cg| / (m g R_b), smoothed because a blow is over before a bottle can tip."""
     if tipping is None:
         return
-    if bottles.weight[i] <= 0.0:
-        return
-    kind = bottles.type[i]
     fx = fy = 0.0
     for c in range(count):
         fx -= history.normal[c] * history.nx[c] + history.tangential[c] * history.ny[c]
         fy += history.tangential[c] * history.nx[c] - history.normal[c] * history.ny[c]
+    tip(i, bottles, tipping, fx, fy, dt)
+
+
+@part
+def tip(i: int, bottles: Bottles, tipping: Any, fx: float, fy: float, dt: float) -> None:
+    """Update |F_c (h_c - h_cg) - F_b h_cg| / (m g R_b), smoothed because a blow is over before a bottle can tip.
+
+    fx, fy: sum of the contact forces on bottle i, N.
+    """
+    if bottles.weight[i] <= 0.0:
+        return
+    kind = bottles.type[i]
     along, under = tipping.contact_lever[kind] / bottles.weight[i], tipping.base_lever[kind] / bottles.weight[i]
     weight = dt / (dt + tipping.delay[kind])
     tipping.mean_x[i] += weight * (along * fx - under * tipping.fx[i] - tipping.mean_x[i])
     tipping.mean_y[i] += weight * (along * fy - under * tipping.fy[i] - tipping.mean_y[i])
-    _raise(tipping.ratio, i, math.sqrt(tipping.mean_x[i] ** 2 + tipping.mean_y[i] ** 2))
+    raise_to(tipping.ratio, i, math.sqrt(tipping.mean_x[i] ** 2 + tipping.mean_y[i] ** 2))

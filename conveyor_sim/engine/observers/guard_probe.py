@@ -20,15 +20,16 @@ from conveyor_sim.engine.threads.workers import units
 
 
 @kernel
-def look(bottles: Bottles, spin: Any) -> tuple[int, int, float, float, float]:
-    """Return the first slot that is not finite, the fastest slot, its squared speed, the weight and kinetic energy.
+def look(bottles: Bottles, spin: Any, probe: GuardProbe) -> tuple[int, int, float, float, float, float, float]:
+    """Return the first slot that is not finite, the fastest slot, its squared speed, the mass and kinetic energy.
 
-    The slots are -1 if there is none. Units: m^2/s^2; N and J of all bottles.
+    Last come the deepest overlaps since the last call, of two bottles and with rails. They are discarded in `probe`.
+    The slots are -1 if there is none. Units: m^2/s^2; kg and J of all bottles; radii.
     """
-    bad, fastest, square, weight, energy = -1, -1, -1.0, 0.0, 0.0
+    bad, fastest, square, mass, energy = -1, -1, -1.0, 0.0, 0.0
     for i in range(bottles.x.size):
         if bottles.id[i] >= 0:
-            weight += bottles.weight[i]
+            mass += 1.0 / bottles.inverse_mass[i]
             speed = bottles.vx[i] ** 2 + bottles.vy[i] ** 2
             energy += 0.5 * speed / bottles.inverse_mass[i] + _turning_energy(spin, i)
             if not math.isfinite(bottles.x[i] + bottles.y[i] + speed + _turn(spin, i)):
@@ -36,7 +37,11 @@ def look(bottles: Bottles, spin: Any) -> tuple[int, int, float, float, float]:
                     bad = i
             elif speed > square:
                 fastest, square = i, speed
-    return bad, fastest, square, weight, energy
+    pair, rail = probe.depth[0], probe.depth[1]
+    probe.depth[0] = 0.0
+    probe.depth[1] = 0.0
+    probe.due[0] = 0
+    return bad, fastest, square, mass, energy, pair, rail
 
 
 @kernel

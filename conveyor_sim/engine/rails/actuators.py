@@ -150,10 +150,23 @@ def _leave_profile(actuators: Actuators, moving: MovingBodies, a: int, push: flo
     wanted = moving.course[a, phase_at(moving.course, a, time), 3]
     acceleration = _possible(actuators, moving, a, wanted, push)
     if acceleration != wanted:
-        actuators.mode[a], actuators.left[a] = OFF_PROFILE, 1
+        leave_profile(actuators, moving, a)
         actuators.acceleration[a] = acceleration
-        moving.resting[a] = 0
     return acceleration
+
+
+@part
+def overloads(actuators: Actuators, moving: MovingBodies, a: int, push: float, time: float) -> bool:
+    """Return True if an axis on its profile can't follow it at a time (s) against a push."""
+    wanted = moving.course[a, phase_at(moving.course, a, time), 3]
+    return _possible(actuators, moving, a, wanted, push) != wanted
+
+
+@part
+def leave_profile(actuators: Actuators, moving: MovingBodies, a: int) -> None:
+    """Take an axis off its profile."""
+    actuators.mode[a], actuators.left[a] = OFF_PROFILE, 1
+    moving.resting[a] = 0
 
 
 @part
@@ -186,9 +199,7 @@ def _rejoin_speed(
     """
     k = phase_at(moving.course, a, time)
     since, planned = time - moving.course[a, k, 0], moving.course[a, k, 3]
-    target = moving.course[a, k, 2] + planned * since
-    missing, most = target - moving.speed[a], max(actuators.max_acceleration[a], abs(planned))
-    wanted = min(max(planned + missing / dt, -most), most)
+    wanted, missing, most = _for_speed(actuators, moving, a, k, since, dt)
     acceleration = _possible(actuators, moving, a, wanted, push)
     if acceleration == wanted and abs(missing) <= most * dt:
         _book(ledger, actuators, a, dt * missing)
@@ -197,6 +208,29 @@ def _rejoin_speed(
             moving.course[a, phase, 1] += moving.position[a] - there
         actuators.mode[a], actuators.left[a] = ON_PROFILE, 1
     return acceleration
+
+
+@part
+def _for_speed(
+    actuators: Actuators, moving: MovingBodies, a: int, k: int, since: float, dt: float
+) -> tuple[float, float, float]:
+    """Return the wanted acceleration of an endless axis, the speed that it lacks, and its largest acceleration."""
+    planned = moving.course[a, k, 3]
+    target = moving.course[a, k, 2] + planned * since
+    missing, most = target - moving.speed[a], max(actuators.max_acceleration[a], abs(planned))
+    return min(max(planned + missing / dt, -most), most), missing, most
+
+
+@part
+def wanted_speed(actuators: Actuators, moving: MovingBodies, a: int, time: float, dt: float) -> float:
+    """Return the speed that an axis off its profile should have after a step of dt (s) that begins at a time (s)."""
+    if _is_endless(actuators, a):
+        k = phase_at(moving.course, a, time)
+        wanted, _, _ = _for_speed(actuators, moving, a, k, time - moving.course[a, k, 0], dt)
+    else:
+        target, most, braking = moving.course[a, PHASES - 1, 1], actuators.max_speed[a], actuators.max_acceleration[a]
+        wanted = wanted_acceleration(moving.position[a], moving.speed[a], target, most, braking)
+    return moving.speed[a] + dt * wanted
 
 
 @part

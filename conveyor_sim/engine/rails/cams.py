@@ -36,6 +36,24 @@ def find_displacement(cams: CamMotion, b: int, coordinate: float) -> float:
 
 
 @part
+def rates_at(cams: CamMotion, b: int, coordinate: float) -> tuple[float, float]:
+    """Return the derivatives of the displacements of body b, along and aside, at a coordinate near the present one.
+
+    Beyond the range of its cam they are the present ones.
+    """
+    if cams.period[b] > 0.0:
+        coordinate -= cams.period[b] * math.floor(coordinate / cams.period[b])
+    table, cam, second = cams.table, cams.cam[b], cams.second[b]
+    if cam < 0 or not table.u[table.first[cam]] <= coordinate <= table.end[cam]:
+        return cams.rate[b], cams.aside_rate[b]
+    _, rate = _at(table, cam, coordinate)
+    if second < 0:
+        return rate, 0.0
+    _, aside_rate = _at(table, second, coordinate)
+    return rate, aside_rate
+
+
+@part
 def _at(table: CamTable, cam: int, u: float) -> tuple[float, float]:
     """Return displacement and slope of a cam at a coordinate."""
     p = table.first[cam]

@@ -24,7 +24,7 @@ from conveyor_sim.engine.rails.actuators import (
     drive_axes,
 )
 from conveyor_sim.engine.rails.arc import arc_contact
-from conveyor_sim.engine.rails.cams import is_present
+from conveyor_sim.engine.rails.cams import is_present, rates_at
 from conveyor_sim.engine.rails.deepest_contacts import keep_deepest
 from conveyor_sim.engine.rails.poses import list_active, move_axes, note_resting, place_bodies
 from conveyor_sim.engine.rails.sectors import cluster_at, clusters_beside
@@ -92,11 +92,16 @@ def _note_slide(springs: Any, cams: Any, b: int, sign: float) -> None:
 
 
 @part
-def moving_contacts(i: int, bottles: Bottles, moving: Any, near: Any, contacts: RailContacts, count: int) -> int:
-    """Append the contacts of bottle i with bodies to the first `count`; return their new number."""
+def moving_contacts(
+    i: int, bottles: Bottles, moving: Any, near: Any, margin: float, contacts: RailContacts, count: int
+) -> int:
+    """Append the contacts of bottle i with bodies to the first `count`; return their new number.
+
+    margin: m, added to its radius; overlaps contain it.
+    """
     if near is None:
         return count
-    clusters, radius = moving.clusters, bottles.radius[i]
+    clusters, radius = moving.clusters, bottles.radius[i] + margin
     for entry in range(near.start[i], near.start[i + 1]):
         b = near.piece[entry]
         if is_present(moving.cams, b):
@@ -106,7 +111,9 @@ def moving_contacts(i: int, bottles: Bottles, moving: Any, near: Any, contacts: 
                 k = cluster_at(moving.sectors, place)
                 dx, dy, reach = clusters.x[k] - x, clusters.y[k] - y, clusters.radius[k] + radius
                 if dx * dx + dy * dy <= reach * reach:
-                    count = _segment_contacts(moving, moving.segments, k, bottles, i, contacts, count)
+                    count = _segment_contacts(
+                        moving, moving.segments, k, bottles.x[i], bottles.y[i], radius, contacts, count
+                    )
                     count = _arc_contacts(moving, moving.arcs, b, k, x, y, radius, contacts, count)
     return count
 
@@ -124,16 +131,17 @@ def _segment_contacts(
     moving: MovingBodies,
     segments: Any,
     k: int,
-    bottles: Bottles,
-    i: int,
+    x: float,
+    y: float,
+    radius: float,
     contacts: RailContacts,
     count: int,
 ) -> int:
-    """Append the contacts of bottle i with the straight pieces of cluster k."""
+    """Append the contacts of a bottle at (x, y) with the straight pieces of cluster k."""
     if segments is None:
         return count
     for g in range(moving.clusters.segment[k], moving.clusters.segment[k + 1]):
-        overlap, nx, ny = segment_contact(segments, g, bottles.x[i], bottles.y[i], bottles.radius[i])
+        overlap, nx, ny = segment_contact(segments, g, x, y, radius)
         if overlap > 0.0:
             material, rail, surface = segments.material[g], segments.rail[g], segments.surface[g]
             count = keep_deepest(contacts, count, overlap, nx, ny, material, rail, surface, MOVING + g)
@@ -166,6 +174,39 @@ def _arc_contacts(
 
 
 @part
+def piece_contact(moving: MovingBodies, q: int, x: float, y: float, radius: float) -> tuple[float, float, float, int]:
+    """Return the overlap (m) of a circle with piece q of a body, the unit normal to it, and its rail; 0 or less: none.
+
+    A body that is absent is not touched.
+    """
+    b, straight = moving.body[q], _count(moving.segments)
+    if not is_present(moving.cams, b):
+        return 0.0, 0.0, 0.0, 0
+    if q < straight:
+        return _straight_contact(moving.segments, q, x, y, radius)
+    x, y = seen_from(moving, b, x, y)
+    overlap, mx, my, rail = _bent_contact(moving.arcs, q - straight, x, y, radius)
+    cosine, sine = moving.pose.cosine[b], moving.pose.sine[b]
+    return overlap, mx * cosine - my * sine, mx * sine + my * cosine, rail
+
+
+@part
+def _straight_contact(segments: Any, g: int, x: float, y: float, radius: float) -> tuple[float, float, float, int]:
+    if segments is None:
+        return 0.0, 0.0, 0.0, 0
+    overlap, nx, ny = segment_contact(segments, g, x, y, radius)
+    return overlap, nx, ny, segments.rail[g]
+
+
+@part
+def _bent_contact(arcs: Any, k: int, x: float, y: float, radius: float) -> tuple[float, float, float, int]:
+    if arcs is None:
+        return 0.0, 0.0, 0.0, 0
+    overlap, nx, ny = arc_contact(arcs, k, x, y, radius)
+    return overlap, nx, ny, arcs.rail[k]
+
+
+@part
 def _count(segments: Any) -> int:
     """Return the number of straight pieces, after which arcs are numbered."""
     if segments is None:
@@ -193,6 +234,40 @@ def surface_velocity(moving: Any, contacts: RailContacts, c: int, bottles: Bottl
     dx, dy = _arm(moving, contacts, c, b, bottles, i)
     ux, uy = pose.vx[b] - pose.turn[b] * dy, pose.vy[b] + pose.turn[b] * dx
     return _with_surface(moving, moving.surface_speed, contacts, c, b, bottles, i, ux, uy, 1.0)
+
+
+@part
+def belt_speed(moving: MovingBodies, contacts: RailContacts, c: int, bottles: Bottles, i: int) -> float:
+    """Return the speed (m/s) at which the surface of a body runs along itself at contact c of bottle i."""
+    b = moving.body[contacts.entry[c] - MOVING]
+    ux, uy = _with_surface(moving, moving.surface_speed, contacts, c, b, bottles, i, 0.0, 0.0, 1.0)
+    return uy * contacts.nx[c] - ux * contacts.ny[c]
+
+
+@part
+def mean_motion(
+    moving: MovingBodies, contacts: RailContacts, c: int, dx: float, dy: float, h: float
+) -> tuple[float, float]:
+    """Return the velocity of a body at contact c along its normal and across it, over the speed of its axis.
+
+    It is that in the middle of the next h (s), so that the displacement in this time is exact to order 3. dx, dy:
+    vector from the pivot to the contact, m.
+    """
+    b = moving.body[contacts.entry[c] - MOVING]
+    half = 0.5 * h * moving.pose.turn[b]
+    dx, dy = dx - half * dy, dy + half * dx
+    ux, uy = moving.along_x[b] - moving.turning[b] * dy, moving.along_y[b] + moving.turning[b] * dx
+    ux, uy = _by_mean_rate(moving, moving.cams, b, ux, uy, h)
+    return ux * contacts.nx[c] + uy * contacts.ny[c], uy * contacts.nx[c] - ux * contacts.ny[c]
+
+
+@part
+def _by_mean_rate(moving: MovingBodies, cams: Any, b: int, ux: float, uy: float, h: float) -> tuple[float, float]:
+    if cams is None:
+        return ux, uy
+    a = moving.axis[b]
+    rate, aside_rate = rates_at(cams, b, moving.position[a] - moving.lag[b] + 0.5 * h * moving.speed[a])
+    return rate * ux + aside_rate * cams.across_x[b], rate * uy + aside_rate * cams.across_y[b]
 
 
 @part

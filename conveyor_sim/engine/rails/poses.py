@@ -77,6 +77,18 @@ def move_axes(moving: MovingBodies, time: float) -> None:
             moving.speed[a] = moving.course[a, k, 2] + acceleration * since
 
 
+@part
+def mean_speed(moving: MovingBodies, a: int, h: float) -> float:
+    """Return the mean speed in the next h (s) of an axis on its profile; 0 off it."""
+    if moving.resting[a] != 0 or is_off_profile(moving.actuators, a):
+        return 0.0
+    time = (moving.clock[0] + 1.0) * h
+    k = phase_at(moving.course, a, time)
+    since = time - moving.course[a, k, 0]
+    then = moving.course[a, k, 1] + (moving.course[a, k, 2] + 0.5 * moving.course[a, k, 3] * since) * since
+    return (then - moving.position[a]) / h
+
+
 @kernel
 def fastest_point(moving: MovingBodies, reach: F8) -> float:
     """Return the largest speed (m/s) that a point of a body can have in this tick without bottles.

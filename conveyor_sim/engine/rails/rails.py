@@ -60,7 +60,7 @@ def find_rail_contacts(i: int, world: World, contacts: RailContacts) -> int:
     """Write the contacts of bottle i with rails, shares included; return their number."""
     count = _segment_contacts(i, world.bottles, world.segments, world.near_segments, contacts, 0)
     count = _arc_contacts(i, world.bottles, world.arcs, world.near_arcs, contacts, count)
-    count = moving_contacts(i, world.bottles, world.moving, world.near_bodies, contacts, count)
+    count = moving_contacts(i, world.bottles, world.moving, world.near_bodies, 0.0, contacts, count)
     if count == 1:
         contacts.share[0] = 1.0
     elif count > 1:

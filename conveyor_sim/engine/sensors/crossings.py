@@ -6,31 +6,33 @@ from conveyor_sim.engine.compiler.compile import kernel, part
 
 
 @kernel
-def find_crossings(
-    before: F8, ids_before: I8, x: F8, y: F8, ids: I8, line: F8, slots: I8, share: F8, forward: I8
-) -> int:
-    """Return the number of axes that crossed a line on the straight path from their previous positions, (2, slots), m.
+def find_crossings(before: F8, x: F8, y: F8, ids: I8, lines: F8, crossed: I8, share: F8) -> int:
+    """Return how often axes crossed lines on the straight paths from their previous positions, (2, slots), m.
 
-    line: its start, its vector, m, and the vector's square: (5,). Written, (slots,): the slots that crossed, the share
-    of the tick at which they did, and 1 for those that went from the line's left to its right.
+    lines: start, vector (m), and the vector's square, (L, 5). Written per crossing: line, slot, and 1 from the line's
+    left to its right, (3, n); the share of the tick before it, (n,). n is L times the slots.
+
+    Bottles come and go between ticks only, so each slot has the same bottle at both places.
     """
     count = 0
-    for i in range(ids_before.size):
-        if ids_before[i] < 0 or ids[i] != ids_before[i]:
-            continue
-        left_before, along_before = _seen(line, before[0, i], before[1, i])
-        left, along = _seen(line, x[i], y[i])
-        if (left_before > 0.0) == (left > 0.0):
-            continue
-        at = left_before / (left_before - left)
-        if 0.0 <= along_before + at * (along - along_before) <= 1.0:
-            slots[count], share[count], forward[count] = i, at, left_before > 0.0
-            count += 1
+    for line in range(lines.shape[0]):
+        for i in range(ids.size):
+            if ids[i] < 0:
+                continue
+            left_before, along_before = _seen(lines, line, before[0, i], before[1, i])
+            left, along = _seen(lines, line, x[i], y[i])
+            if (left_before > 0.0) == (left > 0.0):
+                continue
+            at = left_before / (left_before - left)
+            if 0.0 <= along_before + at * (along - along_before) <= 1.0:
+                crossed[0, count], crossed[1, count], crossed[2, count] = line, i, left_before > 0.0
+                share[count] = at
+                count += 1
     return count
 
 
 @part
-def _seen(line: F8, x: float, y: float) -> tuple[float, float]:
+def _seen(lines: F8, line: int, x: float, y: float) -> tuple[float, float]:
     """Return how far a point is to the left of a line (in its lengths), and how far along it (0 to 1)."""
-    dx, dy = x - line[0], y - line[1]
-    return (line[2] * dy - line[3] * dx) / line[4], (line[2] * dx + line[3] * dy) / line[4]
+    dx, dy, ex, ey = x - lines[line, 0], y - lines[line, 1], lines[line, 2], lines[line, 3]
+    return (ex * dy - ey * dx) / lines[line, 4], (ex * dx + ey * dy) / lines[line, 4]

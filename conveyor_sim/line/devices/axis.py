@@ -15,7 +15,7 @@ import numpy as np
 from conveyor_sim.engine.arrays.moving import HELD, ON_PROFILE
 from conveyor_sim.line.alarms.declaration import Declared, error
 from conveyor_sim.line.device import Device, ScanContext
-from conveyor_sim.line.devices.axis_motion import Motion, Shift, acceleration_toward
+from conveyor_sim.line.devices.axis_motion import Motion, Shift, acceleration_toward, write_profile
 from conveyor_sim.line.devices.drive import NamedDriveDevice
 from conveyor_sim.line.devices.edge import RisingEdge
 from conveyor_sim.line.devices.setup import DeviceSetup
@@ -61,6 +61,7 @@ class AxisDevice(Device):
         self._number = [axis.name for axis in setup.model.plant.axes].index(name)
         belts = moved_by_axis(scene, short_name)
         self._belts = np.array([setup.speed_index(f"belts/{belt}") for belt in belts], dtype=np.int64)
+        self._moves_belts = bool(belts)
         self._travels = np.array([travel_per_radian(scene.belts[belt]) for belt in belts])
         self._torque_alarm, self._fault_alarm = f"{name}/torque", f"{name}/fault"
         self._power = setup.power("drives", self)
@@ -161,7 +162,7 @@ class AxisDevice(Device):
     @property
     def is_geared(self) -> bool:
         """True if it is in gear, in phase, without following error."""
-        return self.mode == GEARED and self.phase_error == 0.0 and self.following_error == 0.0
+        return self.mode == GEARED and self._phase_error == 0.0 and self.following_error == 0.0
 
     @property
     def phase_error(self) -> float:
@@ -174,7 +175,12 @@ class AxisDevice(Device):
 
     @property
     def _is_jammed(self) -> bool:
-        return self.jammed or any(machine.jammed for machine in self._machines)
+        if self.jammed:
+            return True
+        for machine in self._machines:  # noqa: SIM110 - a generator takes three times as long, four times per tick
+            if machine.jammed:
+                return True
+        return False
 
     @property
     def _is_locked(self) -> bool:
@@ -235,7 +241,7 @@ class AxisDevice(Device):
 
     def wanted(self, now: ScanContext) -> float:
         """Return the speed that it is commanded to have out of gear, or that of its gear, rad/s."""
-        if self.master is not None and self.mode != FREE:
+        if self.mode != FREE and self.master is not None:
             return self._part.ratio * self.master.wanted(now)
         if not self._may_run:
             return 0.0
@@ -246,7 +252,15 @@ class AxisDevice(Device):
     @property
     def _may_run(self) -> bool:
         """True if it runs, and no axis that is in gear with it has failed."""
-        return self.runs and not any(axis.tripped for axis in self._train())
+        return self.runs and not self._carries_failed
+
+    @property
+    def _carries_failed(self) -> bool:
+        """True if an axis that is in gear with this one, directly or not, has failed."""
+        for axis in self._slaves():  # noqa: SIM110 - as in `_is_jammed`
+            if axis.mode != FREE and (axis.tripped or axis._carries_failed):
+                return True
+        return False
 
     def _source_speed(self, now: ScanContext) -> float:
         part = self._part
@@ -271,6 +285,9 @@ class AxisDevice(Device):
 
     _followers: "list[AxisDevice] | None" = None
 
+    _in_phase: tuple[float, float] | None = None
+    """Offset and phase shift that agree, unless a shift has begun since."""
+
     def plan(self, now: ScanContext) -> Motion:
         """Return the commanded motion in the tick that begins, and set the commands at its end."""
         if self._planned != now.tick:
@@ -286,8 +303,11 @@ class AxisDevice(Device):
             target = part.ratio * master.speed
         else:
             target = self.wanted(now)
-        if target == self.speed == 0.0 and self.mode == FREE:
-            return Motion(self.position, 0.0)
+        if target == self.speed and self.mode == FREE:
+            motion = Motion(self.position, self.speed)
+            if self.speed != 0.0:
+                self.position, self.follows = motion.after(tick)[0], part.drive is not None
+            return motion
         # A drive has a ramp itself. Once an axis has its speed, it keeps up.
         limit = math.inf if self.follows and self.runs else part.acceleration
         if self.mode == FREE and not self._may_run and part.stop_deceleration is not None:
@@ -295,7 +315,8 @@ class AxisDevice(Device):
         acceleration = acceleration_toward(self.speed, target, limit, tick)
         motion = Motion(self.position, self.speed, acceleration)
         reached = abs(target - self.speed) <= limit * tick
-        self.position, self.speed = motion.position_after(tick), target if reached else motion.speed_after(tick)
+        self.position, speed = motion.after(tick)
+        self.speed = target if reached else speed
         self.follows = reached and part.drive is not None and self.runs
         if reached and self.mode == SYNCHRONISING and master is not None:
             self._take_up_phase(self.position - part.ratio * master.position, now.tick + 1)
@@ -321,13 +342,15 @@ class AxisDevice(Device):
         """Return the motion of the master times the ratio, and a shift of the phase that goes on."""
         part, tick, master = self._part, self._tick, self.master
         assert master is not None
-        if self.shift.distance == 0.0:
+        if self.shift.distance == 0.0 and self._in_phase != (phase := (self.offset, self.phase_shift)):
+            self._in_phase = phase
             turns = round((self.offset - self._goal) / self._spacing)
             if abs(change := self._goal + turns * self._spacing - self.offset) > ROUNDING:
                 self.offset += change
                 self._begin_shift(now.tick, change)
-        motion = master.plan(now).geared(part.ratio, self.offset)
-        self.position, self.speed = part.ratio * master.position + self.offset, part.ratio * master.speed
+        ratio, offset = part.ratio, self.offset
+        motion = master.plan(now).geared(ratio, offset)
+        self.position, self.speed = ratio * master.position + offset, ratio * master.speed
         shift = self.shift.during(now.tick, tick) if self.shift.distance else None
         self._phase_error = 0.0
         if shift is not None:
@@ -340,30 +363,30 @@ class AxisDevice(Device):
 
     def begin(self, now: ScanContext) -> None:
         """Set the motion profile of this tick in the engine, and the speeds of its belts."""
-        motion = self._of_shaft(self.plan(now), now)
+        motion, jammed = self.plan(now), self._is_jammed
+        if jammed or self.following_error != 0.0:
+            motion = self._of_shaft(motion, now)
+        after = self.actual_position, self.actual_speed = motion.after(self._tick)
         moving, number = now.state.world.moving, self._number
         if moving is not None:
-            motion.write(moving.course[number], self._tick)
+            write_profile(moving.course, number, motion, after, self._tick)
             if (actuators := moving.actuators) is not None:
                 actuators.left[number] = 0
-                if self._is_jammed:
+                if jammed:
                     actuators.mode[number] = HELD
-                elif actuators.mode[number] == HELD:
+                elif actuators.mode.item(number) == HELD:
                     actuators.mode[number] = ON_PROFILE
-        self.actual_position, self.actual_speed = motion.position_after(self._tick), motion.speed_after(self._tick)
-        if self._belts.size:
+        if self._moves_belts:
             now.setpoints[self._belts] = self._travels * self.wanted(now)
             now.speeds[self._belts] = self._travels * ((self.actual_position - motion.position) / self._tick)
 
     def _of_shaft(self, motion: Motion, now: ScanContext) -> Motion:
-        """Return the motion of the shaft: at rest if jammed, else with the following error, which it catches up."""
+        """Return the motion of the shaft: at rest if jammed, else with its following error, which it catches up."""
         part, tick = self._part, self._tick
         if self._is_jammed:
             self.catch_up.stop()
             self.following_error = self.position - self.actual_position
             return Motion(self.actual_position, 0.0)
-        if self.following_error == 0.0:
-            return motion
         if self.catch_up.distance == 0.0:
             if self.limited or not self.runs:
                 return motion.plus(Motion(-self.following_error, 0.0))
@@ -377,8 +400,8 @@ class AxisDevice(Device):
         """Take over position and torque of a limited drive, and fail if the following error is too large."""
         moving, number = now.state.world.moving, self._number
         if now.tick and moving is not None and (actuators := moving.actuators) is not None:
-            self.torque = 0.0 - float(actuators.load[number] / moving.clock[0])  # not -0
-            limited = bool(actuators.left[number]) and not self._is_jammed
+            self.torque = 0.0 - actuators.load.item(number) / moving.clock.item(0)  # not -0
+            limited = bool(actuators.left.item(number)) and not self._is_jammed
             if limited:
                 self.catch_up.stop()
                 self.actual_position, self.actual_speed = float(moving.position[number]), float(moving.speed[number])
@@ -387,8 +410,8 @@ class AxisDevice(Device):
                 self.limited = limited
                 now.alarm(self._torque_alarm, limited)
         limit = self._part.following_limit
-        grows = self._is_jammed or self.limited
-        if grows and limit != "none" and abs(self.following_error) > limit and not self.tripped:
+        beyond = self.following_error != 0.0 and limit != "none" and abs(self.following_error) > limit
+        if beyond and not self.tripped and (self.limited or self._is_jammed):
             self.tripped = True
             now.alarm(self._fault_alarm, True)
 

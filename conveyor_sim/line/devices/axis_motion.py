@@ -5,10 +5,9 @@ Changes of speed and phase begin and end at ticks, so a geared axis has one phas
 """
 
 import math
+import struct
 from dataclasses import dataclass
-from typing import NamedTuple
-
-import numpy as np
+from typing import Any, NamedTuple
 
 from conveyor_sim.engine.arrays.moving import PHASES
 from conveyor_sim.engine.arrays.types import F8
@@ -24,13 +23,10 @@ class Motion(NamedTuple):
     acceleration: float = 0.0
     """Constant during the tick, rad/s^2."""
 
-    def position_after(self, seconds: float) -> float:
-        """Return the position (rad) `seconds` after the start of the tick."""
-        return self.position + (self.speed + 0.5 * self.acceleration * seconds) * seconds
-
-    def speed_after(self, seconds: float) -> float:
-        """Return the speed (rad/s) `seconds` after the start of the tick."""
-        return self.speed + self.acceleration * seconds
+    def after(self, seconds: float) -> tuple[float, float]:
+        """Return position (rad) and speed (rad/s) `seconds` after the start of the tick."""
+        position, speed, acceleration = self
+        return position + (speed + 0.5 * acceleration * seconds) * seconds, speed + acceleration * seconds
 
     def plus(self, other: "Motion") -> "Motion":
         """Return the sum of two motions."""
@@ -40,16 +36,18 @@ class Motion(NamedTuple):
         """Return the motion of an axis in gear. offset: its position (rad) while this axis is at 0."""
         return Motion(ratio * self.position + offset, ratio * self.speed, ratio * self.acceleration)
 
-    def write(self, course: F8, tick: float) -> None:
-        """Write the motion as the motion profile of one axis, (PHASES, 4). Units: rad and s. tick: s."""
-        course[0] = 0.0, self.position, self.speed, self.acceleration
-        course[1:] = tick, self.position_after(tick), self.speed_after(tick), 0.0
 
-    def profile(self, tick: float) -> F8:
-        """Return the motion as a motion profile, (PHASES, 4), see `write`."""
-        course = np.zeros((PHASES, 4))
-        self.write(course, tick)
-        return course
+_PROFILE = struct.Struct(f"{4 * PHASES}d")
+
+
+def write_profile(courses: F8, axis: int, motion: Motion, after: tuple[float, float], tick: float) -> None:
+    """Write a motion as the motion profile of one axis into courses, (axes, PHASES, 4), in rad and s.
+
+    after: position and speed after the tick (s). Packing takes a quarter of the time of an assignment to the array.
+    """
+    rest = tick, *after, 0.0
+    buffer: Any = courses  # numpy's type stubs of Python 3.10 do not say that arrays are buffers
+    _PROFILE.pack_into(buffer, axis * _PROFILE.size, 0.0, *motion, *((PHASES - 1) * rest))
 
 
 def acceleration_toward(speed: float, target: float, limit: float, tick: float) -> float:

@@ -2,17 +2,20 @@
 """Lines that bottle axes cross within a tick: passages with their times, counters and inspections."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from conveyor_sim.engine.arrays.types import F8, I8
+from conveyor_sim.engine.arrays.bodies import Bottles
+from conveyor_sim.engine.arrays.types import F8
+from conveyor_sim.engine.compiler.numba_internals.machine_code import entry
 from conveyor_sim.engine.sensors.crossings import find_crossings
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.devices.setup import DeviceSetup
 from conveyor_sim.line.tag import count, seconds, switch
 from conveyor_sim.scene.parts.counter import Counter
 from conveyor_sim.scene.parts.inspection import Inspection
+from conveyor_sim.scene.types import XY
 
 
 class Passage(NamedTuple):
@@ -25,45 +28,64 @@ class Passage(NamedTuple):
     """True from the left of the line to its right, seen from its first end."""
 
 
-class CrossingLine:
-    """Line between two points (m) that bottle axes pass over. Needs `begin` and `end` in every tick."""
+class CrossedDevice(Device):
+    """Device on a line that bottle axes cross."""
 
-    def __init__(self, start: tuple[float, float], end: tuple[float, float]) -> None:
+    def passed(self, passages: Sequence[Passage], now: ScanContext) -> None:
+        """Take the passages of a tick, in order of time; at least one."""
+        raise NotImplementedError(f"{self.name} takes no passages")
+
+
+class Crossings(Device):
+    """All lines that bottle axes cross, evaluated in one pass over lines and bottles."""
+
+    def __init__(self) -> None:
+        """Start without lines."""
+        super().__init__("crossings")
+        self._owners: list[CrossedDevice] = []
+        self._lines: F8 = np.empty((0, 5))
+        self._bottles: Bottles | None = None
+        self._began = False
+        self._find: Any = None
+
+    def add(self, owner: CrossedDevice, start: XY, end: XY) -> None:
+        """Add a line between two points (m), and the device that takes its passages."""
         along = np.array(end) - np.array(start)
-        self._line = np.array([*start, *along, float(along @ along)])
-        self._room: tuple[F8, I8] = np.empty((2, 0)), np.empty(0, np.int64)
-        self._before: tuple[F8, I8] | None = None
-        self._buffers: tuple[I8, F8, I8] = (np.empty(0, np.int64), np.empty(0), np.empty(0, np.int64))
+        self._owners.append(owner)
+        self._lines = np.vstack((self._lines, [*start, *along, float(along @ along)]))
 
     def begin(self, now: ScanContext) -> None:
         """Store the bottle positions before the steps of a tick."""
         bottles = now.state.world.bottles
-        if self._room[1].size != bottles.id.size:
-            self._room = np.empty((2, bottles.id.size)), np.empty(bottles.id.size, np.int64)
-        self._before = self._room
-        places, ids = self._before
-        places[0], places[1], ids[:] = bottles.x, bottles.y, bottles.id
+        if bottles is not self._bottles:
+            slots, most = bottles.id.size, len(self._lines) * bottles.id.size
+            self._bottles, self._before = bottles, np.empty((2, slots))
+            self._crossed, self._share = np.empty((3, most), np.int64), np.empty(most)
+        self._before[0], self._before[1] = bottles.x, bottles.y
+        self._began = True
 
-    def end(self, now: ScanContext) -> list[Passage]:
-        """Return the passages since `begin` in order of time.
+    def end(self, now: ScanContext) -> None:
+        """Report the passages since `begin`.
 
         The path between the two positions is taken as straight, and the time is interpolated.
         """
+        if not self._began:
+            return
         bottles = now.state.world.bottles
-        if self._before is None:
-            return []
-        before, ids = self._before
-        if self._buffers[0].size < ids.size:
-            self._buffers = np.empty(ids.size, np.int64), np.empty(ids.size), np.empty(ids.size, np.int64)
-        slots, share, forward = self._buffers
-        count = find_crossings(before, ids, bottles.x, bottles.y, bottles.id, self._line, slots, share, forward)
-        return sorted(
-            Passage(now.time - (1.0 - float(share[n])) * now.length, int(ids[slots[n]]), bool(forward[n]))
-            for n in range(count)
-        )
+        arguments = self._before, bottles.x, bottles.y, bottles.id, self._lines, self._crossed, self._share
+        self._find = self._find or entry(find_crossings, *arguments)
+        if not (count := self._find(*arguments)):
+            return
+        passages: dict[int, list[Passage]] = {}
+        rows = zip(*self._crossed[:, :count].tolist(), self._share[:count].tolist(), strict=True)
+        for line, slot, forward, share in rows:
+            passage = Passage(now.time - (1.0 - share) * now.length, int(bottles.id[slot]), bool(forward))
+            passages.setdefault(line, []).append(passage)
+        for line, passed in passages.items():
+            self._owners[line].passed(sorted(passed), now)
 
 
-class CounterDevice(Device):
+class CounterDevice(CrossedDevice):
     """Counter of bottles whose axes pass over a line, by direction."""
 
     def __init__(self, name: str, counter: Counter, setup: DeviceSetup) -> None:
@@ -74,16 +96,12 @@ class CounterDevice(Device):
                 count(f"{name}/backward", "counter", "Bottles that passed in the opposite direction."),
             ],
         )
-        self._line = CrossingLine(counter.from_, counter.to)
+        setup.shared(Crossings, Crossings).add(self, counter.from_, counter.to)
         self.forward = self.backward = 0
 
-    def begin(self, now: ScanContext) -> None:
-        """Store the bottle positions."""
-        self._line.begin(now)
-
-    def end(self, now: ScanContext) -> None:
+    def passed(self, passages: Sequence[Passage], now: ScanContext) -> None:
         """Count the passages of this tick. A bottle that returns within the tick is not counted."""
-        for passage in self._line.end(now):
+        for passage in passages:
             if passage.forward:
                 self.forward += 1
             else:
@@ -94,7 +112,7 @@ class CounterDevice(Device):
         return self.forward, self.backward
 
 
-class InspectionDevice(Device):
+class InspectionDevice(CrossedDevice):
     """Machine that detects bad bottles among those that pass a line."""
 
     def __init__(self, name: str, inspection: Inspection, setup: DeviceSetup) -> None:
@@ -109,7 +127,7 @@ class InspectionDevice(Device):
                 switch(f"{name}/stop", "fault", "Sees no bottles."),
             ],
         )
-        self._line = CrossingLine(inspection.from_, inspection.to)
+        setup.shared(Crossings, Crossings).add(self, inspection.from_, inspection.to)
         self.stop = False
         self.count = self.bad = 0
         self.time = self.bad_time = 0.0
@@ -119,13 +137,9 @@ class InspectionDevice(Device):
         """Apply the fault `stop`."""
         self.stop = value != 0.0
 
-    def begin(self, now: ScanContext) -> None:
-        """Store the bottle positions."""
-        self._line.begin(now)
-
-    def end(self, now: ScanContext) -> None:
+    def passed(self, passages: Sequence[Passage], now: ScanContext) -> None:
         """Inspect the bottles that passed."""
-        for passage in self._line.end(now):
+        for passage in passages:
             if passage.forward and not self.stop:
                 self.count, self.time = self.count + 1, passage.time
                 if passage.id in now.bad:

@@ -69,6 +69,9 @@ class DriveDevice(SetpointDevice):
 
     _starts_by_speed = False
 
+    travel: float
+    """Travel forward minus backward, m. Only drives with an encoder have it."""
+
     def __init__(
         self,
         name: str,
@@ -104,8 +107,8 @@ class DriveDevice(SetpointDevice):
         self.reset = RisingEdge()
         self.trip = False
         self.tripped = False
-        self.travel = 0.0
-        """Travel forward minus backward, m."""
+        if drive.pulses_per_metre is not None:
+            self.travel = 0.0
 
     @property
     def alarms(self) -> Sequence[Declared]:
@@ -118,6 +121,7 @@ class DriveDevice(SetpointDevice):
         if name == self._speed_command:
             super().command(name, value, now)
             return
+        self.wake()
         what = name.removeprefix(f"{self.name}/")
         if what == "run":
             if value != 0.0 and not self.run:
@@ -134,6 +138,13 @@ class DriveDevice(SetpointDevice):
             self.tripped = self.tripped or self.trip
             now.alarm(self._tripped, self.tripped)
 
+    def rests(self, now: ScanContext) -> bool:
+        """Return True at constant speed, without an encoder that counts."""
+        ramp = self.ramp
+        if ramp.value != 0.0 and self._drive.pulses_per_metre is not None:
+            return False
+        return ramp.acceleration == 0.0 and ramp.value == self.wanted(now)
+
     def begin(self, now: ScanContext) -> None:
         """Ramp for one tick."""
         drive, ramp, wanted = self._drive, self.ramp, self.wanted(now)
@@ -146,7 +157,7 @@ class DriveDevice(SetpointDevice):
 
     def end(self, now: ScanContext) -> None:
         """Add the travel of this tick."""
-        if now.tick > 0:
+        if now.tick > 0 and self._drive.pulses_per_metre is not None:
             self.travel += self.ramp.value * now.length
 
     def values(self, now: ScanContext) -> Sequence[float]:

@@ -84,6 +84,7 @@ class InfeedDevice(Device, Scattering, Switching):
             ],
         )
         self._infeed = infeed
+        self._slot = 0  # of the last bottle, unless it has left
         self.switch_among(infeed, setup)
         if infeed.rate_limit is not None and infeed.rate is not None:
             self.rate = infeed.rate
@@ -159,7 +160,9 @@ class InfeedDevice(Device, Scattering, Switching):
         The position of a removed bottle is extrapolated at the speed of the infeed.
         """
         bottles = state.world.bottles
-        slot = int((bottles.id == self.last).argmax())
+        if self._slot >= bottles.id.size or bottles.id[self._slot] != self.last:
+            self._slot = int((bottles.id == self.last).argmax())
+        slot = self._slot
         if bottles.id[slot] != self.last:
             return self._infeed.speed * (time - self.due)
         dx = float(bottles.x[slot]) - self._infeed.position[0]

@@ -2,12 +2,14 @@
 """Photo-eyes: light beams that bottles cross within a tick, their faults, debounce and delays."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from conveyor_sim.engine.arrays.beams import BottleMotion, LightBeams
-from conveyor_sim.engine.arrays.types import F8
-from conveyor_sim.engine.sensors.beams import ROUNDING, block_beams
+from conveyor_sim.engine.arrays.bodies import Bottles
+from conveyor_sim.engine.compiler.numba_internals.machine_code import entry
+from conveyor_sim.engine.sensors.beams import BLOCKED, FREE, ROUNDING, block_beams
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.devices.setup import CHATTER, DeviceSetup
 from conveyor_sim.line.tag import count, number, seconds, switch
@@ -16,6 +18,9 @@ from conveyor_sim.scene.types import XY
 
 Span = tuple[float, float]
 """Start and end, s."""
+
+UNSTEADY = -1
+"""In place of the state of a beam: its eye changes even while the beam does not."""
 
 
 class Beams(Device):
@@ -37,47 +42,68 @@ class Beams(Device):
             used=np.zeros(len(ends), dtype=np.int64),
             state=np.zeros(len(ends), dtype=np.int64),
         )
-        self._room: F8 = np.empty((4, 0))
-        self._began: F8 | None = None
-        self._motion: BottleMotion | None = None
-        self._states: list[int] = [0] * len(ends)
+        self._eyes: list[PhotoEyeDevice] = []
+        self._steady: list[int] = []
+        self._bottles: Bottles | None = None
+        self._began = False
+        self._block: Any = None
+
+    def add(self, eye: "PhotoEyeDevice") -> int:
+        """Add the photo-eye of the next beam. Return the index of the beam."""
+        self._eyes.append(eye)
+        self._steady.append(UNSTEADY)
+        return len(self._eyes) - 1
+
+    def settle(self, beam: int, state: int) -> None:
+        """Don't evaluate an eye while its beam is in a state; UNSTEADY: evaluate it in every tick."""
+        self._steady[beam] = state
 
     def begin(self, now: ScanContext) -> None:
         """Store the bottle positions."""
         bottles = now.state.world.bottles
-        if self._room.shape[1] != bottles.x.size:
-            self._room = np.empty((4, bottles.x.size))
-        self._began = began = self._room
-        began[0], began[1], began[2], began[3] = bottles.x, bottles.y, bottles.vx, bottles.vy
+        if bottles is not self._bottles:
+            self._follow(bottles)
+        np.concatenate(self._columns, out=self._start)
+        self._began = True
 
     def end(self, now: ScanContext) -> None:
-        """Find the times at which each beam was blocked. At the start, bottles are at rest."""
-        bottles = now.state.world.bottles
-        vx, vy, start = bottles.vx, bottles.vy, self._began
-        if start is None:
-            vx = vy = np.zeros(bottles.x.size)
-            start = np.stack((bottles.x, bottles.y, vx, vy))
-        self._began = None
-        motion = BottleMotion(start, bottles.x, bottles.y, vx, vy, bottles.radius, bottles.id)
-        # The layout for kernels is made once, so equal arrays are passed in the same tuple.
-        if self._motion is None or any(a is not b for a, b in zip(self._motion, motion, strict=True)):
-            self._motion = motion
-        motion = self._motion
-        while short := block_beams(motion, now.length, self._beams):
+        """Find the times at which each beam was blocked, and evaluate the eyes that are concerned.
+
+        At the start, bottles are at rest.
+        """
+        motion = self._motion if self._began else _at_rest(now.state.world.bottles)
+        self._began = False
+        self._block = self._block or entry(block_beams, motion, now.length, self._beams)
+        while short := self._block(motion, now.length, self._beams):
             near, spans = self._beams.near, self._beams.spans
             if short == 1:
                 self._beams = self._beams._replace(near=np.empty((2, 2 * near.shape[1]), dtype=np.int64))
             else:
                 self._beams = self._beams._replace(spans=np.empty((len(spans), 2 * spans.shape[1], 2)))
-        self._states = self._beams.state.tolist()
+        states = self._beams.state.tolist()
+        if states != self._steady:
+            for eye, state, steady in zip(self._eyes, states, self._steady, strict=True):
+                if state != steady:
+                    eye.evaluate(now)
 
-    def state(self, beam: int) -> int:
-        """Return the state of a beam in this tick (engine/sensors/beams.py): FREE, BLOCKED or CHANGES."""
-        return self._states[beam]
+    def _follow(self, bottles: Bottles) -> None:
+        """Use the arrays of other bottles from now on. The layout for kernels is made once for them."""
+        self._bottles = bottles
+        self._columns = bottles.x, bottles.y, bottles.vx, bottles.vy
+        start = np.empty((4, bottles.x.size))
+        self._start = start.reshape(-1)
+        self._motion = BottleMotion(start, *self._columns, bottles.radius, bottles.id)
 
     def spans(self, beam: int) -> list[Span]:
         """Return the intervals in which a beam was blocked, s from the start of the tick. Adjoining ones are joined."""
         return [(begin, end) for begin, end in self._beams.spans[beam, : self._beams.used[beam]].tolist()]
+
+
+def _at_rest(bottles: Bottles) -> BottleMotion:
+    """Return the motion of bottles that rest."""
+    rest = np.zeros(bottles.x.size)
+    start = np.stack((bottles.x, bottles.y, rest, rest))
+    return BottleMotion(start, bottles.x, bottles.y, rest, rest, bottles.radius, bottles.id)
 
 
 FASTEST_CHATTER, LONGEST_DELAY = 1000.0, 60.0
@@ -135,7 +161,6 @@ class PhotoEyeDevice(Device):
     def __init__(self, name: str, eye: PhotoEye, setup: DeviceSetup) -> None:
         eyes = setup.scene.photo_eyes
         beams = setup.shared(Beams, lambda: Beams([(each.from_, each.to) for each in eyes.values()]))
-        index = setup.index("photo_eyes", name.rpartition("/")[2])
         super().__init__(
             name,
             [
@@ -149,8 +174,8 @@ class PhotoEyeDevice(Device):
                 number(f"{name}/delay", "fault", "Delay of all changes.", "s", 0.0, LONGEST_DELAY),
             ],
         )
-        self._beams, self._index, self._debounce = beams, index, eye.debounce
-        self._quiet = False  # True: no change until the beam changes
+        self._beams, self._debounce = beams, eye.debounce
+        self._index = beams.add(self)
         self.random = setup.random(name, CHATTER)
         self.stuck_on = self.stuck_off = False
         self.chatter = 0.0
@@ -179,7 +204,7 @@ class PhotoEyeDevice(Device):
 
     def command(self, name: str, value: float, now: ScanContext) -> None:
         """Inject or clear a fault from this tick on."""
-        self._quiet = False
+        self._beams.settle(self._index, UNSTEADY)
         fault = name.rpartition("/")[2]
         setattr(self, fault, bool(value) if fault.startswith("stuck") else float(value))
         if fault == "chatter":
@@ -189,12 +214,10 @@ class PhotoEyeDevice(Device):
 
     def restored(self, tick: int) -> None:
         """Evaluate the beam again in the next tick, because a delay may be running."""
-        self._quiet = False
+        self._beams.settle(self._index, UNSTEADY)
 
-    def end(self, now: ScanContext) -> None:
+    def evaluate(self, now: ScanContext) -> None:
         """Evaluate this tick."""
-        if self._quiet and self._beams.state(self._index) == self.beam:  # FREE and False, or BLOCKED and True
-            return
         spans = self._beams.spans(self._index)
         if now.tick == 0:
             self.beam = self.level = bool(spans)
@@ -221,7 +244,8 @@ class PhotoEyeDevice(Device):
             else:
                 self.fell = at - self._debounce
         self.delayed.follow(seen, time)
-        self._quiet = not (self.chatter or self.late or self.debounced.runs or self.delayed.runs)
+        changes_later = self.chatter or self.late or self.debounced.runs or self.delayed.runs
+        self._beams.settle(self._index, UNSTEADY if changes_later else BLOCKED if self.beam else FREE)
 
     def values(self, now: ScanContext) -> Sequence[float]:
         """Return the values in the order of the signals."""

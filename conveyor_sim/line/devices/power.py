@@ -61,6 +61,8 @@ class PowerSupply(Device):
         self.latched.append(name)
         if "drives" in self._cuts[name]:
             self.locked = [drive.name for drive in self._fed["drives"]]
+            for drive in self._fed["drives"]:
+                drive.wake()
         if "machines" in self._cuts[name]:
             for machine in self._fed["machines"]:
                 machine.cut_power(now)

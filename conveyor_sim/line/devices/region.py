@@ -3,12 +3,14 @@
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from conveyor_sim.engine.arrays.bodies import Bottles
 from conveyor_sim.engine.arrays.types import F8, I8
+from conveyor_sim.engine.compiler.numba_internals.machine_code import entry
 from conveyor_sim.engine.sensors.regions import find_inside
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.devices.setup import DeviceSetup
@@ -38,12 +40,15 @@ class Region:
         """Store the corners, in order, m."""
         self.corners: NDArray[np.float64] = np.array(corners, dtype=np.float64)
         self._slots: I8 = np.empty(0, dtype=np.int64)
+        self._find: Any = None
 
     def inside(self, bottles: Bottles) -> I8:
         """Return the slots of bottles whose axes are inside, (n,). Valid until the next call."""
         if self._slots.size < bottles.id.size:
             self._slots = np.empty(bottles.id.size, dtype=np.int64)
-        return self._slots[: find_inside(self.corners, bottles.x, bottles.y, bottles.id, self._slots)]
+        arguments = self.corners, bottles.x, bottles.y, bottles.id, self._slots
+        self._find = self._find or entry(find_inside, *arguments)
+        return self._slots[: self._find(*arguments)]
 
 
 MOST_OFFSET = 1000.0

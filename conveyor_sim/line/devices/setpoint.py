@@ -130,7 +130,12 @@ class SetpointDevice(SpeedDevice):
 
     def take_setpoint(self, value: float, now: ScanContext) -> None:
         """Set the setpoint, m/s."""
+        self.wake()
         now.setpoints[self._index] = value
+
+    def rests(self, now: ScanContext) -> bool:
+        """Return True if it has the speed of the setpoint."""
+        return bool(now.speeds[self._index] == now.setpoints[self._index]) and not self.is_locked
 
     def take_mode(self, mode: int, now: ScanContext) -> None:
         """Suspend the watchdog outside automatic mode."""

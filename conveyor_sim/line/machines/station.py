@@ -42,10 +42,9 @@ class TakingDevice(MachineDevice):
     def queue(self, now: ScanContext) -> Mapping[int, int]:
         """Update `waiting`, and return the slots of the waiting bottles by their ids."""
         bottles = now.state.world.bottles
-        slots = self._region.inside(bottles)
-        slot_of: dict[int, int] = dict(zip(bottles.id[slots].tolist(), slots.tolist(), strict=True))
-        stayed = tuple(bottle for bottle in self.waiting if bottle in slot_of)
-        if stayed != self.waiting or len(stayed) < len(slot_of):
+        slot_of = {int(bottles.id[slot]): slot for slot in self._region.inside(bottles).tolist()}
+        if slot_of.keys() != set(self.waiting):
+            stayed = tuple(bottle for bottle in self.waiting if bottle in slot_of)
             self.waiting = (*stayed, *sorted(slot_of.keys() - set(stayed)))
         return slot_of
 

@@ -13,6 +13,9 @@ from conveyor_sim.physics.state import State
 from conveyor_sim.physics.state.snapshot import restore, snapshot, typed
 from conveyor_sim.scene import Scene
 
+UNBOOKED = nullcontext()
+"""Context without a ledger."""
+
 
 class Accounts:
     """Accounts of one State. An attribute is None if the scene does not enable it."""
@@ -28,11 +31,6 @@ class Accounts:
         """Open the energy ledger with the present state, if the scene enables it."""
         if self._state.model.has("energy_ledger"):
             self.energy = EnergyAccount(self._state)
-
-    def begin(self, was_output: bool) -> None:
-        """Begin a tick. was_output: damage was output at its beginning."""
-        if self.damage is not None:
-            self.damage.begin(was_output)
 
     def end(self, tick: int, removed: Callable[[], Mapping[str, int]]) -> list[DamageEvent]:
         """End a tick. Return the limits that were passed in it. removed: returns the bottles taken by each device."""
@@ -53,11 +51,11 @@ class Accounts:
 
     def feeding(self) -> AbstractContextManager[None]:
         """Book energy gained inside the context as brought by bottles."""
-        return nullcontext() if self.energy is None else self.energy.feeding()
+        return UNBOOKED if self.energy is None else self.energy.feeding()
 
     def removing(self) -> AbstractContextManager[None]:
         """Book energy lost inside the context as carried away by removed bottles."""
-        return nullcontext() if self.energy is None else self.energy.removing()
+        return UNBOOKED if self.energy is None else self.energy.removing()
 
     def snapshot(self) -> dict[str, Any]:
         """Return the memory of all accounts, as plain data."""

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conveyor_sim.engine.arrays.contacts import ContactLaw
-from conveyor_sim.engine.arrays.impulses import ROW
+from conveyor_sim.engine.arrays.impulses import CONTACTS, ROW
 from conveyor_sim.engine.arrays.rails import RailContacts
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.engine.arrays.world import World
@@ -42,6 +42,22 @@ def deepest_overlap(world: World, found: RailContacts) -> float:
     return float((values[4] / smaller).max(initial=0.0))
 
 
+def pressed_energy(model: Model, world: World, found: RailContacts) -> float:
+    """Return the energy (J) in the springs of contacts under their normal impulses, N^2 / (2 k). found: scratch."""
+    kind, (a, b), values = closed_contacts(world, found)
+    if not kind.size:
+        return 0.0
+    types, pairs = world.bottles.type.astype(np.int64), kind == BOTTLE_BOTTLE
+    stored = 0.0
+    for law, entries, normal in (
+        (model.pair_law, types[a[pairs]] * len(model.bottle_types) + types[b[pairs]], values[5, pairs]),
+        (model.rail_law, rail_entries(model, types[a[~pairs]], b[~pairs]), values[5, ~pairs]),
+    ):
+        if law is not None and law.stiffness is not None:
+            stored += float((normal * normal / (2.0 * law.stiffness[entries])).sum())
+    return stored
+
+
 def impulse_energy(model: Model, world: World) -> float:
     """Return the energy (J) that the held impulses of a World store in their contacts, F^2 / (2 k)."""
     if world.impulses is None or world.impulses.step[0] == 0.0:
@@ -56,6 +72,13 @@ def impulse_energy(model: Model, world: World) -> float:
             piece = near.piece[: bottle.size]
             kind = world.bottles.type[bottle].astype(np.int64) * materials + pieces.material[piece]
             stored += _stored(near.impulse.row, step, model.rail_law, kind)
+    if (bodies := world.impulses.bodies) is not None and world.moving is not None and model.rail_law is not None:
+        place = np.flatnonzero(bodies.piece >= 0)
+        material = np.concatenate(
+            [group.material for group in (world.moving.segments, world.moving.arcs) if group is not None]
+        )
+        kind = world.bottles.type[place // CONTACTS].astype(np.int64) * materials + material[bodies.piece[place]]
+        stored += _stored(bodies.row.reshape(-1, ROW)[place], step, model.rail_law, kind)
     return stored
 
 

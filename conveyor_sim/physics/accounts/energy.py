@@ -8,9 +8,11 @@ import numpy as np
 
 from conveyor_sim.columns.ledger import Ledger, balance
 from conveyor_sim.engine.arrays.types import F8
+from conveyor_sim.engine.arrays.world import World
 from conveyor_sim.engine.observers.ledger import BASE_FRICTION, BELTS, CONTACT_FRICTION, DAMPING
-from conveyor_sim.engine.observers.stored_energy import BASE_SPRINGS, SPRINGS, stored_energy
+from conveyor_sim.engine.observers.stored_energy import BASE_SPRINGS, ELASTIC, SPRINGS, stored_energy
 from conveyor_sim.engine.threads.workers import workers
+from conveyor_sim.physics.accounts.elastic import pressed_energy
 from conveyor_sim.physics.state import State
 
 
@@ -21,7 +23,7 @@ class EnergyAccount:
         """Open the ledger with the energy of the present bottles. The neighbour lists must be valid."""
         self._state = state
         self._found = workers(1)[0].rail_contacts
-        self.fed = self.removed = self.springs = self.base_springs = 0.0
+        self.fed = self.removed = self.springs = self.base_springs = self.elastic = 0.0
         self.restart()
 
     def restart(self) -> None:
@@ -33,6 +35,8 @@ class EnergyAccount:
         """J in tangential springs of fed minus removed bottles, which is not dissipated."""
         self.base_springs = float(stored[BASE_SPRINGS])
         """J in springs under fed minus removed bottles."""
+        self.elastic = float(stored[ELASTIC])
+        """J in contacts of fed minus removed bottles. Impulses do work against their springs, which return it."""
 
     @contextmanager
     def feeding(self) -> Iterator[None]:
@@ -57,6 +61,7 @@ class EnergyAccount:
         # Springs store a part of the friction work, which is dissipated when they are released.
         held = float(stored[SPRINGS]) - self.springs
         held_by_base = float(stored[BASE_SPRINGS]) - self.base_springs
+        pressed = 0.0 if self._state.world.impulses is None else float(stored[ELASTIC]) - self.elastic
         return balance(
             stored,
             self.fed,
@@ -65,7 +70,7 @@ class EnergyAccount:
             work[BELTS + surfaces :],
             float(work[BASE_FRICTION]) - held_by_base,
             float(work[CONTACT_FRICTION]) - held,
-            float(work[DAMPING]),
+            float(work[DAMPING]) - pressed,
         )
 
     def _by_belt(self, work: F8) -> F8:
@@ -83,12 +88,25 @@ class EnergyAccount:
         gained = self._stored() - before
         self.springs += float(gained[SPRINGS])
         self.base_springs += float(gained[BASE_SPRINGS])
+        self.elastic += float(gained[ELASTIC])
         return gained
 
     def _stored(self) -> F8:
-        return stored_energy(self._state.world, self._found)
+        world = self._state.world
+        if world.impulses is None:
+            return stored_energy(world, self._found)
+        return np.array([_kinetic(world), pressed_energy(self._state.model, world, self._found), 0.0, 0.0])
 
     def _work(self) -> F8:
         ledger = self._state.world.ledger
         assert ledger is not None
         return ledger.work
+
+
+def _kinetic(world: World) -> float:
+    bottles = world.bottles
+    there = bottles.id >= 0
+    energy = (0.5 * (bottles.vx**2 + bottles.vy**2)[there] / bottles.inverse_mass[there]).sum()
+    if world.spin is not None:
+        energy += (0.5 * world.spin.omega[there] ** 2 / world.spin.inverse_inertia[there]).sum()
+    return float(energy)

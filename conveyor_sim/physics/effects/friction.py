@@ -6,7 +6,7 @@ from collections.abc import Collection
 from functools import partial
 
 from conveyor_sim.engine.contact.laws.linear import contact_time
-from conveyor_sim.engine.integrators import AHEAD, WARM
+from conveyor_sim.engine.integrators import AHEAD, SWEPT, WARM
 from conveyor_sim.physics.effects.contacts import contacts_in_use
 from conveyor_sim.physics.effects.declaration import Cause, Effect
 from conveyor_sim.physics.effects.load import ENDLESS_QUEUE
@@ -162,6 +162,13 @@ def _chosen(plant: Plant, on: Collection[str], *, field: str, value: str) -> Cau
     return None
 
 
+def _implicit(plant: Plant, on: Collection[str]) -> Cause | None:
+    # Impulses have implicit friction with either solver.
+    if plant.scene.accuracy.integrator in SWEPT:
+        return None
+    return _chosen(plant, on, field="friction_solver", value="implicit")
+
+
 def _spring(plant: Plant, on: Collection[str]) -> Cause | None:
     if "contact_friction" not in on:
         return None
@@ -234,8 +241,8 @@ IMPLICIT_FRICTION = Effect(
     "prediction says so. Not available with dormand_prince, which divides its steps, and linearly_implicit, which "
     "solves for friction itself",
     source="added; the warm start as in Catto, GDC 2006",
-    called_for=partial(_chosen, field="friction_solver", value="implicit"),
-    absent="friction_solver is explicit, or nothing has friction",
+    called_for=_implicit,
+    absent="friction_solver is explicit, nothing has friction, or the friction of integrator impulses is implicit",
     needs="closed contacts and 1/m + R^2/J of each bottle",
     bounds=_implicit_bounds,
     bound="with rk4 gamma dt is at most 1 + 20 times the tolerance, for resting load; none with the others. It removes "

@@ -63,7 +63,7 @@ MOVING_RAILS = Effect(
     absent="no gate, pusher or diverter, and no other machine with moving rails",
     needs="profile and position of each axis, and the box that each body sweeps; if a drive has a force limit, the sum "
     "of forces of bottles on each axis; in the scene, a contact for each pair of materials, and leapfrog, "
-    "semi_implicit_euler or velocity_verlet as integrator. "
+    "semi_implicit_euler, velocity_verlet or impulses as integrator. "
     "If it is forced off, axes and bodies move, and bottles pass through the bodies",
 )
 UNEQUAL_RADII = Effect(

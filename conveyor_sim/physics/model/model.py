@@ -21,7 +21,7 @@ from conveyor_sim.engine.integrators import AHEAD, LAG, WARM
 from conveyor_sim.errors import SceneError
 from conveyor_sim.physics.effects.choice import prediction_of
 from conveyor_sim.physics.effects.declaration import EffectChoice
-from conveyor_sim.physics.effects.load import Load
+from conveyor_sim.physics.effects.load import Load, longest_queue
 from conveyor_sim.physics.laws.coefficients import BaseSprings, Laws
 from conveyor_sim.physics.laws.rebounds import Rebounds, build_rebounds
 from conveyor_sim.physics.model.plant_arrays import plant_grid, rail_arrays
@@ -31,6 +31,7 @@ from conveyor_sim.physics.plant import Plant
 from conveyor_sim.physics.sources_hash import sources_hash
 from conveyor_sim.physics.timestep.bounds import SKIN, Bound
 from conveyor_sim.physics.timestep.prediction import Impact, Prediction
+from conveyor_sim.physics.timestep.settling import Settling, settling
 from conveyor_sim.scene.accuracy import MOST_STEPS
 from conveyor_sim.scene.effect_names import EffectName
 from conveyor_sim.scene.places import Places
@@ -59,6 +60,8 @@ class Model:
     integrator: str
     sweeps: int
     """Sweeps in a step of integrator impulses; 0 with others."""
+    settling: Settling | None
+    """Time in which forces in queues settle with integrator impulses; None with others."""
     effects: tuple[EffectChoice, ...]
     belts: tuple[str, ...]
     rails: tuple[str, ...]
@@ -132,6 +135,7 @@ def build_model(scene: Scene) -> Model:
         load=choice.terms.load,
         integrator=scene.accuracy.integrator,
         sweeps=scene.accuracy.sweeps or 0,
+        settling=_settling(plant, steps, scene.accuracy.sweeps),
         effects=choice.effects,
         belts=tuple(scene.belts),
         rails=tuple(rail.name for rail in plant.rails),
@@ -180,6 +184,10 @@ def build_model(scene: Scene) -> Model:
         versions=versions_here(),
         machine=_machine(),
     )
+
+
+def _settling(plant: Plant, steps: int, sweeps: int | None) -> Settling | None:
+    return None if sweeps is None else settling(steps, sweeps, plant.scene.tick, *longest_queue(plant))
 
 
 @cache

@@ -23,10 +23,15 @@ from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.engine.threads.workers import UNIT
 from conveyor_sim.physics.model import Model
 from conveyor_sim.physics.model.moving_rails import ordered_pieces
+from conveyor_sim.scene.effect_names import EffectName
 from conveyor_sim.scene.geometry import ArcPiece, Piece
 
 BIN = 0.05
 """Largest length of a bin of rail, m."""
+
+
+LOADS: tuple[EffectName, ...] = ("scuffing", "crushing", "impacts", "tipping")
+"""Effects with loads on bottles."""
 
 
 @dataclass(frozen=True)

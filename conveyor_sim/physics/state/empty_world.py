@@ -11,10 +11,16 @@ from conveyor_sim.engine.arrays.impulses import (
     BODY,
     COLOURS,
     CONSTANTS,
+    CONTACTS,
+    GEOMETRY,
+    MOST_PRESSED,
     ROW,
+    BodyImpulses,
     Impulses,
+    LoadScratch,
     NearImpulses,
     PairImpulses,
+    WorkScratch,
 )
 from conveyor_sim.engine.arrays.integrators import Blocks, Linear, PairTangent, Slopes, Stage, Triple
 from conveyor_sim.engine.arrays.lists import Near, NearSprings, Neighbourhood
@@ -33,7 +39,7 @@ from conveyor_sim.physics.model import Model
 from conveyor_sim.physics.model.moving_rails import moving_arrays
 from conveyor_sim.physics.model.plant_arrays import belt_arrays, listed
 from conveyor_sim.physics.model.vibration import vibration_arrays
-from conveyor_sim.physics.state.empty_damage import empty_damage
+from conveyor_sim.physics.state.empty_damage import LOADS, empty_damage
 
 
 def empty_pairs(model: Model, entries: int) -> Pairs | None:
@@ -61,8 +67,12 @@ def empty_pairs(model: Model, entries: int) -> Pairs | None:
         spring=_pair_springs(entries) if _has_history(model, law) else None,
         tangent=_pair_tangent(entries) if model.integrator in LINEAR else None,
         impulse=_pair_impulses(entries) if model.integrator in SWEPT else None,
-        parts=PairParts(_triple(2 * entries + 1), _triple(2 * entries + 1)) if model.has("energy_ledger") else None,
+        parts=_pair_parts(entries) if model.has("energy_ledger") and model.integrator not in SWEPT else None,
     )
+
+
+def _pair_parts(entries: int) -> PairParts:
+    return PairParts(_triple(2 * entries + 1), _triple(2 * entries + 1))
 
 
 def empty_near(model: Model, slots: int, entries: int) -> Near:
@@ -268,7 +278,35 @@ def _impulses(model: Model, slots: int) -> Impulses:
         step=np.zeros(1),
         anew=np.ones(1, np.int64),
         mask=np.zeros(slots, np.int64),
+        bodies=_body_impulses(len(model.plant.axes), slots) if model.has("moving_rails") else None,
+        work=_work(slots) if model.has("energy_ledger") else None,
+        loads=_loads(slots) if any(model.has(name) for name in LOADS) else None,
     )
+
+
+def _body_impulses(axes: int, slots: int) -> BodyImpulses:
+    contacts = CONTACTS * slots
+    return BodyImpulses(
+        piece=np.full(contacts, -1, np.int32),
+        row=np.zeros(ROW * contacts),
+        geometry=np.zeros(GEOMETRY * contacts),
+        axis=np.zeros(contacts, np.int32),
+        kind=np.zeros(contacts, np.int32),
+        speed=np.zeros(axes),
+        drive=np.zeros(axes),
+        leaves=np.zeros(axes, np.int32),
+        struck=np.zeros(-(-slots // UNIT) * axes),
+    )
+
+
+def _work(slots: int) -> WorkScratch:
+    return WorkScratch(np.zeros(slots), np.zeros(slots), _triple(slots), np.zeros(slots))
+
+
+def _loads(slots: int) -> LoadScratch:
+    normal, blow, x, y = (np.zeros(slots) for _ in range(4))
+    pressed = (np.zeros(MOST_PRESSED * slots) for _ in range(3))
+    return LoadScratch(normal, blow, x, y, np.zeros(slots, np.int64), *pressed)
 
 
 def _riding(model: Model, slots: int) -> Riding:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from conveyor_sim.engine.arrays.contacts import PairSprings
 from conveyor_sim.engine.arrays.damage import lasting_columns, slot_columns
-from conveyor_sim.engine.arrays.impulses import ROW, NearImpulses, PairImpulses
+from conveyor_sim.engine.arrays.impulses import CONTACTS, ROW, NearImpulses, PairImpulses
 from conveyor_sim.engine.arrays.lists import Near, NearSprings
 from conveyor_sim.engine.impulses.carry import drop_near_impulses, drop_pair_impulses
 from conveyor_sim.engine.lists.near import drop_near_springs
@@ -148,6 +148,9 @@ class State:
         for near in (world.near_segments, world.near_arcs):
             if near is not None:
                 drop_near_impulses(near, near.impulse, slot)
+        if (bodies := world.impulses.bodies) is not None:
+            bodies.piece.reshape(-1, CONTACTS)[slot] = -1
+            bodies.row.reshape(-1, CONTACTS * ROW)[slot] = 0.0
 
     def take_removed(self) -> list[int]:
         """Return the ids of bottles removed since the last call, in order."""
@@ -248,6 +251,9 @@ class State:
                 held = np.flatnonzero(rows.any(axis=1))
                 bottle = np.searchsorted(near.start, held, side="right") - 1
                 yield from (bottle, near.piece[held], rows[held])
+        if world.impulses is not None and (bodies := world.impulses.bodies) is not None:
+            place = np.flatnonzero(bodies.piece >= 0)
+            yield from (place, bodies.piece[place], bodies.row.reshape(-1, ROW)[place])
 
     def moving_rails(self) -> tuple[RailShape, ...]:
         """Return the bodies that are present, each as a rail, at their present positions."""

@@ -40,6 +40,11 @@ FIXED = (
 )
 """Arrays in other groups that follow from the scene and never change."""
 
+SUBSTEP = (
+    *("body", "free", "work.", "loads."),
+    *(f"bodies.{name}" for name in ("geometry", "axis", "kind", "speed", "drive", "leaves", "struck")),
+)
+
 SCRATCH: Mapping[str, str] = {
     "bottles.packed": "positions and velocities side by side, copied before forces are summed",
     "spin.moment": "summed anew from zero",
@@ -50,7 +55,7 @@ SCRATCH: Mapping[str, str] = {
     "linear.": "of one step of the linearly implicit method",
     "riding.": "of one call of an integrator",
     **dict.fromkeys(("impulses.pair_constants", "impulses.rail_constants"), "of one call of an integrator"),
-    **dict.fromkeys(("impulses.body", "impulses.free"), "of one substep of the method of impulses"),
+    **dict.fromkeys((f"impulses.{name}" for name in SUBSTEP), "of one substep of the method of impulses"),
     **dict.fromkeys(("impulses.mask", "pairs.impulse.next"), "of one rebuild of the lists"),
     **dict.fromkeys(("vibration.phase", "vibration.clock"), "of one tick"),
     "vibration.ahead": "of one step",

@@ -5,9 +5,11 @@ from typing import Any
 
 import numpy as np
 
+from conveyor_sim.engine.arrays.impulses import MOST_PRESSED
 from conveyor_sim.engine.arrays.moving import HELD, ON_PROFILE
 from conveyor_sim.engine.arrays.world import World
 from conveyor_sim.engine.contact.slots import WIDTH
+from conveyor_sim.engine.impulses.bodies import LEFT
 from conveyor_sim.engine.lists.riding import PLANNED, STEPPED
 from conveyor_sim.physics.model import Model
 from conveyor_sim.physics.state.empty_world import empty_near, empty_pairs, empty_slots, empty_world, near_bodies
@@ -102,7 +104,15 @@ def ranges(world: World, model: Model, next_id: int) -> dict[str, tuple[int, int
         "riding.progress": (STEPPED, PLANNED),
         "impulses.anew": (0, 1),
         "impulses.mask": (0, 2**63 - 1),
+        "impulses.loads.pressed": (0, MOST_PRESSED),
     }
+    if world.impulses is not None and world.impulses.bodies is not None and world.moving is not None:
+        limits |= {
+            "impulses.bodies.piece": (-1, world.moving.body.size - 1),
+            "impulses.bodies.axis": (-1, max(0, axes - 1)),
+            "impulses.bodies.leaves": (0, LEFT),
+            "impulses.bodies.kind": (0, world.impulses.rail_constants.size - 1),
+        }
     if world.belts is not None:
         limits["belts.start"] = (0, world.belts.candidate.size)
     if world.pairs is not None:

@@ -69,6 +69,7 @@ def accuracy_rows(model: Model) -> list[tuple[str, str]]:
         ("predicted error", force),
         ("", resting),
         *(("", f"{percent(term.value)} in {term.quantity}: {term.reason}") for term in prediction.terms),
+        *([] if model.settling is None else [("settling", model.settling.sentence)]),
     ]
 
 

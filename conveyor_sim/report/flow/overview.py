@@ -34,6 +34,7 @@ def overview(scene: Scene, model: Model, limit: StepLimit, flow: LineFlow) -> li
         f"{scene.duration:g} s in ticks of {1e3 * scene.tick:g} ms",
         *_flow_lines(scene, flow),
         labelled("accuracy", _accuracy(model)),
+        *([] if model.settling is None else [labelled("settling", model.settling.sentence)]),
         labelled("step", _step(limit)),
         labelled("speed", expected_factor(limit)),
     ]

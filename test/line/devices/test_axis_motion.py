@@ -8,7 +8,8 @@ import math
 import numpy as np
 import pytest
 
-from conveyor_sim.line.devices.axis_motion import Motion, Shift, acceleration_toward
+from conveyor_sim.engine.arrays.moving import PHASES
+from conveyor_sim.line.devices.axis_motion import Motion, Shift, acceleration_toward, write_profile
 from conveyor_sim.line.devices.mover import position_at
 
 TICK = 0.01
@@ -16,20 +17,22 @@ TICK = 0.01
 
 def test_a_motion_profile_has_the_position_of_the_motion_at_every_time() -> None:
     motion = Motion(1.5, 2.0, -30.0)
-    course = motion.profile(TICK)
+    courses = np.full((3, PHASES, 4), np.nan)
+    write_profile(courses, 1, motion, motion.after(TICK), TICK)
+    assert np.isnan(courses[[0, 2]]).all()
     for time in np.linspace(0.0, TICK, 11):
         expected = 1.5 + 2.0 * time - 15.0 * time**2
-        assert motion.position_after(time) == pytest.approx(expected, rel=1e-15)
-        assert position_at(course, time) == pytest.approx(expected, rel=1e-15)
-    assert position_at(course, 2.0 * TICK) == pytest.approx(motion.position_after(TICK) + (2.0 - 0.3) * TICK)
+        assert motion.after(time)[0] == pytest.approx(expected, rel=1e-15)
+        assert position_at(courses[1], time) == pytest.approx(expected, rel=1e-15)
+    assert position_at(courses[1], 2.0 * TICK) == pytest.approx(motion.after(TICK)[0] + (2.0 - 0.3) * TICK)
 
 
 def test_a_gear_of_a_motion_has_its_ratio_at_every_time() -> None:
     master = Motion(40.0, 41.9, 10.0)
     slave = master.geared(-1 / 12, 0.3)
     for time in np.linspace(0.0, TICK, 5):
-        assert slave.position_after(time) == pytest.approx(0.3 - master.position_after(time) / 12, rel=1e-15)
-        assert slave.speed_after(time) == pytest.approx(-master.speed_after(time) / 12, rel=1e-15)
+        position, speed = master.after(time)
+        assert slave.after(time) == pytest.approx((0.3 - position / 12, -speed / 12), rel=1e-15)
 
 
 @pytest.mark.parametrize(("target", "expected"), [(1.0, 10.0), (-1.0, -10.0), (0.05, 5.0), (0.0, 0.0)])
@@ -46,7 +49,7 @@ def test_a_shift_is_a_continuous_trapezoid_that_ends_exactly(distance: float) ->
     while (motion := shift.during(7 + ticks, TICK)) is not None:
         assert motion.position == pytest.approx(place, abs=1e-14) and motion.speed == pytest.approx(speed, abs=1e-12)
         assert abs(motion.speed) <= 1.05 * (1 + 1e-12) and abs(motion.acceleration) <= 10.0 * (1 + 1e-12)
-        place, speed, ticks = motion.position_after(TICK), motion.speed_after(TICK), ticks + 1
+        (place, speed), ticks = motion.after(TICK), ticks + 1
     assert place == pytest.approx(0.0, abs=1e-14) and speed == pytest.approx(0.0, abs=1e-12)
     assert shift.distance == 0.0
     # The fastest such motion takes d / v + v / a, or 2 sqrt(d / a) below that speed. Corners at ticks add up to three.

@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 from conveyor_sim.columns.events import GuardEvent
 from conveyor_sim.engine.arrays.bodies import Bottles, Spin
+from conveyor_sim.engine.arrays.observers import GuardProbe
 from conveyor_sim.engine.arrays.rails import RailContacts
 from conveyor_sim.engine.compiler.numba_internals.machine_code import entry
 from conveyor_sim.engine.observers.guard_probe import look
@@ -17,8 +18,9 @@ from conveyor_sim.engine.observers.stored_energy import KINETIC, stored_energy
 from conveyor_sim.physics.accounts.elastic import deepest_overlap, impulse_energy
 from conveyor_sim.physics.state import State
 from conveyor_sim.physics.stepping.guard.squeeze import Squeeze, squeeze_of
-from conveyor_sim.physics.stepping.guard.violation import Violation, Words
+from conveyor_sim.physics.stepping.guard.violation import Violation, Words, unresolved
 from conveyor_sim.physics.stepping.guard.world_snapshot import WorldSnapshot
+from conveyor_sim.physics.timestep.prediction import DEEP
 from conveyor_sim.scene.types import Unchecked
 
 DEEPEST = 0.75
@@ -31,7 +33,19 @@ SOFT = 0.2
 """Overlap, in radii, from which a contact is reported as soft. Positions are wrong by the overlap."""
 
 CLOSELY = 128
-"""Largest number of steps between checks of overlaps. A check costs about half a step."""
+"""Largest number of steps between checks of overlaps, sweeps counted as steps. A check costs about half a step."""
+
+HALF_WAY = 0.5
+"""Largest way of a bottle in a step of integrator impulses over the skin of the lists.
+
+A contact acts before bottles touch, so the lists of both must hold for the next step.
+"""
+
+OVERLAP = 2.0 * DEEP
+"""Overlap, in radii, from which integrator impulses is reported as too coarse for contacts that it does not resolve.
+
+An overlap is an error there. Up to DEEP of the diameter the flow was that of stiff contacts.
+"""
 
 
 @dataclass
@@ -65,7 +79,9 @@ class Guard:
         self._model = state.model
         self._found = found
         self._memory = WorldSnapshot()
-        self._every = max(1, math.ceil(CLOSELY / self._model.steps_per_tick))
+        self._every = max(1, math.ceil(CLOSELY / (self._model.steps_per_tick * max(1, self._model.sweeps))))
+        self._longest_way = self._model.settings.skin * (HALF_WAY if self._model.sweeps else 1.0)
+        self._soft_from = OVERLAP if unresolved(self._model) else SOFT
         tick, slip = self._model.tick_ns * 1e-9, self._model.settings.slip_limit
         self._friction = tick * self._model.largest_base_friction
         # The energy of bottles within the slip limit is negligible.
@@ -84,27 +100,25 @@ class Guard:
         """
         model, world = self._model, self._state.world
         self._memory.take(world)
+        bad, _, _, mass, self._kinetic, _, _ = self._look(world.bottles, world.spin, world.probe)
         if tick % self._every == 0:
             world.probe.due[0] = 1
-        bad, _, _, weight, self._kinetic = self._look(world.bottles, world.spin)
         # A rail of speed u does work against friction; its impact can raise a bottle's speed to v + 2 u.
-        hits = 4.0 * rail_speed**2 * self._mass() if rail_speed > 0.0 else 0.0
-        self._work = weight * (self._friction * (surface_speed + rail_speed) + self._noise) + hits
+        hits = 4.0 * rail_speed**2 * mass
+        self._work = mass * model.gravity * (self._friction * (surface_speed + rail_speed) + self._noise) + hits
         return Words(model, world).put_in(bad) if bad >= 0 else None
 
     def end(self, dt: float) -> Violation | None:
         """Return a violation at the end of a tick with steps of dt (s), and put the state back; None without one."""
         world, model = self._state.world, self._model
-        bad, fastest, square, _, kinetic = self._look(world.bottles, world.spin)
-        deep = float(world.probe.depth[0]), float(world.probe.depth[1])
-        self.forget()
+        bad, fastest, square, _, kinetic, *deep = self._look(world.bottles, world.spin, world.probe)
         if bad >= 0:
             return self._words_before().not_finite(bad)
         if fastest < 0:
             return None
         speed = math.sqrt(square)
-        if self._something_there and speed * dt > model.settings.skin:
-            return self._words_before(fastest).far(fastest, speed, dt)
+        if self._something_there and speed * dt > self._longest_way:
+            return self._words_before(fastest).far(fastest, speed, dt, self._longest_way)
         if kinetic > GROWTH * self._kinetic + self._work and (energies := self._grown()):
             return self._words_before(fastest).energy(fastest, *energies, self._work)
         depth = max(deep)
@@ -112,7 +126,7 @@ class Guard:
             return None
         # `put_in` stays True until a check finds no deep overlap.
         self.memory.put_in = self.memory.put_in and depth == 0.0
-        if depth > SOFT >= self.memory.deepest or depth > DEEPEST:
+        if depth > self._soft_from >= self.memory.deepest or depth > DEEPEST:
             worst = deep.index(depth)
             bottle, other = int(world.probe.bottle[worst]), int(world.probe.other[worst])
             words = self._words_before(bottle) if depth > DEEPEST else Words(model, world, self._squeeze(bottle))
@@ -146,11 +160,6 @@ class Guard:
         )
         return GuardEvent(tick, "chatter", bottle, x, y, text)
 
-    def _mass(self) -> float:
-        """Return the mass of all bottles, kg."""
-        bottles = self._state.world.bottles
-        return float(self._model.type_mass[bottles.type[bottles.id >= 0]].sum())
-
     def _grown(self) -> tuple[float, float] | None:
         """Return the energy (J) before and after the tick if it grew too much; else None."""
         after = WorldSnapshot()
@@ -179,10 +188,10 @@ class Guard:
         # Overlaps of contacts that a substep does not resolve are errors: they store no energy.
         return float(stored[KINETIC]) + impulse_energy(self._model, self._state.world)
 
-    def _compile(self, bottles: Bottles, spin: Spin | None) -> Any:
+    def _compile(self, bottles: Bottles, spin: Spin | None, probe: GuardProbe) -> Any:
         """Run the first check, which compiles it."""
-        self._look = entry(look, bottles, spin)
-        return self._look(bottles, spin)
+        self._look = entry(look, bottles, spin, probe)
+        return self._look(bottles, spin, probe)
 
     def _squeeze(self, slot: int) -> Squeeze | None:
         return squeeze_of(self._model, self._state.world, self._found, slot)

@@ -8,6 +8,7 @@ import numpy as np
 
 from conveyor_sim.engine.arrays.contacts import ContactLaw
 from conveyor_sim.engine.arrays.world import World
+from conveyor_sim.engine.impulses.constants import RESOLVED
 from conveyor_sim.engine.integrators.dormand_prince import MOST
 from conveyor_sim.physics.accounts.elastic import elastic_energy, rail_entries
 from conveyor_sim.physics.model import Model
@@ -44,6 +45,13 @@ class Violation:
         return f"{self.what} in the tick that began at {time:g} s at ({self.x:.4g}, {self.y:.4g}) m{even}: {self.why}"
 
 
+def unresolved(model: Model) -> bool:
+    """Return True if steps of integrator impulses are longer than its stiffest contact lasts: overlaps are errors."""
+    laws = [law.stiffness for law in (model.pair_law, model.rail_law) if law is not None and law.stiffness is not None]
+    stiffest = max((float(stiffness.max(initial=0.0)) for stiffness in laws), default=0.0)
+    return bool(model.sweeps) and model.dt**2 * stiffest / float(model.type_mass.min()) >= RESOLVED
+
+
 class Words:
     """Builder of violation messages for the state at the beginning of a tick."""
 
@@ -72,10 +80,10 @@ class Words:
         )
         return self._unstable(slot, what, why, curable=False)
 
-    def far(self, slot: int, speed: float, dt: float) -> Violation:
-        """Return the violation of a bottle that moves too far in one step. speed: m/s."""
+    def far(self, slot: int, speed: float, dt: float, longest: float) -> Violation:
+        """Return the violation of a bottle that moves too far in one step. speed: m/s. longest: allowed way, m."""
         what = f"bottle {self._id(slot)} moves {1e3 * speed * dt:.3g} mm in one step of {dt:g} s"
-        limit = f"contacts may be missed beyond {1e3 * self._model.settings.skin:.3g} mm"
+        limit = f"contacts may be missed beyond {1e3 * longest:.3g} mm"
         why = f"its speed is {speed:.3g} m/s, and {limit}; choose a finer accuracy"
         return self._tunnelling(slot, what, self._forced() or why)
 
@@ -153,9 +161,12 @@ class Words:
         stopped = float(np.sqrt(2.0 * most / mass))
         if forced := self._forced(speed <= CAME_FAST * stopped):
             return forced
-        if self._model.sweeps:
-            sweeps = f"{self._model.steps_per_tick} steps a tick with {self._model.sweeps} sweeps"
-            return f"{sweeps} do not resolve the contact with {what}; choose more steps or sweeps"
+        if unresolved(self._model):
+            sweeps = f"{self._model.sweeps} sweep{'s' * (self._model.sweeps != 1)}"
+            return (
+                f"{self._model.steps_per_tick} steps a tick with {sweeps} do not resolve the contact with {what}, so "
+                "throughput, jams and forces may be wrong; choose more steps or sweeps"
+            )
         if speed > CAME_FAST * stopped:
             needed = mass * (speed / (REMEDY_DEPTH * radius)) ** 2
             return (
