@@ -18,7 +18,7 @@ from multiprocessing import active_children, get_context
 from pathlib import Path
 from typing import Any
 
-from hard_cases.case import Case, read_table
+from hard_cases.case import IMPULSES, Case, read_table
 from hard_cases.measures import Outcome, run
 
 from conveyor_sim.engine.compiler.compile import ENGINE_HASH
@@ -73,7 +73,7 @@ def jobs(cases: Sequence[Case]) -> Iterator[Job]:
     for case in cases:
         for effects in case.variants:
             for integrator in case.integrators or _integrators(case):
-                for preset in case.presets or tuple(PRESETS):
+                for preset in tuple(IMPULSES) if integrator == "impulses" else case.presets or tuple(PRESETS):
                     yield Job(case.name, effects, integrator, preset)
 
 
@@ -81,7 +81,8 @@ def _integrators(case: Case) -> Sequence[str]:
     """All; semi_implicit_euler where a belt turns only, for elsewhere leapfrog gives the same bits."""
     belts = case.given.get("belts", {}).values()
     turns = "file" in case.given or any(belt.get("kind") == "curved" for belt in belts)
-    return [name for name in INTEGRATOR_NAMES if turns or name != "semi_implicit_euler"]
+    names = [name for name in INTEGRATOR_NAMES if turns or name != "semi_implicit_euler"]
+    return [*names, "impulses"]
 
 
 def make(job: Job) -> dict[str, Any]:
@@ -125,7 +126,8 @@ def _tick_work(model: Model, scene: Scene) -> float:
     bottles = sum(
         entry.grid.rows * entry.grid.columns if hasattr(entry, "grid") else 1 for entry in scene.bottles
     ) + sum(min(feed.count or 100, 100) for feed in scene.infeeds.values())
-    return float(TICK + model.steps_per_tick * (bottles + BESIDE) * STEP_COST[model.integrator])
+    cost = STEP_COST[model.integrator] * (scene.accuracy.sweeps or 1)
+    return float(TICK + model.steps_per_tick * (bottles + BESIDE) * cost)
 
 
 def _verdict(case: Case, outcome: Outcome, job: Job, early: bool) -> tuple[str, str]:
@@ -135,7 +137,8 @@ def _verdict(case: Case, outcome: Outcome, job: Job, early: bool) -> tuple[str, 
         wrong = case.broken(outcome.measures, outcome.sentence, job.preset)
     if not wrong:
         return ("kept so far" if early and not outcome.sentence else "kept"), outcome.sentence
-    if (limit := case.limits.get(f"{job.integrator} {job.preset}")) is not None:
+    limit = case.limits.get(f"{job.integrator} {job.preset}", case.limits.get(job.integrator))
+    if limit is not None:
         return "limit", limit
     return "broken", "; ".join(wrong)
 

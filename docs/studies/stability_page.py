@@ -23,7 +23,6 @@ from stability_limits import LEAST, MOST
 from conveyor_sim.columns.bottles import BottleColumns
 from conveyor_sim.physics.model import Model, build_model
 from conveyor_sim.report.figures import style
-from conveyor_sim.scene.accuracy import INTEGRATOR_NAMES
 from conveyor_sim.simulation import Simulation
 
 Line = Mapping[str, str]
@@ -35,6 +34,7 @@ SHORT = {
     "rk4": "RK4",
     "dormand_prince": "Dormand-Prince",
     "linearly_implicit": "linearly implicit",
+    "impulses": "impulses",
 }
 MARKS = {"kept": "kept", "kept so far": "kept*", "broken": "**broken**", "limit": "limit", "refused": "refused",
          "not run": "not run"}  # fmt: skip
@@ -109,7 +109,7 @@ def guard(lines: Sequence[Line]) -> str:
 def summary(matrix: Sequence[Line], folder: Path) -> str:
     """Return the number of runs by result and integrator, and the machine."""
     lines = [f"| | {' | '.join(MARKS)} | same on two threads |", f"| --- |{' ---: |' * (len(MARKS) + 1)}"]
-    for integrator in INTEGRATOR_NAMES:
+    for integrator in SHORT:
         mine = [line for line in matrix if line["integrator"] == integrator]
         verdicts = Counter(line["verdict"] for line in mine)
         threads = Counter(line["two_threads"] for line in mine if line["two_threads"])
@@ -186,11 +186,12 @@ def exceptions(matrix: Sequence[Line]) -> str:
 def limits(lines: Sequence[Line]) -> str:
     """Largest stable step over the bound, and what happens beyond it."""
     scenes = list(dict.fromkeys((line["scene"], line["bound"], line["seconds"]) for line in lines))
-    out = [f"| | bound | {' | '.join(SHORT.values())} |", f"| --- | --- |{' ---: |' * len(SHORT)}"]
+    bounded = [name for name in SHORT if name != "impulses"]  # stiffness and friction bound none of its steps
+    out = [f"| | bound | {' | '.join(SHORT[name] for name in bounded)} |", f"| --- | --- |{' ---: |' * len(bounded)}"]
     beyond = ["| | integrator | in steps 1.25 times the largest stable one |", "| --- | --- | --- |"]
     for scene, bound, seconds in scenes:
         mine = {line["integrator"]: line for line in lines if line["scene"] == scene}
-        ratios = [_ratio(mine[name]["ratio"]) if name in mine else "" for name in SHORT]
+        ratios = [_ratio(mine[name]["ratio"]) if name in mine else "" for name in bounded]
         out.append(f"| {scene} | {bound}, {1e6 * float(seconds):.3g} us | {' | '.join(ratios)} |")
         for name, line in mine.items():
             if line["beyond"]:

@@ -15,6 +15,7 @@ from facts import stating
 from scenes import RADIUS, belt, bottle, kind, polyline, scene
 from swept import MU_BASE, crowd, fields, file_of, forces_on, glass, run, swept
 
+from conveyor_sim.accuracy.trajectory import displace
 from conveyor_sim.bag.messages.encode import FORMAT
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recorded_scene import recorded_scene
@@ -293,6 +294,19 @@ def test_a_contact_that_steps_resolve_may_overlap() -> None:
     for stiffness, expected in ((soft, False), (fields()["contacts"], True)):
         sim = run(8, 2, **file_of(3) | {"contacts": stiffness})
         assert unresolved(sim.model) is expected
+
+
+def test_bottles_put_into_each_other_part_as_their_spring_lets_them() -> None:
+    """Overlap d, half of 1/2 k d^2 each; exactly coincident ones as well, along x. The guard knows that energy."""
+    contacts = [glass(stiffness=1e5, restitution=1.0, friction=0.0), glass("steel")]
+    for gap in (RADIUS, 0.0):
+        sim = run(400, 2, contacts=contacts, bottles=[bottle(0.0, 0.0), bottle(0.5, 0.0)])
+        displace(sim, np.array([0.0, gap - 0.5]), np.zeros(2), np.zeros(2), np.zeros(2))
+        sim.advance(1)
+        state, mass = sim.bottles(), sim.model.type_mass[0]
+        expected = 0.5 * (2.0 * RADIUS - gap) * math.sqrt(2e5 / mass)
+        np.testing.assert_allclose(state.vx, [-expected, expected], rtol=0.03)
+        assert sim.integration.shortened_ticks == 0
 
 
 def test_a_step_may_go_half_the_skin() -> None:

@@ -7,7 +7,15 @@ import random
 from dataclasses import dataclass, replace
 from typing import Any
 
-INTEGRATORS = ("leapfrog", "semi_implicit_euler", "velocity_verlet", "rk4", "dormand_prince", "linearly_implicit")
+INTEGRATORS = (
+    "leapfrog",
+    "semi_implicit_euler",
+    "velocity_verlet",
+    "rk4",
+    "dormand_prince",
+    "linearly_implicit",
+    "impulses",
+)
 MOVING = INTEGRATORS[:3]
 """Those that move rails, and take springs under bases."""
 STEPPED = INTEGRATORS[:4]
@@ -130,7 +138,16 @@ def random_family(seed: int) -> Family:
     )
     family = replace(family, lifts=family.movers and draw.random() < 0.3)
     family = replace(family, panel=draw.random() < 0.4)
-    return replace(family, wheels=move and draw.random() < 0.3)
+    family = replace(family, wheels=move and draw.random() < 0.3)
+    return _of_impulses(family, draw) if integrator == "impulses" else family
+
+
+def _of_impulses(family: Family, draw: random.Random) -> Family:
+    """Return a family without the laws that integrator impulses refuses; in one of eight as it is, to be refused."""
+    if draw.random() < 0.125:
+        return family
+    damping = draw.choice((("none",), ("normal",), ("none", "normal")))
+    return replace(family, elastic=("linear",), damping=damping, atan=False, ring=False, ledger=False, axes=False)
 
 
 def _some(draw: random.Random, names: tuple[str, ...], least: int = 1) -> tuple[str, ...]:
@@ -154,5 +171,6 @@ CI_FAMILIES = (
     replace(_PLAIN, drives=True, machines=True, sensors=True, axes=True, panel=True),
     Family(types=2, drives=True, movers=True, lifts=True, machines=True, sensors=True, ledger=True, vibration=True),
     Family(rails=("segment", "arc"), wheels=True, panel=True, infeeds=True, ledger=True),
+    replace(_PLAIN, integrator="impulses", damping=("none", "normal")),
 )
 """Few mixtures of effects, so that CI compiles few kernels: devices call for none but rails that move."""

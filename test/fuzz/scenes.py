@@ -144,11 +144,19 @@ class _Frame:
 
 
 def _accuracies(family: Family, beyond: bool) -> st.SearchStrategy[Data]:
+    if family.integrator == "impulses":
+        steps, sweeps = st.integers(4, 32), st.integers(1, 4)
+        fast = st.just({"preset": "fast"})
+        return st.one_of(fast, st.fixed_dictionaries({"per_tick": steps, "sweeps": sweeps}).map(_impulses))
     choices: list[Data] = [{}, {"preset": "draft"}, {"preset": "standard"}, {"tolerance": 0.1}, {"tolerance": 0.03}]
     steps = st.integers(1, 100).map(lambda n: {"per_tick": n})
     given = st.one_of(*[st.sampled_from(choices)] * 2, *[steps, scaled(1e-5, 1e-3).map(lambda dt: {"dt": dt})] * beyond)
     error = st.sampled_from([{}, {"error": 1e-5}]) if family.integrator == "dormand_prince" else st.just({})
     return st.tuples(given, error).map(lambda both: {"integrator": family.integrator, **both[0], **both[1]})
+
+
+def _impulses(steps: Data) -> Data:
+    return {"integrator": "impulses", **steps}
 
 
 @st.composite

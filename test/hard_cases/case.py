@@ -21,6 +21,16 @@ TABLE = Path(__file__).with_name("table.yaml")
 VARIANTS = ("plain", "implicit", "spring", "ring")
 """Sets of effects: as the row says; friction solved implicitly; contacts with tangential springs; ring bases."""
 
+IMPULSES: Mapping[str, Mapping[str, Any]] = {
+    "4x1": {"per_tick": 4, "sweeps": 1},
+    "8x2": {"per_tick": 8, "sweeps": 2},
+    "16x2": {"per_tick": 16, "sweeps": 2},
+}
+"""Settings of integrator impulses, which take the place of presets."""
+
+PROMISED = 0.01
+"""Error of such a setting in what a row expects as a multiple of the promise of a preset: impacts are exact."""
+
 SPRING, SPRING_DAMPING = 0.5, 1.0
 """Tangential stiffness over the normal one, and its damping (kg/s), in the variant `spring`."""
 
@@ -78,7 +88,8 @@ class Case:
     work: float = 1.0
     """How many times as long as other rows a run may take in the matrix."""
     limits: Mapping[str, str] = field(default_factory=dict)
-    """By integrator and preset: a known limit, in a sentence; that run need not keep what is expected."""
+    """By integrator and preset, or integrator alone: a known limit, in a sentence; that run need not keep what is
+    expected."""
 
     def __post_init__(self) -> None:
         unknown = set(self.variants) - set(VARIANTS)
@@ -99,13 +110,18 @@ class Case:
     ) -> Scene:
         """The scene as it is run. Raises SceneError where it is refused.
 
-        ledger: whether the ledger of energy is kept, from which the residual is measured.
+        preset: or, with impulses, one of IMPULSES. ledger: whether the ledger of energy is kept, from which the
+        residual is measured.
         """
         variant = variant or self.variants[0]
         given = dict(self.given)
         tick = given.get("tick", 0.01)
-        accuracy = {"preset": preset, "integrator": integrator}
-        if "accuracy" in given:
+        accuracy: dict[str, Any] = {"preset": preset, "integrator": integrator}
+        if integrator == "impulses":
+            given.pop("accuracy", None)
+            accuracy = {"preset": None, "integrator": integrator, **IMPULSES[preset]}
+            ledger = False
+        elif "accuracy" in given:
             accuracy = {**given["accuracy"], "integrator": integrator}
         common: dict[str, Any] = {
             "duration": self.seconds(short),
@@ -114,7 +130,7 @@ class Case:
             "effects": {"peaks": "on"},
         }
         if "file" in given:
-            whole = {**common, "accuracy": {**accuracy, "per_tick": None, "dt": None}}
+            whole = {**common, "accuracy": {"per_tick": None, "dt": None, **accuracy}}
             return load_scene(ROOT / given["file"], whole)
         fields = {"name": self.name, **common, **given, "accuracy": accuracy}
         fields["effects"] = {**common["effects"], "rotation": "on", "unequal_radii": "on", **given.get("effects", {})}
@@ -156,7 +172,8 @@ class Case:
 def bounds(wanted: Any, preset: str) -> tuple[float, float]:
     """Least and greatest value of an expectation."""
     if isinstance(wanted, Mapping):
-        share = wanted["within"] if "within" in wanted else wanted["promise"] * PRESETS[preset]  # type: ignore[index]
+        promised = PROMISED if preset in IMPULSES else PRESETS[preset]  # type: ignore[index]
+        share = wanted["within"] if "within" in wanted else wanted["promise"] * promised
         value = float(wanted["is"])
         return value - share * abs(value), value + share * abs(value)
     least, greatest = wanted

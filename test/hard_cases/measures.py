@@ -315,10 +315,10 @@ def crossing(one: F8, other: F8, starts: F8, ends: F8) -> NDArray[np.bool_]:
 def chatter(simulation: Simulation) -> float:
     """Amplitude by which velocities jump to and fro at every step from now on, over slip_limit; 0 without bottles.
 
-    NaN with tangential springs, which would begin anew, and where a method divides its steps itself.
+    NaN with tangential springs and impulses, which would begin anew, and where a method divides its steps itself.
     """
     scene = simulation.scene
-    if simulation.model.integrator == "dormand_prince" or any(contact.tangential for contact in scene.contacts):
+    if simulation.model.integrator in ("dormand_prince", "impulses") or any(c.tangential for c in scene.contacts):
         return math.nan
     step = round(max(1, round(scene.tick_ns / simulation.model.steps_per_tick)) * 1e-9, 9)
     supply = {name: "off" for name, there in (("infeed", scene.infeeds), ("outfeed", scene.outfeeds)) if there}

@@ -119,7 +119,9 @@ def _solve(chunk: F8, impulses: Any, alike: Any, threshold: float, slip_limit: f
         x, y, vx, vy = chunk[_X + c], chunk[_Y + c], chunk[_VX + c], chunk[_VY + c]
         distance = math.sqrt(x * x + y * y)
         inverse = 1.0 / distance
-        nx, ny = x * inverse, y * inverse
+        # Coincident centres have no normal; any one parts them, the same as in explicit steps.
+        nx = x * inverse if distance > 0.0 else 1.0
+        ny = y * inverse if distance > 0.0 else 0.0
         change_x, change_y, change_turn, new_x, new_y, new_turn, wait, shift_x, shift_y, act, normal, speed = visit(
             chunk[_HELD_X + c],
             chunk[_HELD_Y + c],

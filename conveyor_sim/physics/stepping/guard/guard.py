@@ -183,7 +183,7 @@ class Guard:
 
     def _energy(self) -> float:
         stored = stored_energy(self._state.world, self._found)
-        if self._state.world.impulses is None:
+        if not unresolved(self._model):
             return float(stored.sum())
         # Overlaps of contacts that a substep does not resolve are errors: they store no energy.
         return float(stored[KINETIC]) + impulse_energy(self._model, self._state.world)
