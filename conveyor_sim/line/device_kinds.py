@@ -28,7 +28,7 @@ from conveyor_sim.line.devices.region import OutfeedDevice, ZoneDevice
 from conveyor_sim.line.devices.reject import RejectDevice
 from conveyor_sim.line.devices.row_pusher import pusher_device
 from conveyor_sim.line.devices.setup import DeviceSetup
-from conveyor_sim.line.devices.side_belt import SideBeltDevice
+from conveyor_sim.line.devices.side_belt import side_belt_device
 from conveyor_sim.line.devices.spill import SpillDevice
 from conveyor_sim.line.machines.carrier import station_device
 from conveyor_sim.line.machines.source import SourceDevice
@@ -56,7 +56,7 @@ DEVICES: Mapping[str, Callable[[str, Any, DeviceSetup], Device]] = {
     "star": StarDevice,
     "carousel": CarouselDevice,
     "screw": ScrewDevice,
-    "side_belt": SideBeltDevice,
+    "side_belt": side_belt_device,
     "infeed": InfeedDevice,
     "outfeed": OutfeedDevice,
     "source": SourceDevice,

@@ -5,6 +5,7 @@ import math
 from collections.abc import Iterator
 
 from conveyor_sim.scene.bodies import BodyShape, Cam, Slide
+from conveyor_sim.scene.gearing import first_speed
 from conveyor_sim.scene.geometry import ArcPiece, SegmentPiece
 from conveyor_sim.scene.parts.screw import Screw
 from conveyor_sim.scene.parts.side_belt import SideBelt
@@ -22,7 +23,7 @@ def wheel_bodies(scene: Scene) -> list[BodyShape]:
     return [
         *(wheel_body(star.wheel, star.phase) for star in wheels.values()),
         *(body for name, screw in scene.screws.items() for body in screw_bodies(name, screw)),
-        *(side_belt_body(name, belt) for name, belt in scene.side_belts.items()),
+        *(side_belt_body(scene, name, belt) for name, belt in scene.side_belts.items()),
     ]
 
 
@@ -104,12 +105,13 @@ def _aside(depth: float, turns: float) -> Cam:
     return Cam(tuple(parts), TURN * (turns + 1.0))
 
 
-def side_belt_body(name: str, belt: SideBelt) -> BodyShape:
+def side_belt_body(scene: Scene, name: str, belt: SideBelt) -> BodyShape:
     """Return the body of a side belt: a rail at rest whose surface moves."""
+    speed = belt.speed if belt.axis is None else belt.travel_per_radian * first_speed(scene, belt.axis)
     return BodyShape(
         name=f"side_belts/{name}",
         material=belt.material,
         pieces=(SegmentPiece(belt.from_, belt.to),),
         axis="",
-        surface_speed=belt.speed,
+        surface_speed=speed,
     )

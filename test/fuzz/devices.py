@@ -115,8 +115,11 @@ def wheels(draw: st.DrawFn, frame: Frame, material: str, found: Data) -> Data:
         length = frame.unit * draw(st.integers(2, 8))
         end = [start[0] + length * math.cos(angle), start[1] + length * math.sin(angle)]
         if what == "side belt":
-            belt = {"from": start, "to": end, "material": material, "speed": frame.speed * draw(signed)}
-            belt["speed_limits"] = [-frame.speed, frame.speed]
+            belt = {"from": start, "to": end, "material": material}
+            if draw(st.booleans()):
+                belt |= {"axis": axis, "travel": frame.unit}
+            else:
+                belt |= {"speed": frame.speed * draw(signed), "speed_limits": [-frame.speed, frame.speed]}
             machines["side_belts"]["side"] = belt
         elif what == "screw":
             pitch = 2.0 * pocket * draw(between(1.0, 1.5))

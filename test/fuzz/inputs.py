@@ -74,6 +74,8 @@ def commands_of(scene: Scene) -> Table:
             table |= {f"axes/{name}/{what}": Input() for what in ("gear_in", "gear_out")}
             table[f"axes/{name}/phase_shift"] = Input("number", -CYCLE, CYCLE)
     for name, belt in scene.side_belts.items():
+        if belt.axis is not None:
+            continue
         table |= {
             f"side_belts/{name}/cmd_speed": Input("number", *belt.speed_limits),
             f"side_belts/{name}/run": Input(),

@@ -285,6 +285,14 @@ class AxisDevice(Device):
 
     _followers: "list[AxisDevice] | None" = None
 
+    _begun = 0.0
+    """Position at the start of the present tick, rad."""
+
+    @property
+    def mean_speed(self) -> float:
+        """Mean speed in the tick that has begun, rad/s."""
+        return (self.actual_position - self._begun) / self._tick
+
     _in_phase: tuple[float, float] | None = None
     """Offset and phase shift that agree, unless a shift has begun since."""
 
@@ -366,6 +374,7 @@ class AxisDevice(Device):
         motion, jammed = self.plan(now), self._is_jammed
         if jammed or self.following_error != 0.0:
             motion = self._of_shaft(motion, now)
+        self._begun = motion.position
         after = self.actual_position, self.actual_speed = motion.after(self._tick)
         moving, number = now.state.world.moving, self._number
         if moving is not None:
@@ -378,7 +387,7 @@ class AxisDevice(Device):
                     actuators.mode[number] = ON_PROFILE
         if self._moves_belts:
             now.setpoints[self._belts] = self._travels * self.wanted(now)
-            now.speeds[self._belts] = self._travels * ((self.actual_position - motion.position) / self._tick)
+            now.speeds[self._belts] = self._travels * self.mean_speed
 
     def _of_shaft(self, motion: Motion, now: ScanContext) -> Motion:
         """Return the motion of the shaft: at rest if jammed, else with its following error, which it catches up."""

@@ -3,12 +3,16 @@
 
 from collections.abc import Sequence
 
+from conveyor_sim.line.commands.refusal import moved_text
 from conveyor_sim.line.device import Device, ScanContext
+from conveyor_sim.line.devices.axis import AxisDevice
 from conveyor_sim.line.devices.drive import AT_SPEED, Ramp
 from conveyor_sim.line.devices.setup import DeviceSetup
 from conveyor_sim.line.tag import number, switch
 from conveyor_sim.scene.moving import bodies_of
 from conveyor_sim.scene.parts.side_belt import SideBelt
+
+_SLIP = "Share of the drive's speed by which the surface is slower."
 
 
 class SideBeltDevice(Device):
@@ -28,12 +32,10 @@ class SideBeltDevice(Device):
                 ),
                 switch(f"{name}/run", "command", "Runs while on.", 1.0),
                 switch(f"{name}/jammed", "fault", "Stands still at once."),
-                number(
-                    f"{name}/slip", "fault", "Share of the drive's speed by which the surface is slower.", "1", 0.0, 1.0
-                ),
+                number(f"{name}/slip", "fault", _SLIP, "1", 0.0, 1.0),
             ),
         )
-        self._body = [body.name for body in bodies_of(setup.scene)].index(name)
+        self._body = _body_of(name, setup)
         self._acceleration = part.acceleration
         self._power = setup.power("drives", self)
         self.ramp = Ramp(part.speed)
@@ -65,9 +67,7 @@ class SideBeltDevice(Device):
             ramp.value, ramp.acceleration = self._power.coast(ramp.value, now.length), 0.0
         else:
             ramp.approach(self._wanted, self._acceleration, None, now.length)
-        moving = now.state.world.moving
-        assert moving is not None and moving.surface_speed is not None
-        moving.surface_speed[self._body] = self._speed
+        _set_speed(self._body, self._speed, now)
 
     def values(self, now: ScanContext) -> Sequence[float]:
         """Return speed and at_speed."""
@@ -84,3 +84,60 @@ class SideBeltDevice(Device):
     @property
     def _is_locked(self) -> bool:
         return self._power is not None and self._power.holds(self.name)
+
+
+class GearedSideBelt(Device):
+    """Side belt that an axis moves. It has no drive: its jam blocks the axis."""
+
+    def __init__(self, name: str, part: SideBelt, setup: DeviceSetup) -> None:
+        """Build the tags."""
+        self._axis, self._travel = setup.device(AxisDevice, f"axes/{part.axis}"), part.travel_per_radian
+        low, high, start = (self._travel * speed for speed in self._axis.speed_range)
+        text = moved_text(self._axis.name, self._travel)
+        super().__init__(
+            name,
+            (
+                number(f"{name}/speed", "actual", text, "m/s", low, high, start),
+                switch(f"{name}/jammed", "fault", "It is blocked, and with it its axis, against any torque."),
+                number(f"{name}/slip", "fault", _SLIP, "1", 0.0, 1.0),
+            ),
+        )
+        self._axis.add_machine(self)
+        self._body = _body_of(name, setup)
+        self.speed = start
+        """Speed of the surface in the last tick, m/s."""
+        self.jammed = False
+        self.slip = 0.0
+
+    def command(self, name: str, value: float, now: ScanContext) -> None:
+        """Apply the fault `jammed` or `slip`."""
+        if name == f"{self.name}/jammed":
+            self.jammed = value != 0.0
+        else:
+            self.slip = value
+
+    def begin(self, now: ScanContext) -> None:
+        """Set the speed of the surface to the mean of the tick, as for belts on an axis."""
+        self.speed = self._travel * self._axis.mean_speed * (1.0 - self.slip)
+        _set_speed(self._body, self.speed, now)
+
+    def values(self, now: ScanContext) -> Sequence[float]:
+        """Return the speed of the surface, m/s."""
+        return (self.speed,)
+
+
+def side_belt_device(name: str, part: SideBelt, setup: DeviceSetup) -> Device:
+    """Build a side belt with a drive, or one that an axis moves."""
+    return (SideBeltDevice if part.axis is None else GearedSideBelt)(name, part, setup)
+
+
+def _body_of(name: str, setup: DeviceSetup) -> int:
+    """Return the number of the body of a side belt."""
+    return [body.name for body in bodies_of(setup.scene)].index(name)
+
+
+def _set_speed(body: int, speed: float, now: ScanContext) -> None:
+    """Set the speed (m/s) of the surface of a body."""
+    moving = now.state.world.moving
+    assert moving is not None and moving.surface_speed is not None
+    moving.surface_speed[body] = speed

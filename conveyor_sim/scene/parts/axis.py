@@ -134,7 +134,7 @@ class Axis(DevicePart):
             yield from self._gear_problems(path, others["axes"])
         if self.cam is not None:
             yield from _cam_problems((*path, "cam"), self.cam)
-            for field in ("belts", "screws"):
+            for field in ("belts", "screws", "side_belts"):
                 for name, part in others.get(field, {}).items():
                     if getattr(part, "axis", None) == path[-1]:
                         text = f"given, expected none: {field}.{name} needs an axis without a cam"
