@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from conveyor_sim.scene.phases import rates, star_phases
 from conveyor_sim.scene.problems import Problem
 from conveyor_sim.scene.schema import Scene
+from conveyor_sim.scene.star_places import wheels_of
+from conveyor_sim.scene.types import COORDINATE_LIMIT
 from conveyor_sim.scene.words import shown
 
 PITCH_TOLERANCE = 5e-4
@@ -16,7 +18,15 @@ _RATE_TOLERANCE = 1e-9
 
 
 def wheel_problems(scene: Scene) -> Iterator[Problem]:
-    """Yield problems of wheels whose pitch is not that of their supply, or that turn at another rate."""
+    """Yield problems of wheels too far away, of another pitch than their supply, or that turn at another rate."""
+    places = wheels_of(scene.stars)
+    for name, wheel in scene.stars.items():
+        place = places.get(name)
+        if place is None or max(map(abs, place.centre)) + wheel.pitch_radius > COORDINATE_LIMIT:
+            yield Problem(
+                ("stars", name, "pitch_radius"),
+                f"{shown(wheel.pitch_radius)} given, expected a wheel that lies within +-{COORDINATE_LIMIT:.0f} (m)",
+            )
     for name, star in star_phases(scene.stars, scene.screws, scene.axes).items():
         supply, part = star.supply, star.wheel.part
         if supply is None:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from conveyor_sim.scene.angles import unit_vector
 from conveyor_sim.scene.parts.star import Star
 from conveyor_sim.scene.rails import ArcRail
-from conveyor_sim.scene.types import XY
+from conveyor_sim.scene.types import COORDINATE_LIMIT, XY
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Wheel:
 
 
 def wheels_of(stars: Mapping[str, Star]) -> dict[str, Wheel]:
-    """Return the wheels by name. A wheel whose place is unknown, or that follows such a wheel, is left out."""
+    """Return the wheels by name, without those whose place is unknown or too far away, and those that follow them."""
     wheels: dict[str, Wheel] = {}
     waiting = dict(stars)
     while waiting:
@@ -71,6 +71,8 @@ def _placed(name: str, star: Star, wheels: Mapping[str, Wheel]) -> Wheel | None:
     cos, sin = unit_vector(before.leaving)
     apart = before.part.pitch_radius + star.pitch_radius
     centre = before.centre[0] + apart * cos, before.centre[1] + apart * sin
+    if max(map(abs, centre)) > COORDINATE_LIMIT:
+        return None
     return Wheel(name, star, centre, -before.sign, before.leaving + math.pi)
 
 

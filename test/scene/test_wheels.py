@@ -250,6 +250,9 @@ REFUSED = {
     'stars.next.after: "next" given, expected a wheel that is not placed after this one': {"next": {"after": "next"}},
     "stars.next.pitch_radius: 0.2 given, expected the pitch of stars.in, 157.08 mm: 2 pi pitch_radius / pockets is "
     "104.72 mm, 52.4 mm too short": {"next": {"pitch_radius": 0.2}},
+    "stars.next.pitch_radius: 1000000000 given, expected a wheel that lies within +-100000 (m)": {
+        "next": {"pitch_radius": 1e9, "guide": {"material": "steel"}}
+    },
 }
 
 
