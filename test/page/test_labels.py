@@ -10,11 +10,12 @@ from typing import Any
 import pytest
 from page.conftest import opened_page
 from page.line import LINE, record
-from page.pixels import settled
+from page.pixels import settled, to_pixels
+from study_page import load_study
 
 from conveyor_sim.page.one_file import write_page
 from conveyor_sim.run.runner import run_scene
-from conveyor_sim.scene import load_scene
+from conveyor_sim.scene import load_scene, parse_scene
 from conveyor_sim.support.resources import scene_path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -111,3 +112,22 @@ def test_devices_close_together_have_names_with_leader_lines(browser: Any, tmp_p
     with opened_page(browser, html, script=NOTE_TEXTS) as page:
         names = check(page)
     assert sum(name.startswith("eye_number_") for name in names) >= 4, "beside the belt there is room for two"
+
+
+@pytest.mark.parametrize(
+    ("part", "name", "place"),
+    [("stoppers", "grip", (1.0, 0.0)), ("dividers", "left", (0.7, 0.05)), ("dividers", "right", (0.7, -0.05))],
+)
+def test_a_mover_is_named_once_beside_its_rails(
+    browser: Any, tmp_path: Path, part: str, name: str, place: tuple[float, float]
+) -> None:
+    """A clamp has two jaws. A long guide that is adjusted across a lane has its name beside the lane, 0.1 m away."""
+    text = load_study("part_pictures").scene_text(ROOT / "docs" / "parts" / f"{part}.md")
+    run_scene(parse_scene(text, overrides={"duration": 0.2}), tmp_path / "bag")
+    html = write_page(tmp_path / "bag", tmp_path / "page.html")
+    with opened_page(browser, html, script=NOTE_TEXTS) as page:
+        ((_, left, top, right, bottom),) = [one for one in texts(page) if one[0] == name]
+        x, y = to_pixels(page, *place)
+        scale = float(page.get_attribute("#plan", "data-camera").split()[2])
+    assert left - 5 <= x <= right + 5
+    assert 0.0 < max(top - y, y - bottom) < 0.1 * scale

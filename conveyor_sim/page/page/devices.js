@@ -201,6 +201,7 @@ export function drawBodies(context, camera, colours, view) {
 }
 
 export function drawMovers(context, camera, colours, view) {
+  const devices = new Map(); // points of the rails of each device, and the direction of its motion
   for (const mover of view.recording.head.movers) {
     const share = view.signal(`${mover.name}/position`);
     const position = share === undefined ? mover.first : share * mover.stroke;
@@ -217,9 +218,18 @@ export function drawMovers(context, camera, colours, view) {
     }
     context.setLineDash([]);
     context.lineCap = "butt";
-    const ends = moverEnds(mover, position), [x, y] = middle(ends), [ax, ay] = mover.along;
-    const reach = 4 + 0.5 * camera.scale * Math.max(Math.abs(ends[1][0] - ends[0][0]), Math.abs(ends[1][1] - ends[0][1]));
-    const towards = ax || ay ? outside(Math.atan2(ay, ax)) : null; // direction of its motion
-    view.labels.add(mover.name, short(mover.name.split("/")[1]), camera.toX(x), camera.toY(y), { importance: view.device === mover.name ? CHOSEN : 4, reach, colour: colours.mover, towards });
+    const slides = mover.along[0] || mover.along[1];
+    const points = [position, ...(slides ? [0, mover.stroke] : [])].flatMap((at) => moverEnds(mover, at));
+    devices.set(mover.name, { along: mover.along, points: [...(devices.get(mover.name)?.points ?? []), ...points] });
   }
+  for (const [device, { along: [ax, ay], points }] of devices) nameMover(camera, colours, view, device, ax, ay, points);
+}
+
+// Names a device beside all of its rails; one that slides beyond its way, in the direction (ax, ay) of its motion.
+function nameMover(camera, colours, view, device, ax, ay, points) {
+  const [[left, right], [low, high]] = [0, 1].map((axis) => points.map((point) => point[axis])).map((values) => [Math.min(...values), Math.max(...values)]);
+  const [width, height] = [right - left, high - low], slides = ax || ay;
+  const reach = 4 + 0.5 * camera.scale * (slides ? Math.abs(ax) * width + Math.abs(ay) * height : Math.max(width, height));
+  const importance = view.device === device ? CHOSEN : 4, towards = slides ? outside(Math.atan2(ay, ax)) : null;
+  view.labels.add(device, short(device.split("/")[1]), camera.toX((left + right) / 2), camera.toY((low + high) / 2), { importance, reach, colour: colours.mover, towards });
 }
