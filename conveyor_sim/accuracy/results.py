@@ -223,6 +223,43 @@ class Answer:
 
 
 @dataclass(frozen=True)
+class FlowRow:
+    """A setting of impulses, judged by counts, throughput and positions in long runs, not by forces."""
+
+    setting: Setting
+    cost: float | None
+    """Processor time, s per simulated second; None where it was not measured."""
+    overlap: float | None
+    """Largest overlap of the long runs over the smaller diameter; None without runs."""
+    stop_force: float | None
+    """Relative difference of the mean stop force from the reference; None without rails or runs."""
+    throughput: Comparison | None
+    """None without runs, and where nothing leaves or returns."""
+    single_forces: float | None
+    """Relative error of single forces in resting contacts: measured, or else predicted; None where nothing rests."""
+    measured: bool
+    """True if `single_forces` was measured from the settled state."""
+    verdict: str
+    """`equivalent` in every count, rate and position; `different`, `undecided`, `too deep`, `failed` or `not run`."""
+    reason: str
+    """The verdict in words."""
+
+
+@dataclass(frozen=True)
+class Flow:
+    """Settings of impulses: the cheapest one that reproduces counts and throughput, and why forces refuse it."""
+
+    rows: tuple[FlowRow, ...]
+    """The cheapest first."""
+    setting: Setting | None
+    """Recommended for counts and throughput; None if none was shown to be equivalent."""
+    sentence: str
+    """Recommendation for counts and throughput, or the reason why there is none."""
+    refusal: str
+    """Why it is not recommended where forces are asked for."""
+
+
+@dataclass(frozen=True)
 class AccuracyStudy:
     """Result of a study of a scene, from which tables, figures and files are built."""
 
@@ -259,3 +296,5 @@ class AccuracyStudy:
     """s of processor time that the study took, compiling left out; None where it was not kept."""
     compiling: float | None = None
     """s of processor time that compiling took."""
+    flow: Flow | None = None
+    """None where impulses refuse the scene (`skipped` has the reason), and in a study of an earlier version."""

@@ -12,7 +12,7 @@ from types import FrameType
 from conveyor_sim.accuracy.effort import PROCESSORS, Bars, Effort
 from conveyor_sim.accuracy.report.forecast import forecast
 from conveyor_sim.accuracy.report.interim import PRELIMINARY, Interim, predicted
-from conveyor_sim.accuracy.report.lines import summary
+from conveyor_sim.accuracy.report.lines import Asked, recommended, summary
 from conveyor_sim.accuracy.report.no_contact import NoContact, without_contact
 from conveyor_sim.accuracy.results import AccuracyStudy
 from conveyor_sim.accuracy.setting import Setting
@@ -28,12 +28,17 @@ Say = Callable[[str], object]
 class Session:
     """One study of a scene for somebody who waits. To be called in this order: `predict`, then `run`."""
 
-    def __init__(self, scene: Scene, tolerance: float, answer: Say, say: Say) -> None:
-        """tolerance: relative error. answer: called with each line of the answer; say: of progress, interim answers."""
+    def __init__(self, scene: Scene, tolerance: float, answer: Say, say: Say, asked: Asked = "forces") -> None:
+        """Prepare a study.
+
+        tolerance: relative error. answer: called with each line of the answer; say: of progress, interim answers.
+        asked: quantities that the setting is recommended for.
+        """
         self.scene = scene
         self.setting: Setting | None = None
         """Recommended in the end; None: nothing is."""
         self._tolerance = tolerance
+        self._asked = asked
         self._answer = answer
         self._say = say
         self._known = forecast(scene, tolerance)
@@ -72,8 +77,8 @@ class Session:
                 raise
             self.show_best()
             raise KeyboardInterrupt from None
-        self.setting = None if study.answer is None else study.answer.setting
-        self._show(ANSWER, summary(study))
+        self.setting = recommended(study, self._asked)
+        self._show(ANSWER, summary(study, self._asked))
         return study
 
     def show_best(self) -> None:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -17,6 +18,7 @@ from conveyor_sim.accuracy.measure.sample_file import SampleFile, fingerprint
 from conveyor_sim.accuracy.measured import Measured, measured_once
 from conveyor_sim.accuracy.report.answer import eligible, find_answer, largest_error
 from conveyor_sim.accuracy.report.files import write_study
+from conveyor_sim.accuracy.report.flow import find_flow
 from conveyor_sim.accuracy.report.interim import Interim, after_measuring, preliminary, unfinished
 from conveyor_sim.accuracy.report.lines import FEW
 from conveyor_sim.accuracy.results import AccuracyStudy, Answer, Comparison, Point, Sample, StiffnessRow
@@ -31,6 +33,8 @@ EXACT = 0.1
 OTHERS_SHARE = 0.2
 """Share of the budget for long runs of the scene's setting and of softer contacts, which decide no answer."""
 
+FLOW_SHARE = 0.1
+"""Share of the budget for long runs of impulses, which are cheap."""
 
 FIRST_RUNS = 20.0
 """s of processor time that the first run of each setting may take in any case, however small the budget."""
@@ -85,6 +89,7 @@ def _study(
     comparisons: Sequence[Comparison] = (),
     reference: Setting | None = None,
 ) -> AccuracyStudy:
+    of_flow = [row for row in comparisons if row.setting.sweeps is not None]
     return AccuracyStudy(
         scene=scene.name,
         source=scene.source_name,
@@ -106,6 +111,7 @@ def _study(
         moving=measured.moving,
         cpu=measured.cpu + sum(sample.cpu for sample in samples),
         compiling=measured.compiling,
+        flow=find_flow(measured.points, samples, of_flow, reference, tolerance),
     )
 
 
@@ -133,6 +139,7 @@ def _long_runs(
     budget = max(0.0, effort.long_runs(measured.cpu) - longest)
     if len(affordable([reference, found.setting], expected, budget, FEW)) < 2:
         return [], [], None
+    shared = 1.0 - OTHERS_SHARE - (FLOW_SHARE if any(point.setting.sweeps for point in measured.points) else 0.0)
     tried: list[Setting] = []
     samples: list[Sample] = []
     comparisons: list[Comparison] = []
@@ -142,28 +149,38 @@ def _long_runs(
         tried.append(found.setting)
         with bars(f"{scene.name}: long runs", "runs") as bar:
             samples, comparisons = run_until_decided(
-                scene, tried, reference, tolerance, (1.0 - OTHERS_SHARE) * budget, folder, _with_left(bar, left)
+                scene, tried, reference, tolerance, shared * budget, folder, _with_left(bar, left)
             )
         found = _answer(measured, comparisons, tolerance)
-    others = [setting for setting in (own_setting(scene), *softer(scene)) if setting not in failed]
+    swept = [point.setting for point in measured.points if point.setting.sweeps is not None and not point.failure]
+    swept = affordable(sorted(swept, key=lambda one: expected.get(one, math.inf)), expected, FLOW_SHARE * budget)
+    others = [one for one in (own_setting(scene), *softer(scene)) if one not in failed and one.sweeps is None]
     others = affordable(others, expected, OTHERS_SHARE * budget)
-    known_cost = sum(sample.cpu for sample in samples if sample.setting == reference)
-    earlier = sum(sample.cpu for sample in samples) - known_cost
-    left.at_most(OTHERS_SHARE * budget / PROCESSORS + RESERVE)
-    with bars(f"{scene.name}: long runs, the scene's own setting and softer contacts", "runs") as bar:
-        more, of_others = run_until_decided(
-            scene,
-            others,
-            reference,
-            tolerance,
-            OTHERS_SHARE * budget + known_cost,
-            folder,
-            _with_left(bar, left, earlier),
-        )
-    made = {(sample.setting, sample.seed): sample for sample in [*samples, *more]}
     known = {row.setting for row in comparisons}
-    comparisons += [row for row in of_others if row.setting not in known]
-    return list(made.values()), comparisons, reference
+    further = [
+        ("long runs of impulses", swept, FLOW_SHARE, OTHERS_SHARE, True),
+        ("long runs, the scene's own setting and softer contacts", others, OTHERS_SHARE, 0.0, False),
+    ]
+    for what, settings, share, later, flow in further:
+        if flow and not settings:
+            continue
+        known_cost = sum(sample.cpu for sample in samples if sample.setting == reference)
+        earlier = sum(sample.cpu for sample in samples) - known_cost
+        left.at_most((share + later) * budget / PROCESSORS + RESERVE)
+        with bars(f"{scene.name}: {what}", "runs") as bar:
+            more, rows = run_until_decided(
+                scene,
+                settings,
+                reference,
+                tolerance,
+                share * budget + known_cost,
+                folder,
+                _with_left(bar, left, earlier),
+                flow=flow,
+            )
+        samples = list({(sample.setting, sample.seed): sample for sample in [*samples, *more]}.values())
+        comparisons += [row for row in rows if row.setting not in known]
+    return samples, comparisons, reference
 
 
 def _with_left(bar: Bar, left: TimeLeft, earlier: float = 0.0) -> Progress:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from importlib.util import find_spec
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -14,6 +15,9 @@ from conveyor_sim.errors import ConveyorError
 from conveyor_sim.support.progress import ProgressBar
 from conveyor_sim.support.signals import held_back
 
+if TYPE_CHECKING:
+    from conveyor_sim.accuracy.report.lines import Asked
+
 
 @click.command()
 @click.argument("scene")
@@ -21,6 +25,13 @@ from conveyor_sim.support.signals import held_back
 @click.option("--out", type=click.Path(path_type=Path), help="Folder (default: runs/accuracy_<scene>_<hash>).")
 @click.option("--thorough", is_flag=True, help="Many more long runs: up to an hour on two free processors.")
 @click.option("--details", is_flag=True, help="Print all tables behind the answer, too.")
+@click.option(
+    "--for",
+    "asked",
+    type=click.Choice(["forces", "flow"]),
+    default="forces",
+    help="What the setting is for: forces, or flow (counts, throughput), for which impulses may do (default: forces).",
+)
 @click.option("--apply", "write", is_flag=True, help="Write the answer into a copy of the scene, in the folder.")
 @scene_options
 def accuracy(
@@ -29,6 +40,7 @@ def accuracy(
     out: Path | None,
     thorough: bool,
     details: bool,
+    asked: Asked,
     write: bool,
     options: SceneOptions,
 ) -> None:
@@ -52,7 +64,7 @@ def accuracy(
 
         loaded = options.load(scene)
         folder = out or study_folder(loaded)
-        session = Session(loaded, tolerance, click.echo, say)
+        session = Session(loaded, tolerance, click.echo, say, asked)
     try:
         with held_back():
             session.predict(folder, effort := THOROUGH if thorough else DEFAULT)

@@ -99,6 +99,29 @@ def ratio_interval(
     return (mean * base_mean - spread) / below, (mean * base_mean + spread) / below
 
 
+def paired_ratio_interval(
+    values: NDArray[np.float64], base: NDArray[np.float64], confidence: float = CONFIDENCE
+) -> tuple[float, float] | None:
+    """Return both ends of the interval of mean(`values`) / mean(`base`) for pairs of runs with equal seeds, both (n,).
+
+    The interval holds all ratios r for which the differences values - r base do not differ significantly from 0
+    (Fieller 1954, with the covariance of the pairs). Return None as `ratio_interval` does, and for other shapes.
+    """
+    count = len(values)
+    if count < 2 or len(base) != count or not np.isfinite([*values, *base]).all() or not base.any():
+        return None
+    if np.array_equal(values, base):
+        return 1.0, 1.0
+    t = t_quantile(count - 1.0, confidence)
+    mean, base_mean = float(values.mean()), float(base.mean())
+    (variance, shared), (_, base_variance) = t**2 / count * np.cov(values, base)
+    square, middle, last = base_mean**2 - base_variance, mean * base_mean - shared, mean**2 - variance
+    if square <= 0.0:
+        return None
+    spread = math.sqrt(max(0.0, middle**2 - square * last))
+    return (middle - spread) / square, (middle + spread) / square
+
+
 POWER = 0.8
 """Statistical power: probability that the runs of `runs_to_tell` show a difference of the estimated size."""
 

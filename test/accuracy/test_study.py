@@ -15,6 +15,7 @@ from pathlib import Path
 
 import pytest
 
+from conveyor_sim.accuracy.candidates import SWEEPS
 from conveyor_sim.accuracy.effort import PROCESSORS, RESERVE, Effort
 from conveyor_sim.accuracy.measure import timing
 from conveyor_sim.accuracy.measure.sample_file import SAMPLES
@@ -107,6 +108,9 @@ def test_a_killed_study_goes_on_to_the_same_tables(interrupted: Path) -> None:
     exact = settings[resumed.answer.setting].errors
     assert exact is not None
     assert exact.peak_force == resumed.answer.error
+    assert resumed.flow is not None
+    assert {(row.setting.per_tick, row.setting.sweeps) for row in resumed.flow.rows} == set(SWEEPS)
+    assert {row.verdict for row in resumed.flow.rows} <= {"undecided", "equivalent", "failed", "too deep"}
     assert {row.factor for row in resumed.stiffness} >= {1.0, 0.25}
     soft = next(row for row in resumed.stiffness if row.factor == 0.25)
     stiff = next(row for row in resumed.stiffness if row.factor == 1.0)

@@ -22,7 +22,7 @@ from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.scene import Scene
 from conveyor_sim.statistics.comparisons import bonferroni
-from conveyor_sim.statistics.intervals import mean_and_variance, ratio_interval
+from conveyor_sim.statistics.intervals import mean_and_variance, paired_ratio_interval, ratio_interval
 
 LOOKS = (8, 16, 32, 64, 128, 256)
 """Runs of a setting after which the intervals are looked at."""
@@ -42,14 +42,16 @@ def compare(
     candidate: Sequence[float | None],
     reference: Sequence[float | None],
     tolerance: float,
+    paired: bool = False,
 ) -> Comparison:
     """One look at an observable: its values (n,) by run under a setting, and (m,) under the reference setting.
 
+    paired: runs of one place have the same seed, so n = m.
     The interval has no ends, and nothing is decided, with fewer than two runs of either, where a run lacks the
     observable (None), or where the reference's mean may as well be 0.
     """
     values, known = _floats(candidate), _floats(reference)
-    low, high = _interval(values, known)
+    low, high = _interval(values, known, paired)
     verdict = "undecided"
     if -tolerance < low and high < tolerance:
         verdict = "equivalent"
@@ -72,9 +74,15 @@ def compare(
 
 
 def decide(
-    samples: Sequence[Sample], settings: Sequence[Setting], reference: Setting, tolerance: float
+    samples: Sequence[Sample],
+    settings: Sequence[Setting],
+    reference: Setting,
+    tolerance: float,
+    flow: bool = False,
 ) -> list[Comparison]:
     """Compare settings with the reference in every observable that is judged, look by look, by seeds in order.
+
+    flow: in counts, rates and positions alone, by which impulses are judged, in pairs of runs with the same seed.
 
     An observable is looked at after each of LOOKS, and at last with all runs there are; the first look that decides it
     stands. Settings that have no runs, or a run that failed, are left out. ConveyorError if the reference failed.
@@ -91,8 +99,8 @@ def decide(
         own = runs.get(setting, [])
         if not own or not known or any(sample.failure for sample in own):
             continue
-        for name in _judged([*own, *known]):
-            comparisons.append(_sequence(setting, name, own, known, tolerance))
+        for name in _judged([*own, *known], flow):
+            comparisons.append(_sequence(setting, name, own, known, tolerance, flow))
     return comparisons
 
 
@@ -105,6 +113,7 @@ def run_until_decided(
     folder: Path,
     progress: Progress,
     processes: int | None = None,
+    flow: bool = False,
 ) -> tuple[list[Sample], list[Comparison]]:
     """Make long runs until every observable of every setting is decided, or the budget (s of processor time) is spent.
 
@@ -134,7 +143,7 @@ def run_until_decided(
             new: list[Run] = [(setting, seed) for seed in range(seeds) for setting in active]
             others = sum(sample.cpu for sample in samples if (sample.setting, sample.seed) not in set(new))
             samples += _added(ensemble.run(new, _with_others(progress, others)), made)
-            comparisons = decide(samples, candidates, reference, tolerance)
+            comparisons = decide(samples, candidates, reference, tolerance, flow)
             undecided = {row.setting for row in comparisons if row.verdict == "undecided"}
             active = [reference, *(setting for setting in candidates if setting in undecided)] if undecided else []
             if seeds < look:
@@ -155,23 +164,23 @@ def _mean_cost(samples: Sequence[Sample], setting: Setting) -> float:
     return float(np.mean([sample.cpu for sample in samples if sample.setting == setting]))
 
 
-def _judged(samples: Sequence[Sample]) -> list[str]:
+def _judged(samples: Sequence[Sample], flow: bool) -> list[str]:
     """Observables that any of the runs has, in the order of their declaration, then others."""
     order = [observable.name for observable in OBSERVABLES]
-    passed_over = {observable.name for observable in OBSERVABLES if not observable.judged}
+    passed_over = {known.name for known in OBSERVABLES if not (known.flow if flow else known.judged)}
     names = dict.fromkeys(name for sample in samples for name in sample.values if name not in passed_over)
     return sorted(names, key=lambda name: order.index(name) if name in order else len(order))
 
 
 def _sequence(
-    setting: Setting, name: str, own: Sequence[Sample], known: Sequence[Sample], tolerance: float
+    setting: Setting, name: str, own: Sequence[Sample], known: Sequence[Sample], tolerance: float, paired: bool
 ) -> Comparison:
     """Return the first look that decides, or else the last."""
     candidate = [sample.values.get(name) for sample in own]
     reference = [sample.values.get(name) for sample in known]
     most = min(len(own), len(known))
     for runs in (*(look for look in LOOKS if look < most), most):
-        comparison = compare(setting, name, candidate[:runs], reference[:runs], tolerance)
+        comparison = compare(setting, name, candidate[:runs], reference[:runs], tolerance, paired)
         if comparison.verdict != "undecided":
             break
     return comparison
@@ -181,9 +190,9 @@ def _floats(values: Sequence[float | None]) -> NDArray[np.float64]:
     return np.array([math.nan if value is None else value for value in values], dtype=np.float64)
 
 
-def _interval(candidate: NDArray[np.float64], reference: NDArray[np.float64]) -> tuple[float, float]:
+def _interval(candidate: NDArray[np.float64], reference: NDArray[np.float64], paired: bool) -> tuple[float, float]:
     """Confidence interval of the ratio of two means, less 1; the mean of the reference is not taken for exact."""
     if min(len(candidate), len(reference)) > 1 and not candidate.any() and not reference.any():
         return 0.0, 0.0  # nothing happened in any run of either
-    found = ratio_interval(candidate, reference, CONFIDENCE)
+    found = (paired_ratio_interval if paired else ratio_interval)(candidate, reference, CONFIDENCE)
     return _EVERYTHING if found is None else (found[0] - 1.0, found[1] - 1.0)

@@ -10,13 +10,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.columns.bottles import BottleColumns
+from conveyor_sim.columns.bottles import BottleColumns, ContactColumns
 from conveyor_sim.columns.itinerary import Itinerary
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
 
 OUTPUT_RATE = 50.0
 """Hz, about, at which bottles are looked at."""
+
+STOP_FORCE, OVERLAP = "stop force", "largest overlap"
+"""Observables that are reported beside the flow of impulses."""
 
 LOOP = 3
 """Belts at least, for a bottle to come round (`Itinerary`)."""
@@ -47,6 +50,8 @@ class Record:
         """N, by output: time-mean, since the output before, of each touched bottle's summed normal forces."""
         self.peak_forces: list[NDArray[np.float64]] = []
         """N, by output: each touched bottle's largest normal force of any one contact since the output before."""
+        self.rail_forces: list[NDArray[np.float64]] = []
+        """N, by output of the second half: sum of the normal forces on each rail, (rails,)."""
         self.overlap = 0.0
         """Largest at an output, over the smaller diameter."""
         self.filled: float | None = None
@@ -73,7 +78,10 @@ class Record:
             touched = self.bottles.peak_force > 0.0
             self.queue_forces.append(self.bottles.impulse[touched] / self.interval)
             self.peak_forces.append(self.bottles.peak_force[touched])
-            self.overlap = max(self.overlap, _largest_overlap(simulation, self.bottles))
+            contacts = simulation.contacts()
+            self.overlap = max(self.overlap, _largest_overlap(simulation, self.bottles, contacts))
+            if simulation.tick > self.scene.duration_ticks // 2:
+                self.rail_forces.append(_rail_forces(simulation, contacts))
 
     def _is_filled(self) -> bool:
         signals = dict(zip(self._simulation.process_image.signal_names, self._simulation.signals(), strict=True))
@@ -93,6 +101,8 @@ class Observable:
     """None where the scene can have none."""
     judged: bool = True
     """True if a setting must reproduce the observable to be eligible."""
+    flow: bool = False
+    """True if it is a count, a rate or a position, by which impulses are judged."""
 
 
 def _throughput(record: Record) -> float | None:
@@ -136,6 +146,12 @@ def _spacing(record: Record) -> float | None:
     return float(nearest.mean())
 
 
+def _stop_force(record: Record) -> float | None:
+    if not record.scene.rails or not record.rail_forces:
+        return None
+    return float(np.mean(record.rail_forces, axis=0).max(initial=0.0))
+
+
 def _overlap_percent(record: Record) -> float | None:
     return 100.0 * record.overlap if record.scene.contacts else None
 
@@ -147,6 +163,7 @@ OBSERVABLES = (
         "Bottles removed in the second half of the run, a minute; on a line where none is removed and with at "
         "least three belts, bottles that came back to the belt with the most returns.",
         _throughput,
+        flow=True,
     ),
     Observable(
         "mean queue force",
@@ -173,15 +190,25 @@ OBSERVABLES = (
         "Until every infeed that counts has fed its last bottle, or the first infeed is blocked; the duration, if "
         "neither happens.",
         _time_to_fill,
+        flow=True,
     ),
     Observable(
         "spacing",
         "m",
         "Distance from a bottle's axis to the nearest other's at the end, mean over bottles.",
         _spacing,
+        flow=True,
     ),
     Observable(
-        "largest overlap",
+        STOP_FORCE,
+        "N",
+        "Sum of the normal forces on the rail that bears most, in the mean over the second half of the run. It is "
+        "reported of impulses; no setting is judged by it.",
+        _stop_force,
+        judged=False,
+    ),
+    Observable(
+        OVERLAP,
         "%",
         "Largest overlap of a contact over the smaller diameter, seen every 20 ms. What a stiffness amounts to, not "
         "what a line does: no setting is judged by it.",
@@ -209,9 +236,15 @@ def _percentile(record: Record, forces: list[NDArray[np.float64]], share: float)
     return None if not record.scene.contacts else float(np.percentile(pooled, share)) if pooled.size else 0.0
 
 
-def _largest_overlap(simulation: Simulation, bottles: BottleColumns) -> float:
+def _rail_forces(simulation: Simulation, contacts: ContactColumns) -> NDArray[np.float64]:
+    on_rails = contacts.kind == 1
+    rails = contacts.b[on_rails].astype(np.int64)
+    sums = np.bincount(rails, contacts.normal_force[on_rails], minlength=len(simulation.model.rails))
+    return np.asarray(sums, dtype=np.float64)
+
+
+def _largest_overlap(simulation: Simulation, bottles: BottleColumns, contacts: ContactColumns) -> float:
     """Over the diameter of the bottle, in a pair of the smaller one."""
-    contacts = simulation.contacts()
     diameter = 2.0 * simulation.model.type_radius[bottles.type]
     pairs = contacts.kind == 0
     least = diameter[np.searchsorted(bottles.id, contacts.a)]

@@ -220,6 +220,24 @@ def _tables(study: AccuracyStudy) -> dict[str, Table]:
             }
             for row in study.comparisons
         ],
+        "flow": [
+            {
+                **_setting(row.setting),
+                "cost_s_per_s": row.cost,
+                "largest_overlap": row.overlap,
+                "stop_force_difference": row.stop_force,
+                "throughput_low": row.throughput and row.throughput.low,
+                "throughput_high": row.throughput and row.throughput.high,
+                "single_forces_error": row.single_forces,
+                "measured": row.measured,
+                "verdict": row.verdict,
+                "recommended": row.setting == study.flow.setting,
+                "reason": row.reason,
+            }
+            for row in study.flow.rows
+        ]
+        if study.flow is not None
+        else [],
         "stiffness": [
             {
                 "factor": row.factor,

@@ -4,12 +4,17 @@
 from __future__ import annotations
 
 import math
+from typing import Literal
 
 from conveyor_sim.accuracy.report.answer import eligible, largest_error
 from conveyor_sim.accuracy.report.apply import line
 from conveyor_sim.accuracy.report.words import digits, duration, percent
 from conveyor_sim.accuracy.results import AccuracyStudy, Answer, Comparison
+from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.physics.timestep.prediction import deep_warning
+
+Asked = Literal["forces", "flow"]
+"""Quantities for which a setting is recommended: forces with all others, or counts and throughput alone."""
 
 NEGLIGIBLE = 1e-4
 """Relative error below which a predicted error is reported as smaller than this."""
@@ -29,11 +34,22 @@ def three_lines(study: AccuracyStudy) -> tuple[str, str, str]:
     return _forces(study, study.answer), _throughput(study, study.answer), _cost(study.answer)
 
 
-def summary(study: AccuracyStudy) -> list[str]:
+def recommended(study: AccuracyStudy, asked: Asked) -> Setting | None:
+    """Return the setting for what was asked; None if no setting is known to meet it."""
+    if asked == "flow" and study.flow is not None:
+        return study.flow.setting or _of_forces(study)
+    return _of_forces(study)
+
+
+def _of_forces(study: AccuracyStudy) -> Setting | None:
+    return None if study.answer is None else study.answer.setting
+
+
+def summary(study: AccuracyStudy, asked: Asked = "forces") -> list[str]:
     """Return the command's output: the three lines, both settings, moving rails, and the cost of the study."""
-    lines = list(three_lines(study))
-    if study.answer is not None:
-        lines.append(f"Setting: {line(study.answer.setting)} (--apply writes it into a copy of the scene)")
+    lines = [*three_lines(study), *flow_lines(study, asked)]
+    if (setting := recommended(study, asked)) is not None:
+        lines.append(f"Setting: {line(setting)} (--apply writes it into a copy of the scene)")
     lines += [own] if (own := _own(study)) else []
     lines += [deep] if (deep := deep_line(study)) else []
     lines += [study.moving] if study.moving else []
@@ -43,6 +59,17 @@ def summary(study: AccuracyStudy) -> list[str]:
             "--details prints its tables."
         )
     return lines
+
+
+def flow_lines(study: AccuracyStudy, asked: Asked) -> list[str]:
+    """Return lines on impulses: recommended for counts and throughput or not, and refused for forces."""
+    if study.flow is None:
+        refused = next((text.splitlines()[0] for text in study.skipped if text.startswith("impulses: ")), "")
+        return [f"Fast: not examined; {refused.removesuffix('.')}."] if refused and asked == "flow" else []
+    if asked == "flow":
+        return [f"Fast: {study.flow.sentence}", f"Fast: {study.flow.refusal}"]
+    offer = "; --for flow writes it" if study.flow.setting is not None else ""
+    return [f"Fast: {study.flow.refusal.removesuffix('.')}. {study.flow.sentence.removesuffix('.')}{offer}."]
 
 
 def deep_line(study: AccuracyStudy) -> str:

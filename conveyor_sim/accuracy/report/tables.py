@@ -24,6 +24,8 @@ from conveyor_sim.accuracy.results import (
     Comparison,
     Cost,
     Errors,
+    Flow,
+    FlowRow,
     Horizon,
     Order,
     Point,
@@ -160,6 +162,7 @@ def blocks(study: AccuracyStudy) -> list[Block]:
         _failures(study.points),
         _ensembles(study),
         _lost_runs(study),
+        _flow(study.flow),
         _stiffness(study.stiffness),
     ]
     kept = [block for block in parts if block.groups]
@@ -331,6 +334,32 @@ def _lost_runs(study: AccuracyStudy) -> Block:
             Column("why", lambda row: row.failure, left=True),
         ],
         {"": [sample for sample in study.samples if sample.failure]},
+    )
+
+
+def _flow(flow: Flow | None) -> Block:
+    """Return the settings of impulses, the cheapest first, with what they are judged by."""
+    return Block.of(
+        "Impulses: judged by counts, throughput and positions",
+        [
+            Column[FlowRow]("steps x\nsweeps", lambda row: f"{row.setting.per_tick} x {row.setting.sweeps}"),
+            Column("x real\ntime", lambda row: digits(1.0 / row.cost if row.cost else None)),
+            Column("overlap, % of\ndiameter", lambda row: hundredths(row.overlap)),
+            Column("stop\nforce, %", lambda row: hundredths(row.stop_force)),
+            Column("throughput\n%", lambda row: "-" if row.throughput is None else _interval(row.throughput)),
+            Column("single\nforces, %", lambda row: hundredths(row.single_forces) + ("" if row.measured else " ?")),
+            Column("verdict", lambda row: row.verdict, left=True),
+        ],
+        {"": [] if flow is None else flow.rows},
+        []
+        if flow is None
+        else [
+            flow.sentence,
+            flow.refusal,
+            "Stop force and throughput: difference from the reference in long runs. Single forces: error in contacts "
+            "that stay closed; ? is predicted, not measured.",
+        ],
+        lambda row: flow is not None and row.setting == flow.setting,
     )
 
 

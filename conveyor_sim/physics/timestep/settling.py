@@ -53,13 +53,13 @@ class Settling:
     def sentence(self) -> str:
         """The bound in words."""
         rate = f"{self.rate:.4g} sweeps per second"
-        within = f"queues of up to {self.longest} bottles settle within {LOAD_TIME:g} s"
+        within = f"up to {self.longest} bottles settle within {LOAD_TIME:g} s"
         if not self.queue:
-            return f"{rate}: {within}"
-        return (
-            f"{rate}: a queue of {self.queue} ({self.reason}) settles in about {shown(self.seconds(self.queue))}, "
-            f"{within}; until then forces in it are wrong, while positions and counts hold"
-        )
+            return f"{rate}: queues of {within}"
+        settles = f"{rate}: a queue of {self.queue} ({self.reason}) settles in about {shown(self.seconds(self.queue))}"
+        if self.queue <= self.longest:
+            return settles
+        return f"{settles}; until then its forces are wrong, while positions and counts hold; {within}"
 
 
 def settling(steps: int, sweeps: int, tick: float, queue: int, reason: str) -> Settling:
