@@ -52,7 +52,8 @@ def glass(count: int, accuracy: dict[str, Any]) -> Scene:
         {"between": ["bottle", other], "stiffness": k, **laws}
         for other, k in (("bottle", STIFFNESS), ("rail", 2.0 * STIFFNESS))
     ]
-    return dense_table(count, "paper", contacts=contacts, accuracy=accuracy)
+    # The speed is that of bottles which are stepped.
+    return dense_table(count, "paper", contacts=contacts, accuracy=accuracy, effects={"sleeping": "off"})
 
 
 def swept(count: int, steps: int, sweeps: int) -> Scene:
