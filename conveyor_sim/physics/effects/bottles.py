@@ -47,15 +47,14 @@ def _prevented(plant: Plant, on: Collection[str]) -> str:
 
 
 def _sleeping(plant: Plant, on: Collection[str]) -> Cause | None:
-    if _kept_awake(plant, on):
+    integrator = plant.scene.accuracy.integrator
+    if integrator not in SWEPT or _kept_awake(plant, on):
         return None
-    return Cause(("accuracy", "integrator"), plant.scene.accuracy.integrator)
+    return Cause(("accuracy", "integrator"), integrator)
 
 
 def _kept_awake(plant: Plant, on: Collection[str]) -> str:
-    """Return why no bottle of a plant can sleep; "" if bottles can."""
-    if plant.scene.accuracy.integrator not in SWEPT:
-        return f"{plant.scene.accuracy.integrator} holds no impulses"
+    """Return the effect that keeps all bottles awake, as a sentence; "" if there is none."""
     every_step = next((name for name in STEP_BY_STEP if name in on), "")
     return f"{every_step} needs every step of every bottle" if every_step else ""
 
