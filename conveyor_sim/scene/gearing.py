@@ -20,6 +20,12 @@ def first_speed(scene: Scene, name: str) -> float:
     return 0.0
 
 
+def slaves_of(scene: Scene, name: str) -> list[str]:
+    """Return the names of the axes that follow an axis, directly or through others."""
+    direct = [other for other, axis in scene.axes.items() if axis.master == name]
+    return [slave for other in direct for slave in (other, *slaves_of(scene, other))]
+
+
 def rated_speed(scene: Scene, name: str) -> float:
     """Return the largest speed of an axis in gear, rad/s, with the sign of its ratio."""
     axis = scene.axes[name]

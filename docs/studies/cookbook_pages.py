@@ -5,9 +5,10 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from conveyor_sim.control.load import load
 from conveyor_sim.control.st import StructuredText
@@ -26,8 +27,8 @@ def write_files(page: Path, folder: Path) -> None:
 
 
 @contextmanager
-def recipe_line(page: Path, folder: Path) -> Iterator[Scenario]:
-    """Write the files of a page to a folder. Yield the line and the controller that its command `serve` names."""
+def recipe_line(page: Path, folder: Path, overrides: Mapping[str, Any] | None = None) -> Iterator[Scenario]:
+    """Write the files of a page to a folder. Yield its line, with the controller that its command `serve` names."""
     write_files(page, folder)
     command = re.search(r"^    conveyor-sim serve (\S+) --controller (\S+)", page.read_text(), re.MULTILINE)
     if command is None:
@@ -36,7 +37,7 @@ def recipe_line(page: Path, folder: Path) -> Iterator[Scenario]:
     os.chdir(folder)
     try:
         program = command[2]
-        plant = Scenario(folder / command[1])
+        plant = Scenario(folder / command[1], overrides)
         plant.attach(StructuredText(program) if program.endswith(".st") else load(program))
         yield plant
     finally:

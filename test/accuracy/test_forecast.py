@@ -14,7 +14,7 @@ from conveyor_sim.accuracy.report.forecast import TRUSTED, forecast, foretold, p
 from conveyor_sim.accuracy.report.interim import PREDICTED, predicted
 from conveyor_sim.accuracy.results import Point
 from conveyor_sim.accuracy.setting import Setting
-from conveyor_sim.physics.model.remedies import BESIDE, BOTTLE_STEP, TICK_COST
+from conveyor_sim.physics.model.tick_cost import BESIDE, BOTTLE_STEP, line_size, tick_seconds
 from conveyor_sim.scene import Scene
 
 
@@ -67,7 +67,7 @@ def test_each_line_says_that_nothing_has_run() -> None:
 def test_cost_goes_as_the_steps_with_a_part_that_ticks_take() -> None:
     it = line()
     one, two = (seconds(it, Setting("leapfrog", steps), 40) for steps in (100, 200))
-    assert one == pytest.approx(100 / 0.01 * (40 + BESIDE) * BOTTLE_STEP + TICK_COST / 0.01)
+    assert one == pytest.approx(100 / 0.01 * (40 + BESIDE) * BOTTLE_STEP + tick_seconds(0.0, 40, line_size(it)) / 0.01)
     assert two - one == pytest.approx(100 / 0.01 * (40 + BESIDE) * BOTTLE_STEP)
     assert seconds(it, Setting("rk4", 100), 40) > one
 

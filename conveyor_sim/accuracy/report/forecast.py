@@ -14,7 +14,8 @@ from conveyor_sim.accuracy.candidates import candidates
 from conveyor_sim.accuracy.results import Point
 from conveyor_sim.accuracy.setting import Setting, with_setting
 from conveyor_sim.physics.model import build_model
-from conveyor_sim.physics.model.remedies import MANY, STEP_COST, step_cost, tick_seconds
+from conveyor_sim.physics.model.remedies import MANY, STEP_COST, step_cost
+from conveyor_sim.physics.model.tick_cost import line_size, tick_seconds
 from conveyor_sim.physics.plant import Plant
 from conveyor_sim.physics.timestep.prediction import expected_deep_warning
 from conveyor_sim.scene import Scene
@@ -95,7 +96,7 @@ def predicted_error(point: Point) -> float:
 def seconds(scene: Scene, setting: Setting, bottles: int) -> float:
     """Return the estimated time of one processor per simulated second, s."""
     work = setting.per_tick * step_cost(setting.integrator, scene.friction_solver, setting.sweeps)
-    return tick_seconds(work, bottles) / scene.tick
+    return tick_seconds(work, bottles, line_size(scene)) / scene.tick
 
 
 def _cheapest(points: Iterable[Point], tolerance: float) -> Point | None:

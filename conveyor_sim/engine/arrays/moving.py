@@ -144,6 +144,18 @@ class Clusters(NamedTuple):
 
 
 @group
+class Sectors(NamedTuple):
+    """Clusters by sector around the pivot of a body (`sectors.py`), S sectors; None if no body has many clusters."""
+
+    first: I4
+    """First sector of each body, (B + 1,)."""
+    start: I4
+    """First place in `cluster` of each sector, (S + 1,)."""
+    cluster: I4
+    """Clusters that bottles in a sector can touch, in ascending order."""
+
+
+@group
 class MovingBodies(NamedTuple):
     """Axes, and the bodies that they move."""
 
@@ -193,6 +205,7 @@ class MovingBodies(NamedTuple):
     body: I4
     """Body of each piece, (Q,)."""
     clusters: Clusters
+    sectors: Sectors | None
     home_segments: Segments | None
     """Straight pieces at displacement 0, relative to the pivot; None without any."""
     segments: Segments | None

@@ -27,6 +27,7 @@ from conveyor_sim.engine.rails.arc import arc_contact
 from conveyor_sim.engine.rails.cams import is_present, rates_at
 from conveyor_sim.engine.rails.deepest_contacts import keep_deepest
 from conveyor_sim.engine.rails.poses import list_active, move_axes, note_resting, place_bodies
+from conveyor_sim.engine.rails.sectors import cluster_at, clusters_beside
 from conveyor_sim.engine.rails.segment import segment_contact
 from conveyor_sim.engine.threads.workers import UNIT, units, wait_for_all
 
@@ -105,7 +106,9 @@ def moving_contacts(
         b = near.piece[entry]
         if is_present(moving.cams, b):
             x, y = seen_from(moving, b, bottles.x[i], bottles.y[i])
-            for k in range(moving.first_cluster[b], moving.first_cluster[b + 1]):
+            begin, end = clusters_beside(moving, moving.sectors, b, x, y)
+            for place in range(begin, end):
+                k = cluster_at(moving.sectors, place)
                 dx, dy, reach = clusters.x[k] - x, clusters.y[k] - y, clusters.radius[k] + radius
                 if dx * dx + dy * dy <= reach * reach:
                     count = _segment_contacts(

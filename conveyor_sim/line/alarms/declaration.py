@@ -8,7 +8,7 @@ from graphlib import TopologicalSorter
 from typing import NamedTuple
 
 from conveyor_sim.scene.part import part_from
-from conveyor_sim.scene.parts.alarm import AlarmFields, id_problem
+from conveyor_sim.scene.parts.alarm import MOST_CAUSES, AlarmFields, id_problem
 from conveyor_sim.support.printable import SENTENCE, printable
 
 MOST_ALARMS = 1000
@@ -29,12 +29,13 @@ LINE_GROUP = "line"
 """Group of the line's own alarms."""
 
 
-def error(id: str, text: str, tag: str) -> Declared:
+def error(id: str, text: str, tag: str, causes: Sequence[str] = ()) -> Declared:
     """Return the line's alarm for a device that has stopped working.
 
-    tag: the signal that shows it.
+    tag: the signal that shows it. causes: ids of alarms that suppress it.
     """
-    return Declared(id, AlarmFields(text=text, alarm_class="error", tag=tag, group=LINE_GROUP))
+    shown = tuple(causes)[:MOST_CAUSES]
+    return Declared(id, AlarmFields(text=text, alarm_class="error", tag=tag, suppressed_by=shown, group=LINE_GROUP))
 
 
 def as_sent(text: str) -> str:

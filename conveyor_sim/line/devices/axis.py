@@ -21,7 +21,7 @@ from conveyor_sim.line.devices.edge import RisingEdge
 from conveyor_sim.line.devices.setup import DeviceSetup
 from conveyor_sim.line.tag import Tag, number, switch
 from conveyor_sim.scene.driven import moved_by_axis
-from conveyor_sim.scene.gearing import first_position, first_speed, top_speed, travel_per_radian
+from conveyor_sim.scene.gearing import first_position, first_speed, slaves_of, top_speed, travel_per_radian
 from conveyor_sim.scene.parts.axis import CYCLE, Axis
 
 FREE, SYNCHRONISING, GEARED = range(3)
@@ -53,7 +53,7 @@ class AxisDevice(Device):
         scene, short_name = setup.scene, name.rpartition("/")[2]
         top, first = top_speed(scene, short_name), first_position(scene, short_name)
         start = first_speed(scene, short_name)
-        self._part, self._setup, self._tick = part, setup, scene.tick
+        self._part, self._setup, self._tick, self._short_name = part, setup, scene.tick, short_name
         self._top, self._spacing = top, part.gear_spacing
         self._has_own_rate = part.drive is None and part.machine is None
         self._modulus = CYCLE if part.cam is None else part.cam[-1][0]
@@ -95,15 +95,14 @@ class AxisDevice(Device):
         self.restored(0)
 
     def _drive_tags(self, name: str, first: float, start: float) -> Iterator[Tag]:
-        part, top = self._part, self._top
-        most = LARGEST_TORQUE if part.torque_limit == "none" else part.torque_limit
+        part, top, most = self._part, self._top, self._most_torque
         place = "Position." if part.cam is None else "Position, the input of its cam."
         yield number(f"{name}/position", "actual", place, "rad", 0.0, self._modulus, first % self._modulus)
         yield number(f"{name}/speed", "actual", "Speed.", "rad/s", -top, top, start)
-        yield number(
-            f"{name}/torque", "actual", "Torque that it exerts on bottles, forward positive.", "N m", -most, most
-        )
-        yield number(f"{name}/following_error", "actual", "Commanded minus actual position.", "rad", -CYCLE, CYCLE)
+        text = "Torque that it exerts on bottles, forward positive, up to its limit."
+        yield number(f"{name}/torque", "actual", text, "N m", -most, most)
+        text = "Commanded minus actual position, up to a cycle."
+        yield number(f"{name}/following_error", "actual", text, "rad", -CYCLE, CYCLE)
         yield switch(f"{name}/running", "status", "Enabled, with power, and not failed.", 1.0, "state")
         yield switch(f"{name}/torque_limited", "status", "Its load exceeds its torque limit.", adds_to="state")
         yield switch(f"{name}/fault", "status", "Failed by its following error.", adds_to="state")
@@ -135,11 +134,19 @@ class AxisDevice(Device):
 
     @property
     def alarms(self) -> Sequence[Declared]:
-        """Alarms of the torque limit and of the following error."""
-        name = self.name
-        torque = error(self._torque_alarm, f"{name} has reached its torque limit", f"{name}/torque_limited")
-        fault = error(self._fault_alarm, f"{name} has failed: its following error is too large", f"{name}/fault")
+        """Alarms of the torque limit and of the following error.
+
+        The failure of an axis stops its masters, whose alarms it suppresses as consequences.
+        """
+        name, causes = self.name, [f"axes/{slave}/fault" for slave in slaves_of(self._setup.scene, self._short_name)]
+        torque = error(self._torque_alarm, f"{name} has reached its torque limit", f"{name}/torque_limited", causes)
+        text = f"{name} has failed: its following error is too large"
+        fault = error(self._fault_alarm, text, f"{name}/fault", causes)
         return (torque, fault) if self._part.torque_limit != "none" else (fault,)
+
+    @property
+    def _most_torque(self) -> float:
+        return LARGEST_TORQUE if self._part.torque_limit == "none" else self._part.torque_limit
 
     @property
     def speed_range(self) -> tuple[float, float, float]:
@@ -393,7 +400,7 @@ class AxisDevice(Device):
         """Take over position and torque of a limited drive, and fail if the following error is too large."""
         moving, number = now.state.world.moving, self._number
         if now.tick and moving is not None and (actuators := moving.actuators) is not None:
-            self.torque = -(actuators.load.item(number) / moving.clock.item(0))
+            self.torque = 0.0 - actuators.load.item(number) / moving.clock.item(0)  # not -0
             limited = bool(actuators.left.item(number)) and not self._is_jammed
             if limited:
                 self.catch_up.stop()
@@ -413,8 +420,8 @@ class AxisDevice(Device):
         values = (
             self.actual_position % self._modulus,
             self.actual_speed,
-            self.torque,
-            self.following_error,
+            _within(self.torque, self._most_torque),
+            _within(self.following_error, CYCLE),
             self.runs,
             self.limited,
             self.tripped,
@@ -425,3 +432,8 @@ class AxisDevice(Device):
         """Return running, torque_limited, fault, and in_gear of an axis with a master."""
         geared = () if self._part.master is None else (self.is_geared,)
         return [self.runs, self.limited, self.tripped, *geared]
+
+
+def _within(value: float, most: float) -> float:
+    """Return a value limited to the range of its signal, from -most to most."""
+    return min(max(value, -most), most)

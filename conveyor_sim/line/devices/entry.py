@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from conveyor_sim.line.device import ScanContext
 from conveyor_sim.physics.state import State
@@ -50,8 +51,17 @@ def has_room(state: State, x: float, y: float, radius: float) -> bool:
     near = (bottles.x - x) ** 2 + (bottles.y - y) ** 2 < (bottles.radius + radius - CLEAR) ** 2
     if bool((near & (bottles.id >= 0)).any()):
         return False
-    place, moving = np.array([[x, y]]), [piece for rail in state.moving_rails() for piece in rail.pieces]
-    return all(float(piece.distance(place)[0]) >= radius - CLEAR for piece in moving)
+    place, moving = np.array([[x, y]]), state.world.moving
+    if moving is None or not _is_near(moving.sweep, place, radius):
+        return True
+    pieces = [piece for rail in state.moving_rails() for piece in rail.pieces]
+    return all(float(piece.distance(place)[0]) >= radius - CLEAR for piece in pieces)
+
+
+def _is_near(boxes: NDArray[np.float64], place: NDArray[np.float64], reach: float) -> bool:
+    """Return True if a place (1, 2) m is within a distance (m) of any of the boxes that bodies sweep, (B, 4)."""
+    inside = (boxes[:, :2] - reach <= place) & (place <= boxes[:, 2:] + reach)
+    return bool(inside.all(axis=1).any())
 
 
 class Scattering:

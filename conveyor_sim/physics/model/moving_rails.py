@@ -23,6 +23,7 @@ from conveyor_sim.engine.arrays.rails import Arcs, Segments
 from conveyor_sim.engine.compiler.numba_internals.machine_code import entry
 from conveyor_sim.engine.rails.poses import fastest_point
 from conveyor_sim.engine.threads.workers import UNIT
+from conveyor_sim.physics.model.cluster_sectors import cluster_sectors
 from conveyor_sim.physics.model.plant_arrays import rail_arrays
 from conveyor_sim.physics.plant import Plant
 from conveyor_sim.scene.bodies import BodyShape, Cam, bounding_circle, moved_piece
@@ -47,6 +48,8 @@ def moving_arrays(plant: Plant, surface: int, slots: int, ledger: bool, springs:
     pieces = ordered_pieces(shapes)
     segments, arcs = _pieces(plant, surface)
     home_segments, _ = _pieces(plant, surface)
+    clusters, first_cluster = _clusters(shapes), _starts([len(shape.groups) for shape in shapes])
+    types = plant.scene.bottle_types
     moves = any(shape.surface_speed is not None for shape in shapes)
     return MovingBodies(
         position=position,
@@ -70,9 +73,10 @@ def moving_arrays(plant: Plant, surface: int, slots: int, ledger: bool, springs:
         is_near=np.zeros(len(shapes), np.int8),
         near=np.zeros(len(shapes), np.int32),
         nears=np.zeros(1, np.int64),
-        first_cluster=_starts([len(shape.groups) for shape in shapes]),
+        first_cluster=first_cluster,
         body=np.array([b for b, _ in pieces], np.int32),
-        clusters=_clusters(shapes),
+        clusters=clusters,
+        sectors=cluster_sectors(clusters, first_cluster, max(kind.radius for kind in types.values())),
         home_segments=home_segments,
         segments=segments,
         arcs=arcs,

@@ -4,8 +4,7 @@
 A remedy is a change of the scene file. Each candidate is tried: the steps of the changed scene are chosen, and only
 changes that make a tick cheaper by enough are reported, with the resulting steps and speed.
 
-The cost model of a tick: TICK_COST, and for each step BOTTLE_STEP times (bottles + BESIDE) times its relative cost.
-`explain --price` measures what this model estimates.
+`tick_cost.py` estimates the time of a tick.
 """
 
 from collections.abc import Iterator, Mapping
@@ -15,6 +14,7 @@ from typing import Any
 from conveyor_sim.engine.integrators import WARM
 from conveyor_sim.errors import SceneError
 from conveyor_sim.physics.model.step_choice import StepChoice, choose_steps
+from conveyor_sim.physics.model.tick_cost import LineSize, line_size, tick_seconds
 from conveyor_sim.physics.plant import Plant
 from conveyor_sim.physics.timestep.bounds import Bound, fewest_steps
 from conveyor_sim.physics.timestep.presets import DEFAULT
@@ -49,15 +49,6 @@ IMPLICIT_COST = 2.5
 
 OTHERS = ("leapfrog", "velocity_verlet")
 """Integrators that a remedy may choose."""
-
-BOTTLE_STEP = 3e-8
-"""s per bottle and step on one core of the 2020s, rounded."""
-
-BESIDE = 10
-"""Fixed cost of a step, independent of the number of bottles, in units of the cost of one bottle."""
-
-TICK_COST = 5e-5
-"""s per tick besides its steps, rounded: devices, commands and the guard."""
 
 MANY = 100
 """Assumed number of bottles of a scene with an endless infeed."""
@@ -99,6 +90,7 @@ class StepLimit:
     """s"""
     bottles: int
     """Number of bottles on the line that costs are estimated for."""
+    line: LineSize
     remedies: tuple[Remedy, ...]
 
     @property
@@ -136,7 +128,7 @@ class StepLimit:
     @property
     def seconds(self) -> float:
         """Estimated computing time (s) on one core for a simulated second of `bottles` bottles."""
-        return tick_seconds(self.steps * self.step_cost, self.bottles) / self.tick
+        return tick_seconds(self.steps * self.step_cost, self.bottles, self.line) / self.tick
 
     def _warning(self) -> str:
         text = f"{self.seconds:.2g}" if self.seconds < 100.0 else f"{self.seconds:.0f}"
@@ -148,11 +140,6 @@ def step_cost(integrator: str, friction_solver: str, sweeps: int | None = None) 
     return STEP_COST[integrator] * (sweeps or 1) * (IMPLICIT_COST if friction_solver == "implicit" else 1.0)
 
 
-def tick_seconds(work: float, bottles: int) -> float:
-    """Return the estimated computing time (s) of a tick on one core. work: its steps times their relative cost."""
-    return TICK_COST + work * (bottles + BESIDE) * BOTTLE_STEP
-
-
 def step_limit(scene: Scene, choice: StepChoice | None = None, bottles: int | None = None) -> StepLimit:
     """Return the limit on the steps of a valid scene with remedies.
 
@@ -162,8 +149,9 @@ def step_limit(scene: Scene, choice: StepChoice | None = None, bottles: int | No
     most = choice.terms.plant.most_bottles if bottles is None else bottles
     bottles = MANY if most is None else max(1, most)
     cost = step_cost(scene.accuracy.integrator, scene.friction_solver, scene.accuracy.sweeps)
-    before = tick_seconds(choice.steps * cost, bottles)
-    tried = (_tried(scene, *candidate, before, bottles) for candidate in _candidates(scene, choice))
+    line = line_size(scene)
+    before = tick_seconds(choice.steps * cost, bottles, line)
+    tried = (_tried(scene, *candidate, before, bottles, line) for candidate in _candidates(scene, choice))
     least = 1.0 / WORTH
     helpful = [one for one in tried if one and one.faster >= least and one.steps <= WORTH * choice.steps]
     helpful.sort(key=lambda remedy: -remedy.faster)
@@ -174,6 +162,7 @@ def step_limit(scene: Scene, choice: StepChoice | None = None, bottles: int | No
         tick=scene.tick,
         step_cost=cost,
         bottles=bottles,
+        line=line,
         remedies=tuple(remedy for remedy in helpful[:NAMED] if NEAR * remedy.faster >= helpful[0].faster),
     )
 
@@ -233,7 +222,9 @@ def _onset(scene: Scene, speed: float) -> list[dict[str, Any]] | None:
     return contacts if changed else None
 
 
-def _tried(scene: Scene, words: str, overrides: Mapping[str, Any], before: float, bottles: int) -> Remedy | None:
+def _tried(
+    scene: Scene, words: str, overrides: Mapping[str, Any], before: float, bottles: int, line: LineSize
+) -> Remedy | None:
     """Return a candidate with steps and speed; None if it is not valid for the scene. before: s per tick without it."""
     try:
         changed = with_remedy(scene, overrides)
@@ -241,7 +232,7 @@ def _tried(scene: Scene, words: str, overrides: Mapping[str, Any], before: float
     except SceneError:
         return None
     cost = step_cost(changed.accuracy.integrator, changed.friction_solver, changed.accuracy.sweeps)
-    faster = before / tick_seconds(steps * cost, bottles)
+    faster = before / tick_seconds(steps * cost, bottles, line)
     return Remedy(words, overrides, steps, faster) if steps <= MOST_STEPS else None
 
 

@@ -23,6 +23,7 @@ FIXED = (
     *(f"moving.{name}" for name in ("axis", "pivot_", "along_", "turning", "account", "sweep", "home_")),
     *(f"moving.{name}" for name in ("first_cluster", "body")),
     "moving.clusters.",
+    "moving.sectors.",
     "moving.arcs.",
     *(f"moving.segments.{name}" for name in ("length", "material", "rail", "surface", "ends.joint")),
     *(f"moving.cams.{name}" for name in ("cam", "second", "across_", "period", "table.")),

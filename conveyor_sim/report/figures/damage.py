@@ -96,8 +96,8 @@ def bin_lines(wear: RailWearColumns) -> list[Floats]:
     unit = np.where(near[:, None], step / np.where(near, distance, 1.0)[:, None], 0.0)
     none = np.zeros((1, 2))
     ahead, behind = np.concatenate([unit, none]), np.concatenate([none, unit])
-    to_next = np.where(ahead.any(axis=1)[:, None], ahead, behind)
-    to_last = np.where(behind.any(axis=1)[:, None], behind, ahead)
+    to_next = np.where(np.hypot(*ahead.T)[:, None] > 0.0, ahead, behind)
+    to_last = np.where(np.hypot(*behind.T)[:, None] > 0.0, behind, ahead)
     half = 0.5 * wear.length[:, None]
     return [*np.stack([middle - half * to_last, middle, middle + half * to_next], axis=1)]
 

@@ -464,3 +464,28 @@ def test_an_overloaded_drive_pushes_with_its_limit_and_its_failure_stops_the_tra
     sim.advance(300)
     assert signal(sim, "star/in_gear") == 1.0 and signal(sim, "block/speed") == TURN
     assert not {"axes/star/torque", "axes/star/fault"} & sim.alarms
+
+
+def test_signals_of_a_long_jam_stay_in_their_ranges() -> None:
+    """A jam without following limit lasts for longer than a cycle; the bottle has come to rest, so its torque is 0."""
+    sim = loaded(following_limit="none")
+    sim.inject("axes/star/jammed", 1.0)
+    sim.advance(1500)
+    assert signal(sim, "star/following_error") == TURN
+    assert math.copysign(1.0, signal(sim, "star/torque")) == 1.0 and signal(sim, "star/torque") == 0.0
+    tags = sim.process_image.signals
+    assert all(tag.low <= value <= tag.high for tag, value in zip(tags, sim.signals().tolist(), strict=True))
+
+
+def test_failure_of_a_slave_suppresses_the_alarms_of_its_master() -> None:
+    """Both have failed, and both statuses say so; only the alarm of the slave, the cause, stands."""
+    sim = loaded(following_limit=0.05)
+    sim.inject("axes/star/jammed", 1.0)
+    sim.inject("axes/block/jammed", 1.0)
+    sim.advance(100)
+    assert signal(sim, "star/fault") == signal(sim, "block/fault") == 1.0
+    assert "axes/star/fault" in sim.alarms and "axes/block/fault" not in sim.alarms
+    sim.inject("axes/star/jammed", 0.0)
+    sim.command(["axes/star/reset"], [1.0])
+    sim.advance(50)
+    assert "axes/star/fault" not in sim.alarms and "axes/block/fault" in sim.alarms

@@ -11,7 +11,8 @@ from scenes import MASS, base, belt, bottle, contact, kind, scene
 
 from conveyor_sim.errors import SceneError
 from conveyor_sim.physics.model import build_model
-from conveyor_sim.physics.model.remedies import IMPLICIT_COST, StepLimit, step_limit, tick_seconds, with_remedy
+from conveyor_sim.physics.model.remedies import IMPLICIT_COST, StepLimit, step_limit, with_remedy
+from conveyor_sim.physics.model.tick_cost import line_size, tick_seconds
 from conveyor_sim.scene import Scene, load_scene
 from conveyor_sim.scene.accuracy import MANY_STEPS, MOST_STEPS
 from conveyor_sim.support.resources import scene_path
@@ -74,7 +75,8 @@ def test_the_hopper_of_1000_bottles_is_told_in_two_lines() -> None:
     facts = ["contact friction", f"{limit.steps} steps a tick", f"{limit.ratio:.2g} times the next bound", second.name]
     assert missing(first, [*facts, str(math.ceil(0.01 / second.dt))]) == []
     implicit = build_model(with_remedy(BIG, {"friction_solver": "implicit"})).steps_per_tick
-    faster = tick_seconds(limit.steps, 1000) / tick_seconds(implicit * IMPLICIT_COST, 1000)
+    line = line_size(BIG)
+    faster = tick_seconds(limit.steps, 1000, line) / tick_seconds(implicit * IMPLICIT_COST, 1000, line)
     facts = ["fewer steps", "friction_solver: implicit", f"{implicit} steps a tick", f"{faster:.2g} times as fast"]
     assert missing(remedies, facts) == []
 
@@ -146,7 +148,7 @@ def test_many_steps_are_told_to_be_slow() -> None:
         for steps in (MANY_STEPS - 1, MANY_STEPS)
     )
     assert "slow" not in few
-    assert missing(many, ["slow", "simulated second", "100 bottles", "6.6 s", "one core"]) == []
+    assert missing(many, ["slow", "simulated second", "100 bottles", "5.1 s", "one core"]) == []
 
 
 def test_a_scene_that_nothing_bounds_has_nothing_to_tell() -> None:
