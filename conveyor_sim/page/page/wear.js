@@ -10,6 +10,7 @@ export const WEARS = {
   pressure: { label: "by pressure", unit: "N/m", of: ([time, , impulse], i, bins, start) => impulse[i] / bins.length[i] / Math.max(time - start, 1e-9) },
 };
 
+const DOT = [0.01, 0]; // direction of a bin without neighbours: a path without length is not drawn
 export const NO_WEAR = 1e-9; // values up to this are treated as none
 
 // Unit vector from the middle of a bin to its neighbour on a side; null if no entry beside it is near enough.
@@ -47,7 +48,7 @@ export class Wear {
       if (share <= 0.01) return;
       context.beginPath();
       const sides = [-1, 1].map((side) => towards(bins, i, side)), half = 0.5 * bins.length[i];
-      const [back, ahead] = [sides[0] ?? sides[1]?.map((part) => -part) ?? [0, 0], sides[1] ?? sides[0]?.map((part) => -part) ?? [0, 0]];
+      const [back, ahead] = [sides[0] ?? sides[1]?.map((part) => -part) ?? DOT, sides[1] ?? sides[0]?.map((part) => -part) ?? [0, 0]];
       for (const [dx, dy] of [back, [0, 0], ahead]) context.lineTo(camera.toX(x + half * dx), camera.toY(bins.y[i] + half * dy));
       context.strokeStyle = SCALES.force[Math.min(STEPS - 1, Math.floor(share * STEPS))];
       context.stroke();
