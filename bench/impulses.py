@@ -65,7 +65,8 @@ def glass(count: int, accuracy: dict[str, Any], stiffness: float = STIFFNESS) ->
         {"between": ["bottle", other], "stiffness": k, **laws}
         for other, k in (("bottle", stiffness), ("rail", 2.0 * stiffness))
     ]
-    return dense_table(count, "paper", contacts=contacts, accuracy=accuracy)
+    # The speed is that of bottles which are stepped.
+    return dense_table(count, "paper", contacts=contacts, accuracy=accuracy, effects={"sleeping": "off"})
 
 
 def swept(count: int, steps: int, sweeps: int) -> Scene:

@@ -53,7 +53,7 @@ WITHIN: Mapping[str, Mapping[str, str]] = {
         "model": "effects laws plant sources_hash timestep",
         "state": "model",
         "accounts": "model state",
-        "stepping": "accounts model state",
+        "stepping": "accounts model state timestep",
     },
     "bag": {"mcap": "", "messages": "", "": "mcap messages"},
     "page": {"drawings": "", "": "drawings"},
