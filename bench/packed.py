@@ -61,7 +61,7 @@ def box_for(count: int) -> Box:
     return Box(min(LONGEST, rows * row / FILL + PITCH), (across + 0.5) * PITCH, rows, across, count)
 
 
-def table(count: int, effects: str, dt: float = DT, **changes: Any) -> Scene:
+def table(count: int, effects: str, dt: float = DT, /, **changes: Any) -> Scene:
     """Build the dense table with one of EFFECTS, in steps of dt (s). changes: fields of the scene to override."""
     box = box_for(count)
     fields: dict[str, Any] = {

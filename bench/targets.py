@@ -14,6 +14,7 @@ from bench import (
     dense,
     filler_block,
     growth,
+    impulses,
     isolation,
     lockstep,
     node,
@@ -59,6 +60,10 @@ def _ratio(n: float, one: str, other: str) -> Callable[[Rows], float | None]:
 
 def _plant(contestant: str) -> Callable[[Rows], float | None]:
     return lambda rows: _middle(rows.spread(plant.CASE, 0, contestant, plant.FACTOR))
+
+
+def _swept(n: float, steps: int, sweeps: int, quantity: str) -> Callable[[Rows], float | None]:
+    return lambda rows: _middle(rows.spread(impulses.CASE, n, impulses.name_of(steps, sweeps), quantity))
 
 
 def _first_step(rows: Rows) -> float | None:
@@ -176,6 +181,24 @@ TARGETS = (
     Target("paper's plant, times real time", "plant", LEAST, 25.0, _plant(plant.PAPER)),
     Target(
         "plant of glass, 1e8 N/m, 20 steps, times real time", "plant", LEAST, 3.0, _plant(plant.glass_name(1e8, 20))
+    ),
+    *(
+        Target(
+            f"glass by impulses, {steps} x {sweeps}, N = {n}, {quantity}",
+            "impulses",
+            bound,
+            value,
+            _swept(n, steps, sweeps, quantity),
+        )
+        for n, steps, sweeps, quantity, bound, value in (
+            (1_000, 8, 2, impulses.SPEED, LEAST, 8_000.0),
+            (1_000, 8, 1, impulses.SPEED, LEAST, 15_000.0),
+            (1_000, 8, 2, impulses.OVERLAP, MOST, 0.3),
+            (10_000, 8, 2, impulses.SPEED, LEAST, 7_000.0),
+            (10_000, 8, 2, impulses.TWO, LEAST, 1.5),
+            (1_000, 8, 2, impulses.CHOSEN, LEAST, 1.0),
+            (10_000, 8, 2, impulses.CHOSEN, LEAST, 1.0),
+        )
     ),
     Target("rise of the cost from N = 100 to 10 000", "growth", MOST, 0.25, _rise(growth.BOTTLES, 100, 10_000)),
     Target("rise of the cost from 1 to 1 000 belts", "growth", MOST, 0.15, _rise(growth.BELTS, 1, 1_000)),

@@ -77,4 +77,4 @@ def run(
     if done.bag is None:
         report_unrecorded(loaded, model, done, details)
     else:
-        report(done.bag, done.wall, drawing, done.spent, details)
+        report(done.bag, done.wall, drawing, done.spent, details, done.asleep)

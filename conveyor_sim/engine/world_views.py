@@ -23,6 +23,10 @@ NOT_FOR_CONTACTS = _INTEGRATORS | _IMPULSES | _FORCES_OF_PAIRS | {
     "pair_law", "grid", "railed", "moving.actuators", "belts", "surface", "vibration", "footing", "ring",
     "static_friction", "ledger",
 }  # fmt: skip
+NOT_FOR_SLEEP = NOT_FOR_LISTS - {"peaks", "spin", "moving.actuators", "moving.springs"} | {
+    "neighbourhood", "probe", "slots", "grid", "railed", "ring", "belts", "pairs.reach", "pairs.radius_i",
+    "pairs.spring", "near_segments.springs", "near_arcs.springs", "moving", "impulses.bodies",
+}  # fmt: skip
 _LOSSES = ("friction", "tangential_damping", *(law.column for law in DAMPING))
 NOT_FOR_ENERGY = NOT_FOR_CONTACTS - {"static_friction"} | {
     "settings.atan", *(f"{law}.{column}" for law in ("pairs.law", "rail_law") for column in _LOSSES)
@@ -32,6 +36,11 @@ NOT_FOR_ENERGY = NOT_FOR_CONTACTS - {"static_friction"} | {
 def lists_of(world: World) -> World:
     """Return a view of the World for `rebuild` and for `probe_overlaps`."""
     return _fewer(world, NOT_FOR_LISTS)
+
+
+def sleep_of(world: World) -> World:
+    """Return a view of the World for `decide_sleep`."""
+    return _fewer(world, NOT_FOR_SLEEP)
 
 
 def contacts_of(world: World) -> World:

@@ -18,8 +18,11 @@ FILES = 2
 """Lines about files that `outline` leaves room for."""
 
 
-def outline(summary: Summary) -> list[str]:
-    """Return the lines of a recorded run without those about its files. Quantities that are absent have no line."""
+def outline(summary: Summary, asleep: float | None = None) -> list[str]:
+    """Return the lines of a recorded run without those about its files. Quantities that are absent have no line.
+
+    asleep: as in `Run`.
+    """
     lines = [headline(summary.scene, summary.simulated, summary.wall), labelled("bottles", _bottles(summary))]
     if summary.loop is not None:
         loop = f"{summary.loop.returns} bottles came back to {summary.loop.belt}, {summary.loop.per_minute:.1f} per min"
@@ -30,6 +33,7 @@ def outline(summary: Summary) -> list[str]:
         lines.append(labelled("forces", f"{forces}{summary.origin}{_peak_note(summary.queue)}{predicted}"))
     if summary.load_sentence:
         lines.append(labelled("damage", summary.load_sentence))
+    lines += _asleep(asleep)
     if summary.alarms is not None and summary.alarms.any:
         lines += [labelled("" if index else "alarms", line) for index, line in enumerate(summary.alarms.lines)]
     if summary.commands > summary.refused:
@@ -44,9 +48,14 @@ def outline_unrecorded(
     lines = [headline(name, run.simulated, run.wall)]
     if run.peak_force:
         lines.append(labelled("forces", f"peak {run.peak_force:.3g} N{_peak_note(run.queue)}"))
+    lines += _asleep(run.asleep)
     warnings = [*_queue_warnings(run.queue), *_check_warnings(checks)]
     guard = (f"guard: {text}" for text in run.guard)
     return _with_warnings(lines, [*warnings, *scene_warnings, *guard])
+
+
+def _asleep(share: float | None) -> list[str]:
+    return [] if share is None else [labelled("stepped", f"{100.0 * (1.0 - share):.3g} % of bottles; the others slept")]
 
 
 def headline(name: str, simulated: float, wall: float | None) -> str:

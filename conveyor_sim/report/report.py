@@ -84,17 +84,22 @@ PAGE_SECONDS = 600.0
 
 
 def report(
-    bag: Path, wall: float | None, drawing: Drawing | None, spent: Spent | None = None, details: bool = False
+    bag: Path,
+    wall: float | None,
+    drawing: Drawing | None,
+    spent: Spent | None = None,
+    details: bool = False,
+    asleep: float | None = None,
 ) -> None:
     """Print the outline of a run that took `wall` s, and write its summary, a page and pictures into the run's folder.
 
-    drawing: None draws nothing. details: print everything that the summary contains, as well.
+    drawing: None draws nothing. details: print everything that the summary contains, as well. asleep: as in `Run`.
     """
     began = time.monotonic()
     if drawing is not None:
         drawing.begin(bag, suffixes=PNG)  # `conveyor-sim plot` draws SVG too
     summary = summarize(bag, wall)
-    for line in outline(summary):
+    for line in outline(summary, asleep):
         click.echo(line)
     files = [write_summary(summary, bag)]
     pictures: Sequence[Path] = ()

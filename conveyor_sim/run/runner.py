@@ -47,6 +47,8 @@ class Run:
     """Largest lasting load on a bottle (`force_check.Pressed`), N; None if it is unknown."""
     queue: QueueCheck | None
     """Longest queue with integrator impulses; None with others."""
+    asleep: float | None
+    """Share of bottles asleep, mean over the run; None if no bottle can sleep."""
     guard: tuple[str, ...]
     """Reports of the guard."""
     spent: Spent
@@ -117,7 +119,7 @@ def run_scene(
         kernels = simulation.integration.kernel_seconds
         spent = Spent(kernels, stepping - kernels, 0.0 if recorder is None else wall - stepping)
         simulated, reached = simulation.tick * scene.tick, (peaks.force, peaks.load, peaks.queue)
-        return Run(bag, simulated, wall, stop.is_set(), *reached, guard, spent)
+        return Run(bag, simulated, wall, stop.is_set(), *reached, simulation.integration.asleep_share, guard, spent)
 
 
 @contextmanager

@@ -38,6 +38,7 @@ EffectName = Literal[
     "impacts",
     "tipping",
     "riding",
+    "sleeping",
 ]
 
 EFFECT_NAMES: tuple[EffectName, ...] = get_args(EffectName)

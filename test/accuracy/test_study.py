@@ -163,7 +163,7 @@ def test_the_time_left_holds_from_phase_to_phase(tmp_path: Path) -> None:
         lambda what, _counted: nullcontext(Recorded(what)),
     )
     stages, bounds = zip(*shown, strict=True)
-    assert sum("long runs" in stage for stage in dict.fromkeys(stages)) == 2
+    assert sum("long runs" in stage for stage in dict.fromkeys(stages)) == 3
     assert all(later <= earlier for earlier, later in pairwise(bounds))
     assert len({sample.seed for sample in study.samples}) > 1
     assert study.cpu is not None

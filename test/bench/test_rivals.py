@@ -5,11 +5,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from bench import lammps_rival, ours
+from bench import box2d_rival, impulses, lammps_rival, ours, pymunk_rival
 from bench.all_pairs import AllPairs
+from bench.box2d_rival import Box2D
+from bench.discs import Discs, largest_overlap
 from bench.half_list import HalfList
 from bench.lammps_rival import Lammps
-from bench.packed import DT, FRICTION, GRAVITY, MASS, box_for, table
+from bench.packed import DT, FRICTION, GRAVITY, MASS, RADIUS, box_for, table
+from bench.pymunk_rival import Pymunk
 from conveyor_sim.simulation import Simulation
 
 COUNT = 60
@@ -83,3 +86,59 @@ def test_lammps_packs_as_densely() -> None:
     assert rival.contacts_per_bottle() > 1.5
     assert rival.contacts_per_bottle() == pytest.approx(ours.contacts_per_bottle(engine), rel=0.25)
     rival.close()
+
+
+def test_largest_overlap_is_that_of_the_deepest_contact() -> None:
+    """Of two bottles, or of one and a wall, whichever is deeper; 0 where all are apart."""
+    box, r = box_for(COUNT), RADIUS
+    apart = np.array([[2.0 * r, 2.0 * r], [5.0 * r, 2.0 * r], [2.0 * r, 5.0 * r]])
+    assert largest_overlap(apart, box) == 0.0
+    pair = np.vstack([apart, [2.0 * r, 3.99 * r]])
+    assert largest_overlap(pair, box) == pytest.approx(0.99 * r, rel=1e-12)  # with the third
+    wall = np.vstack([apart, [box.length - 0.5 * r, 8.0 * r]])
+    assert largest_overlap(wall, box) == pytest.approx(0.5 * r, rel=1e-12)
+
+
+def test_largest_overlap_is_that_of_the_engine() -> None:
+    engine = ours.packed(impulses.swept(COUNT, 4, 1), settle=0.3, threads=1)
+    deepest = engine.contacts().overlap.max()
+    state = ours.state_of(engine, box_for(COUNT))
+    assert deepest > 0.0
+    assert largest_overlap(np.column_stack([state.x, state.y]), state.box) == pytest.approx(deepest, abs=1e-12)
+
+
+def rigid_rivals(start: ours.PackedState) -> list[Discs]:
+    """Box2D and pymunk with one tuning each, as far as they are installed."""
+    rivals: list[Discs] = []
+    if not box2d_rival.why_not():
+        rivals.append(Box2D(start, box2d_rival.TUNINGS[-1]))
+    if not pymunk_rival.why_not():
+        rivals.append(Pymunk(start, pymunk_rival.TUNINGS[-1]))
+    return rivals
+
+
+def test_rigid_rivals_hold_the_crowd_in_the_box(start: ours.PackedState) -> None:
+    """Released from our packing, bottles stay pressed against the end wall, with overlaps below a hundredth of R."""
+    rivals = rigid_rivals(start)
+    if not rivals:
+        pytest.skip(f"{box2d_rival.why_not()}; {pymunk_rival.why_not()}")
+    for rival in rivals:
+        rival.advance(2.0)
+        positions = rival.positions()
+        assert positions.shape == (COUNT, 2)
+        assert start.box.length - RADIUS - 1e-3 < positions[:, 0].max() < start.box.length - RADIUS + 1e-3
+        assert largest_overlap(positions, start.box) < 0.01 * RADIUS
+        np.testing.assert_allclose(positions[:, 0].mean(), start.x.mean(), atol=0.2 * RADIUS)
+
+
+def test_a_rigid_rival_slides_as_the_belt_pulls() -> None:
+    """A bottle alone, from rest: half of mu g t^2, to the size of a step."""
+    box = box_for(COUNT)
+    one = np.array([4.0 * RADIUS]), np.array([0.5 * box.width]), np.zeros(1), np.zeros(1)
+    rivals = rigid_rivals(ours.PackedState(box, *one))
+    if not rivals:
+        pytest.skip(f"{box2d_rival.why_not()}; {pymunk_rival.why_not()}")
+    for rival in rivals:
+        rival.advance(0.25)
+        way = 0.5 * FRICTION * GRAVITY * 0.25**2
+        assert rival.positions()[0, 0] - one[0][0] == pytest.approx(way, rel=0.1)

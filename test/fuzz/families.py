@@ -171,6 +171,5 @@ CI_FAMILIES = (
     replace(_PLAIN, drives=True, machines=True, sensors=True, axes=True, panel=True),
     Family(types=2, drives=True, movers=True, lifts=True, machines=True, sensors=True, ledger=True, vibration=True),
     Family(rails=("segment", "arc"), wheels=True, panel=True, infeeds=True, ledger=True),
-    replace(_PLAIN, integrator="impulses", damping=("none", "normal")),
 )
 """Few mixtures of effects, so that CI compiles few kernels: devices call for none but rails that move."""

@@ -145,7 +145,7 @@ class _Frame:
 
 def _accuracies(family: Family, beyond: bool) -> st.SearchStrategy[Data]:
     if family.integrator == "impulses":
-        steps, sweeps = st.integers(4, 32), st.integers(1, 4)
+        steps, sweeps = st.integers(4, 12), st.integers(1, 3)
         fast = st.just({"preset": "fast"})
         return st.one_of(fast, st.fixed_dictionaries({"per_tick": steps, "sweeps": sweeps}).map(_impulses))
     choices: list[Data] = [{}, {"preset": "draft"}, {"preset": "standard"}, {"tolerance": 0.1}, {"tolerance": 0.03}]

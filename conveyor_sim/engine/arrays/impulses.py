@@ -8,6 +8,7 @@ bodies: CONTACTS by slot. SI units, float64.
 from typing import Any, NamedTuple
 
 from conveyor_sim.engine.arrays.integrators import Triple
+from conveyor_sim.engine.arrays.sleep import Sleep
 from conveyor_sim.engine.arrays.types import F8, I4, I8, U4
 from conveyor_sim.engine.compiler.groups import group
 
@@ -171,6 +172,7 @@ class Impulses(NamedTuple):
     """1: lists were rebuilt, so `warm` must be summed anew, (1,)."""
     mask: I8
     """Scratch of a rebuild: colours of each bottle's pairs, one bit each, (S,)."""
+    sleep: Sleep | None
     bodies: BodyImpulses | None
     work: WorkScratch | None
     loads: LoadScratch | None

@@ -5,6 +5,8 @@ from typing import Any
 
 from conveyor_sim.engine.arrays.impulses import COLOURS, ROW
 from conveyor_sim.engine.compiler.compile import fill, kernel, part
+from conveyor_sim.engine.impulses.meeting import mark_met, wake_marked
+from conveyor_sim.engine.impulses.runs import plan_runs
 
 
 @part
@@ -35,12 +37,37 @@ def order_pairs(bottles: Any, pairs: Any, impulses: Any) -> None:
         return
     impulses.anew[0] = 1
     if pairs is not None:
-        _colour(bottles, pairs, pairs.impulse, impulses.mask, impulses.types)
+        _colour(bottles, pairs, pairs.impulse, impulses)
+        _restore_pairs(pairs, pairs.impulse)
+        _wake_met(bottles, pairs, impulses, impulses.sleep)
+
+
+@part
+def _wake_met(bottles: Any, pairs: Any, impulses: Any, sleep: Any) -> None:
+    """Wake islands that a bottle will touch before the lists are rebuilt again, if a tick has begun."""
+    if sleep is None:
+        return
+    if sleep.ahead[0] == 0.0 or sleep.sleepers[0] == 0:
+        return
+    fill(sleep.mark, 0)
+    mark_met(bottles, pairs, sleep, sleep.ahead[0])
+    if wake_marked(bottles, impulses, sleep):
+        group_pairs(bottles, pairs, impulses)
+        plan_runs(bottles, sleep)
+
+
+@part
+def group_pairs(bottles: Any, pairs: Any, impulses: Any) -> None:
+    """Put the pairs of two sleepers behind the others of their colour, and awake ones in their places."""
+    if pairs is not None:
+        store_pairs(pairs, pairs.impulse)
+        _colour(bottles, pairs, pairs.impulse, impulses)
         _restore_pairs(pairs, pairs.impulse)
 
 
 @part
-def _colour(bottles: Any, pairs: Any, held: Any, mask: Any, types: int) -> None:
+def _colour(bottles: Any, pairs: Any, held: Any, impulses: Any) -> None:
+    mask = impulses.mask
     fill(mask, 0)
     fill(held.start, 0)
     for p in range(pairs.used[0]):
@@ -55,14 +82,36 @@ def _colour(bottles: Any, pairs: Any, held: Any, mask: Any, types: int) -> None:
     for colour in range(COLOURS):
         held.start[colour + 1] += held.start[colour]
         held.next[colour] = held.start[colour]
+    _place(bottles, pairs, held, impulses, impulses.sleep)
+
+
+@part
+def _place(bottles: Any, pairs: Any, held: Any, impulses: Any, sleep: Any) -> None:
+    """Put pairs in their places: in each colour those with an awake bottle first."""
+    if sleep is None:
+        for p in range(pairs.used[0]):
+            _put(bottles, pairs, held, impulses, p)
+        return
     for p in range(pairs.used[0]):
-        i, j, colour = pairs.i[p], pairs.j[p], held.place[p]
-        place = held.next[colour]
-        held.next[colour] += 1
-        held.place[p] = place
-        held.i[place] = i
-        held.j[place] = j
-        held.kind[place] = bottles.type[i] * types + bottles.type[j]
+        if sleep.asleep[pairs.i[p]] == 0 or sleep.asleep[pairs.j[p]] == 0:
+            _put(bottles, pairs, held, impulses, p)
+    for colour in range(COLOURS):
+        sleep.end[colour] = held.next[colour]
+    if sleep.sleepers[0] > 0:
+        for p in range(pairs.used[0]):
+            if sleep.asleep[pairs.i[p]] != 0 and sleep.asleep[pairs.j[p]] != 0:
+                _put(bottles, pairs, held, impulses, p)
+
+
+@part
+def _put(bottles: Any, pairs: Any, held: Any, impulses: Any, p: int) -> None:
+    i, j, colour = pairs.i[p], pairs.j[p], held.place[p]
+    place = held.next[colour]
+    held.next[colour] += 1
+    held.place[p] = place
+    held.i[place] = i
+    held.j[place] = j
+    held.kind[place] = bottles.type[i] * impulses.types + bottles.type[j]
 
 
 @part

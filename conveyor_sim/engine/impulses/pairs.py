@@ -33,6 +33,7 @@ from conveyor_sim.engine.impulses.constants import (
 )
 from conveyor_sim.engine.impulses.law import visit
 from conveyor_sim.engine.impulses.loads import note_blow, note_pressed
+from conveyor_sim.engine.impulses.runs import end_of_awake
 from conveyor_sim.engine.impulses.work import book_impact, note_impact, pair_unit
 from conveyor_sim.engine.threads.workers import CHUNK, share, wait_for_all
 
@@ -61,9 +62,11 @@ def _sweep(
     world: World, worker: Worker, impulses: Any, pairs: PairImpulses, h: float, threshold: float, last: bool
 ) -> None:
     for colour in range(COLOURS):
-        start, end = pairs.start[colour], pairs.start[colour + 1]
-        if start == end:
+        start, end = pairs.start[colour], end_of_awake(impulses.sleep, pairs, colour)
+        if start == pairs.start[colour + 1]:
             break
+        if start == end:
+            continue
         begin, stop = share(worker, end - start)
         if colour == COLOURS - 1:
             # These pairs may share bottles, so one thread takes them all.

@@ -26,6 +26,7 @@ from conveyor_sim.engine.impulses.constants import (
 from conveyor_sim.engine.impulses.law import visit
 from conveyor_sim.engine.impulses.loads import note_blow, note_pressed
 from conveyor_sim.engine.impulses.pairs import note_peak
+from conveyor_sim.engine.impulses.runs import sleeps
 from conveyor_sim.engine.impulses.work import book_impact, note_impact
 from conveyor_sim.engine.observers.damage import rail_bin, wear
 from conveyor_sim.engine.rails.arc import arc_contact
@@ -45,6 +46,8 @@ def sweep_rails(world: World, impulses: Any, h: float, threshold: float, last: b
     begin, stop = units(first, end)
     for place in range(railed.first[begin], railed.first[stop]):
         i = railed.bottle[place]
+        if sleeps(impulses.sleep, i):
+            continue
         _segments(i, world, world.segments, world.near_segments, impulses, h, threshold, last)
         _arcs(i, world, world.arcs, world.near_arcs, impulses, h, threshold, last)
 

@@ -8,6 +8,8 @@ depth of the queue; fast impacts rebound in closed form. A substep is
 2. `sweeps` times: all pairs, colour by colour, then all rails and bodies (`impulses/law.py`), then drives off profile;
 3. r += h v, and axes and bodies move.
 
+Bottles that sleep are left out (`impulses/sleep.py`).
+
 The step is that of Catto (GDC 2006) with the compliance of Bender et al. (2014) and short substeps as in Macklin et al.
 (2019). The positions of pressed contacts are corrected without a velocity, so no energy enters. Forces of single
 contacts in a crowd converge slowly, with the root of substeps times sweeps; docs/accuracy.md has the errors.
@@ -28,6 +30,7 @@ from conveyor_sim.engine.impulses.drives import begin_drives, clear_marks, pass_
 from conveyor_sim.engine.impulses.loads import begin_loads, end_loads
 from conveyor_sim.engine.impulses.pairs import sweep_pairs
 from conveyor_sim.engine.impulses.rails import sweep_rails
+from conveyor_sim.engine.impulses.runs import run_of, runs_from, runs_to
 from conveyor_sim.engine.impulses.work import begin_work, book_pressed, mean_velocities
 from conveyor_sim.engine.integrators.motion import lists_hold, probe_rebuilt
 from conveyor_sim.engine.rails.moving import place_rails
@@ -56,7 +59,9 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
         for first in range(begin, stop, BLOCK):
             end = min(first + BLOCK, stop)
             check_footing(bottles, world.belts, world.surface, world.footing, world.ring, first, end)
-            begin_substep(world, impulses, dt, first, end)
+            for run in range(runs_from(impulses.sleep, first), runs_to(impulses.sleep, end)):
+                left, right = run_of(impulses.sleep, first, end, run)
+                begin_substep(world, impulses, dt, left, right)
             find_bodies(world, worker, impulses, impulses.bodies, dt, first, end)
             begin_work(world, impulses, dt, first, end)
             begin_loads(world, impulses, dt, first, end)
@@ -76,10 +81,12 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
             end = min(first + BLOCK, stop)
             end_bodies(world, impulses, impulses.bodies, dt, first, end)
             mean_velocities(world, impulses, first, end)
-            end_substep(world, impulses, dt, first, end)
+            for run in range(runs_from(impulses.sleep, first), runs_to(impulses.sleep, end)):
+                left, right = run_of(impulses.sleep, first, end, run)
+                end_substep(world, impulses, dt, left, right)
+                if _leaves(bottles, world.neighbourhood, world.settings.skin, dt, left, right):
+                    raise_flag(worker, MOVED)
             end_loads(world, impulses, dt, first, end)
-            if _leaves(bottles, world.neighbourhood, world.settings.skin, dt, first, end):
-                raise_flag(worker, MOVED)
         book_pressed(world, worker, impulses)
         hold = lists_hold(world, worker)
         pass_bodies(world, worker, impulses.bodies, dt)

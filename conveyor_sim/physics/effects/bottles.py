@@ -3,7 +3,7 @@
 
 from collections.abc import Collection
 
-from conveyor_sim.engine.integrators import RIDES
+from conveyor_sim.engine.integrators import RIDES, SWEPT
 from conveyor_sim.physics.effects.base import RING_BASE
 from conveyor_sim.physics.effects.damping import TURNING
 from conveyor_sim.physics.effects.declaration import Cause, Effect
@@ -11,6 +11,9 @@ from conveyor_sim.physics.effects.friction import CONTACT_FRICTION
 from conveyor_sim.physics.laws.coefficients import base_friction
 from conveyor_sim.physics.plant import Plant
 from conveyor_sim.scene.schema import Single
+
+STEP_BY_STEP = ("vibration", "energy_ledger", "scuffing", "crushing", "impacts", "tipping")
+"""Effects that change or evaluate forces in every step."""
 
 
 def _rotation(plant: Plant, on: Collection[str]) -> Cause | None:
@@ -43,6 +46,19 @@ def _prevented(plant: Plant, on: Collection[str]) -> str:
     return f"{changing} changes the force under bottles at every step" if changing else ""
 
 
+def _sleeping(plant: Plant, on: Collection[str]) -> Cause | None:
+    integrator = plant.scene.accuracy.integrator
+    if integrator not in SWEPT or _kept_awake(plant, on):
+        return None
+    return Cause(("accuracy", "integrator"), integrator)
+
+
+def _kept_awake(plant: Plant, on: Collection[str]) -> str:
+    """Return the effect that keeps all bottles awake, as a sentence; "" if there is none."""
+    every_step = next((name for name in STEP_BY_STEP if name in on), "")
+    return f"{every_step} needs every step of every bottle" if every_step else ""
+
+
 def _infeed(plant: Plant, on: Collection[str]) -> Cause | None:
     carousels = ((("carousels", name), part) for name, part in plant.scene.carousels.items())
     return next((Cause(path) for path, _ in (*plant.scene.givers(), *carousels)), None)
@@ -72,6 +88,19 @@ RIDING = Effect(
     "integrator is rk4, dormand_prince, linearly_implicit or impulses",
     absent_here=_prevented,
     needs="velocities of the previous step; ranges of slots whose bottles are stepped",
+)
+SLEEPING = Effect(
+    name="sleeping",
+    law="bottles at rest whose contacts held constant forces for 20 ticks are not stepped, also if a belt slides below "
+    "them. An island of them wakes if a contact changes by more than 0.2 of the friction under a bottle, if a bottle "
+    "comes to touch it or is removed or edited, or if the belt changes its speed. Bottles near the sweep of a moving "
+    "rail do not sleep",
+    source="added",
+    called_for=_sleeping,
+    absent="the integrator is not impulses, a belt vibrates, or an effect needs every step: energy_ledger, scuffing, "
+    "crushing, impacts, tipping",
+    absent_here=_kept_awake,
+    needs="sums over bottles and pairs once a tick; a dozen columns by bottle",
 )
 INFEED = Effect(
     name="infeed",

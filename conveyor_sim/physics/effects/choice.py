@@ -7,7 +7,7 @@ from functools import partial
 from conveyor_sim.engine.integrators import SWEPT
 from conveyor_sim.errors import SceneError
 from conveyor_sim.physics.effects.base import BASE_FRICTION, BELTS, CURVED_BELTS, RING_BASE
-from conveyor_sim.physics.effects.bottles import INFEED, OUTFEED, RIDING, ROTATION
+from conveyor_sim.physics.effects.bottles import INFEED, OUTFEED, RIDING, ROTATION, SLEEPING
 from conveyor_sim.physics.effects.contacts import BOTTLE_CONTACT, HERTZ, LINEAR, TABLE
 from conveyor_sim.physics.effects.damping import DAMPING_EFFECTS
 from conveyor_sim.physics.effects.declaration import Effect, EffectChoice
@@ -64,6 +64,7 @@ EFFECTS: tuple[Effect, ...] = (
     IMPACTS,
     TIPPING,
     RIDING,
+    SLEEPING,
 )
 """All effects in the order of decision. An effect that is on may enable later ones."""
 

@@ -40,6 +40,7 @@ from conveyor_sim.physics.model.moving_rails import moving_arrays
 from conveyor_sim.physics.model.plant_arrays import belt_arrays, listed
 from conveyor_sim.physics.model.vibration import vibration_arrays
 from conveyor_sim.physics.state.empty_damage import LOADS, empty_damage
+from conveyor_sim.physics.state.empty_sleep import empty_sleep
 
 
 def empty_pairs(model: Model, entries: int) -> Pairs | None:
@@ -278,6 +279,7 @@ def _impulses(model: Model, slots: int) -> Impulses:
         step=np.zeros(1),
         anew=np.ones(1, np.int64),
         mask=np.zeros(slots, np.int64),
+        sleep=empty_sleep(model, slots) if model.has("sleeping") else None,
         bodies=_body_impulses(len(model.plant.axes), slots) if model.has("moving_rails") else None,
         work=_work(slots) if model.has("energy_ledger") else None,
         loads=_loads(slots) if any(model.has(name) for name in LOADS) else None,

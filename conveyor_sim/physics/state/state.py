@@ -239,8 +239,10 @@ class State:
         return b"".join(part.tobytes() for part in parts)
 
     def _impulses(self) -> Iterator[NDArray[Any]]:
-        """Yield the impulses that contacts hold, with their slots and rail pieces."""
+        """Yield the impulses that contacts hold, with their slots and rail pieces, then the slots of sleepers."""
         world = self.world
+        if world.impulses is not None and world.impulses.sleep is not None:
+            yield np.flatnonzero(world.impulses.sleep.asleep)
         if world.pairs is not None and world.pairs.impulse is not None:
             rows = world.pairs.impulse.row.reshape(-1, ROW)[world.pairs.impulse.place[: world.pairs.used[0]]]
             held = np.flatnonzero(rows.any(axis=1))

@@ -57,6 +57,10 @@ SCRATCH: Mapping[str, str] = {
     **dict.fromkeys(("impulses.pair_constants", "impulses.rail_constants"), "of one call of an integrator"),
     **dict.fromkeys((f"impulses.{name}" for name in SUBSTEP), "of one substep of the method of impulses"),
     **dict.fromkeys(("impulses.mask", "pairs.impulse.next"), "of one rebuild of the lists"),
+    **dict.fromkeys(
+        (f"impulses.sleep.{name}" for name in ("first_run", "run_", "mark", "sum", "root", "noise")),
+        "of one tick",
+    ),
     **dict.fromkeys(("vibration.phase", "vibration.clock"), "of one tick"),
     "vibration.ahead": "of one step",
 }

@@ -10,6 +10,7 @@ from conveyor_sim.engine.arrays.moving import HELD, ON_PROFILE
 from conveyor_sim.engine.arrays.world import World
 from conveyor_sim.engine.contact.slots import WIDTH
 from conveyor_sim.engine.impulses.bodies import LEFT
+from conveyor_sim.engine.impulses.sleep import LONG
 from conveyor_sim.engine.lists.riding import PLANNED, STEPPED
 from conveyor_sim.physics.model import Model
 from conveyor_sim.physics.state.empty_world import empty_near, empty_pairs, empty_slots, empty_world, near_bodies
@@ -104,6 +105,19 @@ def ranges(world: World, model: Model, next_id: int) -> dict[str, tuple[int, int
         "riding.progress": (STEPPED, PLANNED),
         "impulses.anew": (0, 1),
         "impulses.mask": (0, 2**63 - 1),
+        "impulses.sleep.asleep": (0, 1),
+        "impulses.sleep.island": (0, slots - 1),
+        "impulses.sleep.quiet": (0, LONG),
+        "impulses.sleep.id": (0, max(0, next_id - 1)),
+        "impulses.sleep.type": (0, len(model.bottle_types) - 1),
+        "impulses.sleep.sleepers": (0, slots),
+        "impulses.sleep.ticks": (0, 2**63 - 1),
+        "impulses.sleep.first_run": (0, slots),
+        "impulses.sleep.run_begin": (0, slots),
+        "impulses.sleep.run_end": (0, slots),
+        "impulses.sleep.mark": (0, 2),
+        "impulses.sleep.root": (0, slots - 1),
+        "impulses.sleep.noise": (0, 1),
         "impulses.loads.pressed": (0, MOST_PRESSED),
     }
     if world.impulses is not None and world.impulses.bodies is not None and world.moving is not None:
@@ -131,6 +145,7 @@ def ranges(world: World, model: Model, next_id: int) -> dict[str, tuple[int, int
             "pairs.impulse.place": (0, pairs - 1),
             "pairs.impulse.start": (0, int(world.pairs.used[0])),
             "pairs.impulse.next": (0, pairs),
+            "impulses.sleep.end": (0, int(world.pairs.used[0])),
             "pairs.impulse.kept_i": (0, slots - 1),
             "pairs.impulse.kept_j": (0, slots - 1),
             "pairs.impulse.kept_count": (-1, pairs),

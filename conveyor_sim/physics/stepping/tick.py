@@ -19,6 +19,7 @@ from conveyor_sim.physics.stepping.guard import chatter
 from conveyor_sim.physics.stepping.guard.guard import Guard
 from conveyor_sim.physics.stepping.guard.violation import Violation
 from conveyor_sim.physics.stepping.guard.world_snapshot import WorldSnapshot
+from conveyor_sim.physics.stepping.sleep import SleepDecision, asleep_share
 
 SHORTER = (4, 16, 64)
 """Factors by which the steps of a failed tick are shortened, one after the other."""
@@ -41,6 +42,7 @@ class Integration:
         self._memory = self._guard.memory
         self._chatter_ticks = self._ticks_between_checks()
         self._kernel_seconds = 0.0
+        self._sleep = SleepDecision()
 
     @property
     def kernel_seconds(self) -> float:
@@ -56,6 +58,11 @@ class Integration:
     def found(self) -> RailContacts:
         """Work arrays of the calling thread for rail contacts."""
         return self._pool.group(1)[0].rail_contacts
+
+    @property
+    def asleep_share(self) -> float | None:
+        """Share of bottles asleep, over all ticks so far; None if no bottle can sleep, or before the first tick."""
+        return asleep_share(self._state.world)
 
     @property
     def deepest_overlap(self) -> float:
@@ -129,12 +136,14 @@ class Integration:
         """Take the steps of one tick, shortened by a factor. Lengthen lists that are too short; bits stay the same."""
         done, phase, steps, dt = 0, START, factor * self._model.steps_per_tick, self._model.dt / factor
         self._set_clock(0)
+        self._sleep.begin(self._state.world, dt, steps)
         while True:
             done += self._pool.advance(self.threads, self._advance, self._state.world, steps - done, dt, phase)
             if not self._state.world.neighbourhood.stale[0]:
-                return
+                break
             self._state.make_lists()
             phase = RESUME
+        self._sleep.end(self._state.world)
 
     def _set_clock(self, steps: int) -> None:
         """Put bodies and vibrating belts where they are after `steps` steps of the tick."""

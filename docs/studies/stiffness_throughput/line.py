@@ -32,7 +32,8 @@ def line(scene: str, stiffness: float, setting: str) -> Scene:
     """Return a scene: `funnel`, `combiner` or `paper_plant`.
 
     stiffness: between bottles, N/m; that of rails keeps its ratio, and restitution stays. setting: a preset, with
-    leapfrog and explicit friction; or `implicit_16`, leapfrog with implicit friction and 16 steps per tick.
+    leapfrog and explicit friction; or `implicit_16`, leapfrog with implicit friction and 16 steps per tick; or
+    `impulses_8x2`, impulses with 8 steps per tick and 2 sweeps, where damping acts along the normal.
     """
     base = load_scene(COMBINER if scene == "combiner" else scene_path(scene))
     shipped = base.contacts[0].stiffness
@@ -41,6 +42,11 @@ def line(scene: str, stiffness: float, setting: str) -> Scene:
     changes["contacts"] = scaled_contacts(base, stiffness / shipped)
     if setting == "implicit_16":
         changes |= {"accuracy": explicit("leapfrog", 16, None), "friction_solver": "implicit"}
+    elif setting.startswith("impulses_"):
+        per_tick, sweeps = map(int, setting.removeprefix("impulses_").split("x"))
+        changes |= {"accuracy": explicit("impulses", per_tick, None, sweeps)}
+        changes["contacts"] = [{**contact, "damping": {**contact["damping"], "law": "normal"}}
+                               for contact in changes["contacts"]]  # fmt: skip
     else:
         changes["accuracy"] = setting
     return parse_again(base.source_text, base.source_name, changes)

@@ -211,7 +211,7 @@ def test_every_effect_is_decided_and_says_why_not() -> None:
         "moving_rails", "hertz", "table", "tsuji_damping", "onset_damping", "viscoelastic_damping",
         "atan_friction", "implicit_friction",
         "tangential_spring", "static_friction", "ring_base", "vibration", "peaks", "contact_arrays", "energy_ledger",
-        "scuffing", "crushing", "impacts", "tipping",
+        "scuffing", "crushing", "impacts", "tipping", "sleeping",
     ]  # fmt: skip
 
 
