@@ -2,7 +2,7 @@
 """Moving parts of a scene: its bodies and its axes, in the order of their numbers."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 
 from conveyor_sim.scene.bodies import AxisShape, BodyShape, Cam, moved_piece
@@ -140,9 +140,26 @@ def axis_shape(scene: Scene, name: str) -> AxisShape:
     )
 
 
-def positions_of(axes: Sequence[AxisShape], value: Callable[[str], float]) -> dict[str, float]:
-    """Return the position (m or rad) of each axis, by name. value: returns the value of a signal."""
-    return {axis.name: axis.position(value(f"{axis.name}/position")) for axis in axes}
+def place_signals(scene: Scene) -> list[str]:
+    """Return the names of the signals that state the places of bodies."""
+    own = [f"{mover_shape(path, mover)[1].name}/position" for path, mover in movers_of(scene)]
+    return [*own, *dict.fromkeys(f"{body.name}/angle" for body in wheel_bodies(scene) if body.axis)]
+
+
+def bodies_by_signals(scene: Scene, value: Callable[[str], float]) -> tuple[RailShape, ...]:
+    """Return the bodies that are present, each as a rail, where `place_signals` state that they are.
+
+    Angles of star wheels and screws contain slip on their shafts and cams of their axes. value: returns the value of
+    a signal.
+    """
+    shapes, first = [], dict[str, float]()
+    for path, mover in movers_of(scene):
+        bodies, axis = mover_shape(path, mover)
+        shapes += [body.shape(axis.position(value(f"{axis.name}/position"))) for body in bodies]
+    for body in wheel_bodies(scene):
+        lag = first.setdefault(body.name, body.lag)
+        shapes.append(body.shape(lag + value(f"{body.name}/angle") if body.axis else 0.0))
+    return tuple(shape for shape in shapes if shape.pieces)
 
 
 def bodies_at(bodies: Iterable[BodyShape], positions: Mapping[str, float]) -> tuple[RailShape, ...]:

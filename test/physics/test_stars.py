@@ -3,6 +3,7 @@
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,6 +25,7 @@ from wheel_lines import (
 from conveyor_sim.engine.threads.workers import UNIT
 from conveyor_sim.scene import parse_scene
 from conveyor_sim.scene.geometry import ArcPiece
+from conveyor_sim.scene.moving import bodies_by_signals
 from conveyor_sim.simulation import Simulation
 
 PAGE = Path(__file__).parents[2] / "docs" / "parts" / "stars.md"
@@ -194,3 +196,21 @@ def test_queue_is_handed_over_without_knocks() -> None:
     assert passed == pytest.approx(15.0 * RATE, abs=1.0)
     play = POCKET_RADIUS - RADIUS
     assert largest < CENTRIPETAL + DRAG + blow(SPEED * math.sqrt(2.0 * play / PITCH_RADIUS))
+
+
+@pytest.mark.parametrize("cam", [None, [["0 deg", "0 deg"], ["120 deg", "30 deg"], ["360 deg", "360 deg"]]])
+def test_signals_state_the_places_of_slipped_wheels(cam: list[list[str]] | None) -> None:
+    """Figures, viewers and carousels use the angle: the outline by it is that in the engine, with slip and cam."""
+    axes: dict[str, Any] = {"block": {"rate": RATE}, "star": {"master": "block", "ratio": 1.0 / POCKETS}}
+    if cam is not None:
+        axes["star"]["cam"] = cam
+    sim = star_line(axes=axes)
+    sim.inject("stars/in/slip", 0.1)
+    for _ in range(5):
+        sim.advance(50)
+        signals = dict(zip(sim.process_image.signal_names, sim.signals().tolist(), strict=True))
+        stated = bodies_by_signals(sim.scene, signals.__getitem__)
+        actual = sim._state.moving_rails()
+        assert len(stated) == len(actual) == 1
+        for one, other in zip(stated[0].pieces, actual[0].pieces, strict=True):
+            np.testing.assert_allclose(one.ends, other.ends, atol=1e-9)

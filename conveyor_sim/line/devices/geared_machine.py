@@ -73,7 +73,12 @@ class GearedMachine(Device):
     @property
     def angle(self) -> float:
         """Angle from its phase, rad, from 0 to a turn."""
-        return (self._axis.actual_position - self._lags[0] - self.slipped) % TURN
+        return self.coordinate % TURN
+
+    @property
+    def coordinate(self) -> float:
+        """Position of its axis minus its phase and its slip, rad."""
+        return self._axis.actual_position - self._lags[0] - self.slipped
 
     def values(self, now: ScanContext) -> Sequence[float]:
         """Return the angle."""
@@ -94,3 +99,11 @@ class StarDevice(GearedMachine):
     def __init__(self, name: str, part: Star, setup: DeviceSetup) -> None:
         """Build the tags."""
         super().__init__(name, part, setup, "wheel", part.pitch_radius)
+        self._cam = bodies_of(setup.scene)[self._numbers[0]].cam
+
+    @property
+    def angle(self) -> float:
+        """Angle from its phase, rad, from 0 to a turn, with the cam of its axis."""
+        if self._cam is None:
+            return super().angle
+        return self._cam.at(self.coordinate % self._cam.end)[0] % TURN

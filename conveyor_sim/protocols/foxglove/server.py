@@ -27,7 +27,7 @@ from conveyor_sim.protocols.tags.line_mirror import DRAWING_TOPICS, STATE_TOPICS
 from conveyor_sim.scene import parse_again, parse_overrides
 from conveyor_sim.scene.geometry import rail_shapes, surface_shapes
 from conveyor_sim.scene.marks import marks_of
-from conveyor_sim.scene.moving import axes_of, bodies_at, bodies_of, positions_of
+from conveyor_sim.scene.moving import bodies_by_signals
 
 PLANT, MARKERS = "plant", "markers"
 """Topics made here from other topics: the drawing."""
@@ -171,8 +171,7 @@ class FoxgloveServer:
         self._drawn = decode
         message, line = decode(), drawable.line
         signals = dict(zip(line.signal_names, drawable.signals.tolist(), strict=False))
-        scene = self._scene()
-        moving = bodies_at(bodies_of(scene), positions_of(axes_of(scene), signals.__getitem__))
+        moving = bodies_by_signals(self._scene(), signals.__getitem__)
         header = Header(int(message.tick), int(message.tick) * int(line.tick_ns), FRAME)
         columns = TOPICS["bottles"].unpack(message)
         self._channels[MARKERS].log(bottles_markers(columns, np.asarray(line.type_radius), moving, header))

@@ -33,7 +33,7 @@ from conveyor_sim.report.figures.data import (
 )
 from conveyor_sim.scene import Scene, parse_again, parse_overrides
 from conveyor_sim.scene.geometry import RailShape, initial_bottles
-from conveyor_sim.scene.moving import axes_of, bodies_at, bodies_of
+from conveyor_sim.scene.moving import bodies_by_signals, place_signals
 
 Integers = NDArray[np.int64]
 
@@ -223,25 +223,23 @@ class Recording:
         return self.plant.speeds if last < 0 else speeds[last]
 
     @cached_property
-    def _position_records(self) -> tuple[Integers, Floats]:
-        """Ticks (n,) and positions (n, axes), m or rad, of the recorded process images."""
-        axes = axes_of(self.scene)
-        names = list(self._bag.line.signal_names)
-        columns = [names.index(f"{axis.name}/position") for axis in axes]
-        frames = list(self._bag.messages("signals")) if axes else []
-        values = [to_image(frame.data).truth[columns] for frame in frames]
-        positions = [[axis.position(value) for axis, value in zip(axes, row, strict=True)] for row in values]
+    def _place_records(self) -> tuple[Integers, Floats]:
+        """Ticks (n,) and values (n, signals) of `place_signals` in the recorded process images."""
+        signals, names = place_signals(self.scene), list(self._bag.line.signal_names)
+        columns = [names.index(signal) for signal in signals]
+        frames = list(self._bag.messages("signals")) if signals else []
         ticks = np.array([frame.tick for frame in frames], dtype=np.int64)
-        return ticks, np.array(positions, dtype=np.float64).reshape(len(frames), len(axes))
+        values = [to_image(frame.data).truth[columns] for frame in frames]
+        return ticks, np.array(values, dtype=np.float64).reshape(len(frames), len(signals))
 
     def _moving(self, tick: int) -> tuple[RailShape, ...]:
         """Bodies where they were last recorded up to `tick`; none before, when they are as at first."""
-        ticks, positions = self._position_records
+        ticks, values = self._place_records
         last = int(np.searchsorted(ticks, tick, side="right")) - 1
         if last < 0:
             return ()
-        names = (axis.name for axis in axes_of(self.scene))
-        return bodies_at(bodies_of(self.scene), dict(zip(names, positions[last].tolist(), strict=True)))
+        places = dict(zip(place_signals(self.scene), values[last].tolist(), strict=True))
+        return bodies_by_signals(self.scene, places.__getitem__)
 
     @cached_property
     def _summary(self) -> _Summary:
