@@ -33,6 +33,8 @@ class CarouselDevice(BottleWork, Device):
     """Bottle under the tool of each pocket between the two angles, by its id; NONE or IDLE."""
     done: list[int]
     """Last bottle on which the work was complete, of each pocket. It passes again if the wheel has turned backward."""
+    left_out: list[int]
+    """Last bottle that was counted as skipped, of each pocket. It passes again if the wheel has turned backward."""
 
     def __init__(self, name: str, part: Carousel, setup: DeviceSetup) -> None:
         """Build the tags, and find the pocket at each of the two angles."""
@@ -65,7 +67,7 @@ class CarouselDevice(BottleWork, Device):
         self.missing = self.skipped = self.lost = 0
         self.on = True
         self.dead_tool = 0
-        self.bottles, self.done = [NONE] * star.pockets, [NONE] * star.pockets
+        self.bottles, self.done, self.left_out = ([NONE] * star.pockets for _ in range(3))
         self.turned = self._star.angle
         """Angle by which the wheel has turned, rad, with all of its turns."""
         self.passed = [self._passed(angle) for angle in self._ends]
@@ -108,7 +110,8 @@ class CarouselDevice(BottleWork, Device):
         if bottle in (NONE, self.done[pocket]):
             return
         if bottle != begun:
-            self.skipped += 1
+            self.skipped += bottle != self.left_out[pocket]
+            self.left_out[pocket] = bottle
             now.set_attribute(bottle, BAD, 1.0)
             return
         before = int(now.state.world.bottles.type[slot])

@@ -154,6 +154,24 @@ def test_a_wheel_that_stands_or_turns_backward_does_no_work_twice() -> None:
     assert sim._line.now.bad == set()
 
 
+def test_a_skipped_bottle_that_passes_again_counts_once() -> None:
+    """The wheel carries a bottle past the end of the work, back by 30 degrees, and past it again."""
+    sim = simulation(**fields(filled=(0,)))
+    sim.inject("carousels/filler/dead_tool", 1.0)
+    sim.advance(220)
+    assert of(sim, "skipped") == 1.0
+    passed = angle_of(sim, 0)
+    sim.command(["axes/block/rate"], [0.0])
+    sim.advance(100)
+    sim.command(["axes/block/jog_backward"], [1.0])
+    while angle_of(sim, 0) > math.radians(170.0):
+        sim.advance()
+    sim.command(["axes/block/jog_backward", "axes/block/rate"], [0.0, RATE])
+    while angle_of(sim, 0) < passed:
+        sim.advance()
+    assert (of(sim, "skipped"), of(sim, "processed"), sim._line.now.bad) == (1.0, 0.0, {0})
+
+
 @pytest.mark.parametrize("pockets", [1, 2, 3])
 def test_wheels_of_few_pockets_work_on_their_bottles(pockets: int) -> None:
     """The work of 160 degrees is done once per turn in each pocket; without bottles, pockets are missing."""
@@ -179,6 +197,39 @@ def test_a_run_goes_on_from_a_checkpoint_with_the_same_bits(threads: int, tmp_pa
         assert loaded.full_state_hash() == sim.full_state_hash()
         assert loaded.signals().tolist() == sim.signals().tolist()
     assert of(sim, "processed") > 0.0
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_any_sequence_of_commands_and_faults_keeps_the_ledger_of_bottles(seed: int, tmp_path: Path) -> None:
+    """Faults, an emergency stop and wrong values at random: signals stay in range, a checkpoint goes on alike."""
+    rng = np.random.default_rng(seed)
+    filled = (0, 1, 2, 4, 6, 8, 9, 11)
+    stop = {"kind": "emergency_stop", "cuts": ["drives", "machines"], "deceleration": 1.0}
+    both = [simulation(**fields(filled=filled, panel={"estop": stop}))]
+    names = both[0].process_image.signal_names
+    limits = {tag.name: (tag.low, tag.high) for tag in both[0].process_image.tags}
+    faults = ("carousels/filler/dead_tool", "stars/wheel/slip", "stars/wheel/jammed", "axes/block/jammed")
+    commands = ("carousels/filler/on", "axes/block/enable", "axes/block/jog_backward", "axes/block/reset",
+                "axes/block/rate", "panel/estop/press", "panel/estop/reset")  # fmt: skip
+    values = (0.0, 1.0, -1.0, 0.3, 2.0, 12.0, 13.0, math.nan, math.inf, 1e308)
+    for tick in range(400):
+        if rng.random() < 0.1:
+            name, value = str(rng.choice([*faults, *commands])), float(rng.choice(values))
+            for sim in both:
+                if name in faults:
+                    sim.inject(name, value)
+                else:
+                    sim.command([name], [value])
+        if tick == 200:
+            both[0].save(tmp_path / "there")
+            both.append(Simulation.load(tmp_path / "there", 2))
+        for sim in both:
+            sim.advance()
+        for name, value in zip(names, both[0].signals().tolist(), strict=True):
+            assert limits[name][0] <= value <= limits[name][1], name
+    assert both[0].full_state_hash() == both[1].full_state_hash()
+    assert both[0].signals().tolist() == both[1].signals().tolist()
+    assert of(both[0], "skipped") <= len(filled) and of(both[0], "processed") <= len(filled)
 
 
 def test_a_recording_replays(tmp_path: Path) -> None:
