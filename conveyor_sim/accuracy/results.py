@@ -246,7 +246,7 @@ class FlowRow:
 
 
 @dataclass(frozen=True)
-class Flow:
+class FlowAnswer:
     """Settings of impulses: the cheapest one that reproduces counts and throughput, and why forces refuse it."""
 
     rows: tuple[FlowRow, ...]
@@ -296,5 +296,5 @@ class AccuracyStudy:
     """s of processor time that the study took, compiling left out; None where it was not kept."""
     compiling: float | None = None
     """s of processor time that compiling took."""
-    flow: Flow | None = None
+    flow: FlowAnswer | None = None
     """None where impulses refuse the scene (`skipped` has the reason), and in a study of an earlier version."""

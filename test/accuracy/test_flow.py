@@ -18,7 +18,7 @@ from conveyor_sim.accuracy.report.files import read_study, write_study
 from conveyor_sim.accuracy.report.flow import find_flow
 from conveyor_sim.accuracy.report.lines import recommended, summary
 from conveyor_sim.accuracy.report.tables import blocks
-from conveyor_sim.accuracy.results import Cost, Errors, Flow, Point, Sample
+from conveyor_sim.accuracy.results import Cost, Errors, FlowAnswer, Point, Sample
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.physics.timestep.prediction import DEEP
 from conveyor_sim.scene import load_scene, parse_scene
@@ -44,7 +44,7 @@ def runs(setting: Setting, throughput: float, overlap: float = 0.1, stop: float 
     ]  # fmt: skip
 
 
-def judged(fast: list[Sample], slow: list[Sample], points: list[Point] | None = None) -> Flow:
+def judged(fast: list[Sample], slow: list[Sample], points: list[Point] | None = None) -> FlowAnswer:
     samples = [*runs(REFERENCE, 60.0), *fast, *slow]
     comparisons = decide(samples, [FAST, SLOW], REFERENCE, 0.01, flow=True)
     assert {row.observable for row in comparisons} <= {"throughput"}

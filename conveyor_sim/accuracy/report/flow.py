@@ -15,7 +15,7 @@ import numpy as np
 
 from conveyor_sim.accuracy.measure.observables import OVERLAP, STOP_FORCE
 from conveyor_sim.accuracy.report.words import digits, percent
-from conveyor_sim.accuracy.results import Comparison, Flow, FlowRow, Point, Sample
+from conveyor_sim.accuracy.results import Comparison, FlowAnswer, FlowRow, Point, Sample
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.physics.timestep.prediction import DEEP
 
@@ -26,7 +26,7 @@ def find_flow(
     comparisons: Sequence[Comparison],
     reference: Setting | None,
     tolerance: float,
-) -> Flow | None:
+) -> FlowAnswer | None:
     """Return the settings of impulses, judged, and the cheapest equivalent one; None if the study has none.
 
     comparisons: of counts, rates and positions. reference: setting of long runs; None without any.
@@ -38,7 +38,7 @@ def find_flow(
     rows = tuple(_row(point, known, samples, comparisons) for point in sorted(swept, key=_order))
     chosen = next((row for row in rows if row.verdict == "equivalent"), None)
     setting = None if chosen is None else chosen.setting
-    return Flow(rows, setting, _sentence(rows, chosen, tolerance), _refusal(rows, chosen))
+    return FlowAnswer(rows, setting, _sentence(rows, chosen, tolerance), _refusal(rows, chosen))
 
 
 def named(setting: Setting) -> str:

@@ -24,7 +24,7 @@ from conveyor_sim.accuracy.results import (
     Comparison,
     Cost,
     Errors,
-    Flow,
+    FlowAnswer,
     FlowRow,
     Horizon,
     Order,
@@ -337,7 +337,7 @@ def _lost_runs(study: AccuracyStudy) -> Block:
     )
 
 
-def _flow(flow: Flow | None) -> Block:
+def _flow(flow: FlowAnswer | None) -> Block:
     """Return the settings of impulses, the cheapest first, with what they are judged by."""
     return Block.of(
         "Impulses: judged by counts, throughput and positions",

@@ -144,7 +144,7 @@ class Clusters(NamedTuple):
 
 
 @group
-class Sectors(NamedTuple):
+class ClusterSectors(NamedTuple):
     """Clusters by sector around the pivot of a body (`sectors.py`), S sectors; None if no body has many clusters."""
 
     first: I4
@@ -205,7 +205,7 @@ class MovingBodies(NamedTuple):
     body: I4
     """Body of each piece, (Q,)."""
     clusters: Clusters
-    sectors: Sectors | None
+    sectors: ClusterSectors | None
     home_segments: Segments | None
     """Straight pieces at displacement 0, relative to the pivot; None without any."""
     segments: Segments | None

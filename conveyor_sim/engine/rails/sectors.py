@@ -3,7 +3,7 @@
 
 from typing import Any
 
-from conveyor_sim.engine.arrays.moving import MovingBodies, Sectors
+from conveyor_sim.engine.arrays.moving import ClusterSectors, MovingBodies
 from conveyor_sim.engine.compiler.compile import part
 
 
@@ -19,7 +19,7 @@ def clusters_beside(moving: MovingBodies, sectors: Any, b: int, x: float, y: flo
 
 
 @part
-def _places(sectors: Sectors, b: int, x: float, y: float) -> tuple[int, int]:
+def _places(sectors: ClusterSectors, b: int, x: float, y: float) -> tuple[int, int]:
     first = sectors.first[b]
     s = first + sector_at(x, y, sectors.first[b + 1] - first)
     return sectors.start[s], sectors.start[s + 1]

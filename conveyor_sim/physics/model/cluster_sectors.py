@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.engine.arrays.moving import Clusters, Sectors
+from conveyor_sim.engine.arrays.moving import Clusters, ClusterSectors
 from conveyor_sim.engine.rails.sectors import sector_at
 
 MANY = 6
@@ -19,7 +19,7 @@ ROUNDING = 1e-9
 _sector: Any = sector_at.py_func  # type: ignore[attr-defined]
 
 
-def cluster_sectors(clusters: Clusters, first_cluster: NDArray[np.int32], radius: float) -> Sectors | None:
+def cluster_sectors(clusters: Clusters, first_cluster: NDArray[np.int32], radius: float) -> ClusterSectors | None:
     """Return the sectors of all bodies, one of a body with few clusters; None if all have few. radius: largest, m."""
     if np.diff(first_cluster).max(initial=0) < MANY:
         return None
@@ -33,7 +33,7 @@ def cluster_sectors(clusters: Clusters, first_cluster: NDArray[np.int32], radius
                 own[s].append(k)
         lists += own
         first.append(len(lists))
-    return Sectors(
+    return ClusterSectors(
         first=np.array(first, np.int32),
         start=np.cumsum([0, *(len(own) for own in lists)]).astype(np.int32),
         cluster=np.array([k for own in lists for k in own], np.int32),
