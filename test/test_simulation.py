@@ -95,7 +95,7 @@ def test_the_little_line_is_busy(reference: Simulation) -> None:
     off = {choice.name for choice in sim.model.effects if not choice.on}
     others = {"hertz", "table", "tsuji_damping", "onset_damping", "atan_friction", "implicit_friction"}
     others |= {"moving_rails", "scuffing", "crushing", "impacts", "tipping"}
-    others |= {"static_friction", "vibration", "viscoelastic_damping"}
+    others |= {"static_friction", "vibration", "viscoelastic_damping", "sleeping"}
     others |= set() if sim.model.integrator in RIDES else {"riding"}
     assert off == others | {"tangential_spring", "ring_base", "peaks", "contact_arrays", "energy_ledger"}
     assert [outcome.source for outcome in sim.take_outcomes()][-1] == "watchdog"
