@@ -99,6 +99,16 @@ def test_a_file_presses_on_a_stop_with_mu_m_g_of_each_bottle() -> None:
     assert behind == pytest.approx(expected, rel=5e-3)
 
 
+@pytest.mark.parametrize("share", [0.25, 0.5, 1.0])
+def test_a_slow_belt_drags_with_its_friction_curve(share: float) -> None:
+    """mu m g (2 s - s^2) of each bottle on a belt at the share s of the slip limit, in steps of any length."""
+    for steps in (2, 16):
+        sim = run(steps, 2, slip_limit=0.3 / share, **file_of(3))
+        sim.advance(300)
+        expected = 3.0 * MU_BASE * MASS * G * (2.0 * share - share**2)
+        assert forces_on(sim, "stop") == pytest.approx(expected, rel=1e-3)
+
+
 def test_a_crowd_rests_with_the_sum_of_its_drags_on_the_end_wall() -> None:
     sim = run(16, 2, **{name: value for name, value in crowd(6, 5).items() if name in ("belts", "rails", "bottles")})
     sim.advance(600)

@@ -19,19 +19,22 @@ _BODY, _FREE = uint64(BODY), uint64(4)
 
 @part
 def begin_substep(world: World, impulses: Any, h: float, first: int, end: int) -> None:
-    """Apply base friction over h (s) to bottles first to end, then the impulses that their contacts hold."""
+    """Apply the impulses that contacts hold to bottles first to end, then base friction over h (s).
+
+    So the friction under a bottle that contacts keep at rest is that at rest, on slow belts as well.
+    """
     bottles, body, free, warm = world.bottles, impulses.body, impulses.free, impulses.warm
     for i in range(uint64(first), uint64(end)):
-        vx, vy = _on_base(world, world.footing, h, i)
+        vx, vy = _on_base(world, world.footing, warm.x[i], warm.y[i], h, i)
         b, f = i * _BODY, i * _FREE
         body[b] = bottles.x[i]
         body[b + uint64(1)] = bottles.y[i]
-        body[b + uint64(2)] = vx + warm.x[i]
-        body[b + uint64(3)] = vy + warm.y[i]
+        body[b + uint64(2)] = vx
+        body[b + uint64(3)] = vy
         body[b + uint64(5)] = bottles.inverse_mass[i]
         body[b + uint64(7)] = bottles.radius[i]
-        free[f] = vx
-        free[f + uint64(1)] = vy
+        free[f] = vx - warm.x[i]
+        free[f + uint64(1)] = vy - warm.y[i]
     _begin_turn(world, world.spin, impulses, first, end)
 
 
@@ -49,16 +52,17 @@ def _begin_turn(world: World, spin: Any, impulses: Any, first: int, end: int) ->
 
 
 @part
-def _on_base(world: World, footing: Any, h: float, i: int) -> tuple[float, float]:
-    """Return the velocity of bottle i after the friction under it has acted for h (s), implicitly.
+def _on_base(world: World, footing: Any, warm_x: float, warm_y: float, h: float, i: int) -> tuple[float, float]:
+    """Return the velocity of bottle i after its contacts and the friction under it have acted for h (s), implicitly.
 
+    warm_x, warm_y: change of velocity by the contacts, m/s.
     The belt's velocity is that at the middle of the way. The friction curve is evaluated at the slip at the end.
     """
     bottles, limit = world.bottles, world.settings.slip_limit
     if footing is None:
-        return bottles.vx[i], bottles.vy[i]
+        return bottles.vx[i] + warm_x, bottles.vy[i] + warm_y
     ux, uy = belt_velocity(bottles, footing, h, i)
-    vx, vy = bottles.vx[i] - ux, bottles.vy[i] - uy
+    vx, vy = bottles.vx[i] + warm_x - ux, bottles.vy[i] + warm_y - uy
     slip = math.sqrt(vx * vx + vy * vy)
     rest = implicit_slip(slip, h * footing.friction_limit[i] * bottles.inverse_mass[i] / limit, limit, None)
     share = rest / slip if slip > 0.0 else 0.0

@@ -4,7 +4,7 @@
 Contacts stiffer than a substep resolves stay stable and press with the right forces once the sweeps have passed the
 depth of the queue; fast impacts rebound in closed form. A substep is
 
-1. friction under each bottle, implicit, then the impulses that its contacts held in the last substep (warm start);
+1. the impulses that contacts held in the last substep (warm start), then friction under each bottle, implicit;
 2. `sweeps` times: all pairs, colour by colour, then all rails and bodies (`impulses/law.py`), then drives off profile;
 3. r += h v, and axes and bodies move.
 
