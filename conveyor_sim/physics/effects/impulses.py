@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 
 from conveyor_sim.physics.effects.terms import Terms
-from conveyor_sim.physics.timestep.bounds import SKIN, Bound
+from conveyor_sim.physics.timestep.bounds import IMPULSE_WAY, Bound
 from conveyor_sim.physics.timestep.prediction import Impact, Prediction
 
 SWEEPS_IN = 0.01
@@ -19,11 +19,9 @@ SWEEPS_IN = 0.01
 
 def impulse_bounds(terms: Terms) -> tuple[Bound, ...]:
     """Return the bound on the way of a bottle in a substep."""
-    skin = SKIN * min(kind.radius for kind in terms.types)
+    way = IMPULSE_WAY * min(kind.radius for kind in terms.types)
     speed = terms.plant.impact_speed
-    return (
-        Bound("way per step", 0.5 * skin / speed, f"{500.0 * skin:.3g} mm, half of the lists' skin, at {speed:g} m/s"),
-    )
+    return (Bound("way per step", way / speed, f"{1e3 * way:.3g} mm, a tenth of the radius, at {speed:g} m/s"),)
 
 
 def impulse_prediction(terms: Terms, expected: Sequence[Impact], dt: float) -> Prediction:

@@ -29,7 +29,7 @@ from conveyor_sim.physics.model.remedies import too_many
 from conveyor_sim.physics.model.step_choice import choose_steps
 from conveyor_sim.physics.plant import Plant
 from conveyor_sim.physics.sources_hash import sources_hash
-from conveyor_sim.physics.timestep.bounds import SKIN, Bound
+from conveyor_sim.physics.timestep.bounds import IMPULSE_SKIN, SKIN, Bound
 from conveyor_sim.physics.timestep.prediction import Impact, Prediction
 from conveyor_sim.physics.timestep.settling import Settling, settling
 from conveyor_sim.scene.accuracy import MOST_STEPS
@@ -117,7 +117,7 @@ def build_model(scene: Scene) -> Model:
         raise SceneError(f"{Places(scene).of(('accuracy',))}: accuracy: {too_many(scene, choice)}")
     types = list(scene.bottle_types.values())
     radius = np.array([kind.radius for kind in types])
-    skin = SKIN * float(radius.min())
+    skin = (IMPULSE_SKIN if scene.accuracy.integrator == "impulses" else SKIN) * float(radius.min())
     segments, arcs = rail_arrays(plant.rails_at_rest, plant.rail_materials)
     dt = scene.tick_ns * 1e-9 / steps
     warm = "implicit_friction" in on and scene.accuracy.integrator in WARM and not scene.friction_anew

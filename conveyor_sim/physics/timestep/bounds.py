@@ -7,6 +7,14 @@ from dataclasses import dataclass
 
 SKIN = 0.2
 """Ratio of the neighbour lists' skin to the smallest radius, a compromise between rare rebuilds and short lists."""
+IMPULSE_SKIN = 0.9
+"""Ratio for integrator impulses, in whose long steps bottles on fast belts move by millimetres."""
+
+IMPULSE_WAY = 0.1
+"""Ratio of a bottle's largest way in a step of integrator impulses to the smallest radius.
+
+A contact keeps the normal that it has at the beginning of a step.
+"""
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,7 @@ from conveyor_sim.physics.state import State
 from conveyor_sim.physics.stepping.guard.squeeze import Squeeze, squeeze_of
 from conveyor_sim.physics.stepping.guard.violation import Violation, Words, unresolved
 from conveyor_sim.physics.stepping.guard.world_snapshot import WorldSnapshot
+from conveyor_sim.physics.timestep.bounds import IMPULSE_SKIN, IMPULSE_WAY
 from conveyor_sim.physics.timestep.prediction import DEEP
 from conveyor_sim.scene.types import Unchecked
 
@@ -34,12 +35,6 @@ SOFT = 0.2
 
 CLOSELY = 128
 """Largest number of steps between checks of overlaps, sweeps counted as steps. A check costs about half a step."""
-
-HALF_WAY = 0.5
-"""Largest way of a bottle in a step of integrator impulses over the skin of the lists.
-
-A contact acts before bottles touch, so the lists of both must hold for the next step.
-"""
 
 OVERLAP = 2.0 * DEEP
 """Overlap, in radii, from which integrator impulses is reported as too coarse for contacts that it does not resolve.
@@ -80,7 +75,7 @@ class Guard:
         self._found = found
         self._memory = WorldSnapshot()
         self._every = max(1, math.ceil(CLOSELY / (self._model.steps_per_tick * max(1, self._model.sweeps))))
-        self._longest_way = self._model.settings.skin * (HALF_WAY if self._model.sweeps else 1.0)
+        self._longest_way = self._model.settings.skin * (IMPULSE_WAY / IMPULSE_SKIN if self._model.sweeps else 1.0)
         self._soft_from = OVERLAP if unresolved(self._model) else SOFT
         tick, slip = self._model.tick_ns * 1e-9, self._model.settings.slip_limit
         self._friction = tick * self._model.largest_base_friction
