@@ -37,6 +37,10 @@ class FillerBlock:
     master: str = "block"
     slow: float = 0.6
     """Rate over the commanded one while few bottles come."""
+    cell: str = ""
+    """Prefix of the names of all parts but the panel, such as "block_" for a cell "block"."""
+    run_empty: bool = False
+    """The gate is open even if too few bottles wait, until the discharge is full or the block stops."""
     top_rate: float = 24000.0
     """Bottles per hour at which the infeed conveyor has `top_speed`."""
     top_speed: float = 1.05
@@ -51,7 +55,7 @@ class FillerBlock:
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
         """Return the commands of one scan."""
-        axes = (self.master, *self.slaves)
+        cell, axes = self.cell, [f"{self.cell}{axis}" for axis in (self.master, *self.slaves)]
         powered = inputs["panel/estop/contact"] != 0.0
         failed = any(inputs[f"axes/{axis}/fault"] for axis in axes)
         start, reset = inputs["panel/start/contact"] != 0.0, inputs["panel/reset/contact"] != 0.0
@@ -59,30 +63,33 @@ class FillerBlock:
         self._start = start
         # An axis reports the end of its failure one scan after the reset.
         self._ready = powered and not failed and (self._ready or reset)
-        geared = all(inputs[f"axes/{axis}/in_gear"] for axis in self.slaves)
+        geared = all(inputs[f"axes/{axis}/in_gear"] for axis in axes[1:])
         self._pulse = self._step == Step.GEARING and not self._pulse
         self._step = self._next(failed, starts, geared, inputs["panel/stop/contact"] != 0.0)
         runs = self._step == Step.RUNNING
-        full = inputs["photo_eyes/backed_up/blocked"] != 0.0
+        full = inputs[f"photo_eyes/{cell}backed_up/blocked"] != 0.0
         turns = runs and not full
         rate = inputs["panel/rate/value"]
         wanted = rate / 3600.0
-        share = 1.0 if inputs["photo_eyes/supplied/blocked"] else self.slow
+        share = 1.0 if inputs[f"photo_eyes/{cell}supplied/blocked"] else self.slow
+        queued = self.run_empty or inputs[f"photo_eyes/{cell}queued/blocked"] != 0.0
         commands = {
-            f"axes/{self.master}/rate": wanted * share if turns else 0.0,
-            "belts/infeed/cmd_speed": self.top_speed * (rate / self.top_rate) * share if turns else self.top_speed,
-            "gates/stop/open": float(turns and inputs["photo_eyes/queued/blocked"] != 0.0),
-            "belts/infeed/run": float(powered and self._step != Step.FAILED),
-            "belts/discharge/run": float(powered and self._step != Step.FAILED),
+            f"axes/{axes[0]}/rate": wanted * share if turns else 0.0,
+            f"belts/{cell}infeed/cmd_speed": self.top_speed * (rate / self.top_rate) * share
+            if turns
+            else self.top_speed,
+            f"gates/{cell}stop/open": float(turns and queued),
+            f"belts/{cell}infeed/run": float(powered and self._step != Step.FAILED),
+            f"belts/{cell}discharge/run": float(powered and self._step != Step.FAILED),
             "panel/stack/red": float(failed or not powered),
             "panel/stack/yellow": float(powered and not failed and not self._ready),
             "panel/stack/green": float(runs),
-            "panel/filled/write": inputs["carousels/valves/good"],
+            "panel/filled/write": inputs[f"carousels/{cell}valves/good"],
         }
         for axis in axes:
             commands[f"axes/{axis}/enable"] = float(self._step != Step.ENABLING)
             commands[f"axes/{axis}/reset"] = float(reset)
-        for axis in self.slaves:
+        for axis in axes[1:]:
             commands[f"axes/{axis}/gear_in"] = float(self._step == Step.GEARING and self._pulse)
         return commands
 

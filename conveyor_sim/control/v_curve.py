@@ -62,12 +62,12 @@ class Neighbour:
 class VCurve:
     """Rates of a line with a bottleneck.
 
-    bottleneck: the command that sets its rate. rate: 1/s. margin: share of `rate` per step away from the bottleneck, by
-    which a machine may be faster or must be slower; its limit must allow that. upstream, downstream: the machines on
-    either side, the nearest first.
+    bottleneck: the command that sets its rate; None: another controller gives it. rate: 1/s. margin: share of `rate`
+    per step away from the bottleneck, by which a machine may be faster or must be slower; its limit must allow that.
+    upstream, downstream: the machines on either side, the nearest first.
     """
 
-    bottleneck: str
+    bottleneck: str | None
     rate: float
     margin: float
     upstream: tuple[Neighbour, ...] = ()
@@ -80,7 +80,7 @@ class VCurve:
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
         """Return a rate for each machine, 1/s."""
-        answer = {self.bottleneck: self.rate}
+        answer = {} if self.bottleneck is None else {self.bottleneck: self.rate}
         # Upstream a lack requires a higher rate, downstream a surplus.
         for machines, faster in ((self.upstream, _Buffer.SHORT), (self.downstream, _Buffer.OVER)):
             rate = self.rate
