@@ -14,8 +14,6 @@ from conveyor_sim.simulation import Simulation
 
 ROOT = Path(__file__).parent.parent
 PARTS = ROOT / "docs" / "parts"
-MOST_BYTES = 5_000_000
-"""Largest sum of the sizes of all pictures of the docs."""
 
 
 @pytest.mark.parametrize("name", sorted(PAGES))
@@ -43,8 +41,3 @@ def test_pages_of_a_folder_are_linked_from_its_index(folder: str) -> None:
     pages = sorted((ROOT / "docs" / folder).glob("*.md"))
     assert pages
     assert [page.name for page in pages if f"]({folder}/{page.name})" not in index] == []
-
-
-def test_pictures_are_small() -> None:
-    files = [file for file in (ROOT / "docs" / "images").rglob("*") if file.is_file()]
-    assert sum(file.stat().st_size for file in files) <= MOST_BYTES
