@@ -10,6 +10,8 @@ from conveyor_sim.testing.plugin import Lines
 
 BEYOND = {"buffer_lane", "two_stations", "zoned_line"}
 """Queues that close up: their scene files say why they press harder than their predicted error rests on."""
+COARSE = {"brewery"}
+"""Scenes of the fast tier in which bottles may overlap by more than 0.4 % of a diameter for a moment, in a combiner."""
 
 
 @pytest.fixture(autouse=True)
@@ -18,7 +20,8 @@ def quiet(line: Lines) -> Iterator[None]:
     yield
     for scenario, _ in line.made:
         simulation, model = scenario.simulation, scenario.simulation.model
-        assert [event.text for event in scenario._outputs.take_noticed()] == []
+        noticed = [event.text for event in scenario._outputs.take_noticed()]
+        assert [text for text in noticed if "overlaps" not in text or scenario.scene.name not in COARSE] == []
         deepest = simulation.integration.deepest_overlap * float(model.type_radius.max())
         allowed = min(impact.overlap(HARDER * model.prediction.force) for impact in model.impacts)
-        assert deepest <= allowed or scenario.scene.name in BEYOND
+        assert deepest <= allowed or scenario.scene.name in BEYOND | COARSE

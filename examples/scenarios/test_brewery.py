@@ -4,10 +4,9 @@
 Run it by hand: `pytest examples/scenarios/test_brewery.py`.
 """
 
-import importlib.util
 from pathlib import Path
 
-from conveyor_sim.control.scan import Controller
+from conveyor_sim.control.load import load
 from conveyor_sim.testing.plugin import Lines
 
 FOLDER = Path(__file__).resolve().parents[1] / "brewery"
@@ -15,20 +14,9 @@ RATE = 40_000 / 3600  # bottles per second
 AT_START = 4800
 
 
-def controller() -> Controller:
-    """Return the controller that is shipped beside the scene."""
-    spec = importlib.util.spec_from_file_location("brewery", FOLDER / "brewery.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    made: Controller = module.brewery()
-    return made
-
-
 def test_the_line_starts_and_fills(line: Lines) -> None:
     plant = line(FOLDER / "brewery.yaml")
-    plant.attach(controller())
+    plant.attach(load(f"{FOLDER / 'brewery.py'}:brewery"))
     plant.run_for(0.5)
     assert plant.signals["belts/supply/speed"] == plant.signals["axes/block_master/speed"] == 0.0
     plant.panel.press("start")
