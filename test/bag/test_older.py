@@ -217,7 +217,7 @@ def _of_format_4(folder: Path, integrator: str, solver: str) -> Path:
 
 def test_the_fifth_format_replays_with_integrators_of_forces() -> None:
     report = replay(EXPLICIT)
-    assert (report.difference, report.last_tick, report.compared["contacts"]) == (None, 20, 11)
+    assert (report.difference, report.last_tick, report.compared["bottles"]) == (None, 20, 11)
     with open_bag(EXPLICIT) as bag:
         assert (bag.format, bag.line.sweeps, bag.line.integrator) == (5, 0, "leapfrog")
         assert bag.line.tags
