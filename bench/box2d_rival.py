@@ -20,7 +20,7 @@ from bench.ours import PackedState
 from bench.packed import MASS, RADIUS
 
 DAMPING_RATIO, PUSH = 10.0, 3.0
-"""Of its contacts, 1; greatest speed at which it parts overlaps, m/s: its defaults."""
+"""Damping ratio of its contacts, and greatest speed at which it parts overlaps, m/s: its defaults."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ TUNINGS = (Tuning(60.0, 4, 30.0), Tuning(60.0, 8, 120.0), Tuning(100.0, 8, 200.0
 
 
 def why_not() -> str:
-    """Why Box2D can't be had here, "" if it can."""
+    """Return the reason for which Box2D can't be imported, "" if it can."""
     if find_spec("pyb2d3") is None:
         return "the package pyb2d3 is not installed (pip install -r requirements/bench.txt)"
     return ""

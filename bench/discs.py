@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rivals with rigid discs have in common: the box of glass, the pull of its belt, and overlaps."""
+"""Common parts of rivals with rigid discs: the box of glass, the pull of its belt, and overlaps."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from bench.packed import FRICTION, GRAVITY, MASS, RADIUS, Box
 
 CONTACT_FRICTION, RESTITUTION = 0.1, 0.5
-"""Of glass on glass and on walls."""
+"""Coefficients of friction and of restitution of glass on glass and on walls."""
 PULL = FRICTION * GRAVITY
 """m/s^2, along x: that of a belt below bottles which slip on it."""
 INERTIA = MASS * RADIUS**2

@@ -41,7 +41,7 @@ TUNINGS = (Tuning(60.0, 10), Tuning(400.0, 10))
 
 
 def why_not() -> str:
-    """Why pymunk can't be had here, "" if it can."""
+    """Return the reason for which pymunk can't be imported, "" if it can."""
     return "" if find_spec("pymunk") else "the package pymunk is not installed (pip install -r requirements/bench.txt)"
 
 

@@ -75,7 +75,7 @@ class Point:
     speed: float
     """Bottles x real time per core."""
     error: float
-    """Of a diameter, of the RMS force, or of the throughput; a flow has that of results.csv instead."""
+    """Error as a share of a diameter or of the RMS force; 0 for flows, whose bias results.csv has."""
 
 
 def measure() -> Iterator[Point]:

@@ -89,7 +89,7 @@ def test_lammps_packs_as_densely() -> None:
 
 
 def test_largest_overlap_is_that_of_the_deepest_contact() -> None:
-    """Of two bottles, or of one and a wall, whichever is deeper; 0 where all are apart."""
+    """The largest overlap is that of two bottles, or of one and a wall; it is 0 where all are apart."""
     box, r = box_for(COUNT), RADIUS
     apart = np.array([[2.0 * r, 2.0 * r], [5.0 * r, 2.0 * r], [2.0 * r, 5.0 * r]])
     assert largest_overlap(apart, box) == 0.0

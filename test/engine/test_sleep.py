@@ -28,7 +28,7 @@ def eventful(threads: int = 1) -> Simulation:
 
 
 def go_on(sim: Simulation, calls: tuple[int, ...], look: bool = False) -> Simulation:
-    """Advance to ENDS with the events of `eventful`, in calls of at most so many ticks in turn."""
+    """Advance to ENDS with the events of `eventful`, in calls whose largest numbers of ticks take turns."""
     turn = 0
     while sim.tick < ENDS:
         if sim.tick == 200:

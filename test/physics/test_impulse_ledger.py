@@ -23,7 +23,7 @@ WATCHED: dict[str, Any] = {"outputs": {**NO_OUTPUTS, "ledger": 10, "damage": 10}
 """Fields that enable every observer."""
 DRAG = MU_BASE * MASS * G
 ROUNDING = 1e-13
-"""Of the turnover."""
+"""Largest residual over the turnover."""
 
 
 def watched(steps: int = 8, sweeps: int = 2, **more: Any) -> Simulation:
