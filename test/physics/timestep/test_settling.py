@@ -1,17 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Settling of queues with integrator impulses: its closed form, files that settle as predicted, the longest queue."""
+"""Settling of queues with integrator impulses: its closed form, and files that settle as predicted."""
 
 import math
 
 import numpy as np
 import pytest
-from scenes import MASS, RADIUS, belt, scene
+from scenes import MASS, scene
 from swept import MU_BASE, G, fields, file_of, forces_on, run, swept
 
 from conveyor_sim.engine.impulses.constants import OVER, OVER_ONE
-from conveyor_sim.physics.effects.load import ROWS, longest_queue
 from conveyor_sim.physics.model import build_model
-from conveyor_sim.physics.plant import Plant
 from conveyor_sim.physics.timestep.settling import DECAYS, LOAD_TIME, settling
 
 
@@ -56,20 +54,6 @@ def test_the_sentence_has_queue_and_time() -> None:
     words = settling(8, 2, 0.01, 60, "a reason").sentence
     assert "1600 sweeps per second" in words and "a queue of 60 (a reason) settles in about 2.8 s" in words
     assert "a queue" not in settling(8, 2, 0.01, 0, "").sentence
-
-
-def test_the_longest_queue_is_all_bottles_or_the_full_belts() -> None:
-    few = scene(**fields(**file_of(12)))
-    assert longest_queue(Plant.of(few)) == (12, "all bottles, one behind the other")
-    infeed = {"bottle": "bottle", "position": [0.1, 0.0], "direction": 0.0, "speed": 0.3, "rate": 1.0}
-    narrow, wide = (
-        scene(bottle_types={"bottle": fields()["bottle_types"]["bottle"]}, contacts=fields()["contacts"],
-              base=fields()["base"], belts={"belt": belt(0.3, (0.0, -0.5 * width), 6.5, width)},
-              infeeds={"inlet": infeed})
-        for width in (2.2 * RADIUS, 1.0)
-    )  # fmt: skip
-    assert longest_queue(Plant.of(narrow))[0] == math.floor(6.5 / (2.0 * RADIUS))
-    assert longest_queue(Plant.of(wide))[0] == math.floor(6.5 / (2.0 * RADIUS * ROWS))
 
 
 def test_only_impulses_settle_by_sweeps() -> None:
