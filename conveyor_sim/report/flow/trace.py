@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -43,18 +43,33 @@ _LANE = 1.0
 """m, farthest guide that leads a bottle."""
 
 
+class Takers:
+    """Devices that take bottles, with their regions."""
+
+    def __init__(self, regions: Sequence[tuple[Path, Sequence[XY]]]) -> None:
+        self._regions = regions
+        corners = [np.asarray(region) for _, region in regions]
+        self._low = np.array([polygon.min(axis=0) for polygon in corners]).reshape(-1, 2)
+        self._high = np.array([polygon.max(axis=0) for polygon in corners]).reshape(-1, 2)
+
+    def near(self, points: Array) -> Iterator[tuple[Path, Sequence[XY]]]:
+        """Yield the devices whose boxes meet that of points (k, 2), m."""
+        apart = (points.min(axis=0) > self._high).any(axis=1) | (points.max(axis=0) < self._low).any(axis=1)
+        return (self._regions[index] for index in np.flatnonzero(~apart))
+
+
 def drift(
     start: Array,
     along: Array,
     radius: float,
     surfaces: SurfaceMap,
     guides: Guides,
-    takers: Sequence[tuple[Path, Sequence[XY]]],
+    takers: Takers,
     steps: int,
 ) -> tuple[Array, Array, Path | None]:
     """Return times (k,) s and places (k, 2) of a bottle that moves with the belts, and the device that takes it.
 
-    start: place, m. along: unit vector of its motion. radius: of the bottle, m. takers: devices with their regions. It
+    start: place, m. along: unit vector of its motion. radius: of the bottle, m. takers: devices that take bottles. It
     follows the middle between near guides, or a guide that it touches. It ends after a number of steps or beside the
     belts, without a device (None).
     """
@@ -76,7 +91,7 @@ def drift(
         time += _STEP / speed
         times.append(time)
         places.append(place)
-        for path, region in takers:
+        for path, region in takers.near(place[None]):
             if inside(place[None], region)[0]:
                 return np.array(times), np.array(places), path
     return np.array(times), np.array(places).reshape(-1, 2), None
@@ -225,8 +240,9 @@ class _Tracer:
         self._integration = Integration(self._state, 1, True)
         self._ticks = 0
         self._pushers = [_Sweep.of(pusher) for pusher in scene.pushers.values()]
-        self._exits = [(path, part.region) for path, part in scene.exits() if isinstance(part, (Outfeed, Sink))]
-        self._stations = [(path, part.region) for path, part in scene.exits() if isinstance(part, Station)]
+        takers = {path: part for path, part in scene.exits() if isinstance(part, (Outfeed, Sink, Station))}
+        self._takers = Takers([(path, part.region) for path, part in takers.items()])
+        self._stations = {path for path, part in takers.items() if isinstance(part, Station)}
 
     def run(self) -> list[Leg]:
         """Advance all bottles until each has ended."""
@@ -283,15 +299,14 @@ class _Tracer:
     def _ended(self, index: int, track: Track) -> Leg | None:
         """Return the leg of a bottle that has ended within the last chunk, or None."""
         taken = [
-            (track.before + int(np.argmax(within)) + 1, kind, device)
-            for kind, devices in (("exit", self._exits), ("station", self._stations))
-            for device, region in devices
+            (track.before + int(np.argmax(within)) + 1, device)
+            for device, region in self._takers.near(track.chunk)
             if (within := inside(track.chunk, region)).any()
         ]
         astray = track.astray
         if taken and (astray is None or min(count for count, *_ in taken) <= astray[1]):
-            count, kind, device = min(taken, key=lambda entry: entry[0])
-            return self._leg(index, track, count, "exit" if kind == "exit" else "station", device)
+            count, device = min(taken, key=lambda entry: entry[0])
+            return self._leg(index, track, count, "station" if device in self._stations else "exit", device)
         if astray is not None:
             return self._leg(index, track, astray[0], "off")
         if (count_to := track.stopped()) is not None:
@@ -304,9 +319,10 @@ class _Tracer:
         """Return a leg that ends at the cap with the rest of its way by the speeds of the belts."""
         step = leg.points[-1] - leg.points[-2]
         along = step / max(float(np.hypot(*step)), 1e-12)
-        takers = [*self._exits, *self._stations]
-        times, points, taker = drift(leg.points[-1], along, leg.radius, self._surfaces, self._guides, takers, steps)
-        end: End = "cap" if taker is None else "station" if taker in dict(self._stations) else "exit"
+        times, points, taker = drift(
+            leg.points[-1], along, leg.radius, self._surfaces, self._guides, self._takers, steps
+        )
+        end: End = "cap" if taker is None else "station" if taker in self._stations else "exit"
         return replace(
             leg,
             times=np.concatenate([leg.times, leg.times[-1] + times]),
