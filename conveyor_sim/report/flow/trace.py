@@ -55,7 +55,7 @@ class Takers:
     def near(self, points: Array) -> Iterator[tuple[Path, Sequence[XY]]]:
         """Yield the devices whose boxes meet that of points (k, 2), m."""
         apart = (points.min(axis=0) > self._high).any(axis=1) | (points.max(axis=0) < self._low).any(axis=1)
-        return (self._regions[index] for index in np.flatnonzero(~apart))
+        return (self._regions[index] for index in np.flatnonzero(~apart).tolist())
 
 
 def drift(
