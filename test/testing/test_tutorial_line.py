@@ -29,7 +29,7 @@ OF_THIS_RUN = re.compile(r"\d x real time$|^recorded ")
 
 
 def test_the_files_of_the_example_are_those_of_the_page() -> None:
-    header = re.compile(r'\A# SPDX-.*\n""".*"""\n\n')
+    header = re.compile(r'\A# SPDX-.*\n""".*"""\n\n|\A(?:# |\(\* )\S+(?: \*\))?\n')
     assert {name: header.sub("", (EXAMPLE / name).read_text()) for name in FILES} == FILES
     assert set(FILES) == {"layers.yaml", "line.yaml", "line.st", "test_line.py"}
 
@@ -41,7 +41,7 @@ def test_the_page_does_what_it_says(pytester: pytest.Pytester) -> None:
     seen = set()
     for each in snippets(PAGE):
         if isinstance(each, Block) and each.name:
-            (folder / each.name).write_text(each.text)
+            (folder / each.name).write_text(f"# {each.name}\n{each.text}")  # errors and warnings name its lines
         elif isinstance(each, Block) and not each.language:
             (folder / "line.st").write_text(FILES["line.st"])
         elif isinstance(each, Block) and each.language == "text":
