@@ -153,8 +153,7 @@ class Case:
         if self.stops:
             if not re.search(self.stops, sentence):
                 return [f"ended with {sentence!r}, expected a sentence that matches {self.stops!r}"]
-            return []
-        if sentence:
+        elif sentence:
             return [f"stopped: {sentence}"]
         wrong = []
         for name, wanted in self.expect.items():
