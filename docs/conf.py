@@ -51,6 +51,7 @@ NAVIGATION = {
             "docs/tutorial_scada",
             "docs/tutorial_ros",
             "docs/filler_block",
+            "docs/brewery",
             "docs/cookbook/index",
             "docs/troubleshooting",
             "docs/gallery",
