@@ -69,7 +69,7 @@ class Case:
     ramp: Mapping[str, Any] = field(default_factory=dict)
     """`belt`, `from`, `to` (m/s) and `acceleration` (m/s^2): a command every tick."""
     put: Sequence[Mapping[str, Any]] = ()
-    """`at`, `bottle`, and `by` (m) or `push` (m/s): a bottle displaced from outside."""
+    """`at`, `bottle`, and `by` (m) or `push` (m/s): a bottle displaced from outside. `taken`: it is removed."""
     saved: float | None = None
     """When the run is saved and goes on from its checkpoint."""
     stiffness: float | None = None
