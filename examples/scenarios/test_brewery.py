@@ -82,3 +82,19 @@ def test_the_line_is_empty_before_the_next_bottle_comes(line: Lines) -> None:
     assert rejected == plant.signals["machines/camera/bad"] == plant.signals["machines/labeller/defective"] > 0
     assert plant.signals["machines/reject/rejected_good"] == plant.signals["machines/reject/missed"] == 0
     assert plant.simulation.bottles().type.tolist().count(full) == 84 - 72 - rejected < 24
+
+
+def test_the_failure_of_the_depalletiser_explains_the_low_supply(line: Lines) -> None:
+    early = {
+        "machines": {"depalletiser": {"failures": {"pallet": {"between": {"mean": 0.5}, "repair": {"mean": 2.0}}}}}
+    }
+    plant = line(FOLDER / "brewery.yaml", {**SHORT, **early}, variant="failures")
+    plant.attach(StructuredText(FOLDER / "plc"))
+    plant.run_for(2.5)
+    assert plant.alarms == {"supply_low"}
+    plant.panel.press("start")
+    plant.eventually(lambda s: s["machines/depalletiser/fault"], within=20.0)
+    plant.run_for(0.1)
+    assert plant.alarms == {"machines/depalletiser/fault"}
+    plant.eventually(lambda s: not s["machines/depalletiser/fault"], within=10.0)
+    assert plant.signals["machines/depalletiser/running"]
