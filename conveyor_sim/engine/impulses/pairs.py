@@ -51,8 +51,8 @@ _SHIFT_X, _SHIFT_Y, _ACT, _NORMAL, _SPEED = (uint64(CHUNK * column) for column i
 _FIRST = 21
 """First column of the constants of each pair, if these differ."""
 
-_NEARER, _FARTHER = 1.001, 1e-9
-"""Margins for rounding in the test of pairs that can't touch: factor of the way, and distance, m."""
+NEARER, FARTHER = 1.001, 1e-9
+"""Margins for rounding in the test of contacts that can't touch: factor of the way, and distance, m."""
 
 
 @part
@@ -107,7 +107,7 @@ def _gather(
         chunk[_HELD_X + c], chunk[_HELD_Y + c], chunk[_HELD_TURN + c] = held_x, held_y, held_turn
         chunk[_WAIT + c] = wait
         listed[c] = p
-        reach = body[a + uint64(7)] + body[b + uint64(7)] + _FARTHER + h * _NEARER * (abs(vx) + abs(vy))
+        reach = body[a + uint64(7)] + body[b + uint64(7)] + FARTHER + h * NEARER * (abs(vx) + abs(vy))
         idle = (held_x == 0.0) & (held_y == 0.0) & (held_turn == 0.0) & (wait == 0.0) & (x * x + y * y > reach * reach)
         c += uint64(0) if idle else uint64(1)
         p += uint64(1)

@@ -38,25 +38,31 @@ def list_pairs(bottles: Bottles, hood: Neighbourhood, pairs: Any, cell: float, s
                 b = bucket_of(cx, cy, buckets)
                 for entry in range(hood.bucket[b], hood.bucket[b + 1]):
                     j = hood.order[entry]
-                    if j <= i or hood.cell[j, 0] != cx or hood.cell[j, 1] != cy:
-                        continue
                     dx = bottles.x[j] - bottles.x[i]
                     dy = bottles.y[j] - bottles.y[i]
                     reach = bottles.radius[i] + bottles.radius[j] + skin
-                    if dx * dx + dy * dy < reach * reach:
-                        if count < capacity:
-                            k = count
-                            while k > first and pairs.j[k - 1] > j:
-                                pairs.j[k] = pairs.j[k - 1]
-                                k -= 1
-                            pairs.j[k] = j
-                            pairs.i[count] = i
-                        count += 1
+                    near = (dx * dx + dy * dy < reach * reach) & (hood.cell[j, 0] == cx) & (hood.cell[j, 1] == cy)
+                    # Most candidates are none, in no order, so a branch would often be predicted wrongly.
+                    pairs.j[min(count, capacity - 1)] = j
+                    count += near & (j > i)
+        _sort(pairs, i, first, min(count, capacity))
     pairs.used[0] = min(count, capacity)
     _fill_radii(pairs, pairs.reach, bottles)
     if count <= capacity:
         _restore_springs(pairs, pairs.spring)
     return count
+
+
+@part
+def _sort(pairs: Pairs, i: int, first: int, end: int) -> None:
+    """Sort the pairs of bottle i, which are first to end, by their second bottle."""
+    for p in range(first, end):
+        pairs.i[p] = i
+        j, k = pairs.j[p], p
+        while k > first and pairs.j[k - 1] > j:
+            pairs.j[k] = pairs.j[k - 1]
+            k -= 1
+        pairs.j[k] = j
 
 
 @kernel

@@ -4,6 +4,9 @@
 from conveyor_sim.engine.arrays.types import F8, I8
 from conveyor_sim.engine.compiler.compile import kernel
 
+ROUNDING = 1e-9
+"""Margin of the box around a polygon, m, because the places where edges are crossed are rounded."""
+
 
 @kernel
 def find_inside(corners: F8, x: F8, y: F8, ids: I8, slots: I8) -> int:
@@ -12,8 +15,12 @@ def find_inside(corners: F8, x: F8, y: F8, ids: I8, slots: I8) -> int:
     A bottle is inside if a ray to the right crosses an odd number of edges.
     """
     count = 0
+    left, right, low, high = corners[0, 0], corners[0, 0], corners[0, 1], corners[0, 1]
+    for corner in range(corners.shape[0]):
+        left, right = min(left, corners[corner, 0] - ROUNDING), max(right, corners[corner, 0] + ROUNDING)
+        low, high = min(low, corners[corner, 1]), max(high, corners[corner, 1])
     for i in range(x.size):
-        if ids[i] < 0:
+        if ids[i] < 0 or not (left <= x[i] <= right and low <= y[i] <= high):
             continue
         inside = False
         for corner in range(corners.shape[0]):
