@@ -54,6 +54,11 @@ class Neighbourhood(NamedTuple):
     """Starts of the hashed cells in `order`, (buckets + 1,); the number of buckets is a power of two."""
     order: U4
     """Slots by bucket, (S,)."""
+    sorted_x: F8
+    """Scratch of a rebuild, in the order of `order`: positions, radii, and cells as one number each, (S,)."""
+    sorted_y: F8
+    sorted_radius: F8
+    sorted_cell: I8
     home: I4
     """Scratch of a rebuild: cell of the static grid under each bottle, (S,); -1: none, or a free slot."""
 

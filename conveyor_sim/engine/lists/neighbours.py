@@ -6,13 +6,15 @@ It is sorted by slot, so that sums over it, and hence the bits of a run, do not 
 
 from typing import Any
 
+from numba import uint64
+
 from conveyor_sim.engine.arrays.bodies import Bottles
 from conveyor_sim.engine.arrays.contacts import ContactLaw, Pairs
 from conveyor_sim.engine.arrays.lists import Neighbourhood
 from conveyor_sim.engine.arrays.types import I8, U4
 from conveyor_sim.engine.compiler.compile import kernel, part, written
 from conveyor_sim.engine.impulses.carry import store_pairs
-from conveyor_sim.engine.lists.cells import bucket_of, sort_into_cells
+from conveyor_sim.engine.lists.cells import bucket_of, number_of, sort_into_cells
 
 
 @part
@@ -36,12 +38,13 @@ def list_pairs(bottles: Bottles, hood: Neighbourhood, pairs: Any, cell: float, s
         for cx in range(hood.cell[i, 0] - 1, hood.cell[i, 0] + 2):
             for cy in range(hood.cell[i, 1] - 1, hood.cell[i, 1] + 2):
                 b = bucket_of(cx, cy, buckets)
-                for entry in range(hood.bucket[b], hood.bucket[b + 1]):
+                number = number_of(cx, cy)
+                for entry in range(uint64(hood.bucket[b]), uint64(hood.bucket[b + 1])):
                     j = hood.order[entry]
-                    dx = bottles.x[j] - bottles.x[i]
-                    dy = bottles.y[j] - bottles.y[i]
-                    reach = bottles.radius[i] + bottles.radius[j] + skin
-                    near = (dx * dx + dy * dy < reach * reach) & (hood.cell[j, 0] == cx) & (hood.cell[j, 1] == cy)
+                    dx = hood.sorted_x[entry] - bottles.x[i]
+                    dy = hood.sorted_y[entry] - bottles.y[i]
+                    reach = bottles.radius[i] + hood.sorted_radius[entry] + skin
+                    near = (dx * dx + dy * dy < reach * reach) & (hood.sorted_cell[entry] == number)
                     # Most candidates are none, in no order, so a branch would often be predicted wrongly.
                     pairs.j[min(count, capacity - 1)] = j
                     count += near & (j > i)

@@ -57,7 +57,8 @@ SCRATCH: Mapping[str, str] = {
     **dict.fromkeys(("impulses.pair_constants", "impulses.rail_constants"), "of one call of an integrator"),
     **dict.fromkeys((f"impulses.{name}" for name in SUBSTEP), "of one substep of the method of impulses"),
     **dict.fromkeys(
-        ("impulses.mask", "impulses.group", "pairs.impulse.next", "neighbourhood.home"), "of one rebuild of the lists"
+        ("impulses.mask", "impulses.group", "pairs.impulse.next", "neighbourhood.home", "neighbourhood.sorted_"),
+        "of one rebuild of the lists",
     ),
     **dict.fromkeys(
         (f"impulses.sleep.{name}" for name in ("first_run", "run_", "mark", "sum", "root", "noise")),

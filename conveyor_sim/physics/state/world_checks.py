@@ -179,7 +179,7 @@ def ranges(world: World, model: Model, next_id: int) -> dict[str, tuple[int, int
 
 def indices(arrays: Arrays) -> set[str]:
     """Return the names of the integer arrays that must lie in a range. Others are only compared."""
-    free = ("neighbourhood.cell", "damage.impacts.")
+    free = ("neighbourhood.cell", "neighbourhood.sorted_cell", "damage.impacts.")
     return {name for name, array in arrays.items() if array.dtype.kind in "iu" and not name.startswith((*FIXED, *free))}
 
 
