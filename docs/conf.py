@@ -47,6 +47,7 @@ NAVIGATION = {
     "README": {
         "Tutorials": [
             "docs/build_a_line",
+            "docs/tutorial_line",
             "docs/tutorial_plc",
             "docs/tutorial_scada",
             "docs/tutorial_ros",

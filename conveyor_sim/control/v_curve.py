@@ -62,13 +62,14 @@ class Neighbour:
 class VCurve:
     """Rates of a line with a bottleneck.
 
-    bottleneck: the command that sets its rate; None: another controller gives it. rate: 1/s. margin: share of `rate`
-    per step away from the bottleneck, by which a machine may be faster or must be slower; its limit must allow that.
-    upstream, downstream: the machines on either side, the nearest first.
+    bottleneck: the command that sets its rate; None: another controller gives it. rate: 1/s, or the signal that holds
+    it in bottles per hour, as a panel does. margin: share of `rate` per step away from the bottleneck, by which a
+    machine may be faster or must be slower; its limit must allow that. upstream, downstream: the machines on either
+    side, the nearest first.
     """
 
     bottleneck: str | None
-    rate: float
+    rate: float | str
     margin: float
     upstream: tuple[Neighbour, ...] = ()
     downstream: tuple[Neighbour, ...] = ()
@@ -80,13 +81,14 @@ class VCurve:
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
         """Return a rate for each machine, 1/s."""
-        answer = {} if self.bottleneck is None else {self.bottleneck: self.rate}
+        commanded = inputs[self.rate] / 3600.0 if isinstance(self.rate, str) else self.rate
+        answer = {} if self.bottleneck is None else {self.bottleneck: commanded}
         # Upstream a lack requires a higher rate, downstream a surplus.
         for machines, faster in ((self.upstream, _Buffer.SHORT), (self.downstream, _Buffer.OVER)):
-            rate = self.rate
+            rate = commanded
             for step, machine in enumerate(machines, 1):
                 buffer = machine.buffer(inputs)
                 if buffer is not _Buffer.AT_LEVEL:
-                    rate = self.rate * (1.0 + (step if buffer is faster else -step) * self.margin)
+                    rate = commanded * (1.0 + (step if buffer is faster else -step) * self.margin)
                 answer[machine.command] = rate
         return answer

@@ -9,7 +9,7 @@ import numpy as np
 from conveyor_sim.scene.geometry import Array, Piece, RailShape, belt_shapes
 from conveyor_sim.scene.parts.machine import TakingPart
 from conveyor_sim.scene.parts.station import Station
-from conveyor_sim.scene.polygons import inside, why_not_simple
+from conveyor_sim.scene.polygons import boxes_meet, inside, why_not_simple
 from conveyor_sim.scene.problems import Path, Problem
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.scene.types import XY
@@ -64,12 +64,15 @@ def _station_problems(path: Path, station: Station, scene: Scene) -> Iterator[Pr
             before = False
             continue
         # Only the first of two stations reports the problem.
-        if (before and isinstance(part, Station)) or why_not_simple(part.region) is not None:
+        if (before and isinstance(part, Station)) or not boxes_meet(part.region, station.region):
+            continue
+        if why_not_simple(part.region) is not None:
             continue
         if inside(points, part.region).any() or inside(_centres(part.region)[0], station.region).any():
             text = f"overlaps the region of {other[0]}.{other[1]}, expected a region that is its own"
             yield Problem((*path, "region"), text)
-    if not any(inside(points, belt.outline()).any() for belt in belt_shapes(scene)):
+    outlines = (belt.outline() for belt in belt_shapes(scene))
+    if not any(boxes_meet(outline, station.region) and inside(points, outline).any() for outline in outlines):
         yield Problem((*path, "region"), "lies on no belt, expected a region to which a belt brings bottles")
 
 

@@ -21,6 +21,13 @@ def inside(points: NDArray[np.float64], corners: Sequence[XY] | NDArray[np.float
     return found
 
 
+def boxes_meet(one: Sequence[XY] | NDArray[np.float64], other: Sequence[XY] | NDArray[np.float64]) -> bool:
+    """Return True if the boxes around two polygons have a common point: if not, the polygons have none."""
+    first, second = np.asarray(one, dtype=np.float64), np.asarray(other, dtype=np.float64)
+    after = (first.min(axis=0) > second.max(axis=0)).any()
+    return not (after or (second.min(axis=0) > first.max(axis=0)).any())
+
+
 def why_not_simple(corners: tuple[XY, ...]) -> str | None:
     """Return why a polygon is not simple, or None if it is."""
     sides = list(zip(corners, (*corners[1:], corners[0]), strict=True))

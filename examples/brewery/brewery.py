@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Controller of brewery.yaml: start, stop and changeover of the line, the feeds of its combiners, and its V-curve.
+"""Controller of brewery.yaml: start, stop and changeover of the line, the feeds of its combiners, V-curve and reject.
 
 cd examples/brewery; conveyor-sim serve brewery.yaml --controller brewery.py:brewery --web
+
+The folder plc has the same controller in Structured Text.
 """
 
 from __future__ import annotations
@@ -12,6 +14,7 @@ from enum import IntEnum
 
 from conveyor_sim.control.filler_block import FillerBlock
 from conveyor_sim.control.level import Count
+from conveyor_sim.control.reject import TrackedReject
 from conveyor_sim.control.scan import Controller, Inputs, together
 from conveyor_sim.control.start_stop import ABORTED, CLEAR
 from conveyor_sim.control.v_curve import Neighbour, VCurve
@@ -107,12 +110,12 @@ class BottlingLine:
             self._waited = 0
             return LineStep.WARNING if starts else LineStep.STOPPED
         self._waited += 1
-        if self._step == LineStep.WARNING:
-            return LineStep.RUNNING if self._waited > self.warning else LineStep.WARNING
+        if self._step == LineStep.WARNING and self._waited <= self.warning:
+            return LineStep.WARNING
         wanted = int(inputs["panel/format/position"])
         if wanted == self._format:
             return LineStep.RUNNING
-        if self._step == LineStep.RUNNING or sum(inputs[name] for name in self.bottles) > self.remainder:
+        if self._step != LineStep.EMPTYING or sum(inputs[name] for name in self.bottles) > self.remainder:
             self._waited = 0
         elif self._waited > self.settle:
             self._format = wanted
@@ -121,7 +124,7 @@ class BottlingLine:
 
 
 def brewery() -> Controller:
-    """Return the controller of `brewery.yaml`: the sequence of the line, and its V-curve."""
+    """Return the controller of `brewery.yaml`: the sequence of the line, its V-curve, and the reject."""
     belts = ("supply", "spread", "filled", "leaving", "cold", "wide", "packing")
     cells = ("single", "label")
     line = BottlingLine(
@@ -139,10 +142,20 @@ def brewery() -> Controller:
             *(f"belts/{belt}/bottles" for belt in (*belts, "block_infeed", "block_discharge")),
             *(f"belts/{cell}_{belt}/bottles" for cell in cells for belt in ("feed", "chains", "lane")),
             *(f"machines/{machine}/held" for machine in ("rinser", "pasteuriser", "labeller")),
+            "zones/layer/bottles",
         ),
         formats=({"machines/depalletiser/cmd_bottle": 0.0}, {"machines/depalletiser/cmd_bottle": 1.0}),
     )
-    return together(line, v_curve())
+    reject = TrackedReject(
+        belt="label_lane",
+        inspection="machines/camera/bad",
+        seen="machines/camera/bad_time",
+        fire="machines/reject/fire",
+        distance=1.0,
+        stroke=0.03,
+        pulses_per_metre=2000.0,
+    )
+    return together(line, v_curve(), reject)
 
 
 def v_curve() -> VCurve:
@@ -153,7 +166,7 @@ def v_curve() -> VCurve:
 
     return VCurve(
         bottleneck=None,
-        rate=40_000 / 3600,
+        rate="panel/rate/value",
         margin=0.04,
         upstream=(neighbour("depalletiser", "supply", 2200, 2600, 3000),),
         downstream=(

@@ -10,8 +10,11 @@ from conveyor_sim.testing.plugin import Lines
 
 BEYOND = {"buffer_lane", "two_stations", "zoned_line"}
 """Queues that close up: their scene files say why they press harder than their predicted error rests on."""
-COARSE = {"brewery"}
-"""Scenes of the fast tier in which bottles may overlap by more than 0.4 % of a diameter for a moment, in a combiner."""
+COARSE = {"brewery": ("overlaps", "screws block_in")}
+"""Scenes of the fast tier with words of reports that are expected.
+
+In the brewery, bottles overlap for a moment in a combiner, and the screw squeezes a bottle that comes alone.
+"""
 
 
 @pytest.fixture(autouse=True)
@@ -21,7 +24,8 @@ def quiet(line: Lines) -> Iterator[None]:
     for scenario, _ in line.made:
         simulation, model = scenario.simulation, scenario.simulation.model
         noticed = [event.text for event in scenario._outputs.take_noticed()]
-        assert [text for text in noticed if "overlaps" not in text or scenario.scene.name not in COARSE] == []
+        expected = COARSE.get(scenario.scene.name, ())
+        assert [text for text in noticed if not any(words in text for words in expected)] == []
         deepest = simulation.integration.deepest_overlap * float(model.type_radius.max())
         allowed = min(impact.overlap(HARDER * model.prediction.force) for impact in model.impacts)
-        assert deepest <= allowed or scenario.scene.name in BEYOND | COARSE
+        assert deepest <= allowed or scenario.scene.name in BEYOND | COARSE.keys()

@@ -1,17 +1,38 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A whole line in production: it starts from standstill, and every machine works in line with its neighbours.
+"""A whole line in production: it starts from standstill, works in line with its neighbours, and changes its bottle.
 
 Run it by hand: `pytest examples/scenarios/test_brewery.py`.
 """
 
 from pathlib import Path
+from typing import Any
 
 from conveyor_sim.control.load import load
+from conveyor_sim.control.st import StructuredText
 from conveyor_sim.testing.plugin import Lines
 
 FOLDER = Path(__file__).resolve().parents[1] / "brewery"
 RATE = 40_000 / 3600  # bottles per second
 AT_START = 4800
+
+
+def few(type: str, conveyor: str, at: float, offset: float, rows: int, columns: int) -> dict[str, Any]:
+    """Return a grid of bottles at the start."""
+    grid = {"type": type, "along": conveyor, "at": at, "offset": offset, "rows": rows, "columns": columns}
+    return {"grid": {**grid, "pitch": 0.07, "pattern": "hexagonal"}}
+
+
+SHORT = {
+    "bottles": [few("empty", "single_lane", 0.1, 0.0, 1, 24), few("full", "packing", 8.2, -0.55, 10, 6)],
+    "conveyors": {belt: {"speed": 0.5} for belt in ("supply", "filled", "cold", "packing")},
+    "machines": {
+        "depalletiser": {"layer": {"rows": 6, "columns": 15, "pitch": 0.0675, "pusher": "sweep"}},
+        "pasteuriser": {"hold": 2.0},
+        "labeller": {"sets": {"label": {"share": 0.9}}},
+    },
+    "zones": {"layer": {"full_at": 90}},
+}
+"""The line with few bottles, fast wide conveyors, small layers, a short stay in the pasteuriser and many bad labels."""
 
 
 def test_the_line_starts_and_fills(line: Lines) -> None:
@@ -35,3 +56,29 @@ def test_the_line_starts_and_fills(line: Lines) -> None:
     plant.panel.press("estop")
     plant.eventually(lambda s: s["axes/block_master/speed"] == 0.0 and s["belts/block_infeed/speed"] == 0.0, within=3.0)
     assert plant.signals["carousels/block_valves/lost"] == 0.0
+
+
+def test_the_line_is_empty_before_the_next_bottle_comes(line: Lines) -> None:
+    plant = line(FOLDER / "brewery.yaml", SHORT)
+    plant.attach(StructuredText(FOLDER / "plc"))
+    empty, light, full = range(3)
+
+    def types() -> set[int]:
+        return set(plant.simulation.bottles().type.tolist())
+
+    plant.run_for(0.5)
+    plant.panel.turn("format", "light")
+    plant.panel.press("start")
+    plant.run_for(0.2)
+    plant.panel.release("start")
+    assert types() == {empty, full}
+    plant.eventually(lambda s: s["carousels/block_heads/good"] == 24, within=60.0)
+    assert types() == {full}
+    plant.eventually(lambda s: s["machines/packer/taken"] == 72, within=100.0)
+    assert plant.simulation.counts.fed == 0
+    plant.eventually(lambda s: s["machines/depalletiser/produced"] == 90, within=40.0)
+    assert types() == {full, light}
+    rejected = plant.signals["machines/reject/rejected_bad"]
+    assert rejected == plant.signals["machines/camera/bad"] == plant.signals["machines/labeller/defective"] > 0
+    assert plant.signals["machines/reject/rejected_good"] == plant.signals["machines/reject/missed"] == 0
+    assert plant.simulation.bottles().type.tolist().count(full) == 84 - 72 - rejected < 24

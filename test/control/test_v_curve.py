@@ -47,6 +47,14 @@ def test_the_further_away_the_faster(table: str, bottles: float, washer: float, 
     )
 
 
+def test_the_rate_of_a_panel_applies_to_all() -> None:
+    curve = VCurve(FILLER, "panel/rate/value", 0.1, (neighbour(WASHER, "before"),), (neighbour(LABELLER, "one"),))
+    scans = Scans(curve, **{"zones/before/bottles": 100.0, "zones/one/bottles": 200.0})
+    for per_hour, rate in ((36_000.0, 10.0), (18_000.0, 5.0)):
+        expected = {FILLER: rate, WASHER: 1.1 * rate, LABELLER: rate}
+        assert scans.scan({"panel/rate/value": per_hour}) == pytest.approx(expected)
+
+
 def test_a_surplus_is_worked_off_down_to_the_target() -> None:
     scans = curve()
     rows = ((300, 11.0), (250, 11.0), (201, 11.0), (200, 10.0), (250, 10.0), (100, 9.0), (199, 9.0), (200, 10.0))

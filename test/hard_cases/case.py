@@ -69,7 +69,7 @@ class Case:
     ramp: Mapping[str, Any] = field(default_factory=dict)
     """`belt`, `from`, `to` (m/s) and `acceleration` (m/s^2): a command every tick."""
     put: Sequence[Mapping[str, Any]] = ()
-    """`at`, `bottle`, and `by` (m) or `push` (m/s): a bottle displaced from outside."""
+    """`at`, `bottle`, and `by` (m) or `push` (m/s): a bottle displaced from outside. `taken`: it is removed."""
     saved: float | None = None
     """When the run is saved and goes on from its checkpoint."""
     stiffness: float | None = None
@@ -153,8 +153,7 @@ class Case:
         if self.stops:
             if not re.search(self.stops, sentence):
                 return [f"ended with {sentence!r}, expected a sentence that matches {self.stops!r}"]
-            return []
-        if sentence:
+        elif sentence:
             return [f"stopped: {sentence}"]
         wrong = []
         for name, wanted in self.expect.items():

@@ -70,6 +70,8 @@ MEASURES = {
     "residual": "energy that the ledger can't place, over its turnover",
     "simulated": "s",
     "riding": "bottles that ride at once, at most, of those that are looked at",
+    "asleep": "bottles asleep at once, at most, of those that are looked at",
+    "woken": "bottles that slept and were awake at a later tick that is looked at",
     "unlike_stepped": "1 if a run in which nobody rides ends in another state, else 0; where a row expects it",
 }
 """What is measured, and in what; NaN where there is nothing to measure it on."""
@@ -158,6 +160,14 @@ def riders(simulation: Simulation) -> int:
     return int((skipped_slots(world.riding, ids.size) & (ids >= 0)).sum())
 
 
+def sleepers(simulation: Simulation) -> set[int]:
+    """IDs of the bottles that sleep; none where nobody can sleep."""
+    world = simulation._state.world
+    if world.impulses is None or world.impulses.sleep is None:
+        return set()
+    return set(world.bottles.id[world.impulses.sleep.asleep != 0].tolist())
+
+
 def _acts(case: Case, scene: Scene) -> list[int]:
     """Ticks before which something is done from outside, in order."""
     times = [act["at"] for act in (*case.commands, *case.put)]
@@ -188,7 +198,9 @@ def _act(case: Case, simulation: Simulation, tick: int) -> None:
         gone = min(abs(way), _rise(case, scene) * (tick + 1))
         simulation.command([f"belts/{case.ramp['belt']}/cmd_speed"], [case.ramp["from"] + math.copysign(gone, way)])
     for put in case.put:
-        if round(put["at"] / scene.tick) == tick:
+        if round(put["at"] / scene.tick) == tick and put.get("taken"):
+            simulation.delete(put["bottle"])
+        elif round(put["at"] / scene.tick) == tick:
             count = simulation.counts.present
             by, push = np.zeros((2, count)), np.zeros((2, count))
             by[:, put["bottle"]] = put.get("by", (0.0, 0.0))
@@ -203,7 +215,9 @@ class _Watch:
         self._settled = settled
         self._first = simulation.counts.present - simulation.counts.fed
         self._at_first = simulation.bottles()
-        self._most = dict.fromkeys(("overlap", "peak_force", "speed", "slip", "riding"), 0.0)
+        self._most = dict.fromkeys(("overlap", "peak_force", "speed", "slip", "riding", "asleep"), 0.0)
+        self._slept: set[int] = set()
+        self._woken: set[int] = set()
         self._crossed: set[int] = set()
         self._before: BottleColumns | None = None
         self._start: BottleColumns | None = None
@@ -220,6 +234,10 @@ class _Watch:
         self._raise("peak_force", np.array([simulation.peak_force or 0.0]))
         self._raise("slip", slips(simulation, bottles))
         self._raise("riding", np.array([float(riders(simulation))]))
+        asleep = sleepers(simulation)
+        self._raise("asleep", np.array([float(len(asleep))]))
+        self._slept |= asleep
+        self._woken |= (self._slept & set(bottles.id.tolist())) - asleep
         radius = simulation.model.type_radius[bottles.type]
         smaller = radius[np.searchsorted(bottles.id, contacts.a)]
         pairs = contacts.kind == PAIR
@@ -259,6 +277,7 @@ class _Watch:
             "drift": math.nan,
             "rail_force": float(np.mean(self._rail_forces)) if self._rail_forces else math.nan,
             "tunnelled": float(len(self._crossed)),
+            "woken": float(len(self._woken)),
             "lost": float(self._first + counts.fed - counts.removed - counts.present),
             "fed": float(counts.fed),
             "removed": float(counts.removed),

@@ -16,6 +16,7 @@ from conveyor_sim.columns.ledger import Ledger
 from conveyor_sim.engine.arrays.impulses import CONTACTS
 from conveyor_sim.engine.arrays.moving import OFF_PROFILE, Actuators, MovingBodies
 from conveyor_sim.engine.threads.workers import UNIT
+from conveyor_sim.errors import SimulationError
 from conveyor_sim.physics.stepping.guard.world_snapshot import WorldSnapshot
 from conveyor_sim.simulation import Simulation
 
@@ -274,6 +275,25 @@ def test_a_pusher_stalls_at_its_limit(count: int, mass: float) -> None:
     sim.command(["pushers/p/push"], [0])
     sim.advance(400)
     assert axis_of(sim, "pushers/p") == (0.0, 0.0)
+
+
+@pytest.mark.parametrize(("count", "speed"), [(1, 0.2), (1, 1.0), (3, 0.5)])
+def test_a_pusher_without_limit_stops_the_run_before_an_axis_passes_the_wall(count: int, speed: float) -> None:
+    """Repeats in shorter steps don't help, and the reason has pusher, bottles and wall."""
+    length = 0.05 + 2.0 * RADIUS * count
+    sim = plant(
+        *(bottle(RADIUS + 0.02 + n * (2.0 * RADIUS + 5e-4), 0.0) for n in range(count)),
+        floor={"friction": 0.4},
+        pushers={"p": pusher("steel", acceleration=20.0, max_speed=speed)},
+        rails={"wall": segment((length, -0.2), (length, 0.2))},
+    )
+    sim.command(["pushers/p/push"], [1])
+    more = f" and {count - 1} more" if count > 1 else ""
+    reason = f"pusher p pushes bottle 0{more} against rail wall with unlimited force; give it a force_limit$"
+    with pytest.raises(SimulationError, match=f"even in steps 64 times shorter: {reason}"):
+        sim.advance(300)
+    assert np.all(np.diff([0.0, *sim.bottles().x[:count], length]) > 0.0)
+    assert "soft" in {event.kind for event in sim.take_events().guard}
 
 
 def test_a_drive_at_its_limit_gives_its_force_to_plate_and_bottle() -> None:

@@ -4,6 +4,9 @@
 from conveyor_sim.engine.arrays.types import F8, I8
 from conveyor_sim.engine.compiler.compile import kernel, part
 
+ROUNDING = 1e-9
+"""Larger than the rounding error of a crossing, m."""
+
 
 @kernel
 def find_crossings(before: F8, x: F8, y: F8, ids: I8, lines: F8, crossed: I8, share: F8) -> int:
@@ -16,19 +19,30 @@ def find_crossings(before: F8, x: F8, y: F8, ids: I8, lines: F8, crossed: I8, sh
     """
     count = 0
     for line in range(lines.shape[0]):
+        left, right = _range(lines[line, 0], lines[line, 2])
+        low, high = _range(lines[line, 1], lines[line, 3])
         for i in range(ids.size):
-            if ids[i] < 0:
+            # Almost all bottles of a long line are outside the box of the line.
+            if max(x[i], before[0, i]) < left or min(x[i], before[0, i]) > right or ids[i] < 0:
                 continue
-            left_before, along_before = _seen(lines, line, before[0, i], before[1, i])
-            left, along = _seen(lines, line, x[i], y[i])
-            if (left_before > 0.0) == (left > 0.0):
+            if max(y[i], before[1, i]) < low or min(y[i], before[1, i]) > high:
                 continue
-            at = left_before / (left_before - left)
+            side_before, along_before = _seen(lines, line, before[0, i], before[1, i])
+            side, along = _seen(lines, line, x[i], y[i])
+            if (side_before > 0.0) == (side > 0.0):
+                continue
+            at = side_before / (side_before - side)
             if 0.0 <= along_before + at * (along - along_before) <= 1.0:
-                crossed[0, count], crossed[1, count], crossed[2, count] = line, i, left_before > 0.0
+                crossed[0, count], crossed[1, count], crossed[2, count] = line, i, side_before > 0.0
                 share[count] = at
                 count += 1
     return count
+
+
+@part
+def _range(start: float, extent: float) -> tuple[float, float]:
+    """Return the limits of a coordinate along a line."""
+    return min(start, start + extent) - ROUNDING, max(start, start + extent) + ROUNDING
 
 
 @part

@@ -2,10 +2,10 @@
 """Bottles whose axes are in a region."""
 
 from conveyor_sim.engine.arrays.types import F8, I8
-from conveyor_sim.engine.compiler.compile import kernel
+from conveyor_sim.engine.compiler.compile import kernel, part
 
 ROUNDING = 1e-9
-"""Margin of the box around a polygon, m, because the places where edges are crossed are rounded."""
+"""Larger than the rounding error of a point on an edge, m."""
 
 
 @kernel
@@ -14,13 +14,12 @@ def find_inside(corners: F8, x: F8, y: F8, ids: I8, slots: I8) -> int:
 
     A bottle is inside if a ray to the right crosses an odd number of edges.
     """
+    left, right = _range(corners[:, 0])
+    low, high = _range(corners[:, 1])
     count = 0
-    left, right, low, high = corners[0, 0], corners[0, 0], corners[0, 1], corners[0, 1]
-    for corner in range(corners.shape[0]):
-        left, right = min(left, corners[corner, 0] - ROUNDING), max(right, corners[corner, 0] + ROUNDING)
-        low, high = min(low, corners[corner, 1]), max(high, corners[corner, 1])
     for i in range(x.size):
-        if ids[i] < 0 or not (left <= x[i] <= right and low <= y[i] <= high):
+        # Almost all bottles of a long line are outside the box of the polygon.
+        if x[i] < left or x[i] > right or y[i] < low or y[i] > high or ids[i] < 0:
             continue
         inside = False
         for corner in range(corners.shape[0]):
@@ -32,3 +31,12 @@ def find_inside(corners: F8, x: F8, y: F8, ids: I8, slots: I8) -> int:
             slots[count] = i
             count += 1
     return count
+
+
+@part
+def _range(coordinates: F8) -> tuple[float, float]:
+    """Return the limits of the corners, with a margin for rounding."""
+    low = high = coordinates[0]
+    for coordinate in coordinates:
+        low, high = min(low, coordinate), max(high, coordinate)
+    return low - ROUNDING, high + ROUNDING

@@ -26,6 +26,8 @@ class Chain:
     name: str = ""
     width: float = 0.0
     is_closed: bool = False
+    other_names: tuple[str, ...] = ()
+    """Names of strokes that differ from `name`."""
     opposed: tuple[EntityRef, ...] = ()
     """Strokes that were drawn against the direction of the chain."""
 
@@ -56,7 +58,7 @@ def _partners(strokes: Sequence[Stroke], smooth: bool) -> dict[End, End]:
     cells: dict[tuple[int, int], list[End]] = defaultdict(list)
     ends = [(number, last) for number, stroke in enumerate(strokes) if not stroke.is_closed for last in (False, True)]
     for end in ends:
-        cells[_cell(_point(strokes, end))].append(end)
+        cells[_cell(end_point(strokes, end))].append(end)
     near = {end: _neighbours(strokes, end, cells) for end in ends}
     pairs = {end: others[0] for end, others in near.items() if len(others) == 1 and near[others[0]] == [end]}
     return {end: other for end, other in pairs.items() if _fit(strokes, end, other, smooth)}
@@ -68,12 +70,12 @@ def _cell(at: XY) -> tuple[int, int]:
 
 def _neighbours(strokes: Sequence[Stroke], end: End, cells: Mapping[tuple[int, int], list[End]]) -> list[End]:
     """Return the other ends within JOIN; two of them if there are more, because these are not joined."""
-    at = _point(strokes, end)
+    at = end_point(strokes, end)
     i, j = _cell(at)
     found: list[End] = []
     for cell in ((i + di, j + dj) for di in (-1, 0, 1) for dj in (-1, 0, 1)):
         for other in cells.get(cell, ()):
-            if other != end and math.dist(at, _point(strokes, other)) <= JOIN:
+            if other != end and math.dist(at, end_point(strokes, other)) <= JOIN:
                 found.append(other)
                 if len(found) > 1:
                     return found
@@ -95,7 +97,8 @@ def _leading(stroke: Stroke, end: End, to: bool) -> DrawnPiece:
     return piece if end[1] == to else piece.reversed
 
 
-def _point(strokes: Sequence[Stroke], end: End) -> XY:
+def end_point(strokes: Sequence[Stroke], end: End) -> XY:
+    """Return the point of an end."""
     pieces = strokes[end[0]].pieces
     return pieces[-1].end if end[1] else pieces[0].start
 
@@ -121,13 +124,15 @@ def _chain(order: list[tuple[int, bool]], strokes: Sequence[Stroke], partner: di
     curves = [strokes[n].pieces if forward else reversed_curve(strokes[n].pieces) for n, forward in order]
     parts = [strokes[number] for number, _ in order]
     against = tuple(s.source for s, (_, forward) in zip(parts, order, strict=True) if not forward and s.has_direction)
+    names = list(dict.fromkeys(stroke.name for stroke in parts if stroke.name))
     is_closed = parts[0].is_closed or (len(order) > 1 and partner.get((order[-1][0], order[-1][1])) is not None)
     return Chain(
         [strokes[number].source for number in sorted(number for number, _ in order)],
         _met([list(curve) for curve in curves]),
-        next((stroke.name for stroke in parts if stroke.name), ""),
+        names[0] if names else "",
         max(stroke.width for stroke in parts),
         is_closed,
+        tuple(names[1:]),
         against,
     )
 

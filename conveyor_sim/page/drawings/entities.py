@@ -13,13 +13,15 @@ from typing import Any, Final
 
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.page.drawings.dxf_file import MOST_ENTITIES, metres_per_unit, open_dxf
-from conveyor_sim.page.drawings.pieces import DrawnPiece, arc
+from conveyor_sim.page.drawings.pieces import DrawnPiece, arc, fitted
 from conveyor_sim.scene.types import COORDINATE_LIMIT, TOUCH, XY
 from conveyor_sim.support.files import FileError
 
 _DEEPEST: Final = 16  # blocks in blocks
 _FLAT: Final = 1e-6  # m; a plan has no heights
-_READ: Final = "LINE, ARC, CIRCLE, LWPOLYLINE, POLYLINE, POINT, INSERT or TEXT"
+_READ: Final = "LINE, ARC, CIRCLE, LWPOLYLINE, POLYLINE, SPLINE, POINT, INSERT or TEXT"
+_SPLINE_OFF: Final = 1e-3  # m; a spline that departs this far from a line or an arc is one
+_SAMPLES: Final = 64  # of a spline
 
 IsSymbol = Callable[[str, str], bool]
 """Return True if a block (by layer and name) stands for a device, so that it is not taken apart."""
@@ -47,6 +49,8 @@ class Stroke:
     """Name from an attribute of its block, or from a text."""
     has_direction: bool = True
     """False of arcs and circles, which DXF stores counter-clockwise."""
+    note: str = ""
+    """Remark on how the entity was read."""
 
 
 @dataclass
@@ -61,6 +65,8 @@ class Symbol:
     attributes: dict[str, str] = field(default_factory=dict)
     strokes: list[Stroke] = field(default_factory=list)
     """Curves in the block."""
+    label: str = ""
+    """Text beside a symbol without attributes."""
 
 
 @dataclass(frozen=True)
@@ -205,6 +211,8 @@ class _Reader:
             if abs(entity.dxf.start.z - entity.dxf.end.z) * self._scale > _FLAT:
                 return "it rises, and a plan has no heights"
             return self._made(source, [DrawnPiece(start, end)])
+        if kind == "SPLINE":
+            return self._spline(entity, source)
         if kind not in ("ARC", "CIRCLE", "LWPOLYLINE", "POLYLINE"):
             return f"expected {_READ}"
         if kind == "POLYLINE" and not (entity.is_2d_polyline or entity.is_3d_polyline):
@@ -257,6 +265,21 @@ class _Reader:
         if isinstance(made, Stroke) and len(widths) == 1:
             made.width = abs(next(iter(widths))) * self._scale
         return made
+
+    def _spline(self, entity: Any, source: EntityRef) -> Stroke | str:
+        """Return the line or arc that a spline follows, or the reason why it follows none."""
+        curve = list(entity.construction_tool().approximate(_SAMPLES))
+        if max(point.z for point in curve) - min(point.z for point in curve) > _FLAT / self._scale:
+            return "it rises, and a plan has no heights"
+        points = [self._flat(source, None, point) for point in curve]
+        pieces, off = fitted(points)
+        if off > _SPLINE_OFF:
+            return f"a spline {1e3 * off:.2g} mm beside the nearest arc, expected at most 1 mm: draw it with arcs"
+        stroke = self._made(source, pieces)
+        if isinstance(stroke, Stroke):
+            shape = f"an arc with a radius of {pieces[0].radius:.4g} m" if pieces[0].bulge else "a line"
+            stroke.note = f"SPLINE {source.handle} on layer {source.layer} is read as {shape}"
+        return stroke
 
     def _made(self, source: EntityRef, pieces: list[DrawnPiece], is_closed: bool = False) -> Stroke | str:
         kept = tuple(piece for piece in pieces if piece.chord > TOUCH)

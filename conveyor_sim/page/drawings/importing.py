@@ -18,6 +18,7 @@ from conveyor_sim.page.drawings.chains import Chain, joined
 from conveyor_sim.page.drawings.conveyor_path import path_of
 from conveyor_sim.page.drawings.entities import DrawnPlan, DrawnText, EntityRef, Stroke, Symbol
 from conveyor_sim.page.drawings.layer_map import LayerMap, Rule
+from conveyor_sim.page.drawings.mending import NOTICED, close_gaps, distinct, gaps
 from conveyor_sim.page.drawings.numbers import degrees, number, point
 from conveyor_sim.page.drawings.pieces import DrawnPiece, box_of, length_of, nearest, within
 from conveyor_sim.scene.quantities import to_si
@@ -54,15 +55,19 @@ class _Axis:
     width: float
 
 
-def imported(plan: DrawnPlan, rules: LayerMap) -> Imported:
-    """Return the parts that a plan shows. Raise ConveyorError for a field of a rule that has an invalid value."""
-    return _Importer(plan, rules).run()
+def imported(plan: DrawnPlan, rules: LayerMap, join: float = 0.0) -> Imported:
+    """Return the parts that a plan shows. join: largest gap in a conveyor (m) that is closed.
+
+    Raise ConveyorError for a field of a rule that has an invalid value.
+    """
+    return _Importer(plan, rules, join).run()
 
 
 class _Importer:
-    def __init__(self, plan: DrawnPlan, rules: LayerMap) -> None:
-        self._plan, self._rules = plan, rules
-        self._result = Imported(skipped=list(plan.skipped))
+    def __init__(self, plan: DrawnPlan, rules: LayerMap, join: float) -> None:
+        self._plan, self._rules, self._join = plan, rules, join
+        unread = [entry for entry in plan.skipped if not self._is_ignored(entry[0].layer)]
+        self._result = Imported(skipped=unread)
         self._axes: list[_Axis] = []
         self._boxes, self._reach = np.empty((0, 4)), 0.0
         self._pairs = 0
@@ -84,6 +89,10 @@ class _Importer:
             self._parts(rule, self._strokes[number_], self._symbols[number_])
         return self._result
 
+    def _is_ignored(self, layer: str) -> bool:
+        rule = self._rules.of(layer)
+        return rule is not None and rule.target.shape == "none"
+
     def _sort(self) -> None:
         """Assign strokes and symbols to rules, and texts to strokes."""
         texts: dict[str, list[DrawnText]] = defaultdict(list)
@@ -104,18 +113,47 @@ class _Importer:
                 place = self._rules.rules.index(rule)
                 kept: list[Any] = self._symbols[place] if isinstance(entity, Symbol) else self._strokes[place]
                 kept.append(entity)
+                if isinstance(entity, Stroke) and entity.note:
+                    self._note(entity.note)
         layers: dict[str, list[Stroke]] = defaultdict(list)
-        for strokes in self._strokes.values():
-            for stroke in strokes:
+        symbols: dict[str, list[Symbol]] = defaultdict(list)
+        for place, rule in enumerate(self._rules.rules):
+            if rule.kind == "conveyor":
+                self._strokes[place], repeated = distinct(self._strokes[place])
+                for again, original in repeated:
+                    self._skip(
+                        again.source, f"drawn again, the same as {original.source.entity} {original.source.handle}"
+                    )
+            for stroke in self._strokes[place]:
                 layers[stroke.source.layer].append(stroke)
-        for layer, strokes in layers.items():
+            for symbol in self._symbols[place]:
+                symbols[symbol.source.layer].append(symbol)
+        for layer in {**layers, **symbols}:
             if len(texts[layer]) > _MOST_TEXTS:
                 problem = f"{len(texts[layer])} texts on layer {layer}, expected at most {_MOST_TEXTS}"
                 raise ConveyorError(f"{self._plan.file}: {problem}")
-            self._give_names(strokes, texts[layer])
+            left = self._give_names(layers[layer], texts[layer])
+            self._give_labels(symbols[layer], left)
 
-    def _give_names(self, strokes: list[Stroke], texts: list[DrawnText]) -> None:
-        """Name strokes by the texts of their layer: each text the nearest stroke that has no name yet."""
+    def _give_labels(self, symbols: list[Symbol], texts: list[DrawnText]) -> None:
+        """Label symbols without attributes by texts of their layer: each text the nearest symbol without a label."""
+        open_ones = [symbol for symbol in symbols if not symbol.attributes]
+        spans = [_box(symbol) for symbol in open_ones] if texts else []
+        boxes = np.array(spans).reshape(-1, 4)
+        pairs = []
+        for t, text in enumerate(texts):
+            for s in self._counted(within(boxes, text.position, _NAMED_WITHIN)):
+                away = _from_box(spans[s], text.position)
+                if away <= _NAMED_WITHIN:
+                    pairs.append((round(away, 6), round(math.dist(open_ones[s].position, text.position), 6), t, s))
+        used: set[int] = set()
+        for _, _, t, s in sorted(pairs):
+            if t not in used and not open_ones[s].label:
+                open_ones[s].label = texts[t].text.strip()
+                used.add(t)
+
+    def _give_names(self, strokes: list[Stroke], texts: list[DrawnText]) -> list[DrawnText]:
+        """Name strokes by texts of their layer: each text the nearest stroke without a name. Return the other texts."""
         boxes = np.array([box_of(stroke.pieces) for stroke in strokes]).reshape(-1, 4) if texts else np.empty((0, 4))
         pairs = []
         for t, text in enumerate(texts):
@@ -129,6 +167,7 @@ class _Importer:
             if t not in used and not strokes[s].name:
                 strokes[s].name = texts[t].text.strip()
                 used.add(t)
+        return [text for t, text in enumerate(texts) if t not in used]
 
     def _counted(self, indices: list[int]) -> list[int]:
         """Return indices of curves whose distance is computed. Raise ConveyorError if that takes too long."""
@@ -156,17 +195,30 @@ class _Importer:
 
     def _conveyors(self, rule: Rule, strokes: list[Stroke]) -> None:
         radius = _length(rule, "radius", rule.radius)
+        found = gaps(strokes, max(self._join, NOTICED))
+        closed = [gap for gap in found if gap.length <= self._join]
+        close_gaps(strokes, closed)
+        for gap in found:
+            one, two = gap.sources
+            pair = f"{one.entity} {one.handle} and {two.entity} {two.handle} on layer {one.layer}"
+            where = f"{1e3 * gap.length:.3g} mm apart at [{gap.at[0]:.4g}, {gap.at[1]:.4g}] (m)"
+            least = math.ceil(1e4 * gap.length - 1e-3) / 10
+            advice = "joined" if gap in closed else f"a gap in the line; --join '{least:g} mm' closes it"
+            self._note(f"{pair} end {where}: {advice}")
         for chain in joined(strokes, smooth=radius is None):
             path = path_of(chain.pieces, radius)
             width = _width(rule, chain)
             if isinstance(path, str) or width is None:
                 self._skip(chain.source, path if isinstance(path, str) else "no width, neither drawn nor in the map")
                 continue
-            own = {} if "width" in rule.fields else {"width": number(width)}
+            own = {} if {"width", "lanes"} & set(rule.fields) else {"width": number(width)}
             name = self._add(rule, chain.name, {**path.fields(), **own})
             self._axes.append(_Axis(name, chain.pieces, width))
             if path.aside > 1e-3:
                 self._note(f"{name} ends {1e3 * path.aside:.3g} mm beside its drawing, which has small corners")
+            if chain.other_names:
+                other = " and ".join(chain.other_names)
+                self._note(f"{name}: {other} names a part of the same curve; draw a label for each of its strokes")
             for source in chain.opposed:
                 self._note(f"{name}: {source.entity} {source.handle} is drawn against its direction of travel")
 
@@ -234,6 +286,7 @@ class _Importer:
             self._skip(symbol.source, f"expected a curve for a {rule.kind}")
             return
         named = symbol.attributes.get(rule.name, "") if rule.name else next(iter(symbol.attributes.values()), "")
+        named = named or symbol.label
         close = [(*nearest(axis.pieces, symbol.position), axis) for axis in self._axes_near(symbol.position)]
         nearby = [entry for entry in close if entry[0] <= entry[2].width / 2 + _BESIDE]
         if nearby:
@@ -294,8 +347,23 @@ class _Importer:
         self._result.notes.append(text)
 
 
+def _box(symbol: Symbol) -> tuple[float, float, float, float]:
+    """Return least x and y, and greatest, of the place and the curves of a block."""
+    (x, y), boxes = symbol.position, [box_of(stroke.pieces) for stroke in symbol.strokes]
+    low_x, low_y, high_x, high_y = zip((x, y, x, y), *boxes, strict=True)
+    return min(low_x), min(low_y), max(high_x), max(high_y)
+
+
+def _from_box(box: tuple[float, float, float, float], at: XY) -> float:
+    """Return the distance of a point from a box; 0 inside."""
+    return math.hypot(max(box[0] - at[0], 0.0, at[0] - box[2]), max(box[1] - at[1], 0.0, at[1] - box[3]))
+
+
 def _width(rule: Rule, drawn: Chain | Stroke) -> float | None:
-    """Return the width of a conveyor (m): that of the map, else that of the polyline."""
+    """Return the width of a conveyor (m): that of the map, or of its lanes, else that of the polyline."""
+    if isinstance(lanes := rule.fields.get("lanes"), list):
+        widths = [_length(rule, "lanes", lane.get("width")) for lane in lanes if isinstance(lane, dict)]
+        return sum(width for width in widths if width is not None) or None
     return _length(rule, "width", rule.fields.get("width")) or drawn.width or None
 
 

@@ -129,6 +129,21 @@ def turned_by(first: float, second: float) -> float:
     return math.remainder(second - first, 2 * math.pi)
 
 
+def fitted(points: Sequence[XY]) -> tuple[list[DrawnPiece], float]:
+    """Return the line or arc (at most a half circle) through a curve's ends and its middle, and its largest distance
+    (m) from the points.
+    """
+    start, end = points[0], points[-1]
+    middle = min(points, key=lambda at: abs(math.dist(at, start) - math.dist(at, end)))
+    first, last = (math.atan2(middle[1] - at[1], middle[0] - at[0]) for at in (start, end))
+    turn = 2.0 * turned_by(first, last + math.pi)
+    straight = DrawnPiece(start, end)
+    pieces = [straight]
+    if straight.chord > 0.0 and 1e-3 < abs(turn) <= math.pi * (1.0 + 1e-9):
+        pieces = [DrawnPiece(start, end, math.tan(turn / 4))]
+    return pieces, max(nearest(pieces, at)[0] for at in points)
+
+
 def arc(start: XY, end: XY, turn: float, middle: XY) -> list[DrawnPiece]:
     """Return an arc; as two halves if it turns by more than a half circle. middle: point half-way along the arc."""
     if abs(turn) <= math.pi * (1.0 + 1e-12):

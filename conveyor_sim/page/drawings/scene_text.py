@@ -43,6 +43,13 @@ def scene_text(sections: Sections, head: str, base: Path | None = None) -> str:
     return f"# {head}\n{stream.getvalue()}"
 
 
+def key_in_yaml(text: str) -> str:
+    """Return a text as a key of YAML, in quotes where they are needed."""
+    stream = io.StringIO()
+    _yaml().dump({text: None}, stream)
+    return stream.getvalue().rstrip().removesuffix(":")
+
+
 def _yaml() -> YAML:
     yaml = YAML()
     yaml.width = 1_000_000  # a line never breaks between a name and its value

@@ -33,13 +33,22 @@ def elastic_energy(model: Model, law: ContactLaw | None, entries: NDArray[np.int
     return stored
 
 
-def deepest_overlap(world: World, found: RailContacts) -> float:
-    """Return the deepest overlap of the present contacts over the (smaller) radius. found: scratch."""
+def deepest_overlaps(world: World, found: RailContacts) -> list[tuple[float, int, int]]:
+    """Return the deepest present overlap of two bottles, and of a bottle with a rail. found: scratch.
+
+    Each is the overlap over the (smaller) radius, slot, and slot or rail; zeros without contact. The neighbour
+    lists must hold.
+    """
     kind, (a, b), values = closed_contacts(world, found)
     pairs = kind == BOTTLE_BOTTLE
     smaller = world.bottles.radius[a]
     smaller[pairs] = np.minimum(smaller[pairs], world.bottles.radius[b[pairs]])
-    return float((values[4] / smaller).max(initial=0.0))
+    depth, deepest = values[4] / smaller, [(0.0, 0, 0), (0.0, 0, 0)]
+    for place, group in enumerate((np.flatnonzero(pairs), np.flatnonzero(~pairs))):
+        if group.size:
+            worst = group[np.argmax(depth[group])]
+            deepest[place] = float(depth[worst]), int(a[worst]), int(b[worst])
+    return deepest
 
 
 def pressed_energy(model: Model, world: World, found: RailContacts) -> float:

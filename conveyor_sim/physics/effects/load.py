@@ -80,23 +80,3 @@ def contact_load(plant: Plant, laws: Laws) -> Load:
     if every <= along:
         return Load(every, f"all {count:.0f} bottles")
     return Load(along, f"bottles on all {sum(shape.running_length for _, shape in belts):.3g} m of belts")
-
-
-def longest_queue(plant: Plant) -> tuple[int, str]:
-    """Return the bottles, one behind the other, in the longest queue that a line has room for, and why.
-
-    It is the smaller of two numbers: the bottles of a run in single file, and the rows that fill all belts. It is 0
-    without bottles or belts.
-    """
-    most = plant.supply
-    belts = [shape for shape in plant.surfaces if shape.belt is not None]
-    if not most or not belts:
-        return 0, "no belt carries bottles"
-    diameter = 2.0 * min(plant.scene.bottle_types[name].radius for name in most)
-    length = sum(shape.running_length for shape in belts)
-    pitches = [diameter * (1.0 if shape.width <= NARROW * diameter else ROWS) for shape in belts]
-    rows = sum(shape.running_length / pitch for shape, pitch in zip(belts, pitches, strict=True))
-    count = sum(most.values())
-    if count <= rows:
-        return round(count), "all bottles, one behind the other"
-    return max(1, math.floor(rows)), f"{length:.3g} m of belts, full"

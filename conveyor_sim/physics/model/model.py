@@ -21,7 +21,8 @@ from conveyor_sim.engine.integrators import AHEAD, LAG, WARM
 from conveyor_sim.errors import SceneError
 from conveyor_sim.physics.effects.choice import prediction_of
 from conveyor_sim.physics.effects.declaration import EffectChoice
-from conveyor_sim.physics.effects.load import Load, longest_queue
+from conveyor_sim.physics.effects.load import Load
+from conveyor_sim.physics.effects.queue import longest_queue
 from conveyor_sim.physics.laws.coefficients import BaseSprings, Laws
 from conveyor_sim.physics.laws.rebounds import Rebounds, build_rebounds
 from conveyor_sim.physics.model.plant_arrays import plant_grid, rail_arrays

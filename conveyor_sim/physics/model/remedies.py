@@ -51,7 +51,7 @@ OTHERS = ("leapfrog", "velocity_verlet")
 """Integrators that a remedy may choose."""
 
 MANY = 100
-"""Assumed number of bottles of a scene with an endless infeed."""
+"""Assumed number of bottles of a scene with an endless infeed, unless more are present at the start."""
 
 COARSER = {"fine": "standard", "standard": "draft"}
 
@@ -143,11 +143,13 @@ def step_cost(integrator: str, friction_solver: str, sweeps: int | None = None) 
 def step_limit(scene: Scene, choice: StepChoice | None = None, bottles: int | None = None) -> StepLimit:
     """Return the limit on the steps of a valid scene with remedies.
 
-    choice: of this scene, if known. bottles: on the line, for the expected speed; by default the most in a run.
+    choice: of this scene, if known. bottles: on the line, for the expected speed. By default they are the most in a
+    run, or with an endless infeed those at the start, but at least MANY.
     """
     choice = choose_steps(Plant.of(scene)) if choice is None else choice
-    most = choice.terms.plant.most_bottles if bottles is None else bottles
-    bottles = MANY if most is None else max(1, most)
+    plant = choice.terms.plant
+    most = plant.most_bottles if bottles is None else bottles
+    bottles = max(MANY, len(plant.bottles)) if most is None else max(1, most)
     cost = step_cost(scene.accuracy.integrator, scene.friction_solver, scene.accuracy.sweeps)
     line = line_size(scene)
     before = tick_seconds(choice.steps * cost, bottles, line)

@@ -119,7 +119,7 @@ class Integration:
         tried, first = 1, wrong
         for factor in self._shorter if wrong.curable else ():
             self._take_steps(factor)
-            again = self._guard.end(self._model.dt / factor)
+            again = self._guard.end(self._model.dt / factor, repeated=True)
             if again is None:
                 self._memory.shortened_ticks += 1
                 text = f"{first.sentence(seconds, 1)}; the tick was repeated in steps {factor} times shorter"

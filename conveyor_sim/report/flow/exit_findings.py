@@ -17,6 +17,7 @@ from conveyor_sim.scene.parts.machine import TakingPart
 from conveyor_sim.scene.parts.outfeed import Outfeed
 from conveyor_sim.scene.parts.scatter import Scattered
 from conveyor_sim.scene.parts.sink import Sink
+from conveyor_sim.scene.parts.source import Source
 from conveyor_sim.scene.schema import Scene
 
 STRAIGHT = 1e-9
@@ -74,6 +75,8 @@ def perfect_columns(
 
 def _scatters(scene: Scene, leg: Leg) -> bool:
     part = scene.named()[str(leg.start.path[0])][str(leg.start.path[1])]
+    if isinstance(part, Source) and part.layer is not None:
+        return True  # a layer is as wide as the pallet
     # A scatter of 0 that is written is meant.
     return isinstance(part, Scattered) and not {"lateral_jitter", "angular_jitter"}.isdisjoint(part.model_fields_set)
 

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -20,6 +20,7 @@ from conveyor_sim.report.flow.surfaces import NONE, Indices, SurfaceMap, running
 from conveyor_sim.report.flow.trace_scene import trace_scene
 from conveyor_sim.report.flow.track import CHUNK, Track
 from conveyor_sim.scene.geometry import Array, initial_bottles
+from conveyor_sim.scene.parts.movers import Pusher
 from conveyor_sim.scene.parts.outfeed import Outfeed
 from conveyor_sim.scene.parts.sink import Sink
 from conveyor_sim.scene.parts.spill import Spill
@@ -32,6 +33,9 @@ from conveyor_sim.scene.types import XY
 _STEP = 0.05
 """m"""
 
+_ASIDE = 0.25 * _STEP
+"""m, largest motion to the side in a step: without a limit, the path turns where a wide guide comes near."""
+
 _MOST_STEPS = 4000
 """Steps of all estimates of a scene, 200 m."""
 
@@ -39,18 +43,35 @@ _LANE = 1.0
 """m, farthest guide that leads a bottle."""
 
 
+class Takers:
+    """Devices that take bottles, with their regions."""
+
+    def __init__(self, regions: Sequence[tuple[Path, Sequence[XY]]]) -> None:
+        self._regions = regions
+        corners = [np.asarray(region) for _, region in regions]
+        self._low = np.array([polygon.min(axis=0) for polygon in corners]).reshape(-1, 2)
+        self._high = np.array([polygon.max(axis=0) for polygon in corners]).reshape(-1, 2)
+
+    def near(self, points: Array) -> Iterator[tuple[Path, Sequence[XY]]]:
+        """Yield the devices whose boxes meet that of points (k, 2), m."""
+        apart = (points.min(axis=0) > self._high).any(axis=1) | (points.max(axis=0) < self._low).any(axis=1)
+        return (self._regions[index] for index in np.flatnonzero(~apart).tolist())
+
+
 def drift(
     start: Array,
     along: Array,
+    radius: float,
     surfaces: SurfaceMap,
     guides: Guides,
-    takers: Sequence[tuple[Path, Sequence[XY]]],
+    takers: Takers,
     steps: int,
 ) -> tuple[Array, Array, Path | None]:
     """Return times (k,) s and places (k, 2) of a bottle that moves with the belts, and the device that takes it.
 
-    start: place, m. along: unit vector of its motion. takers: devices with their regions. It follows the middle between
-    guides, and ends after a number of steps or beside the belts, without a device (None).
+    start: place, m. along: unit vector of its motion. radius: of the bottle, m. takers: devices that take bottles. It
+    follows the middle between near guides, or a guide that it touches. It ends after a number of steps or beside the
+    belts, without a device (None).
     """
     place, time, speed = start.copy(), 0.0, 0.0
     times, places = [], []
@@ -62,12 +83,15 @@ def drift(
             break
         left = left_of(along[None])
         to_left, to_right = float(guides.distance(place[None], left)[0]), float(guides.distance(place[None], -left)[0])
-        aside = 0.5 * (to_left - to_right) if max(to_left, to_right) < _LANE else 0.0
+        if max(to_left, to_right) < _LANE:
+            aside = min(max(0.5 * (to_left - to_right), -_ASIDE), _ASIDE)
+        else:
+            aside = max(0.0, radius - to_right) - max(0.0, radius - to_left)
         place = place + _STEP * along + aside * left[0]
         time += _STEP / speed
         times.append(time)
         places.append(place)
-        for path, region in takers:
+        for path, region in takers.near(place[None]):
             if inside(place[None], region)[0]:
                 return np.array(times), np.array(places), path
     return np.array(times), np.array(places).reshape(-1, 2), None
@@ -83,7 +107,7 @@ MOST_LEGS = 64
 """Largest number of traced bottles."""
 
 FARTHEST_PUSH = 0.5
-"""m, longest way over which bottles push one that rests on a plate."""
+"""m, longest way over which bottles push one that rests on a plate, beside the stroke of a pusher."""
 
 End = Literal["exit", "station", "stopped", "off", "circulates", "cap", "failed"]
 """End of a leg. exit: outfeed or sink; off: beside all belts; cap: the work was used up; failed: the engine refused."""
@@ -165,13 +189,39 @@ def traced_scene(scene: Scene, surfaces: SurfaceMap) -> Scene | None:
 def trace(scene: Scene, surfaces: SurfaceMap, guides: Guides) -> list[Leg]:
     """Trace a lone bottle from every start with the engine at draft accuracy.
 
-    A bottle that stops on a plate is put behind it, as the bottles after it would push it. The work is limited by
-    MOST_WORK, so that the result does not depend on the machine.
+    A bottle that stops on a plate is put behind it, as a pusher or the bottles after it would push it. The work is
+    limited by MOST_WORK, so that the result does not depend on the machine.
     """
     starts = starts_of(scene)
     if not starts or not surfaces:
         return []
     return _Tracer(scene, surfaces, guides, starts).run()
+
+
+@dataclass(frozen=True, eq=False)
+class _Push:
+    velocity: Array
+    """m/s"""
+    farthest: float
+    """m, longest way."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Sweep:
+    """Area that a pusher sweeps."""
+
+    region: Sequence[XY]
+    velocity: Array
+    """m/s"""
+    stroke: float
+    """m"""
+
+    @classmethod
+    def of(cls, pusher: Pusher) -> _Sweep:
+        along = np.array([math.cos(pusher.direction), math.sin(pusher.direction)])
+        near = np.array([pusher.from_, pusher.to])
+        corners = np.vstack([near, near[::-1] + pusher.stroke * along])
+        return cls([(float(x), float(y)) for x, y in corners], pusher.max_speed * along, pusher.stroke)
 
 
 class _Tracer:
@@ -189,8 +239,10 @@ class _Tracer:
         self._belts.move(np.array([*speeds, *([0.0] * (len(model.belts) - len(speeds)))]))
         self._integration = Integration(self._state, 1, True)
         self._ticks = 0
-        self._exits = [(path, part.region) for path, part in scene.exits() if isinstance(part, (Outfeed, Sink))]
-        self._stations = [(path, part.region) for path, part in scene.exits() if isinstance(part, Station)]
+        self._pushers = [_Sweep.of(pusher) for pusher in scene.pushers.values()]
+        takers = {path: part for path, part in scene.exits() if isinstance(part, (Outfeed, Sink, Station))}
+        self._takers = Takers([(path, part.region) for path, part in takers.items()])
+        self._stations = {path for path, part in takers.items() if isinstance(part, Station)}
 
     def run(self) -> list[Leg]:
         """Advance all bottles until each has ended."""
@@ -247,15 +299,14 @@ class _Tracer:
     def _ended(self, index: int, track: Track) -> Leg | None:
         """Return the leg of a bottle that has ended within the last chunk, or None."""
         taken = [
-            (track.before + int(np.argmax(within)) + 1, kind, device)
-            for kind, devices in (("exit", self._exits), ("station", self._stations))
-            for device, region in devices
+            (track.before + int(np.argmax(within)) + 1, device)
+            for device, region in self._takers.near(track.chunk)
             if (within := inside(track.chunk, region)).any()
         ]
         astray = track.astray
         if taken and (astray is None or min(count for count, *_ in taken) <= astray[1]):
-            count, kind, device = min(taken, key=lambda entry: entry[0])
-            return self._leg(index, track, count, "exit" if kind == "exit" else "station", device)
+            count, device = min(taken, key=lambda entry: entry[0])
+            return self._leg(index, track, count, "station" if device in self._stations else "exit", device)
         if astray is not None:
             return self._leg(index, track, astray[0], "off")
         if (count_to := track.stopped()) is not None:
@@ -268,9 +319,10 @@ class _Tracer:
         """Return a leg that ends at the cap with the rest of its way by the speeds of the belts."""
         step = leg.points[-1] - leg.points[-2]
         along = step / max(float(np.hypot(*step)), 1e-12)
-        takers = [*self._exits, *self._stations]
-        times, points, taker = drift(leg.points[-1], along, self._surfaces, self._guides, takers, steps)
-        end: End = "cap" if taker is None else "station" if taker in dict(self._stations) else "exit"
+        times, points, taker = drift(
+            leg.points[-1], along, leg.radius, self._surfaces, self._guides, self._takers, steps
+        )
+        end: End = "cap" if taker is None else "station" if taker in self._stations else "exit"
         return replace(
             leg,
             times=np.concatenate([leg.times, leg.times[-1] + times]),
@@ -282,15 +334,14 @@ class _Tracer:
         )
 
     def _pushed_on(self, index: int, leg: Leg) -> bool:
-        """Put a bottle that has stopped on a plate behind it, at its first speed. Return False if it can't go on."""
+        """Put a bottle that has stopped on a plate behind it, at its last speed. Return False if it can't go on."""
         plate = int(leg.carriers[-1])
-        before = np.flatnonzero(leg.carriers != plate)
-        if not self._surfaces[plate].rests or not before.size or len(leg.points) < 2:
+        push = self._push(leg, plate) if self._surfaces[plate].rests else None
+        if push is None:
             return False
-        came = leg.points[before[-1] + 1] - leg.points[before[-1]]
-        step = float(np.hypot(*came))
-        along = came / max(step, 1e-12)
-        ways = np.arange(0.002, FARTHEST_PUSH, 0.002)[:, None]
+        speed = float(np.hypot(*push.velocity))
+        along = push.velocity / max(speed, 1e-12)
+        ways = np.arange(0.002, push.farthest, 0.002)[:, None]
         ahead = leg.points[-1] + ways * along
         carriers = self._surfaces.under(ahead)
         beyond = np.flatnonzero(carriers != plate)
@@ -301,10 +352,20 @@ class _Tracer:
             return False
         bottles = self._state.world.bottles
         bottles.x[index], bottles.y[index] = ahead[beyond[0]]
-        bottles.vx[index], bottles.vy[index] = came / self._tick
+        bottles.vx[index], bottles.vy[index] = push.velocity
         self._state.world.neighbourhood.stale[0] = 1
         self._integration.put_in()
         return True
+
+    def _push(self, leg: Leg, plate: int) -> _Push | None:
+        """Return the push on a bottle that has stopped on a plate: by a pusher, or by bottles that come as it came."""
+        for pusher in self._pushers:
+            if inside(leg.points[-1:], pusher.region)[0]:
+                return _Push(pusher.velocity, pusher.stroke + FARTHEST_PUSH)
+        before = np.flatnonzero(leg.carriers != plate)
+        if not before.size:
+            return None
+        return _Push((leg.points[before[-1] + 1] - leg.points[before[-1]]) / self._tick, FARTHEST_PUSH)
 
     def _leg(
         self, index: int, track: Track, count: int | None, end: End, device: Path | None = None, reason: str = ""

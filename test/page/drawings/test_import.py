@@ -29,13 +29,15 @@ Import = Callable[..., Imported]
 def run(tmp_path: Path) -> Import:
     """Import what a function draws, by a map of layers."""
 
-    def import_it(draw: Callable[[Any, Any], None], rules: str, unit: int = 4, given: str | None = None) -> Imported:
+    def import_it(
+        draw: Callable[[Any, Any], None], rules: str, unit: int = 4, given: str | None = None, join: float = 0.0
+    ) -> Imported:
         document = ezdxf.new("R2000", units=unit)
         draw(document, document.modelspace())
         document.saveas(tmp_path / "plan.dxf")
         (tmp_path / "map.yaml").write_text(rules)
         layers = read_map(tmp_path / "map.yaml")
-        return imported(read_plan(tmp_path / "plan.dxf", given, layers.is_symbol), layers)
+        return imported(read_plan(tmp_path / "plan.dxf", given, layers.is_symbol), layers, join)
 
     return import_it
 
@@ -226,7 +228,7 @@ def test_skipped_entities_are_listed(run: Import) -> None:
     def draw(document: Any, space: Any) -> None:
         document.blocks.new("OTHER").add_line((0, 0), (1, 0))
         space.add_line((0, 0), (1000, 0), **on("AXES"))
-        space.add_spline([(0, 0), (1, 1), (2, 0)], **on("AXES", handle="A1"))
+        space.add_spline([(0, 0), (100, 100), (200, -100), (300, 0)], **on("AXES", handle="A1"))
         space.add_line((0, 0, 0), (1000, 0, 100), **on("AXES", handle="A2"))
         space.add_circle((0, 0), 10, **on("TITLE", handle="A3"))
         space.add_blockref("MISSING", (0, 0), **on("AXES", handle="A4"))

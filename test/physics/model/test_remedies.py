@@ -11,7 +11,7 @@ from scenes import MASS, base, belt, bottle, contact, kind, scene
 
 from conveyor_sim.errors import SceneError
 from conveyor_sim.physics.model import build_model
-from conveyor_sim.physics.model.remedies import IMPLICIT_COST, StepLimit, step_limit, with_remedy
+from conveyor_sim.physics.model.remedies import IMPLICIT_COST, MANY, StepLimit, step_limit, with_remedy
 from conveyor_sim.physics.model.tick_cost import line_size, tick_seconds
 from conveyor_sim.scene import Scene, load_scene
 from conveyor_sim.scene.accuracy import MANY_STEPS, MOST_STEPS
@@ -121,6 +121,19 @@ def test_a_speed_is_that_of_the_bottles_on_the_line() -> None:
     few, many = (step_limit(what, bottles=count).remedies[0] for count in (16, 1000))
     assert few.steps == many.steps
     assert 1.0 < few.faster < many.faster < step_limit(what).steps / many.steps
+
+
+def test_bottles_at_the_start_count_beside_an_endless_infeed() -> None:
+    """12 x 20 at the start, or 2 x 3, which are fewer than the assumed number."""
+    feed = {"bottle": "bottle", "position": [-1.0, 0.0], "direction": 0.0, "speed": 0.3, "rate": 1.0}
+
+    def limit(rows: int, columns: int) -> StepLimit:
+        grid = {"type": "bottle", "origin": [0.0, 0.0], "rows": rows, "columns": columns, "pitch": 0.14}
+        return step_limit(scene(contacts=[contact(1e3)], bottles=[{"grid": grid}], infeeds={"feed": feed}))
+
+    assert limit(12, 20).bottles == 240
+    assert limit(2, 3).bottles == MANY
+    assert limit(12, 20).seconds > 2.0 * limit(2, 3).seconds
 
 
 def test_a_mass_ratio_of_a_million_is_refused_with_what_helps() -> None:

@@ -65,3 +65,38 @@ def test_a_fault_of_a_layout_is_found_where_it_is_written(
     (finding,) = found(LINE.replace(before, after))
     assert finding.startswith(place)
     assert missing(finding, *facts) == []
+
+
+SWEPT = """\
+name: swept
+duration: 20
+bottle_types: {b: {radius: 33 mm, mass: 350 g, material: glass, base_radius: 30 mm}}
+contacts:
+  - {between: [glass, glass], stiffness: 50000, friction: 0.1, damping: {law: normal, restitution: 0.4}}
+  - {between: [glass, steel], stiffness: 50000, friction: 0.1, damping: {law: normal, restitution: 0.4}}
+base: [{between: [glass, chain], friction: 0.3}, {between: [glass, steel], friction: 0.3}]
+conveyors: {lane: {start: [0, 0], heading: 0 deg, path: [{straight: 2}], width: 0.8, material: chain, speed: 0.2}}
+plates: {pallet: {kind: straight, start: [-0.9, -0.4], angle: 0, length: 0.9, width: 0.8, material: steel}}
+pushers:
+  sweep: {from: [-0.85, -0.38], to: [-0.85, 0.38], direction: 0 deg, stroke: 0.8, max_speed: 0.3, acceleration: 1,
+    material: steel}
+machines:
+  pallets: {kind: source, position: [-0.75, -0.3], direction: 0 deg, speed: 0, bottle: b, rate: 1,
+    layer: {rows: 5, columns: 5, pitch: 67 mm, pusher: sweep}}
+outfeeds: {o: {along: lane, at: 1.5, length: 0.1}}
+"""
+
+
+def test_a_pusher_takes_a_bottle_off_a_plate() -> None:
+    flow = flow_of(parse_scene(SWEPT))
+    (route,) = flow.routes
+    assert [stop[-1] for stop in route.stops] == ["pallets", "o"]
+    assert route.seconds == pytest.approx(1.5 / 0.2, rel=0.1)
+    assert flow.findings == ()
+
+
+def test_a_plate_without_a_pusher_holds_a_bottle() -> None:
+    moved = SWEPT.replace("from: [-0.85, -0.38], to: [-0.85, 0.38]", "from: [3, -0.38], to: [3, 0.38]")
+    (finding, *_) = found(moved)
+    assert finding.startswith("line.yaml:14: machines.pallets: ")
+    assert missing(finding, "no exit", "pallet") == []

@@ -15,7 +15,7 @@ from conveyor_sim.engine.arrays.rails import RailContacts
 from conveyor_sim.engine.compiler.numba_internals.machine_code import entry
 from conveyor_sim.engine.observers.guard_probe import look
 from conveyor_sim.engine.observers.stored_energy import KINETIC, stored_energy
-from conveyor_sim.physics.accounts.elastic import deepest_overlap, impulse_energy
+from conveyor_sim.physics.accounts.elastic import deepest_overlaps, impulse_energy
 from conveyor_sim.physics.state import State
 from conveyor_sim.physics.stepping.guard.squeeze import Squeeze, squeeze_of
 from conveyor_sim.physics.stepping.guard.violation import Violation, Words, unresolved
@@ -35,6 +35,9 @@ SOFT = 0.2
 
 CLOSELY = 128
 """Largest number of steps between checks of overlaps, sweeps counted as steps. A check costs about half a step."""
+
+PRESSED = 0.1
+"""Way of a moving rail between two checks of overlaps with impulses, in radii. DEEPEST leaves 0.25 to the axis."""
 
 OVERLAP = 2.0 * DEEP
 """Overlap, in radii, from which integrator impulses is reported as too coarse for contacts that it does not resolve.
@@ -96,15 +99,18 @@ class Guard:
         model, world = self._model, self._state.world
         self._memory.take(world)
         bad, _, _, mass, self._kinetic, _, _ = self._look(world.bottles, world.spin, world.probe)
-        if tick % self._every == 0:
+        if tick % min(self._every, self._ticks_to_reach(rail_speed)) == 0:
             world.probe.due[0] = 1
         # A rail of speed u does work against friction; its impact can raise a bottle's speed to v + 2 u.
         hits = 4.0 * rail_speed**2 * mass
         self._work = mass * model.gravity * (self._friction * (surface_speed + rail_speed) + self._noise) + hits
         return Words(model, world).put_in(bad) if bad >= 0 else None
 
-    def end(self, dt: float) -> Violation | None:
-        """Return a violation at the end of a tick with steps of dt (s), and put the state back; None without one."""
+    def end(self, dt: float, repeated: bool = False) -> Violation | None:
+        """Return a violation at the end of a tick with steps of dt (s), and put the state back; None without one.
+
+        repeated: the tick failed before, so its final overlaps are checked as well as those after rebuilds of lists.
+        """
         world, model = self._state.world, self._model
         bad, fastest, square, _, kinetic, *deep = self._look(world.bottles, world.spin, world.probe)
         if bad >= 0:
@@ -116,6 +122,8 @@ class Guard:
             return self._words_before(fastest).far(fastest, speed, dt, self._longest_way)
         if kinetic > GROWTH * self._kinetic + self._work and (energies := self._grown()):
             return self._words_before(fastest).energy(fastest, *energies, self._work)
+        if repeated and max(now := deepest_overlaps(world, self._found))[0] > DEEPEST:
+            deep = self._note(now)
         depth = max(deep)
         if self.memory.put_in and depth > DEEPEST and self._was_deep():
             return None
@@ -171,10 +179,10 @@ class Guard:
         bottle, other = watch.bottle.copy(), watch.other.copy()
         after.take(self._state.world)
         self._put_back()
-        deep = deepest_overlap(self._state.world, self._found)
+        deepest = max(deepest_overlaps(self._state.world, self._found))
         after.restore(self._state)
         watch.bottle[:], watch.other[:] = bottle, other
-        return deep > DEEPEST
+        return deepest[0] > DEEPEST
 
     def _energy(self) -> float:
         stored = stored_energy(self._state.world, self._found)
@@ -187,6 +195,23 @@ class Guard:
         """Run the first check, which compiles it."""
         self._look = entry(look, bottles, spin, probe)
         return self._look(bottles, spin, probe)
+
+    def _ticks_to_reach(self, rail_speed: float) -> int:
+        """Return the ticks between checks of overlaps for a fastest moving rail, m/s.
+
+        With impulses a rebuild may come too late: a rail has pressed its bottle through a wall by then.
+        """
+        way = rail_speed * self._model.tick_ns * 1e-9
+        if not self._model.sweeps or way <= 0.0:
+            return self._every
+        return max(1, int(PRESSED * float(self._model.type_radius.min()) / way))
+
+    def _note(self, deepest: list[tuple[float, int, int]]) -> list[float]:
+        """Store overlaps, of two bottles and with a rail, in the probe. Return their depths in radii."""
+        probe = self._state.world.probe
+        for place, (_, bottle, other) in enumerate(deepest):
+            probe.bottle[place], probe.other[place] = bottle, other
+        return [depth for depth, *_ in deepest]
 
     def _squeeze(self, slot: int) -> Squeeze | None:
         return squeeze_of(self._model, self._state.world, self._found, slot)

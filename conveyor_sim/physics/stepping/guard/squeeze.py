@@ -63,7 +63,7 @@ def squeeze_of(model: Model, world: World, found: RailContacts, slot: int) -> Sq
     section, name = shape.name.split("/")
     what = f"{ACTIONS.get(section, section + ' {} presses on').format(name)} bottle {int(world.bottles.id[bottle])}"
     held = _held_by(model, world, bottle, c, kind, a, b, normal)
-    what += f" against {held}" if held else ""
+    what += held
     limit = "torque_limit" if shape.turning else "force_limit"
     return Squeeze(
         what, limit, _force(shape, plant.axes[plant.axis_of_body[body]], moving, body, values[:2, c]), bool(held)
@@ -107,16 +107,26 @@ def _held_by(
     b: NDArray[np.int64],
     normal: NDArray[np.float64],
 ) -> str:
-    """Return the object that a bottle touches opposite its contact `pushed`, in words; "" without one."""
-    facing, held = 0.0, ""
-    for c in range(kind.size):
-        second = kind[c] == BOTTLE_BOTTLE and b[c] == bottle
-        if c == pushed or (a[c] != bottle and not second):
-            continue
-        along = float(normal[c] @ normal[pushed]) * (-1.0 if second else 1.0)
-        if along < facing:
-            facing = along
-            other = int(a[c] if second else b[c])
-            on_rail = kind[c] == BOTTLE_RAIL
-            held = f"rail {model.plant.rails[other].name}" if on_rail else f"bottle {int(world.bottles.id[other])}"
-    return held
+    """Return the object opposite the contact `pushed` of a bottle, as " against rail wall"; "" without one.
+
+    Bottles that touch each other opposite it pass the force on, up to a rail: " and 2 more against rail wall".
+    """
+    row, along, nearest = [bottle], normal[pushed], ""
+    while True:
+        last = row[-1]
+        touching = np.flatnonzero((a == last) | ((kind == BOTTLE_BOTTLE) & (b == last)))
+        seen = np.where((a[touching] == last)[:, None], normal[touching], -normal[touching])
+        facing = seen @ along
+        if not touching.size or facing.min() >= 0.0:
+            return nearest
+        best = int(np.argmin(facing))
+        c = int(touching[best])
+        if kind[c] == BOTTLE_RAIL:
+            more = f" and {len(row) - 1} more" if len(row) > 1 else ""
+            return f"{more} against rail {model.plant.rails[int(b[c])].name}"
+        other = int(b[c] if a[c] == last else a[c])
+        nearest = nearest or f" against bottle {int(world.bottles.id[other])}"
+        if other in row:
+            return nearest
+        row.append(other)
+        along = -seen[best]

@@ -40,7 +40,13 @@ def squeeze(slot: int, points: Any, moves: tuple[int, ...], **fields: Any) -> Sq
 @pytest.mark.parametrize("slot", [0, 1, 2])
 def test_a_row_before_a_pusher(slot: int) -> None:
     """Whichever bottle the guard objects to: what pushes is at the other end of the row."""
-    assert squeeze(slot, ROW, (0,)) == Squeeze("pusher p pushes bottle 0 against bottle 1", "force_limit", 294.5, True)
+    said = "pusher p pushes bottle 0 and 2 more against rail wall"
+    assert squeeze(slot, ROW, (0,)) == Squeeze(said, "force_limit", 294.5, True)
+
+
+def test_a_row_without_a_wall_is_held_by_its_second_bottle() -> None:
+    said = "pusher p pushes bottle 0 against bottle 1"
+    assert squeeze(1, ROW[:2], (0,)) == Squeeze(said, "force_limit", 294.5, True)
 
 
 def test_a_rail_at_rest_squeezes_no_bottle() -> None:
