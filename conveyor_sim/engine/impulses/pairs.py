@@ -111,7 +111,7 @@ def _gather(
         idle = (held_x == 0.0) & (held_y == 0.0) & (held_turn == 0.0) & (wait == 0.0) & (x * x + y * y > reach * reach)
         c += uint64(0) if idle else uint64(1)
         p += uint64(1)
-    return p, c
+    return int(p), int(c)
 
 
 @part
